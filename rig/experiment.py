@@ -1,0 +1,92 @@
+"""What is done to the rig, how it is simulated and how the record is identified."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import model_validator
+
+from gearbench.rig.value import Value, quantity
+
+
+class Multisine(Value):
+    """Random-phase multisine torque on the driver. `amplitude` is the peak of the whole multisine."""
+
+    amplitude: float | None = quantity(None, "nm", gt=0.0, doc="peak of the multisine torque (or give rms)")
+    rms: float | None = quantity(None, "nm", gt=0.0, doc="rms of the multisine torque (or give amplitude)")
+    band: tuple[float, float] = quantity(unit="hz", doc="lowest and highest excited frequency")
+    grid: Literal["full", "odd"] = quantity("full", doc="excited lines")
+    crest: float = quantity(1.7, ge=1.5, doc="crest factor reached by clipping")
+
+    @model_validator(mode="after")
+    def _one_size(self) -> Multisine:
+        if (self.amplitude is None) == (self.rms is None):
+            raise ValueError("give exactly one of amplitude_nm and rms_nm")
+        if not 0.0 <= self.band[0] < self.band[1]:
+            raise ValueError(f"band_hz = {list(self.band)} must rise from a frequency of at least 0")
+        return self
+
+
+class Experiment(Value):
+    """Speed, torque, excitation and sampling. Exactly one of mesh_frequency and speed_driver is given."""
+
+    mesh_frequency: float | None = quantity(None, "hz", gt=0.0, doc="tooth mesh frequency (or give speed_driver)")
+    speed_driver: float | None = quantity(None, "rpm", gt=0.0, doc="driver speed (or give mesh_frequency)")
+    torque_mean: float = quantity(unit="nm", gt=0.0, doc="mean driver torque")
+    sampling_rate: float = quantity(unit="hz", gt=0.0, doc="sampling rate of the record")
+    samples_per_period: int = quantity(ge=16, doc="samples of one excitation period")
+    periods: int = quantity(1, ge=1, doc="recorded excitation periods")
+    realisations: int = quantity(1, ge=1, doc="phase realisations")
+    seed: int = quantity(0, ge=0, doc="seed of the random phases")
+    settling_tolerance: float = quantity(
+        1e-3, gt=0.0, lt=1.0, doc="largest period-to-period change of the DTE, relative to its standard deviation"
+    )
+    settling_periods_max: int = quantity(4, ge=1, doc="excitation periods after which failing to settle is an error")
+    multisine: Multisine | None = quantity(None, doc="absent: constant torque")
+
+    @model_validator(mode="after")
+    def _one_speed(self) -> Experiment:
+        if (self.mesh_frequency is None) == (self.speed_driver is None):
+            raise ValueError("give exactly one of mesh_frequency_hz and speed_driver_rpm")
+        if self.multisine and self.multisine.band[1] >= self.sampling_rate / 2:
+            raise ValueError(
+                f"multisine.band_hz ends at {self.multisine.band[1]:g}, which must lie below half of"
+                f" sampling_rate_hz = {self.sampling_rate:g}"
+            )
+        return self
+
+    def mesh_frequency_for(self, teeth_driver: int) -> float:
+        """Tooth mesh frequency [Hz] of a driver with that many teeth."""
+        if self.mesh_frequency is not None:
+            return self.mesh_frequency
+        assert self.speed_driver is not None
+        from math import pi
+
+        return self.speed_driver * teeth_driver / (2 * pi)
+
+
+class Simulation(Value):
+    """How the experiment is simulated."""
+
+    model: Literal["lumped", "reduced"] = quantity("reduced", doc="lumped 3-DOF model or reduced finite elements")
+    substeps: int = quantity(0, ge=0, le=1024, doc="integration steps per sample; 0: as many as the error bound needs")
+    mesh_stiffness: Literal["potential-energy", "rectangular"] = quantity(
+        "potential-energy", doc="lumped model: law of k(t)"
+    )
+    stiffness_single: float | None = quantity(None, "n_per_m", gt=0.0, doc="rectangular k(t): one pair in contact")
+    stiffness_double: float | None = quantity(None, "n_per_m", gt=0.0, doc="rectangular k(t): two pairs in contact")
+    element_size: float | None = quantity(None, "um", gt=0.0, doc="flank element size; absent: module / 12")
+    modes: int = quantity(8, ge=0, le=60, doc="fixed-hub modes kept per gear (reduced model)")
+    spectral_radius: float = quantity(
+        0.9, ge=0.0, le=1.0, doc="generalised-alpha spectral radius at infinite frequency (reduced model)"
+    )
+
+
+class Identification(Value):
+    """Local polynomial method for periodically time-varying systems."""
+
+    method: Literal["lpm"] = quantity("lpm", doc="estimator")
+    harmonics: int = quantity(0, ge=0, le=2000, doc="branches L on each side; 0: as many as the record supports")
+    order: int = quantity(1, ge=0, le=6, doc="polynomial order R")
+    window: int = quantity(0, ge=0, le=500, doc="half-width n of the local window, in lines; 0: chosen")
+    band: tuple[float, float] | None = quantity(None, "hz", doc="identified band; absent: the multisine's")

@@ -1,0 +1,75 @@
+"""The rig: a gear pair, its material, supports, drives and damping."""
+
+from __future__ import annotations
+
+from math import pi
+from typing import Literal
+
+from gearbench.rig.gear import Gear
+from gearbench.rig.value import Value, quantity
+
+
+class Material(Value):
+    """Linear isotropic material of both gears."""
+
+    youngs_modulus: float = quantity(206e9, "gpa", gt=0.0, le=2e12, doc="Young's modulus")
+    poisson: float = quantity(0.3, ge=0.0, lt=0.5, doc="Poisson's ratio")
+    density: float = quantity(7810.0, "kg_m3", gt=0.0, le=3e4, doc="density")
+    state: Literal["plane-stress", "plane-strain"] = quantity("plane-stress", doc="stress state of the 2-D model")
+
+
+class Support(Value):
+    """Spring and damper that carry one gear's centre in y (or along the line of action) against the ground."""
+
+    stiffness: float = quantity(unit="n_per_m", gt=0.0, doc="support stiffness")
+    damping: float = quantity(0.0, "n_s_per_m", ge=0.0, doc="support damping")
+
+
+class Supports(Value):
+    """The supports of both gears; `direction` is the axis along which the centres move (physics, section 1)."""
+
+    driver: Support
+    driven: Support
+    direction: Literal["tangential", "line-of-action"] = quantity("tangential", doc="axis of support motion")
+
+
+class Drive(Value):
+    """Boundary of the driver: the torque of the experiment."""
+
+    boundary: Literal["torque"] = quantity("torque", doc="what is imposed on the driver")
+
+
+class Load(Value):
+    """Boundary of the driven gear: constant speed, or the torque that balances the driver's at every instant."""
+
+    boundary: Literal["speed", "torque"] = quantity("speed", doc="what is imposed on the driven gear")
+
+
+class Damping(Value):
+    """Damping of the elastic gears (stiffness-proportional) and of the lumped mesh."""
+
+    material_ratio: float = quantity(
+        0.05, ge=0.0, lt=0.5, doc="damping ratio of the elastic gears at `material_frequency` (stiffness-proportional)"
+    )
+    material_frequency: float = quantity(1250.0, "hz", gt=0.0, doc="frequency at which `material_ratio` holds")
+    mesh_ratio: float = quantity(0.05, ge=0.0, lt=0.5, doc="lumped model: zeta in c(t) = 2 zeta sqrt(k(t) m_e)")
+
+    @property
+    def beta(self) -> float:
+        """Stiffness-proportional damping coefficient beta = zeta / (pi f) [s]."""
+        return self.material_ratio / (pi * self.material_frequency)
+
+
+class Rig(Value):
+    """The complete description of one rig. Lengths in m, angles in rad, everything else in SI."""
+
+    centre_distance: float | None = quantity(
+        None, "mm", gt=0.0, doc="centre distance; absent: zero backlash of the unthinned gears at the given shifts"
+    )
+    driver: Gear
+    driven: Gear
+    material: Material = Material()
+    support: Supports
+    drive: Drive = Drive()
+    load: Load = Load()
+    damping: Damping = Damping()
