@@ -1,0 +1,246 @@
+"""One tooth sector as curved quadratic triangles, and its repetition to a full gear. The only user of gmsh.
+
+gmsh fills the half sector between given straight boundary edges; order two is raised here, so that every boundary
+node, mid-side nodes included, lies on the exact profile. The other half is the mirror image.
+"""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass
+from math import pi
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.geometry.error import GeometryError
+from gearbench.geometry.grading import Chain, HalfBoundary, half_boundary
+from gearbench.geometry.profile import Profile
+from gearbench.rig import Gear
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+_GMSH = threading.Lock()  # gmsh keeps global state
+
+
+class MeshingUnavailable(ImportError):
+    """gmsh cannot be loaded; the sentence says what to install."""
+
+
+@dataclass(frozen=True)
+class SectorMesh:
+    """One tooth sector between the polar angles -pi/z and +pi/z, from the hub circle to the profile.
+
+    `points` (n, 2) [m]; `triangles` (m, 6): three corners counter-clockwise, then the middles of 0-1, 1-2, 2-0 (gmsh
+    and meshio order). Node numbers: `cut_low`, `cut_high` on the radial cuts, ordered by radius (corners and middles
+    alternate), equal under a rotation by 2 pi/z; `hub` on the hub circle by polar angle, ends of the cuts included;
+    `boundary_edges` (k, 3) corner, corner, middle along tip land, flanks, fillets and root land by polar angle
+    (counter-clockwise: the material lies to the left). The mesh is symmetric: `mirror[i]` is the node at (x, -y).
+    """
+
+    teeth: int
+    points: Array
+    triangles: Index
+    cut_low: Index
+    cut_high: Index
+    hub: Index
+    boundary_edges: Index
+    mirror: Index
+
+
+@dataclass(frozen=True)
+class GearMesh:
+    """A full gear: `points`, `triangles`, `hub`, `boundary_edges` as in SectorMesh; `node_of[k, i]` is the number of
+    sector node i in tooth k, whose axis stands at the polar angle 2 pi k/z."""
+
+    teeth: int
+    points: Array
+    triangles: Index
+    hub: Index
+    boundary_edges: Index
+    node_of: Index
+
+
+def sector_mesh(gear_profile: Profile, gear: Gear, element_size: float | None = None) -> SectorMesh:
+    """Mesh one tooth sector. `element_size` [m] on flanks and fillets; default module/12.
+
+    Raises GeometryError for an element size outside (module/400, module/2), and MeshingUnavailable without gmsh.
+    """
+    size = gear.module / 12 if element_size is None else element_size
+    if not gear.module / 400 <= size <= gear.module / 2:
+        raise GeometryError(
+            f"simulation.element_size_um = {size * 1e6:g} must lie between {gear.module * 1e6 / 400:g} (module/400) and"
+            f" {gear.module * 1e6 / 2:g} (module/2)"
+        )
+    boundary = half_boundary(gear_profile, gear.hub_radius, size)
+    ring = np.concatenate([chain.corners[:-1] for chain in _sides(boundary)])
+    corners, triangles = _fill(ring)
+    return _mirrored(gear_profile.teeth, boundary, corners, triangles)
+
+
+def _sides(boundary: HalfBoundary) -> tuple[Chain, Chain, Chain, Chain]:
+    """The sides in order around the half sector."""
+    return boundary.outline, boundary.cut, boundary.hub, boundary.axis
+
+
+def _import_gmsh() -> Any:
+    try:
+        import gmsh
+    except (ImportError, OSError) as error:
+        raise MeshingUnavailable(
+            f"gmsh cannot be loaded ({error}); on Debian it needs the packages libgl1 libegl1 libglu1-mesa libxcursor1"
+            " libxft2 libxinerama1 libgomp1"
+        ) from error
+    return gmsh
+
+
+def _fill(ring: Array) -> tuple[Array, Index]:
+    """Triangulate inside the closed polygon `ring` (n, 2) without adding nodes to it.
+
+    Returns corners (m, 2), the first n of which are the ring, and triangles (k, 3). Sizes inside follow the ring's.
+    """
+    gmsh = _import_gmsh()
+    scale = 1 / np.ptp(ring, axis=0).max()  # gmsh's tolerances are absolute
+    with _GMSH:
+        ours = not gmsh.isInitialized()
+        if ours:
+            gmsh.initialize(readConfigFiles=False, interruptible=False)
+        try:
+            return _triangulate(gmsh, ring, scale)
+        finally:
+            if ours:
+                gmsh.finalize()
+
+
+def _triangulate(gmsh: Any, ring: Array, scale: float) -> tuple[Array, Index]:
+    for option, value in (
+        ("General.Terminal", 0),
+        ("General.NumThreads", 1),
+        ("Mesh.Algorithm", 6),
+        ("Mesh.MeshSizeExtendFromBoundary", 1),
+        ("Mesh.MeshSizeFromPoints", 0),
+        ("Mesh.MeshSizeFromCurvature", 0),
+        ("Mesh.Smoothing", 10),
+    ):
+        gmsh.option.setNumber(option, value)
+    gmsh.model.add("tooth sector")
+    try:
+        geo, count = gmsh.model.geo, len(ring)
+        nodes = [geo.addPoint(x * scale, y * scale, 0.0) for x, y in ring]
+        lines = [geo.addLine(nodes[i], nodes[(i + 1) % count]) for i in range(count)]
+        geo.addPlaneSurface([geo.addCurveLoop(lines)])
+        geo.synchronize()
+        for line in lines:
+            gmsh.model.mesh.setTransfiniteCurve(line, 2)
+        gmsh.model.mesh.generate(2)
+        tags, flat, _ = gmsh.model.mesh.getNodes()
+        _, elements = gmsh.model.mesh.getElementsByType(2)
+        first = [int(gmsh.model.mesh.getNodes(0, node)[0][0]) for node in nodes]
+    finally:
+        gmsh.model.remove()
+    order = {tag: i for i, tag in enumerate(first)}
+    for tag in tags:
+        order.setdefault(int(tag), len(order))
+    corners = np.empty((len(order), 2))
+    for tag, point in zip(tags, flat.reshape(-1, 3), strict=True):
+        corners[order[int(tag)]] = point[:2] / scale
+    corners[:count] = ring
+    triangles = np.array([order[int(tag)] for tag in elements], dtype=np.int64).reshape(-1, 3)
+    return corners, triangles
+
+
+def _ccw(points: Array, triangles: Index) -> Index:
+    """The triangles (m, 3) with their corners counter-clockwise."""
+    one, two = points[triangles[:, 1]] - points[triangles[:, 0]], points[triangles[:, 2]] - points[triangles[:, 0]]
+    swap = one[:, 0] * two[:, 1] < one[:, 1] * two[:, 0]
+    turned = triangles.copy()
+    turned[swap] = turned[swap][:, [0, 2, 1]]
+    return turned
+
+
+def _raise_order(corners: Array, triangles: Index, boundary: HalfBoundary) -> tuple[Array, Index, list[Index]]:
+    """Mid-side nodes: straight inside, the given ones on the boundary.
+
+    Returns points, triangles (m, 6) and, for each side of the boundary, its edges (k, 3) corner, corner, middle.
+    """
+    edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    unique, inverse = np.unique(edges, axis=0, return_inverse=True)
+    middles = 0.5 * (corners[unique[:, 0]] + corners[unique[:, 1]])
+    number = {(int(a), int(b)): i for i, (a, b) in enumerate(unique)}
+    sides, start = [], 0
+    ring = sum(len(chain.mids) for chain in _sides(boundary))
+    for chain in _sides(boundary):
+        nodes = (start + np.arange(len(chain.corners))) % ring
+        index = np.array(
+            [number[min(int(a), int(b)), max(int(a), int(b))] for a, b in zip(nodes[:-1], nodes[1:], strict=True)]
+        )
+        middles[index] = chain.mids
+        sides.append(np.column_stack((nodes[:-1], nodes[1:], len(corners) + index)))
+        start += len(chain.mids)
+    return (
+        np.concatenate((corners, middles)),
+        np.column_stack((triangles, len(corners) + inverse.reshape(-1, 3))),
+        sides,
+    )
+
+
+def _walk(edges: Index) -> Index:
+    """Node numbers along a chain of edges (k, 3), middles included."""
+    return np.append(edges[:, [0, 2]].ravel(), edges[-1, 1])
+
+
+def _mirrored(teeth: int, boundary: HalfBoundary, corners: Array, triangles: Index) -> SectorMesh:
+    """The whole sector from its counter-clockwise half."""
+    points, half, (outline, cut, hub, axis) = _raise_order(corners, _ccw(corners, triangles), boundary)
+    on_axis = _walk(axis)
+    points[on_axis, 1] = 0.0
+    n = len(points)
+    image = np.full(n, -1, dtype=np.int64)
+    image[on_axis] = on_axis
+    free = np.flatnonzero(image < 0)
+    image[free] = n + np.arange(len(free))
+    mirror = np.concatenate((image, free))
+    # Mirroring turns the triangles over: corners 0 and 1 change places, hence the middles of 1-2 and 2-0.
+    other = image[half][:, [1, 0, 2, 3, 5, 4]]
+    angle = 2 * pi / teeth
+    low, high = image[_walk(cut)][::-1], _walk(cut)[::-1]
+    points = np.concatenate((points, points[free] * [1.0, -1.0]))
+    points[low] = points[high] @ _rotation(-angle).T
+    return SectorMesh(
+        teeth=teeth,
+        points=points,
+        triangles=np.concatenate((half, other)),
+        cut_low=low,
+        cut_high=high,
+        hub=np.concatenate((image[_walk(hub)], _walk(hub)[-2::-1])),
+        boundary_edges=np.concatenate((image[outline][::-1][:, [1, 0, 2]], outline)),
+        mirror=mirror,
+    )
+
+
+def _rotation(angle: float) -> Array:
+    """Matrix (2, 2) of a counter-clockwise rotation."""
+    return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+
+
+def full_mesh(sector: SectorMesh, teeth: int | None = None) -> GearMesh:
+    """The gear of `teeth` (default: the sector's own number) sectors, each an exact rotation; cut nodes are shared."""
+    z = sector.teeth if teeth is None else teeth
+    if z != sector.teeth:
+        raise GeometryError(f"teeth = {z} cannot be made of sectors of a gear with {sector.teeth} teeth")
+    n = len(sector.points)
+    kept = np.setdiff1d(np.arange(n), sector.cut_high)
+    node_of = np.empty((z, n), dtype=np.int64)
+    node_of[:, kept] = np.arange(z)[:, None] * len(kept) + np.arange(len(kept))
+    node_of[:, sector.cut_high] = np.roll(node_of[:, sector.cut_low], -1, axis=0)
+    points = np.concatenate([sector.points[kept] @ _rotation(2 * pi * k / z).T for k in range(z)])
+    return GearMesh(
+        teeth=z,
+        points=points,
+        triangles=node_of[:, sector.triangles].reshape(-1, 6),
+        hub=np.unique(node_of[:, sector.hub]),
+        boundary_edges=node_of[:, sector.boundary_edges].reshape(-1, 3),
+        node_of=node_of,
+    )

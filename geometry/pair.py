@@ -1,0 +1,227 @@
+"""Kinematics of the pair: centre distance, working pressure angle, path of contact, backlash, refusals.
+
+Both gears are described in their own frame (see `profile`); seen from the driven gear the pair looks the same after
+half a turn, so each gear touches with its counter-clockwise flank. Formulas: ISO 21771:2007.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import acos, atan, pi, sin, sqrt, tan
+
+from gearbench.geometry.error import GeometryError
+from gearbench.geometry.profile import Profile, involute, profile
+from gearbench.rig import Rig
+
+# Backlash and clearance more negative than this are refused; less is rounding of a centre distance in the case.
+ROUNDING = 1e-12
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two gears in mesh; build it with `pair(rig)`. Lengths in m, angles in rad.
+
+    On the line of action rho_driver + rho_driven = centre_distance sin(working_pressure_angle). At mesh phase 0 driver
+    tooth 0 and driven tooth 0 touch at the pitch point; tooth 0 of the driver then stands at the polar angle
+    `driver_angle` (world frame), tooth 0 of the driven gear at pi + `driven_angle`.
+    """
+
+    driver: Profile
+    driven: Profile
+    centre_distance: float
+    working_pressure_angle: float
+    face_width: float  # common: the smaller of the two
+
+    @property
+    def base_pitch(self) -> float:
+        """Distance of successive contacts along the line of action."""
+        return self.driver.base_pitch
+
+    @property
+    def line_of_action(self) -> float:
+        """Distance of the two tangent points: the sum of both roll lengths of a contact."""
+        return self.centre_distance * sin(self.working_pressure_angle)
+
+    @property
+    def pitch_radii(self) -> tuple[float, float]:
+        """Working pitch radii of driver and driven gear."""
+        z1, z2 = self.driver.teeth, self.driven.teeth
+        return self.centre_distance * z1 / (z1 + z2), self.centre_distance * z2 / (z1 + z2)
+
+    @property
+    def rho_pitch(self) -> tuple[float, float]:
+        """Roll lengths of driver and driven gear at the pitch point."""
+        slope = tan(self.working_pressure_angle)
+        return self.driver.base_radius * slope, self.driven.base_radius * slope
+
+    @property
+    def active_driver(self) -> tuple[float, float]:
+        """Roll lengths of the driver where contact on the line of action starts and ends."""
+        return self.line_of_action - self.driven.rho_end, self.driver.rho_end
+
+    @property
+    def active_driven(self) -> tuple[float, float]:
+        """Roll lengths of the driven gear where its active profile begins (end of contact) and ends (start)."""
+        return self.line_of_action - self.driver.rho_end, self.driven.rho_end
+
+    @property
+    def contact_ratio(self) -> float:
+        """Transverse contact ratio of the involutes, which end where the tip-edge arcs begin."""
+        start, stop = self.active_driver
+        return (stop - start) / self.base_pitch
+
+    @property
+    def contact_ratio_sharp(self) -> float:
+        """Transverse contact ratio that sharp tip edges (radius 0) would give."""
+        path = sum(sqrt(gear.tip_radius**2 - gear.base_radius**2) for gear in (self.driver, self.driven))
+        return (path - self.line_of_action) / self.base_pitch
+
+    @property
+    def backlash(self) -> float:
+        """Circumferential backlash on the working pitch circles."""
+        rolled = involute(self.working_pressure_angle)
+        r1, r2 = self.pitch_radii
+        thickness = 2 * r1 * (self.driver.psi_b - rolled) + 2 * r2 * (self.driven.psi_b - rolled)
+        return 2 * pi * r1 / self.driver.teeth - thickness
+
+    @property
+    def backlash_normal(self) -> float:
+        """Backlash along the line of action."""
+        return self.backlash * self.driver.base_radius / self.pitch_radii[0]
+
+    @property
+    def clearances(self) -> tuple[float, float]:
+        """Clearance of the driver's tip at the driven root, and of the driven tip at the driver's root."""
+        return (
+            self.centre_distance - self.driver.tip_radius - self.driven.root_radius,
+            self.centre_distance - self.driven.tip_radius - self.driver.root_radius,
+        )
+
+    @property
+    def driver_angle(self) -> float:
+        """Polar angle of driver tooth 0 at mesh phase 0; it grows as the driver turns."""
+        return involute(self.working_pressure_angle) - self.driver.psi_b
+
+    @property
+    def driven_angle(self) -> float:
+        """Polar angle of driven tooth 0 at mesh phase 0, less pi; it falls as the driven gear turns."""
+        return involute(self.working_pressure_angle) - self.driven.psi_b
+
+
+def inverse_involute(value: float) -> float:
+    """The angle whose involute function is `value` (>= 0), by Newton's method on its tangent.
+
+    With t = tan(angle), f(t) = t - atan(t) rises and is convex: the first step lands at or above the root and the
+    following ones fall to it. The start is the leading term t^3/3 or, far out, t - pi/2.
+    """
+    if value < 0.0:
+        raise ValueError(f"an involute function of {value:g} has no angle: at least 0")
+    if value == 0.0:
+        return 0.0
+    t = max((3 * value) ** (1 / 3), value + pi / 2 if value > 1.0 else 0.0)
+    for _ in range(60):
+        step = (t - atan(t) - value) * (1 + t * t) / (t * t)
+        t -= step
+        if abs(step) <= 1e-16 * t:
+            break
+    return atan(t)
+
+
+def _common_rack(rig: Rig) -> None:
+    one, two = rig.driver, rig.driven
+    if abs(one.module - two.module) > 1e-12 * one.module:
+        raise GeometryError(
+            f"rig.driven.module_mm = {two.module * 1e3:g} must equal rig.driver.module_mm = {one.module * 1e3:g}"
+        )
+    if abs(one.pressure_angle - two.pressure_angle) > 1e-12:
+        raise GeometryError(
+            f"rig.driven.pressure_angle_deg = {two.pressure_angle * 180 / pi:g} must equal"
+            f" rig.driver.pressure_angle_deg = {one.pressure_angle * 180 / pi:g}"
+        )
+
+
+def _zero_backlash_distance(rig: Rig, base_sum: float) -> float:
+    """Centre distance at which the unthinned gears have no backlash (ISO 21771: inv alpha_w)."""
+    alpha = rig.driver.pressure_angle
+    teeth = rig.driver.teeth + rig.driven.teeth
+    shifts = rig.driver.profile_shift + rig.driven.profile_shift
+    rolled = involute(alpha) + 2 * shifts * tan(alpha) / teeth
+    if rolled <= 0.0:
+        raise GeometryError(
+            f"rig.driver.profile_shift + rig.driven.profile_shift = {shifts:g} leaves no centre distance without"
+            f" backlash: it must exceed {-involute(alpha) * teeth / (2 * tan(alpha)):.4f}"
+        )
+    slope = tan(inverse_involute(rolled))
+    return base_sum * sqrt(1 + slope * slope)
+
+
+def pair(rig: Rig) -> Pair:
+    """The pair of a rig. Raises GeometryError (see `profile` for one gear's own refusals) when mates have different
+    racks, the centre distance is impossible, backlash or tip clearance is negative, a tip reaches below its mate's
+    form circle, or the contact ratio is below 1. The common face width is the smaller of the two.
+    """
+    _common_rack(rig)
+    driver, driven = profile(rig.driver, "rig.driver"), profile(rig.driven, "rig.driven")
+    base_sum = driver.base_radius + driven.base_radius
+    distance = rig.centre_distance
+    if distance is None:
+        distance = _zero_backlash_distance(rig, base_sum)
+    elif distance <= base_sum:
+        raise GeometryError(
+            f"rig.centre_distance_mm = {distance * 1e3:g} is impossible: it must exceed the sum of the base radii,"
+            f" {base_sum * 1e3:.6g} mm"
+        )
+    result = Pair(
+        driver=driver,
+        driven=driven,
+        centre_distance=distance,
+        working_pressure_angle=acos(base_sum / distance),
+        face_width=min(rig.driver.face_width, rig.driven.face_width),
+    )
+    _check(result, rig)
+    return result
+
+
+def _check(meshing: Pair, rig: Rig) -> None:
+    """Refuse a pair that cannot run."""
+    z1, z2 = meshing.driver.teeth, meshing.driven.teeth
+    given = "" if rig.centre_distance is not None else " (absent: from the profile shifts)"
+    key = f"rig.centre_distance_mm = {meshing.centre_distance * 1e3:.7g}{given}"
+    base_sum = meshing.driver.base_radius + meshing.driven.base_radius
+    if meshing.backlash < -ROUNDING:
+        # Both half angles add up to pi (1/z1 + 1/z2)/... at zero backlash: inv alpha_w follows.
+        weight = (z1 * meshing.driver.psi_b + z2 * meshing.driven.psi_b - pi) / (z1 + z2)
+        limit = base_sum * sqrt(1 + tan(inverse_involute(weight)) ** 2)
+        raise GeometryError(
+            f"{key} jams the teeth (backlash {meshing.backlash * 1e6:.3g} um): at least {limit * 1e3:.7g} mm"
+        )
+    for gear, mate, name, clearance in (
+        ("rig.driver", "rig.driven", meshing.driver, meshing.clearances[0]),
+        ("rig.driven", "rig.driver", meshing.driven, meshing.clearances[1]),
+    ):
+        if clearance < -ROUNDING:
+            raise GeometryError(
+                f"{gear}.tip_diameter_mm = {2e3 * name.tip_radius:.6g} reaches into the root of {mate}: at most"
+                f" {2e3 * (name.tip_radius + clearance):.6g} at {key}"
+            )
+    _check_interference(meshing, key)
+    if meshing.contact_ratio < 1.0:
+        raise GeometryError(
+            f"{key} gives a contact ratio of {meshing.contact_ratio:.4f} (tip-edge arcs left out): it must be at least 1"
+        )
+
+
+def _check_interference(meshing: Pair, key: str) -> None:
+    """Refuse a tip that would touch below the circle where its mate's involute begins."""
+    for name, gear, mate_name, mate, start in (
+        ("rig.driver", meshing.driver, "rig.driven", meshing.driven, meshing.active_driver[0]),
+        ("rig.driven", meshing.driven, "rig.driver", meshing.driver, meshing.active_driven[0]),
+    ):
+        if start < gear.rho_form - ROUNDING:
+            edge = mate.edge_radius
+            centre = meshing.line_of_action - gear.rho_form - edge  # roll length of the limiting arc's centre
+            limit = edge + sqrt(mate.base_radius**2 + max(centre, 0.0) ** 2)
+            raise GeometryError(
+                f"{mate_name}.tip_diameter_mm = {2e3 * mate.tip_radius:.6g} interferes: the tip reaches below the form"
+                f" circle of {name} ({2e3 * gear.form_radius:.6g} mm); at most {2e3 * limit:.6g} at {key}"
+            )
