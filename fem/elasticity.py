@@ -1,0 +1,62 @@
+"""Plane elasticity of one tooth sector: stiffness and mass, assembled by scikit-fem on curved P2 triangles."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from gearbench.rig import Material
+from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
+from scipy.spatial import cKDTree
+from skfem import Basis, BilinearForm, ElementTriP2, ElementVector, MeshTri2
+from skfem.helpers import dot
+from skfem.models.elasticity import linear_elasticity
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class PlaneModuli:
+    """Effective in-plane constants: `modulus` E' and `poisson` nu' of the equivalent plane-stress problem."""
+
+    modulus: float
+    poisson: float
+
+    @property
+    def lame(self) -> tuple[float, float]:
+        """Lame parameters of the in-plane problem."""
+        shear = self.modulus / (2 * (1 + self.poisson))
+        return self.modulus * self.poisson / (1 - self.poisson**2), shear
+
+
+def plane_moduli(material: Material) -> PlaneModuli:
+    """E' = E, nu' = nu in plane stress; E' = E/(1 - nu^2), nu' = nu/(1 - nu) in plane strain."""
+    e, nu = material.youngs_modulus, material.poisson
+    if material.state == "plane-stress":
+        return PlaneModuli(e, nu)
+    return PlaneModuli(e / (1 - nu**2), nu / (1 - nu))
+
+
+def assemble(points: Array, triangles: NDArray[np.int64], moduli: PlaneModuli) -> tuple[csr_matrix, csr_matrix]:
+    """Stiffness and mass (unit thickness, unit density) on P2 triangles; unknown 2 n + c is component c of node n.
+
+    points: (n, 2) [m]; triangles: (m, 6), corners then mid-side nodes of edges 01, 12, 20.
+    """
+    mesh = MeshTri2(points.T.copy(), triangles.T.copy())
+    basis = Basis(mesh, ElementVector(ElementTriP2()), intorder=6)
+    lame, shear = moduli.lame
+
+    @BilinearForm
+    def inertia(u, v, w):  # type: ignore[no-untyped-def]
+        return dot(u, v)
+
+    stiffness = linear_elasticity(lame, shear).assemble(basis)
+    mass = inertia.assemble(basis)
+    first = np.concatenate([basis.nodal_dofs[0], basis.facet_dofs[0]])
+    second = np.concatenate([basis.nodal_dofs[1], basis.facet_dofs[1]])
+    distance, at = cKDTree(basis.doflocs[:, first].T).query(points)
+    if distance.max() > 1e-9 * np.ptp(points):
+        raise ValueError("the mesh holds a node that belongs to no triangle")
+    order = np.column_stack([first[at], second[at]]).ravel()
+    return stiffness.tocsr()[order][:, order], mass.tocsr()[order][:, order]

@@ -1,0 +1,218 @@
+"""A gear as a ring of identical tooth sectors, each in the frame of its own tooth, tied to a rigid hub.
+
+Every sector is condensed once to its two radial cuts; the ring of cuts is block-circulant and solved by a discrete
+Fourier transform over the teeth. The result is that of the full gear's mesh, to rounding.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import pi
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csc_matrix, csr_matrix
+from scipy.sparse.linalg import LinearOperator, eigsh, splu
+
+Array = NDArray[np.float64]
+Solver = Callable[[Array], Array]
+Indices = NDArray[np.int64]
+SectorField = Callable[[int], Array]
+
+
+class SectorLike(Protocol):
+    """What the ring needs of a sector mesh (see `geometry.mesh.SectorMesh`)."""
+
+    @property
+    def points(self) -> Array: ...
+    @property
+    def cut_low(self) -> Indices: ...
+    @property
+    def cut_high(self) -> Indices: ...
+    @property
+    def hub(self) -> Indices: ...
+
+
+def symmetric_lu(matrix: csc_matrix) -> Solver:
+    """Factorise a symmetric sparse matrix with SuperLU's symmetric mode."""
+    factor = splu(
+        _narrow(matrix), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+    )
+    return factor.solve
+
+
+def unknowns(nodes: Indices) -> Indices:
+    """Unknowns 2 n, 2 n + 1 of nodes."""
+    return (2 * np.asarray(nodes)[:, None] + np.arange(2)).ravel()
+
+
+def rotation(angle: float) -> Array:
+    """2 x 2 rotation matrix, counter-clockwise."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s], [s, c]])
+
+
+@dataclass(frozen=True)
+class Ring:
+    """`teeth` sectors with stiffness and mass of one sector, and its partition of unknowns."""
+
+    teeth: int
+    stiffness: csr_matrix
+    mass: csr_matrix
+    hub: Indices
+    low: Indices
+    high: Indices
+    inner: Indices
+    solve_inner: Solver
+    constraint_modes: Array
+    cut_stiffness: Array
+
+    @property
+    def cuts(self) -> Indices:
+        """Unknowns of both cuts, the lower one first."""
+        return np.concatenate([self.low, self.high])
+
+    @property
+    def turn(self) -> Array:
+        """Block rotation that takes a cut's displacement from the next sector's frame to this one's."""
+        return np.kron(np.eye(len(self.low) // 2), rotation(2 * pi / self.teeth))
+
+
+def make_ring(
+    sector: SectorLike,
+    teeth: int,
+    stiffness: csr_matrix,
+    mass: csr_matrix,
+    factorise: Callable[[csc_matrix], Solver] = symmetric_lu,
+) -> Ring:
+    """Partition and condense one sector (hub held)."""
+    hub_nodes = np.asarray(sector.hub)
+    low_nodes = sector.cut_low[~np.isin(sector.cut_low, hub_nodes)]
+    high_nodes = sector.cut_high[~np.isin(sector.cut_high, hub_nodes)]
+    outer = np.concatenate([hub_nodes, low_nodes, high_nodes])
+    inner_nodes = np.setdiff1d(np.arange(len(sector.points)), outer)
+    hub, low, high, inner = (unknowns(n) for n in (hub_nodes, low_nodes, high_nodes, inner_nodes))
+    cuts = np.concatenate([low, high])
+    k_ii, k_ic = stiffness[inner][:, inner], stiffness[inner][:, cuts]
+    solve = factorise(k_ii.tocsc())
+    modes = solve(k_ic.toarray())
+    condensed = stiffness[cuts][:, cuts].toarray() - k_ic.T @ modes
+    return Ring(
+        teeth, stiffness, mass, hub, low, high, inner, solve, modes, 0.5 * (condensed + condensed.T)
+    )
+
+
+def ring_response(ring: Ring, forces: SectorField, hub: SectorField, wanted: Indices) -> Array:
+    """Displacements of chosen sectors under forces on all sectors and prescribed hub displacements.
+
+    forces(j): (unknowns of a sector, loads); hub(j): (hub unknowns, loads); both in sector j's own frame.
+    Returns (len(wanted), unknowns of a sector, loads).
+    """
+    k = ring.stiffness
+    cuts, inner = ring.cuts, ring.inner
+    k_ih, k_ch = k[inner][:, ring.hub], k[cuts][:, ring.hub]
+    kept: dict[int, tuple[Array, Array]] = {}
+    f_cut = []
+    for j in range(ring.teeth):
+        f, u_hub = forces(j), hub(j)
+        f_inner = f[inner] - k_ih @ u_hub
+        f_cut.append(f[cuts] - k_ch @ u_hub - ring.constraint_modes.T @ f_inner)
+        if j in wanted:
+            kept[j] = (f_inner, u_hub)
+    u_cut = _solve_cuts(ring, np.array(f_cut))
+    out = np.zeros((len(wanted), k.shape[0], u_cut.shape[2]))
+    for n, j in enumerate(wanted):
+        f_inner, u_hub = kept[int(j)]
+        out[n][ring.hub] = u_hub
+        out[n][cuts] = u_cut[j]
+        out[n][inner] = ring.solve_inner(f_inner) - ring.constraint_modes @ u_cut[j]
+    return out
+
+
+def _solve_cuts(ring: Ring, f_cut: Array) -> Array:
+    """Block-circulant solution for both cuts of every sector; f_cut and result (teeth, cut unknowns, loads)."""
+    n = len(ring.low)
+    s, turn = ring.cut_stiffness, ring.turn
+    s_ll, s_lh, s_hh = s[:n, :n], s[:n, n:] @ turn, turn.T @ s[n:, n:] @ turn
+    load = f_cut[:, :n] + turn.T @ np.roll(f_cut[:, n:], 1, axis=0)
+    spectrum = np.fft.rfft(load, axis=0)
+    for h in range(spectrum.shape[0]):
+        phase = np.exp(2j * pi * h / ring.teeth)
+        block = s_ll + s_hh + s_lh * phase + s_lh.T / phase
+        spectrum[h] = np.linalg.solve(block, spectrum[h])
+    low = np.fft.irfft(spectrum, n=ring.teeth, axis=0)
+    high = turn @ np.roll(low, -1, axis=0)
+    return np.concatenate([low, high], axis=1)
+
+
+def _narrow(matrix: csr_matrix) -> csc_matrix:
+    """Compressed columns with contiguous data and 32-bit indices, which SuperLU asks for."""
+    out = csc_matrix(matrix)
+    data = np.ascontiguousarray(out.data)
+    return csc_matrix((data, out.indices.astype(np.int32), out.indptr.astype(np.int32)), shape=out.shape)
+
+
+@dataclass(frozen=True)
+class RingMode:
+    """One real fixed-hub mode: angular frequency [rad/s] and shape (teeth, unknowns), unit modal mass."""
+
+    omega: float
+    diameters: int
+    shape: Array
+
+
+def ring_modes(ring: Ring, density_thickness: float, thickness: float, count: int) -> list[RingMode]:
+    """The lowest fixed-hub modes of the whole gear, degenerate pairs kept whole (so `count` may grow by one).
+
+    density_thickness: rho b [kg/m^2]; thickness b [m]. Modes are mass-normalised over the whole gear.
+    """
+    if count == 0:
+        return []
+    found: list[RingMode] = []
+    highest = ring.teeth // 2
+    for h in range(highest + 1):
+        per = max(2, (count + 3) // 4)
+        modes = _harmonic_modes(ring, h, density_thickness, thickness, per)
+        enough = len(found) >= count and modes[0].omega > sorted(m.omega for m in found)[count - 1]
+        found.extend(modes)
+        if enough and h >= 3:
+            break
+    found.sort(key=lambda m: (round(m.omega, 3), m.diameters))
+    cut = count
+    while cut < len(found) and found[cut].omega < found[cut - 1].omega * (1 + 1e-6):
+        cut += 1
+    return found[:cut]
+
+
+def _harmonic_modes(ring: Ring, h: int, density: float, thickness: float, count: int) -> list[RingMode]:
+    """Modes with h nodal diameters: the sector with its cuts tied by the phase of one tooth."""
+    n_low = len(ring.low)
+    phase = np.exp(2j * pi * h / ring.teeth)
+    free = np.concatenate([ring.low, ring.inner])
+    size = ring.stiffness.shape[0]
+    rows = np.concatenate([ring.low, ring.inner])
+    tie = csr_matrix((np.ones(len(free), complex), (rows, np.arange(len(free)))), shape=(size, len(free)))
+    turn = csr_matrix(ring.turn * phase)
+    expand = csr_matrix(
+        (np.ones(n_low), (ring.high, np.arange(n_low))), shape=(size, n_low)
+    )
+    pick = csr_matrix((np.ones(n_low), (np.arange(n_low), np.arange(n_low))), shape=(n_low, len(free)))
+    tie = tie + expand @ turn @ pick
+    real = h == 0 or 2 * h == ring.teeth
+    k = (tie.conj().T @ ring.stiffness @ tie) * thickness
+    m = (tie.conj().T @ ring.mass @ tie) * density
+    if real:
+        k, m, tie = k.real, m.real, tie.real
+    start = np.random.default_rng(1).standard_normal(len(free))
+    k, m = _narrow(k), _narrow(m)
+    inverse = LinearOperator(k.shape, symmetric_lu(k), dtype=k.dtype)
+    squares, vectors = eigsh(k, k=count, M=m, sigma=0.0, v0=start.astype(k.dtype), OPinv=inverse)
+    out: list[RingMode] = []
+    turns = np.exp(2j * pi * h * np.arange(ring.teeth) / ring.teeth)
+    for w2, v in sorted(zip(squares, vectors.T, strict=True), key=lambda pair: float(pair[0])):
+        full = turns[:, None] * (tie @ v)[None, :]
+        parts = [full.real] if real else [full.real * np.sqrt(2), full.imag * np.sqrt(2)]
+        out.extend(RingMode(float(np.sqrt(w2)), h, p / np.sqrt(ring.teeth)) for p in parts)
+    return out

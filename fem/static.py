@@ -1,0 +1,146 @@
+"""Static analysis with the hub centres held: transmission error, stiffness and load sharing over the mesh cycle."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from gearbench.fem.law import PAIRS, Law, coupling, find_pairs, share_load
+from numba import njit
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+MARGIN = 20e-6  # pairs with a smaller gap may be closed by the deflection of their neighbours [m]
+
+
+class ContactError(ValueError):
+    """A load that the modelled flanks cannot carry, or that does not converge."""
+
+
+@dataclass(frozen=True)
+class StaticCycle:
+    """Static response over mesh phase; arrays (load, phase) unless noted.
+
+    load_kind "torque" [N m] or "dte" [m]; phase (phase,) [cycles]; transmission_error [m]; torque_driver,
+    torque_driven [N m]; force [N] = torque_driver / driver base radius; stiffness_tangent [N/m] = dF/d dte;
+    stiffness_secant [N/m] = F / dte; load_share (load, phase, pair): share of each driver tooth, in order of meshing.
+    """
+
+    load_kind: Literal["torque", "dte"]
+    load: Array
+    phase: Array
+    transmission_error: Array
+    torque_driver: Array
+    torque_driven: Array
+    stiffness_tangent: Array
+    stiffness_secant: Array
+    load_share: Array
+
+
+@njit(cache=True)
+def position(law: Law, theta1: float, theta2: float, x1: float, y1: float, x2: float, y2: float, guess: Array):  # type: ignore[no-untyped-def]
+    """Equilibrium of all pairs at given hub positions.
+
+    Returns number of pairs, sides, teeth, contacts, forces, active flags, driver torque, driven torque, tangent
+    d(driver torque)/d theta1 and whether it converged.
+    """
+    sides, teeth, found, n = find_pairs(law, theta1, theta2, law.centre + x2 - x1, y2 - y1, MARGIN)
+    c = coupling(law, sides, teeth, found, n)
+    force, flex, active, ok = share_load(law, found, c, n, guess[:n])
+    t1 = 0.0
+    t2 = 0.0
+    lever = np.zeros(n)
+    system = np.zeros((n, n))
+    for p in range(n):
+        sign = 1.0 - 2.0 * sides[p]
+        lever[p] = sign * found[p].lever1
+        t1 += lever[p] * force[p]
+        t2 += sign * found[p].lever2 * force[p]
+        if active[p]:
+            for q in range(n):
+                if active[q]:
+                    system[p, q] = flex[p, q]
+        else:
+            system[p, p] = 1.0
+    tangent = 0.0
+    if n > 0:
+        rhs = np.where(active[:n], lever, 0.0)
+        tangent = np.sum(lever * np.linalg.solve(system, rhs))
+    return n, sides, teeth, found, force, active, t1, t2, tangent, ok
+
+
+def static_cycle(
+    law: Law,
+    phases: Array,
+    *,
+    torque: Sequence[float] | None = None,
+    dte: Sequence[float] | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> StaticCycle:
+    """Static response at the mesh phases [cycles], at given driver torques [N m] or given DTE values [m].
+
+    The driven gear stands at its nominal angle; the driver is turned until the torque, or the DTE, is reached.
+    Raises ContactError where contact leaves the modelled flank or equilibrium is not found.
+    """
+    if (torque is None) == (dte is None):
+        raise ContactError("give either torques or transmission errors for the static cycle")
+    loads = np.asarray(torque if torque is not None else dte, dtype=float)
+    kind: Literal["torque", "dte"] = "torque" if torque is not None else "dte"
+    if loads.ndim != 1 or not np.all(np.isfinite(loads)) or np.any(loads <= 0):
+        raise ContactError(f"static loads must be positive and finite, not {loads.tolist()}")
+    shape = (len(loads), len(phases))
+    te, t1, t2, tangent = (np.empty(shape) for _ in range(4))
+    share = np.zeros((*shape, PAIRS))
+    guess = 0.0
+    for i, load in enumerate(loads):
+        for j, phase in enumerate(phases):
+            if kind == "torque":
+                guess = solve_torque(law, float(phase), float(load), guess)
+            else:
+                guess = float(load)
+            n, sides, teeth, _, force, _, a, b, slope, ok = _at(law, float(phase), guess)
+            if not ok:
+                raise ContactError(f"no static equilibrium at mesh phase {phase:g} and load {load:g}")
+            te[i, j], t1[i, j], t2[i, j] = guess, a, b
+            tangent[i, j] = slope / law.driver.rb**2
+            total = max(float(force[:n].sum()), 1e-300)
+            first = int(np.floor(phase)) - 2
+            for p in range(n):
+                if sides[p] == 0 and 0 <= teeth[p] - first < PAIRS:
+                    share[i, j, teeth[p] - first] = force[p] / total
+            if progress:
+                progress((i * len(phases) + j + 1) / te.size)
+    used = np.nonzero(share.any(axis=(0, 1)))[0]
+    share = share[:, :, used[0] : used[-1] + 1] if len(used) else share[:, :, :1]
+    secant = t1 / law.driver.rb / te
+    return StaticCycle(kind, loads, np.asarray(phases), te, t1, t2, tangent, secant, share)
+
+
+def _at(law: Law, phase: float, dte: float):  # type: ignore[no-untyped-def]
+    theta1 = phase * law.driver.pitch + dte / law.driver.rb
+    return position(law, theta1, phase * law.driven.pitch, 0.0, 0.0, 0.0, 0.0, np.zeros(PAIRS))
+
+
+def solve_torque(law: Law, phase: float, torque: float, guess: float = 0.0) -> float:
+    """DTE [m] at which the driver carries `torque` [N m]: safeguarded Newton iteration."""
+    rb = law.driver.rb
+    dte = guess if guess > 0 else torque / rb / 1e8
+    low, high = 0.0, np.inf
+    for _ in range(80):
+        result = _at(law, phase, dte)
+        t1, slope, ok = result[6], result[8] / rb, result[9]
+        if not ok:
+            raise ContactError(f"no static equilibrium at mesh phase {phase:g} and DTE {dte:g} m")
+        if abs(t1 - torque) <= 1e-12 * torque:
+            return dte
+        low, high = (dte, high) if t1 < torque else (low, dte)
+        step = dte + (torque - t1) / slope if slope > 0 else 2 * dte
+        if not low < step < high:
+            step = 0.5 * (low + high) if np.isfinite(high) else 2 * dte
+        if abs(step - dte) <= 1e-15 * dte or high - low <= 1e-15 * high:
+            return step
+        dte = step
+    raise ContactError(f"the DTE at mesh phase {phase:g} and {torque:g} N m did not converge")
