@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from math import pi
+from typing import ClassVar, Literal
 
 from pydantic import model_validator
 
@@ -12,6 +13,7 @@ from gearbench.rig.value import Value, quantity
 class Multisine(Value):
     """Random-phase multisine torque on the driver. `amplitude` is the peak of the whole multisine."""
 
+    groups: ClassVar[tuple[tuple[str, ...], ...]] = (("amplitude", "rms"),)
     amplitude: float | None = quantity(None, "nm", gt=0.0, doc="peak of the multisine torque (or give rms)")
     rms: float | None = quantity(None, "nm", gt=0.0, doc="rms of the multisine torque (or give amplitude)")
     band: tuple[float, float] = quantity(unit="hz", doc="lowest and highest excited frequency")
@@ -23,25 +25,33 @@ class Multisine(Value):
         if (self.amplitude is None) == (self.rms is None):
             raise ValueError("give exactly one of amplitude_nm and rms_nm")
         if not 0.0 <= self.band[0] < self.band[1]:
-            raise ValueError(f"band_hz = {list(self.band)} must rise from a frequency of at least 0")
+            raise ValueError(f"band_hz = {list(self.band)} must rise from a frequency of at least 0 Hz")
         return self
 
 
 class Experiment(Value):
     """Speed, torque, excitation and sampling. Exactly one of mesh_frequency and speed_driver is given."""
 
-    mesh_frequency: float | None = quantity(None, "hz", gt=0.0, doc="tooth mesh frequency (or give speed_driver)")
+    groups: ClassVar[tuple[tuple[str, ...], ...]] = (("mesh_frequency", "speed_driver"),)
+    mesh_frequency: float | None = quantity(
+        None, "hz", gt=0.0, doc="tooth mesh frequency (or give speed_driver)"
+    )
     speed_driver: float | None = quantity(None, "rpm", gt=0.0, doc="driver speed (or give mesh_frequency)")
     torque_mean: float = quantity(unit="nm", gt=0.0, doc="mean driver torque")
     sampling_rate: float = quantity(unit="hz", gt=0.0, doc="sampling rate of the record")
-    samples_per_period: int = quantity(ge=16, doc="samples of one excitation period")
-    periods: int = quantity(1, ge=1, doc="recorded excitation periods")
-    realisations: int = quantity(1, ge=1, doc="phase realisations")
-    seed: int = quantity(0, ge=0, doc="seed of the random phases")
+    samples_per_period: int = quantity(ge=16, le=2**24, doc="samples of one excitation period")
+    periods: int = quantity(1, ge=1, le=10_000, doc="recorded excitation periods")
+    realisations: int = quantity(1, ge=1, le=100_000, doc="phase realisations")
+    seed: int = quantity(0, ge=0, le=2**63 - 1, doc="seed of the random phases")
     settling_tolerance: float = quantity(
-        1e-3, gt=0.0, lt=1.0, doc="largest period-to-period change of the DTE, relative to its standard deviation"
+        1e-3,
+        gt=0.0,
+        lt=1.0,
+        doc="largest period-to-period change of the DTE, relative to its standard deviation",
     )
-    settling_periods_max: int = quantity(4, ge=1, doc="excitation periods after which failing to settle is an error")
+    settling_periods_max: int = quantity(
+        4, ge=1, le=10_000, doc="excitation periods after which failing to settle is an error"
+    )
     multisine: Multisine | None = quantity(None, doc="absent: constant torque")
 
     @model_validator(mode="after")
@@ -60,33 +70,63 @@ class Experiment(Value):
         if self.mesh_frequency is not None:
             return self.mesh_frequency
         assert self.speed_driver is not None
-        from math import pi
-
         return self.speed_driver * teeth_driver / (2 * pi)
 
 
 class Simulation(Value):
     """How the experiment is simulated."""
 
-    model: Literal["lumped", "reduced"] = quantity("reduced", doc="lumped 3-DOF model or reduced finite elements")
-    substeps: int = quantity(0, ge=0, le=1024, doc="integration steps per sample; 0: as many as the error bound needs")
+    model: Literal["lumped", "reduced"] = quantity(
+        "reduced", doc="lumped 3-DOF model or reduced finite elements"
+    )
+    substeps: int = quantity(
+        0, ge=0, le=1024, doc="integration steps per sample; 0: as many as the error bound needs"
+    )
     mesh_stiffness: Literal["potential-energy", "rectangular"] = quantity(
         "potential-energy", doc="lumped model: law of k(t)"
     )
-    stiffness_single: float | None = quantity(None, "n_per_m", gt=0.0, doc="rectangular k(t): one pair in contact")
-    stiffness_double: float | None = quantity(None, "n_per_m", gt=0.0, doc="rectangular k(t): two pairs in contact")
+    stiffness_single: float | None = quantity(
+        None, "n_per_m", gt=0.0, doc="rectangular k(t): one pair in contact"
+    )
+    stiffness_double: float | None = quantity(
+        None, "n_per_m", gt=0.0, doc="rectangular k(t): two pairs in contact"
+    )
     element_size: float | None = quantity(None, "um", gt=0.0, doc="flank element size; absent: module / 12")
     modes: int = quantity(8, ge=0, le=60, doc="fixed-hub modes kept per gear (reduced model)")
     spectral_radius: float = quantity(
         0.9, ge=0.0, le=1.0, doc="generalised-alpha spectral radius at infinite frequency (reduced model)"
     )
 
+    @model_validator(mode="after")
+    def _rectangle_complete(self) -> Simulation:
+        single, double = self.stiffness_single, self.stiffness_double
+        if self.mesh_stiffness == "rectangular" and (single is None or double is None):
+            raise ValueError(
+                'mesh_stiffness = "rectangular" needs stiffness_single_n_per_m and stiffness_double_n_per_m'
+            )
+        return self
+
 
 class Identification(Value):
     """Local polynomial method for periodically time-varying systems."""
 
     method: Literal["lpm"] = quantity("lpm", doc="estimator")
-    harmonics: int = quantity(0, ge=0, le=2000, doc="branches L on each side; 0: as many as the record supports")
+    harmonics: int = quantity(
+        0, ge=0, le=2000, doc="branches L on each side; 0: as many as the record supports"
+    )
     order: int = quantity(1, ge=0, le=6, doc="polynomial order R")
     window: int = quantity(0, ge=0, le=500, doc="half-width n of the local window, in lines; 0: chosen")
     band: tuple[float, float] | None = quantity(None, "hz", doc="identified band; absent: the multisine's")
+
+    @model_validator(mode="after")
+    def _rising_band(self) -> Identification:
+        if self.band and not 0.0 <= self.band[0] < self.band[1]:
+            raise ValueError(f"band_hz = {list(self.band)} must rise from a frequency of at least 0 Hz")
+        return self
+
+
+class Condition(Value):
+    """A named variation of the experiment: it has a record of its own."""
+
+    name: str = quantity(doc="name of the condition", pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$", max_length=60)
+    experiment: Experiment = quantity(doc="the experiment under this condition")
