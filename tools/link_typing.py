@@ -1,4 +1,4 @@
-"""Renews `tools/typing/gearbench`, the tree of links in which mypy and pyright find the namespace as it is installed.
+"""Renews `tools/typing/gearbench`: links in which mypy and pyright find the namespace as it is installed.
 
 Run it after adding a module or a package to `app/`, or a package on top: `python tools/link_typing.py`.
 """
@@ -13,13 +13,13 @@ TREE = ROOT / "tools" / "typing" / "gearbench"
 
 
 def wanted() -> dict[str, Path]:
-    """Name of each link and what it points to: everything importable in `app/`, and every folder on top of it."""
+    """Name of each link and what it points to: everything importable in `app/`, and every other package."""
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["setuptools"]
     links = {}
     for package, folder in settings["package-dir"].items():
         if package == "gearbench":
-            modules = [*(ROOT / folder).glob("*.py"), *(path.parent for path in (ROOT / folder).glob("*/__init__.py"))]
-            links.update({path.name: path for path in modules})
+            links.update({path.name: path for path in (ROOT / folder).glob("*.py")})
+            links.update({path.parent.name: path.parent for path in (ROOT / folder).glob("*/__init__.py")})
         else:
             links[package.removeprefix("gearbench.")] = ROOT / folder
     return links
