@@ -91,6 +91,9 @@ class Simulation(Value):
     stiffness_double: float | None = quantity(
         None, "n_per_m", gt=0.0, doc="rectangular k(t): two pairs in contact"
     )
+    stiffness_edge: float = quantity(
+        0.02, ge=0.0, le=0.5, doc="lumped model: width of the switches of k(t) in mesh periods; 0: sharp"
+    )
     element_size: float | None = quantity(None, "um", gt=0.0, doc="flank element size; absent: module / 12")
     modes: int = quantity(8, ge=0, le=60, doc="fixed-hub modes kept per gear (reduced model)")
     spectral_radius: float = quantity(
