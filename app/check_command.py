@@ -1,0 +1,35 @@
+"""`check CASE`: the data sheet of a case."""
+
+from __future__ import annotations
+
+import typer
+
+from gearbench.options import CaseArgument, JsonOption, SetOption, load_case, print_json
+
+
+def check(case: CaseArgument, settings: SetOption = None, as_json: JsonOption = False) -> None:
+    """Print the data sheet of a case: diameters, contact ratio, backlash, masses; or say what is wrong."""
+    loaded = load_case(case, settings)
+    from gearbench.geometry import data_sheet
+
+    rows = data_sheet(loaded.rig)
+    if as_json:
+        print_json(
+            {"case": loaded.name, "data": {row.name: {"value": row.value, "unit": row.unit} for row in rows}}
+        )
+        return
+    typer.echo(f"{loaded.name}\n")
+    shared = [row for row in rows if not row.name.startswith(("driver ", "driven "))]
+    for row in shared:
+        typer.echo(f"  {row.name:<40} {_figure(row.value):>12}  {row.unit}".rstrip())
+    typer.echo(f"\n  {'':<40} {'driver':>12} {'driven':>12}")
+    driven = {row.name.removeprefix("driven "): row.value for row in rows if row.name.startswith("driven ")}
+    for row in rows:
+        name = row.name.removeprefix("driver ")
+        if name != row.name:
+            both = f"{_figure(row.value):>12} {_figure(driven[name]):>12}"
+            typer.echo(f"  {name:<40} {both}  {row.unit}".rstrip())
+
+
+def _figure(value: float) -> str:
+    return f"{value:.6g}"

@@ -1,0 +1,67 @@
+"""The command line: which commands there are. What a command needs is imported when it runs."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from typing import Annotated
+
+import typer
+
+from gearbench import __version__
+from gearbench.cases_command import cases
+from gearbench.check_command import check
+from gearbench.failure import INTERRUPTED, guarded
+from gearbench.mesh_command import mesh
+from gearbench.options import expand_lists
+from gearbench.schema_command import schema
+
+app = typer.Typer(
+    name="gearbench",
+    help="A virtual gear test rig: from a case file to the record and its time-varying frequency response.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+for command in (check, mesh, cases, schema):
+    app.command()(command)
+
+# Options that take several numbers in a row.
+_LISTS = ("--torque-nm", "--dte-um")
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(__version__)
+        raise typer.Exit
+
+
+@app.callback()
+def _common(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="print the version")
+    ] = False,
+) -> None:
+    """A virtual gear test rig: from a case file to the record and its time-varying frequency response."""
+
+
+def run_command_line(arguments: Sequence[str]) -> int:
+    """Run one command; its exit code."""
+
+    def job() -> int | None:
+        try:
+            result = app(expand_lists(arguments, _LISTS), prog_name="gearbench", standalone_mode=False)
+        except typer.Abort:
+            result = INTERRUPTED
+        if result == INTERRUPTED:  # the library turns the exception into this code
+            raise KeyboardInterrupt
+        return result if isinstance(result, int) else None
+
+    return guarded(job)
+
+
+def main() -> None:
+    """Entry point of the `gearbench` script."""
+    sys.exit(run_command_line(sys.argv[1:]))

@@ -1,0 +1,78 @@
+"""Progress on stderr: a bar on a terminal, a line now and then elsewhere."""
+
+from __future__ import annotations
+
+import sys
+import time
+from types import TracebackType
+from typing import Any
+
+_SECONDS_BETWEEN_LINES = 5.0
+
+
+class Progress:
+    """Reports a job's steps; call it with the fraction done (0..1) of the present step, and perhaps a note.
+
+    with Progress("run paper_fe") as progress:
+        progress.step("simulating")
+        simulate(..., progress)
+    """
+
+    def __init__(self, title: str) -> None:
+        self.title = title
+        self._bar: Any = None
+        self._task: Any = None
+        self._step = ""
+        self._began = self._spoke = time.monotonic()
+
+    def __enter__(self) -> Progress:
+        if sys.stderr.isatty():
+            from rich.console import Console
+            from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
+            from rich.progress import Progress as Bar
+
+            columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+            self._bar = Bar(*columns, console=Console(stderr=True), transient=True)
+            self._bar.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._close_step(done=error is None)
+        if self._bar is not None:
+            self._bar.stop()
+
+    def step(self, name: str) -> None:
+        """Begin the next step; the one before is done."""
+        self._close_step(done=True)
+        self._step = name
+        self._began = self._spoke = time.monotonic()
+        if self._bar is not None:
+            self._task = self._bar.add_task(f"{self.title}: {name}", total=None)
+
+    def __call__(self, fraction: float, note: str = "") -> None:
+        """The fraction done (0..1) of the present step."""
+        now = time.monotonic()
+        if self._bar is not None:
+            text = f"{self.title}: {self._step}" + (f", {note}" if note else "")
+            self._bar.update(self._task, completed=fraction, total=1.0, description=text)
+        elif now - self._spoke >= _SECONDS_BETWEEN_LINES:
+            self._spoke = now
+            self._line(f"{self._step}{f', {note}' if note else ''}: {100 * fraction:.0f} %")
+
+    def _close_step(self, done: bool) -> None:
+        if not self._step:
+            return
+        if done:
+            self._line(f"{self._step}: done in {time.monotonic() - self._began:.1f} s")
+        if self._bar is not None:
+            self._bar.remove_task(self._task)
+        self._step = ""
+
+    def _line(self, text: str) -> None:
+        line = f"{self.title}: {text}"
+        if self._bar is not None:
+            self._bar.console.print(line, highlight=False, markup=False)
+        else:
+            print(line, file=sys.stderr, flush=True)

@@ -1,0 +1,191 @@
+"""Commands from the outside: what they print, and their exit codes."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import meshio
+import numpy as np
+import pytest
+
+from gearbench.cases import case_files, case_path
+from gearbench.cli import run_command_line
+from gearbench.options import expand_lists
+from gearbench.rig import read_case
+
+
+def test_check_prints_the_data_sheet(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run_command_line(["check", str(case_path("paper_fe"))]) == 0
+    out = capsys.readouterr().out
+    rows = {
+        line.strip().rsplit("  ", 2)[0].strip(): line.split() for line in out.splitlines() if line.strip()
+    }
+    assert rows["centre distance"][-2:] == ["124", "mm"]  # m (z1 + z2) / 2
+    assert "116.522" in out  # base diameter 124 cos 20 deg
+    assert "contact ratio" in out and "backlash" in out and "inertia" in out
+
+
+def test_check_as_json_and_with_settings(capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = [
+        "check",
+        "paper_fe",
+        "--json",
+        "--set",
+        "rig.driver.teeth=30",
+        "--set",
+        "rig.driver.inertia_kg_m2=1e-2",
+    ]
+    arguments += ["--set", "rig.driver.hub_radius_mm=20"]
+    assert run_command_line(arguments) == 0
+    data = json.loads(capsys.readouterr().out)["data"]
+    assert data["centre distance"] == {"value": pytest.approx(92.0, rel=1e-12), "unit": "mm"}
+    assert data["driver inertia"] == {"value": pytest.approx(0.01), "unit": "kg m^2"}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["check", "none.toml"], ["none.toml", "does not exist"]),
+        (["check"], ["CASE"]),
+        (["chek", "paper_fe"], ["chek"]),
+        (["check", "paper_fe", "--set", "rig.driver.teeth=4"], ["rig.driver.teeth = 4", "at least 5"]),
+        (["check", "paper_fe", "--set", "rig.driver.module_mm=3"], ["module_mm", "3", "2"]),
+        (
+            ["check", "paper_fe", "--set", "rig.driver.hub_radius_mm=60"],
+            ["rig.driver.hub_radius_mm = 60", "59.3"],
+        ),
+        (["mesh", "paper_fe"], ["--out"]),
+        (["mesh", "paper_fe", "--out", "gear.stl"], ["gear.stl", ".msh"]),
+        (["mesh", "paper_fe", "--out", "gear.msh", "--gear", "third"], ["third"]),
+        (["cases", "papr_fe"], ["papr_fe", "paper_fe"]),
+        (["cases", "--copy", "x"], ["--copy"]),
+    ],
+)
+def test_bad_input_is_one_sentence_and_exit_2(
+    arguments: list[str],
+    words: list[str],
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert run_command_line(arguments) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    sentence = [line for line in captured.err.splitlines() if line.startswith("gearbench: ")]
+    assert len(sentence) == 1
+    for word in words:
+        assert word in sentence[0]
+    assert "Traceback" not in captured.err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_defect_is_told_from_bad_input(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def broken(path: object, overrides: object = ()) -> None:
+        raise ValueError("no error of ours is a plain ValueError")
+
+    monkeypatch.setattr("gearbench.rig.read_case", broken)
+    monkeypatch.delenv("GEARBENCH_DEBUG", raising=False)
+    assert run_command_line(["check", "paper_fe"]) == 1
+    err = capsys.readouterr().err
+    assert "defect of gearbench: ValueError" in err and "GEARBENCH_DEBUG" in err and "Traceback" not in err
+    monkeypatch.setenv("GEARBENCH_DEBUG", "1")
+    assert run_command_line(["check", "paper_fe"]) == 1
+    assert "Traceback" in capsys.readouterr().err
+
+
+def test_interruption_is_130(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    def interrupted(path: object, overrides: object = ()) -> None:
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    before = signal.getsignal(signal.SIGTERM)
+    monkeypatch.setattr("gearbench.rig.read_case", interrupted)
+    assert run_command_line(["check", "paper_fe"]) == 130
+    assert signal.getsignal(signal.SIGTERM) is before
+
+    def ctrl_c(path: object, overrides: object = ()) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("gearbench.rig.read_case", ctrl_c)
+    assert run_command_line(["check", "paper_fe"]) == 130
+    assert "interrupted" in capsys.readouterr().err
+
+
+def test_exit_codes_of_the_process() -> None:
+    def call(*arguments: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run([sys.executable, "-m", "gearbench", *arguments], capture_output=True, text=True)
+
+    version = call("--version")
+    assert (version.returncode, version.stderr) == (0, "") and version.stdout.strip()
+    bad = call("check", "paper_fe", "--set", "rig.driver.teeth=x")
+    assert (bad.returncode, bad.stdout) == (2, "")
+    assert bad.stderr == 'gearbench: rig.driver.teeth = "x" must be a number\n'
+
+
+def test_help_and_registration_import_nothing_heavy() -> None:
+    code = (
+        "import sys; from gearbench.cli import run_command_line; run_command_line(['--help']);"
+        "heavy = {'numpy', 'scipy', 'gmsh', 'xarray', 'numba', 'matplotlib', 'pyvista', 'pydantic'};"
+        "print(sorted(heavy & set(sys.modules)))"
+    )
+    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert out.splitlines()[-1] == "[]"
+
+
+def test_schema_and_reference(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run_command_line(["schema"]) == 0
+    assert json.loads(capsys.readouterr().out)["title"] == "gearbench case"
+    assert run_command_line(["schema", "--reference"]) == 0
+    assert tomllib.loads(capsys.readouterr().out)["name"] == "reference"
+
+
+def test_cases_lists_prints_and_copies(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    assert run_command_line(["cases"]) == 0
+    listed = [line.split()[0] for line in capsys.readouterr().out.splitlines()]
+    assert listed == list(case_files())
+    assert run_command_line(["cases", "paper_fe"]) == 0
+    assert tomllib.loads(capsys.readouterr().out)["name"] == "paper_fe"
+    folder = tmp_path / "mine"
+    assert run_command_line(["cases", "paper_fe", "--copy", str(folder)]) == 0
+    copied = Path(capsys.readouterr().out.strip())
+    assert read_case(copied) == read_case(case_path("paper_fe"))
+    copied.write_text(copied.read_text().replace("periods = 4", "periods = 5"))
+    assert run_command_line(["cases", "paper_fe", "--copy", str(folder)]) == 2
+    assert "not replaced" in capsys.readouterr().err
+    assert read_case(copied).experiment.periods == 5
+
+
+def test_mesh_writes_one_gear_and_both(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    coarse = ["--set", "simulation.element_size_um=800"]
+    both, one = tmp_path / "both.vtu", tmp_path / "one.msh"
+    assert run_command_line(["mesh", "paper_fe", "--out", str(both), "--json", *coarse]) == 0
+    summary = json.loads(capsys.readouterr().out)
+    assert run_command_line(["mesh", "paper_fe", "--out", str(one), "--gear", "driven", *coarse]) == 0
+    pair, single = meshio.read(both), meshio.read(one)
+    assert len(pair.points) == summary["nodes"] == 2 * len(single.points)
+    radii = np.hypot(*single.points[:, :2].T)
+    assert radii.min() == pytest.approx(0.025, abs=1e-9) and radii.max() == pytest.approx(0.064, abs=1e-9)
+    assert pair.points[:, 0].max() == pytest.approx(0.124 + 0.064, abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("given", "spelt"),
+    [
+        (
+            ["static", "c", "--torque-nm", "1", "-2", "3e1"],
+            ["static", "c", "--torque-nm", "1", "--torque-nm", "-2", "--torque-nm", "3e1"],
+        ),
+        (["static", "--torque-nm", "1", "c", "2"], ["static", "--torque-nm", "1", "c", "2"]),
+        (["--torque-nm", "1", "--out", "5"], ["--torque-nm", "1", "--out", "5"]),
+    ],
+)
+def test_lists_of_numbers_are_spelt_out(given: list[str], spelt: list[str]) -> None:
+    assert expand_lists(given, ["--torque-nm"]) == spelt

@@ -1,0 +1,1 @@
+../../../app/cases_command.py

@@ -1,0 +1,1 @@
+../../../app/check_command.py

@@ -1,0 +1,1 @@
+../../../app/mesh_command.py

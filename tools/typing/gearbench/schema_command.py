@@ -1,0 +1,1 @@
+../../../app/schema_command.py
