@@ -1,7 +1,9 @@
 """Gear geometry: exact profile, pair kinematics, bodies, data sheet, mesh and export."""
 
 from gearbench.geometry.body import Body, body, gear_area, sector_area
+from gearbench.geometry.datasheet import Datum, data_sheet
 from gearbench.geometry.error import GeometryError
+from gearbench.geometry.export import PlaneMesh, mesh_pair, write_mesh
 from gearbench.geometry.mesh import GearMesh, MeshingUnavailable, SectorMesh, full_mesh, sector_mesh
 from gearbench.geometry.pair import Pair, inverse_involute, pair
 from gearbench.geometry.profile import Profile, profile
@@ -9,20 +11,25 @@ from gearbench.geometry.quality import Quality, quality
 
 __all__ = [
     "Body",
+    "Datum",
     "GearMesh",
     "GeometryError",
     "MeshingUnavailable",
     "Pair",
+    "PlaneMesh",
     "Profile",
     "Quality",
     "SectorMesh",
     "body",
+    "data_sheet",
     "full_mesh",
     "gear_area",
     "inverse_involute",
+    "mesh_pair",
     "pair",
     "profile",
     "quality",
     "sector_area",
     "sector_mesh",
+    "write_mesh",
 ]

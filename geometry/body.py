@@ -1,4 +1,4 @@
-"""Area, mass and polar moment of inertia of the finite-element body (hub circle to profile) and of the hub."""
+"""Area, mass and polar inertia of the finite-element body (hub circle to profile) and of the hub."""
 
 from __future__ import annotations
 
@@ -17,8 +17,9 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Body:
-    """Masses [kg] and polar moments of inertia [kg m^2] about the gear's axis. The finite-element body reaches from
-    the hub circle to the profile over the gear's own face width; the hub row carries what is left of the totals."""
+    """Masses [kg] and polar moments of inertia [kg m^2] about the gear's axis. The finite-element body
+    reaches from the hub circle to the profile over the gear's own face width; the hub row carries what is
+    left of the totals."""
 
     area: float  # of the finite-element body [m^2]
     mass: float
@@ -30,8 +31,8 @@ class Body:
 
 
 def boundary_quadrature(tooth: Profile) -> tuple[Array, Array, Array]:
-    """Quadrature along the counter-clockwise half of a tooth's outline: points (n, 2), normals (n, 2), weights (n,)
-    [m]. Gauss-Legendre on each smooth piece in its natural parameter, exact to rounding."""
+    """Quadrature along the counter-clockwise half of a tooth's outline: points (n, 2), normals (n, 2),
+    weights (n,) [m]. Gauss-Legendre on each smooth piece in its natural parameter, exact to rounding."""
     x, w = np.polynomial.legendre.leggauss(48)
     x, w = 0.5 * (x + 1), 0.5 * w
     land = tooth.tip_half_angle * x
@@ -46,7 +47,13 @@ def boundary_quadrature(tooth: Profile) -> tuple[Array, Array, Array]:
         tooth.fillet(beta),
         tooth.root_radius * radial(root),
     )
-    normals = (radial(land), radial(turn), tooth.involute_normals(rho), tooth.fillet_normals(beta), radial(root))
+    normals = (
+        radial(land),
+        radial(turn),
+        tooth.involute_normals(rho),
+        tooth.fillet_normals(beta),
+        radial(root),
+    )
     weights = (
         w * tooth.tip_radius * tooth.tip_half_angle,
         w * tooth.edge_radius * tooth.edge_angle,
@@ -74,8 +81,8 @@ def sector_area(tooth: Profile, hub_radius: float) -> float:
 def body(tooth: Profile, gear: Gear, density: float, name: str = "gear") -> Body:
     """Masses and inertias of a gear of `density` [kg/m^3]; `name` is its key in the case.
 
-    `gear.mass` and `gear.inertia` are totals; where absent they follow from the geometry, bore to profile. Raises
-    GeometryError if a total is smaller than the finite-element body alone.
+    `gear.mass` and `gear.inertia` are totals; where absent they follow from the geometry, bore to profile.
+    Raises GeometryError if a total is smaller than the finite-element body alone.
     """
     area, second = gear_area(tooth)
     hub, bore = gear.hub_radius, gear.bore_radius
@@ -83,10 +90,12 @@ def body(tooth: Profile, gear: Gear, density: float, name: str = "gear") -> Body
     mass_fe = per_area * (area - pi * hub**2)
     inertia_fe = per_area * (second - pi / 2 * hub**4)
     mass = gear.mass if gear.mass is not None else mass_fe + per_area * pi * (hub**2 - bore**2)
-    inertia = gear.inertia if gear.inertia is not None else inertia_fe + per_area * pi / 2 * (hub**4 - bore**4)
+    disc = per_area * pi / 2 * (hub**4 - bore**4)
+    inertia = gear.inertia if gear.inertia is not None else inertia_fe + disc
     for key, total, least in (("mass_kg", mass, mass_fe), ("inertia_kg_m2", inertia, inertia_fe)):
         if total < least:
             raise GeometryError(
-                f"{name}.{key} = {total:g} is less than the gear outside its hub circle alone: at least {least:.6g}"
+                f"{name}.{key} = {total:g} is less than the gear outside its hub circle alone: at least"
+                f" {least:.6g}"
             )
     return Body(area - pi * hub**2, mass, inertia, mass_fe, inertia_fe, mass - mass_fe, inertia - inertia_fe)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import ceil, pi, sin
 
@@ -9,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 
-from gearbench.geometry.outline import Segment, half_outline
+from gearbench.geometry.outline import Segment, half_outline, joined
 from gearbench.geometry.profile import Profile, radial
 
 Array = NDArray[np.float64]
@@ -18,8 +19,14 @@ Array = NDArray[np.float64]
 GROWTH = 0.26
 # Elements span at most this angle of a curved boundary [rad].
 BEND = 0.35
+# Smallest size that a sharp bend may ask for, in modules.
+SMALLEST = 1e-4
+# A fillet shorter than this, relative to the elements, is meshed as a corner.
+CORNER = 5e-3
 # Size at a sharp tip corner [m]; a rounded tip edge has a quarter of its radius.
 CORNER_SIZE = 4e-6
+# Largest elements, towards the hub, relative to those of the flank: 0.7 modules by default.
+COARSE = 8.4
 # Quadratic edges along a radial cut, at least.
 CUT_EDGES = 12
 
@@ -34,9 +41,9 @@ class Chain:
 
 @dataclass(frozen=True)
 class HalfBoundary:
-    """The four sides of the half sector, each from its own start: `outline` from the tooth's axis over tip and flank
-    to the middle of the root land, `cut` from there down to the hub circle, `hub` from the cut back to the axis,
-    `axis` from the hub out to the tip."""
+    """The four sides of the half sector, each from its own start: `outline` from the tooth's axis over tip
+    and flank to the middle of the root land, `cut` from there down to the hub circle, `hub` from the cut back
+    to the axis, `axis` from the hub out to the tip."""
 
     outline: Chain
     cut: Chain
@@ -56,83 +63,97 @@ class _Cloud:
         return np.min(self.sizes + GROWTH * cdist(points, self.points), axis=1)
 
 
-def _nodes(length: float, size: Array, at_least: int = 1) -> tuple[Array, Array]:
-    """Positions of corners and mid-sides on [0, length] whose spacing follows `size`, sampled equidistantly."""
-    t = np.linspace(0.0, length, len(size))
+def _nodes(t: Array, size: Array, at_least: int = 1) -> tuple[Array, Array]:
+    """Corners and mid-sides on [0, t[-1]], spaced as `size` (n,) at the rising samples `t` (n,) asks for."""
     density = 1 / size
     count = np.concatenate(([0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(t))))
-    edges = max(at_least, ceil(count[-1] - 1e-9))
+    edges = max(at_least, ceil(count[-1] - 0.25))
     corners = np.interp(np.linspace(0.0, count[-1], edges + 1), count, t)
-    corners[[0, -1]] = 0.0, length
+    corners[[0, -1]] = 0.0, t[-1]
     return corners, 0.5 * (corners[1:] + corners[:-1])
 
 
-def _samples(length: float, size: float) -> Array:
-    """Sampling of [0, length], a few points per smallest element."""
-    return np.linspace(0.0, length, int(np.clip(4 * length / size, 9, 2000)))
+def _march(length: float, size: Callable[[Array], Array]) -> tuple[Array, Array]:
+    """Rising samples of [0, length], a quarter of the size there apart, and the sizes."""
+    t, found = [0.0], [float(size(np.zeros(1))[0])]
+    while t[-1] < length:
+        t.append(min(length, t[-1] + 0.25 * found[-1]))
+        found.append(float(size(np.array(t[-1:]))[0]))
+    return np.array(t), np.array(found)
 
 
 def tip_size(tooth: Profile, element_size: float) -> float:
-    """Element size on the tip edge [m]."""
-    return min(element_size, max(tooth.edge_radius / 4, CORNER_SIZE))
+    """Element size on the tip edge [m]; it shrinks with the elements of a mesh finer than the default one."""
+    finer = min(1.0, element_size / (tooth.module / 12))
+    return min(element_size, finer * max(tooth.edge_radius / 4, CORNER_SIZE))
 
 
-def _outline_cloud(tooth: Profile, pieces: tuple[Segment, ...], element_size: float) -> _Cloud:
-    """Element sizes on the outline: `element_size`, less where it bends sharply and near the tip edge."""
+def _pieces(tooth: Profile, element_size: float) -> list[Segment]:
+    """The outline's pieces; a land much shorter than its neighbour's elements is no piece of its own, and the
+    fillet of a sharp rack tip may be so short that a corner stands for it."""
+    pieces = [p for p in half_outline(tooth) if p.name != "fillet" or p.length > CORNER * element_size]
+    if pieces[-1].name == "root land" and pieces[-1].length < element_size / 8:
+        pieces[-2:] = [joined(*pieces[-2:])]
+    rounded = pieces[0].name == "tip land" and pieces[1].name == "tip edge"
+    if rounded and pieces[0].length < tip_size(tooth, element_size) / 4:
+        pieces[:2] = [joined(*pieces[:2])]
+    return pieces
+
+
+def _outline_cloud(tooth: Profile, pieces: list[Segment], element_size: float) -> _Cloud:
+    """Sizes on the outline: `element_size`, less on short or sharply bent pieces and near the tip edge."""
     points, sizes = [], []
     finest = tip_size(tooth, element_size)
     for piece in pieces:
-        t = _samples(piece.length, finest if piece.name == "tip edge" else element_size / 4)
-        bent = np.maximum(BEND / piece.curvature(t), finest if piece.name == "tip edge" else element_size / 16)
-        points.append(piece.points(t))
-        sizes.append(np.minimum(element_size, bent))
-    points.append(tooth.edge_centre[None] + tooth.edge_radius * tooth.normals(np.array([tooth.s_end, tooth.s_tip])))
-    sizes.append(np.full(2, finest))
+        largest = finest if piece.name == "tip edge" else element_size
+        points.append(piece.points(piece.samples))
+        bent = np.maximum(BEND / piece.curvature(piece.samples), SMALLEST * tooth.module)
+        sizes.append(np.minimum(min(largest, piece.length), bent))
+    if tooth.edge_radius == 0.0:
+        points.append(tooth.edge_centre[None])
+        sizes.append(np.array([finest]))
     return _Cloud(np.concatenate(points), np.concatenate(sizes))
 
 
 def half_boundary(tooth: Profile, hub_radius: float, element_size: float) -> HalfBoundary:
     """Nodes around the half sector between the tooth's axis and the middle of the next tooth space.
 
-    Outline nodes, mid-sides included, lie on the exact profile at the middle of the arc length; hub nodes on the hub
-    circle. `element_size` [m] holds on flank and fillet.
+    Outline nodes, mid-sides included, lie on the exact profile at the middle of the arc length; hub nodes on
+    the hub circle. `element_size` [m] holds on flank and fillet.
     """
     half = pi / tooth.teeth
     rim = tooth.root_radius - hub_radius
-    pieces = half_outline(tooth)
+    pieces = _pieces(tooth, element_size)
     cloud = _outline_cloud(tooth, pieces, element_size)
-    coarsest = max(element_size, min(0.7 * tooth.module, rim / 6))
+    coarsest = max(element_size, min(COARSE * element_size, rim / 6))
 
     def size_on_ray(radius: Array, angle: float) -> Array:
         # The sector narrows inwards: no element longer than half a sector is wide.
-        width = np.maximum(2 * radius * sin(half / 2), 1e-3 * hub_radius)
+        width = 2 * radius * sin(half / 2)
         return np.minimum(np.minimum(coarsest, width), cloud.at(radius[:, None] * radial(angle)))
 
-    depth = _samples(rim, element_size)
-    along = size_on_ray(tooth.root_radius - depth, half)
+    depth, along = _march(rim, lambda t: size_on_ray(tooth.root_radius - t, half))
     wanted = float(np.sum(0.5 * (1 / along[1:] + 1 / along[:-1]) * np.diff(depth)))
     if wanted < CUT_EDGES:
         # A thin rim: refine what lies beside it too, or the triangles there would be flat.
         along = along * (wanted / CUT_EDGES)
         ends = (tooth.root_radius - depth)[:, None] * radial(half)
         cloud = _Cloud(np.concatenate((cloud.points, ends)), np.concatenate((cloud.sizes, along)))
-    corners, mids = _nodes(rim, along, CUT_EDGES)
-    cut = Chain(
-        (tooth.root_radius - corners)[:, None] * radial(half), (tooth.root_radius - mids)[:, None] * radial(half)
-    )
+    corners, mids = (tooth.root_radius - part for part in _nodes(depth, along, CUT_EDGES))
+    cut = Chain(corners[:, None] * radial(half), mids[:, None] * radial(half))
 
-    t = _samples(tooth.tip_radius - hub_radius, element_size)
-    corners, mids = (hub_radius + part for part in _nodes(t[-1], size_on_ray(hub_radius + t, 0.0)))
+    reach = _march(tooth.tip_radius - hub_radius, lambda t: size_on_ray(hub_radius + t, 0.0))
+    corners, mids = (hub_radius + part for part in _nodes(*reach))
     axis = Chain(corners[:, None] * radial(0.0), mids[:, None] * radial(0.0))
     return HalfBoundary(_outline(pieces, cloud), cut, _hub(cloud, hub_radius, half, coarsest), axis)
 
 
-def _outline(pieces: tuple[Segment, ...], cloud: _Cloud) -> Chain:
+def _outline(pieces: list[Segment], cloud: _Cloud) -> Chain:
     """Nodes of the outline; every joint of two pieces is a corner."""
     corners, mids = [], []
     for piece in pieces:
-        t = _samples(piece.length, float(cloud.sizes.min()))
-        nodes, between = _nodes(piece.length, cloud.at(piece.points(t)))
+        t, size = _march(piece.length, lambda t, piece=piece: cloud.at(piece.points(t)))
+        nodes, between = _nodes(t, size, 2 if piece.name == "tip edge" else 1)
         corners.append(piece.points(nodes)[:-1])
         mids.append(piece.points(between))
     last = pieces[-1]
@@ -142,7 +163,9 @@ def _outline(pieces: tuple[Segment, ...], cloud: _Cloud) -> Chain:
 
 def _hub(cloud: _Cloud, radius: float, half: float, coarsest: float) -> Chain:
     """Nodes of the hub circle from the cut back to the axis."""
-    t = _samples(half, 0.05 * half)
-    size = np.minimum(min(coarsest, BEND * radius), cloud.at(radius * radial(half - t)))
-    corners, mids = _nodes(half, size / radius)
-    return Chain(radius * radial(half - corners), radius * radial(half - mids))
+
+    def size(t: Array) -> Array:
+        return np.minimum(min(coarsest, BEND * radius), cloud.at(radius * radial(half - t / radius)))
+
+    corners, mids = (half - part / radius for part in _nodes(*_march(radius * half, size)))
+    return Chain(radius * radial(corners), radius * radial(mids))

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import atan2, cos, pi, sin, sqrt, tan
 
-from gearbench.geometry.error import GeometryError
+from gearbench.geometry.error import GeometryError, at_least, at_most
 from gearbench.rig import Gear
 
-# Thinnest rim between hub circle and root circle, in modules: below it the rigid hub would be the root itself.
+# Thinnest rim between hub circle and root circle, in modules: below it the hub would be the root itself.
 RIM_MODULES = 0.05
+# Smallest rounding of a tip edge that is told from a sharp corner [m].
+SMALLEST_EDGE = 1e-6
 # A form circle this little (in modules of roll length) inside the base circle is rounding, not undercut.
 ROUNDING = 1e-12
 
@@ -19,37 +22,37 @@ def check_rack(gear: Gear, name: str, offset: float) -> None:
     room = pi / 4 - gear.dedendum * tan(alpha)
     if room < 0.0:
         raise GeometryError(
-            f"{name}.dedendum = {gear.dedendum:g} makes the rack tooth pointed: at most {pi / 4 / tan(alpha):.4g}"
-            f" at pressure_angle_deg = {alpha * 180 / pi:g}"
+            f"{name}.dedendum = {gear.dedendum:g} makes the rack tooth pointed: at most"
+            f" {at_most(pi / 4 / tan(alpha), 4)} at pressure_angle_deg = {alpha * 180 / pi:g}"
         )
     if offset < -ROUNDING * gear.module:
         raise GeometryError(
             f"{name}.rack_tip_radius = {gear.rack_tip_radius:g} does not fit the rack tooth: at most"
-            f" {room * cos(alpha) / (1 - sin(alpha)):.4g} with dedendum = {gear.dedendum:g} and"
+            f" {at_most(room * cos(alpha) / (1 - sin(alpha)), 4)} with dedendum = {gear.dedendum:g} and"
             f" pressure_angle_deg = {alpha * 180 / pi:g}"
         )
 
 
 def check_undercut(gear: Gear, name: str, rho_form: float) -> None:
-    """Refuse a tooth whose fillet cuts into the involute (form point behind the base circle, rho_form < 0, m)."""
+    """Refuse a tooth whose fillet cuts into the involute: form point behind the base circle, `rho_form` < 0."""
     if rho_form < -ROUNDING * gear.module:
         limit = gear.profile_shift - rho_form * sin(gear.pressure_angle) / gear.module
         raise GeometryError(
-            f"{name}.profile_shift = {gear.profile_shift:g} undercuts the teeth: at least {limit:.4f} with"
-            f" teeth = {gear.teeth}, dedendum = {gear.dedendum:g}, rack_tip_radius = {gear.rack_tip_radius:g},"
-            f" thinning_um = {gear.thinning * 1e6:g}"
+            f"{name}.profile_shift = {gear.profile_shift:g} undercuts the teeth: at least"
+            f" {at_least(limit, 4)} with teeth = {gear.teeth}, dedendum = {gear.dedendum:g}, rack_tip_radius ="
+            f" {gear.rack_tip_radius:g}, thinning_um = {gear.thinning * 1e6:g}"
         )
 
 
 def land_half_angle(tip: float, edge: float, base: float, psi_b: float) -> float:
-    """Half of the tip land's angle left by an edge of radius `edge` at the tip radius `tip` (negative: pointed)."""
+    """Half the angle of the tip land left by an edge of radius `edge`; negative where the tooth is
+    pointed."""
     centre = sqrt(max((tip - edge) ** 2 - base**2, 0.0))  # roll length of the arc's centre
     return psi_b - (centre + edge) / base + atan2(centre, base)
 
 
-def _largest(fits: float, fails: float, ok: object) -> float:
-    """Bisection between a value that fits and one that fails."""
-    assert callable(ok)
+def _largest(fits: float, fails: float, ok: Callable[[float], bool]) -> float:
+    """The limit between a value for which `ok` and one for which not, by bisection."""
     for _ in range(60):
         middle = 0.5 * (fits + fails)
         fits, fails = (middle, fails) if ok(middle) else (fits, middle)
@@ -59,15 +62,24 @@ def _largest(fits: float, fails: float, ok: object) -> float:
 def check_tip(gear: Gear, name: str, *, tip: float, base: float, psi_b: float, rho_form: float) -> None:
     """Refuse a tip circle inside the form circle, a pointed tip and a tip edge that does not fit."""
     edge = gear.tip_edge_radius
+    if 0.0 < edge < SMALLEST_EDGE:
+        raise GeometryError(
+            f"{name}.tip_edge_radius_um = {edge * 1e6:g} is too small to be meshed: 0 (sharp) or at least"
+            f" {SMALLEST_EDGE * 1e6:g}"
+        )
     form = sqrt(base**2 + max(rho_form, 0.0) ** 2)
     tip_key = f"{name}.tip_diameter_mm = {2e3 * tip:.6g}"
     if gear.tip_diameter is None:
         tip_key += f" (from addendum = {gear.addendum:g}, profile_shift = {gear.profile_shift:g})"
     if tip <= form:
-        raise GeometryError(f"{tip_key} leaves no involute: it must exceed the form diameter of {2e3 * form:.6g} mm")
+        raise GeometryError(
+            f"{tip_key} leaves no involute: it must exceed the form diameter of {at_least(2e3 * form, 4)} mm"
+        )
     if land_half_angle(tip, 0.0, base, psi_b) <= 0.0:
         limit = _largest(base, tip, lambda radius: land_half_angle(radius, 0.0, base, psi_b) > 0.0)
-        raise GeometryError(f"{tip_key} makes the teeth pointed: it must stay below {2e3 * limit:.6g} mm")
+        raise GeometryError(
+            f"{tip_key} makes the teeth pointed: it must stay below {at_most(2e3 * limit, 4)} mm"
+        )
 
     def fits(radius: float) -> bool:
         inside = tip - radius > base and radius + sqrt((tip - radius) ** 2 - base**2) > max(rho_form, 0.0)
@@ -75,8 +87,8 @@ def check_tip(gear: Gear, name: str, *, tip: float, base: float, psi_b: float, r
 
     if not fits(edge):
         raise GeometryError(
-            f"{name}.tip_edge_radius_um = {edge * 1e6:g} does not fit between flank and tip land: it must stay below"
-            f" {1e6 * _largest(0.0, edge, fits):.4g} um"
+            f"{name}.tip_edge_radius_um = {edge * 1e6:g} does not fit between flank and tip land: it must"
+            f" stay below {at_most(1e6 * _largest(0.0, edge, fits), 2)} um"
         )
 
 
@@ -85,8 +97,8 @@ def check_body(gear: Gear, name: str, root: float) -> None:
     limit = root - RIM_MODULES * gear.module
     if gear.hub_radius > limit:
         raise GeometryError(
-            f"{name}.hub_radius_mm = {gear.hub_radius * 1e3:g} is too large: at most {limit * 1e3:.6g}, that is the root"
-            f" radius of {root * 1e3:.6g} mm less {RIM_MODULES:g} modules"
+            f"{name}.hub_radius_mm = {gear.hub_radius * 1e3:g} is too large: at most"
+            f" {at_most(limit * 1e3, 4)}, that is the root radius of {root * 1e3:.6g} mm less {RIM_MODULES:g} modules"
         )
     if gear.bore_radius > gear.hub_radius:
         raise GeometryError(

@@ -1,13 +1,14 @@
 """One tooth sector as curved quadratic triangles, and its repetition to a full gear. The only user of gmsh.
 
-gmsh fills the half sector between given straight boundary edges; order two is raised here, so that every boundary
-node, mid-side nodes included, lies on the exact profile. The other half is the mirror image.
+gmsh fills the half sector between given straight boundary edges; order two is raised here, so that every
+boundary node, mid-side nodes included, lies on the exact profile. The other half is the mirror image.
 """
 
 from __future__ import annotations
 
 import threading
 from dataclasses import dataclass
+from itertools import pairwise
 from math import pi
 from typing import Any
 
@@ -23,6 +24,15 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 _GMSH = threading.Lock()  # gmsh keeps global state
+_OPTIONS = (
+    ("General.Terminal", 0),
+    ("General.NumThreads", 1),  # hence the same mesh every time
+    ("Mesh.Algorithm", 6),  # frontal Delaunay
+    ("Mesh.MeshSizeExtendFromBoundary", 1),
+    ("Mesh.MeshSizeFromPoints", 0),
+    ("Mesh.MeshSizeFromCurvature", 0),
+    ("Mesh.Smoothing", 10),
+)
 
 
 class MeshingUnavailable(ImportError):
@@ -33,11 +43,12 @@ class MeshingUnavailable(ImportError):
 class SectorMesh:
     """One tooth sector between the polar angles -pi/z and +pi/z, from the hub circle to the profile.
 
-    `points` (n, 2) [m]; `triangles` (m, 6): three corners counter-clockwise, then the middles of 0-1, 1-2, 2-0 (gmsh
-    and meshio order). Node numbers: `cut_low`, `cut_high` on the radial cuts, ordered by radius (corners and middles
-    alternate), equal under a rotation by 2 pi/z; `hub` on the hub circle by polar angle, ends of the cuts included;
-    `boundary_edges` (k, 3) corner, corner, middle along tip land, flanks, fillets and root land by polar angle
-    (counter-clockwise: the material lies to the left). The mesh is symmetric: `mirror[i]` is the node at (x, -y).
+    `points` (n, 2) [m]; `triangles` (m, 6): three corners counter-clockwise, then the middles of 0-1, 1-2,
+    2-0 (gmsh and meshio order). Node numbers: `cut_low`, `cut_high` on the radial cuts, ordered by radius
+    (corners and middles alternate), equal under a rotation by 2 pi/z; `hub` on the hub circle by polar angle,
+    ends of the cuts included; `boundary_edges` (k, 3) corner, corner, middle along tip land, flanks, fillets
+    and root land by polar angle (counter-clockwise: the material lies to the left). The mesh is symmetric:
+    `mirror[i]` is the node at (x, -y).
     """
 
     teeth: int
@@ -52,8 +63,8 @@ class SectorMesh:
 
 @dataclass(frozen=True)
 class GearMesh:
-    """A full gear: `points`, `triangles`, `hub`, `boundary_edges` as in SectorMesh; `node_of[k, i]` is the number of
-    sector node i in tooth k, whose axis stands at the polar angle 2 pi k/z."""
+    """A full gear: `points`, `triangles`, `hub`, `boundary_edges` as in SectorMesh; `node_of[k, i]` is the
+    number of sector node i in tooth k, whose axis stands at the polar angle 2 pi k/z."""
 
     teeth: int
     points: Array
@@ -66,13 +77,14 @@ class GearMesh:
 def sector_mesh(gear_profile: Profile, gear: Gear, element_size: float | None = None) -> SectorMesh:
     """Mesh one tooth sector. `element_size` [m] on flanks and fillets; default module/12.
 
-    Raises GeometryError for an element size outside (module/400, module/2), and MeshingUnavailable without gmsh.
+    Raises GeometryError for an element size outside (module/400, module/2), and MeshingUnavailable without
+    gmsh.
     """
     size = gear.module / 12 if element_size is None else element_size
     if not gear.module / 400 <= size <= gear.module / 2:
         raise GeometryError(
-            f"simulation.element_size_um = {size * 1e6:g} must lie between {gear.module * 1e6 / 400:g} (module/400) and"
-            f" {gear.module * 1e6 / 2:g} (module/2)"
+            f"simulation.element_size_um = {size * 1e6:g} must lie between {gear.module * 1e6 / 400:g}"
+            f" (module/400) and {gear.module * 1e6 / 2:g} (module/2)"
         )
     boundary = half_boundary(gear_profile, gear.hub_radius, size)
     ring = np.concatenate([chain.corners[:-1] for chain in _sides(boundary)])
@@ -90,8 +102,8 @@ def _import_gmsh() -> Any:
         import gmsh
     except (ImportError, OSError) as error:
         raise MeshingUnavailable(
-            f"gmsh cannot be loaded ({error}); on Debian it needs the packages libgl1 libegl1 libglu1-mesa libxcursor1"
-            " libxft2 libxinerama1 libgomp1"
+            f"gmsh cannot be loaded ({error}); on Debian it needs the packages libgl1 libegl1 libglu1-mesa"
+            " libxcursor1 libxft2 libxinerama1 libgomp1"
         ) from error
     return gmsh
 
@@ -99,7 +111,8 @@ def _import_gmsh() -> Any:
 def _fill(ring: Array) -> tuple[Array, Index]:
     """Triangulate inside the closed polygon `ring` (n, 2) without adding nodes to it.
 
-    Returns corners (m, 2), the first n of which are the ring, and triangles (k, 3). Sizes inside follow the ring's.
+    Returns corners (m, 2), the first n of which are the ring, and triangles (k, 3). Sizes inside follow the
+    ring's.
     """
     gmsh = _import_gmsh()
     scale = 1 / np.ptp(ring, axis=0).max()  # gmsh's tolerances are absolute
@@ -107,25 +120,23 @@ def _fill(ring: Array) -> tuple[Array, Index]:
         ours = not gmsh.isInitialized()
         if ours:
             gmsh.initialize(readConfigFiles=False, interruptible=False)
+        before = [] if ours else [(option, gmsh.option.getNumber(option)) for option, _ in _OPTIONS]
+        current = "" if ours else gmsh.model.getCurrent()
         try:
             return _triangulate(gmsh, ring, scale)
         finally:
             if ours:
                 gmsh.finalize()
+            else:  # someone else's session: leave it as it was
+                for option, value in before:
+                    gmsh.option.setNumber(option, value)
+                gmsh.model.setCurrent(current)
 
 
 def _triangulate(gmsh: Any, ring: Array, scale: float) -> tuple[Array, Index]:
-    for option, value in (
-        ("General.Terminal", 0),
-        ("General.NumThreads", 1),
-        ("Mesh.Algorithm", 6),
-        ("Mesh.MeshSizeExtendFromBoundary", 1),
-        ("Mesh.MeshSizeFromPoints", 0),
-        ("Mesh.MeshSizeFromCurvature", 0),
-        ("Mesh.Smoothing", 10),
-    ):
+    for option, value in _OPTIONS:
         gmsh.option.setNumber(option, value)
-    gmsh.model.add("tooth sector")
+    gmsh.model.add("gearbench tooth sector")
     try:
         geo, count = gmsh.model.geo, len(ring)
         nodes = [geo.addPoint(x * scale, y * scale, 0.0) for x, y in ring]
@@ -153,17 +164,23 @@ def _triangulate(gmsh: Any, ring: Array, scale: float) -> tuple[Array, Index]:
 
 def _ccw(points: Array, triangles: Index) -> Index:
     """The triangles (m, 3) with their corners counter-clockwise."""
-    one, two = points[triangles[:, 1]] - points[triangles[:, 0]], points[triangles[:, 2]] - points[triangles[:, 0]]
+    one, two = (
+        points[triangles[:, 1]] - points[triangles[:, 0]],
+        points[triangles[:, 2]] - points[triangles[:, 0]],
+    )
     swap = one[:, 0] * two[:, 1] < one[:, 1] * two[:, 0]
     turned = triangles.copy()
     turned[swap] = turned[swap][:, [0, 2, 1]]
     return turned
 
 
-def _raise_order(corners: Array, triangles: Index, boundary: HalfBoundary) -> tuple[Array, Index, list[Index]]:
+def _raise_order(
+    corners: Array, triangles: Index, boundary: HalfBoundary
+) -> tuple[Array, Index, list[Index]]:
     """Mid-side nodes: straight inside, the given ones on the boundary.
 
-    Returns points, triangles (m, 6) and, for each side of the boundary, its edges (k, 3) corner, corner, middle.
+    Returns points, triangles (m, 6) and, for each side of the boundary, its edges (k, 3) corner, corner,
+    middle.
     """
     edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     unique, inverse = np.unique(edges, axis=0, return_inverse=True)
@@ -173,9 +190,7 @@ def _raise_order(corners: Array, triangles: Index, boundary: HalfBoundary) -> tu
     ring = sum(len(chain.mids) for chain in _sides(boundary))
     for chain in _sides(boundary):
         nodes = (start + np.arange(len(chain.corners))) % ring
-        index = np.array(
-            [number[min(int(a), int(b)), max(int(a), int(b))] for a, b in zip(nodes[:-1], nodes[1:], strict=True)]
-        )
+        index = np.array([number[min(a, b), max(a, b)] for a, b in pairwise(nodes.tolist())])
         middles[index] = chain.mids
         sides.append(np.column_stack((nodes[:-1], nodes[1:], len(corners) + index)))
         start += len(chain.mids)
@@ -226,7 +241,8 @@ def _rotation(angle: float) -> Array:
 
 
 def full_mesh(sector: SectorMesh, teeth: int | None = None) -> GearMesh:
-    """The gear of `teeth` (default: the sector's own number) sectors, each an exact rotation; cut nodes are shared."""
+    """The gear of `teeth` (default: the sector's own number) sectors, each an exact rotation; cut nodes are
+    shared."""
     z = sector.teeth if teeth is None else teeth
     if z != sector.teeth:
         raise GeometryError(f"teeth = {z} cannot be made of sectors of a gear with {sector.teeth} teeth")

@@ -1,7 +1,7 @@
 """Kinematics of the pair: centre distance, working pressure angle, path of contact, backlash, refusals.
 
-Both gears are described in their own frame (see `profile`); seen from the driven gear the pair looks the same after
-half a turn, so each gear touches with its counter-clockwise flank. Formulas: ISO 21771:2007.
+Both gears are described in their own frame (see `profile`); seen from the driven gear the pair looks the same
+after half a turn, so each gear touches with its counter-clockwise flank. Formulas: ISO 21771:2007.
 """
 
 from __future__ import annotations
@@ -9,11 +9,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import acos, atan, pi, sin, sqrt, tan
 
-from gearbench.geometry.error import GeometryError
+from gearbench.geometry.error import GeometryError, at_least, at_most
+from gearbench.geometry.interference import TOLERANCE, fillet_clearance
 from gearbench.geometry.profile import Profile, involute, profile
 from gearbench.rig import Rig
 
-# Backlash and clearance more negative than this are refused; less is rounding of a centre distance in the case.
+# Backlash and clearance more negative than this are refused; less is rounding of a centre distance in the
+# case.
 ROUNDING = 1e-12
 
 
@@ -21,9 +23,9 @@ ROUNDING = 1e-12
 class Pair:
     """Two gears in mesh; build it with `pair(rig)`. Lengths in m, angles in rad.
 
-    On the line of action rho_driver + rho_driven = centre_distance sin(working_pressure_angle). At mesh phase 0 driver
-    tooth 0 and driven tooth 0 touch at the pitch point; tooth 0 of the driver then stands at the polar angle
-    `driver_angle` (world frame), tooth 0 of the driven gear at pi + `driven_angle`.
+    On the line of action rho_driver + rho_driven = centre_distance sin(working_pressure_angle). At mesh phase
+    0 driver tooth 0 and driven tooth 0 touch at the pitch point; tooth 0 of the driver then stands at the
+    polar angle `driver_angle` (world frame), tooth 0 of the driven gear at pi + `driven_angle`.
     """
 
     driver: Profile
@@ -61,7 +63,8 @@ class Pair:
 
     @property
     def active_driven(self) -> tuple[float, float]:
-        """Roll lengths of the driven gear where its active profile begins (end of contact) and ends (start)."""
+        """Roll lengths of the driven gear where its active profile begins (end of contact) and ends
+        (start)."""
         return self.line_of_action - self.driver.rho_end, self.driven.rho_end
 
     @property
@@ -111,8 +114,8 @@ class Pair:
 def inverse_involute(value: float) -> float:
     """The angle whose involute function is `value` (>= 0), by Newton's method on its tangent.
 
-    With t = tan(angle), f(t) = t - atan(t) rises and is convex: the first step lands at or above the root and the
-    following ones fall to it. The start is the leading term t^3/3 or, far out, t - pi/2.
+    With t = tan(angle), f(t) = t - atan(t) rises and is convex: the first step lands at or above the root and
+    the following ones fall to it. The start is the leading term t^3/3 or, far out, t - pi/2.
     """
     if value < 0.0:
         raise ValueError(f"an involute function of {value:g} has no angle: at least 0")
@@ -131,7 +134,8 @@ def _common_rack(rig: Rig) -> None:
     one, two = rig.driver, rig.driven
     if abs(one.module - two.module) > 1e-12 * one.module:
         raise GeometryError(
-            f"rig.driven.module_mm = {two.module * 1e3:g} must equal rig.driver.module_mm = {one.module * 1e3:g}"
+            f"rig.driven.module_mm = {two.module * 1e3:g} must equal rig.driver.module_mm ="
+            f" {one.module * 1e3:g}"
         )
     if abs(one.pressure_angle - two.pressure_angle) > 1e-12:
         raise GeometryError(
@@ -148,17 +152,18 @@ def _zero_backlash_distance(rig: Rig, base_sum: float) -> float:
     rolled = involute(alpha) + 2 * shifts * tan(alpha) / teeth
     if rolled <= 0.0:
         raise GeometryError(
-            f"rig.driver.profile_shift + rig.driven.profile_shift = {shifts:g} leaves no centre distance without"
-            f" backlash: it must exceed {-involute(alpha) * teeth / (2 * tan(alpha)):.4f}"
+            f"rig.driver.profile_shift + rig.driven.profile_shift = {shifts:g} leaves no centre distance"
+            f" without backlash: it must exceed {-involute(alpha) * teeth / (2 * tan(alpha)):.4f}"
         )
     slope = tan(inverse_involute(rolled))
     return base_sum * sqrt(1 + slope * slope)
 
 
 def pair(rig: Rig) -> Pair:
-    """The pair of a rig. Raises GeometryError (see `profile` for one gear's own refusals) when mates have different
-    racks, the centre distance is impossible, backlash or tip clearance is negative, a tip reaches below its mate's
-    form circle, or the contact ratio is below 1. The common face width is the smaller of the two.
+    """The pair of a rig. Raises GeometryError (see `profile` for one gear's own refusals) when mates have
+    different racks, the centre distance is impossible, backlash or tip clearance is negative, a tip reaches
+    below its mate's form circle, or the contact ratio is below 1. The common face width is the smaller of the
+    two.
     """
     _common_rack(rig)
     driver, driven = profile(rig.driver, "rig.driver"), profile(rig.driven, "rig.driven")
@@ -168,8 +173,8 @@ def pair(rig: Rig) -> Pair:
         distance = _zero_backlash_distance(rig, base_sum)
     elif distance <= base_sum:
         raise GeometryError(
-            f"rig.centre_distance_mm = {distance * 1e3:g} is impossible: it must exceed the sum of the base radii,"
-            f" {base_sum * 1e3:.6g} mm"
+            f"rig.centre_distance_mm = {distance * 1e3:g} is impossible: it must exceed the sum of the base"
+            f" radii, {at_least(base_sum * 1e3, 6)} mm"
         )
     result = Pair(
         driver=driver,
@@ -184,44 +189,49 @@ def pair(rig: Rig) -> Pair:
 
 def _check(meshing: Pair, rig: Rig) -> None:
     """Refuse a pair that cannot run."""
-    z1, z2 = meshing.driver.teeth, meshing.driven.teeth
     given = "" if rig.centre_distance is not None else " (absent: from the profile shifts)"
     key = f"rig.centre_distance_mm = {meshing.centre_distance * 1e3:.7g}{given}"
-    base_sum = meshing.driver.base_radius + meshing.driven.base_radius
     if meshing.backlash < -ROUNDING:
-        # Both half angles add up to pi (1/z1 + 1/z2)/... at zero backlash: inv alpha_w follows.
-        weight = (z1 * meshing.driver.psi_b + z2 * meshing.driven.psi_b - pi) / (z1 + z2)
-        limit = base_sum * sqrt(1 + tan(inverse_involute(weight)) ** 2)
+        limit = at_least(_tight_distance(meshing) * 1e3, 6)
         raise GeometryError(
-            f"{key} jams the teeth (backlash {meshing.backlash * 1e6:.3g} um): at least {limit * 1e3:.7g} mm"
+            f"{key} jams the teeth (backlash {meshing.backlash * 1e6:.3g} um): at least {limit} mm"
         )
-    for gear, mate, name, clearance in (
-        ("rig.driver", "rig.driven", meshing.driver, meshing.clearances[0]),
-        ("rig.driven", "rig.driver", meshing.driven, meshing.clearances[1]),
-    ):
-        if clearance < -ROUNDING:
+    names = ("rig.driver", "rig.driven")
+    gears = (meshing.driver, meshing.driven)
+    starts = (meshing.active_driver[0], meshing.active_driven[0])
+    for i, mate in ((0, 1), (1, 0)):
+        tip = f"{names[i]}.tip_diameter_mm = {2e3 * gears[i].tip_radius:.6g}"
+        if meshing.clearances[i] < -ROUNDING:
+            limit = at_most(2e3 * (gears[i].tip_radius + meshing.clearances[i]), 4)
+            raise GeometryError(f"{tip} reaches into the root of {names[mate]}: at most {limit} with {key}")
+        form = f"{names[mate]} ({2e3 * gears[mate].form_radius:.6g} mm)"
+        if starts[mate] < gears[mate].rho_form - ROUNDING:
+            limit = at_most(2e3 * _tip_reaching(gears[i], meshing.line_of_action - gears[mate].rho_form), 4)
             raise GeometryError(
-                f"{gear}.tip_diameter_mm = {2e3 * name.tip_radius:.6g} reaches into the root of {mate}: at most"
-                f" {2e3 * (name.tip_radius + clearance):.6g} at {key}"
+                f"{tip} interferes: the tip reaches below the form circle of {form};"
+                f" at most {limit} with {key}"
             )
-    _check_interference(meshing, key)
+        cut = fillet_clearance(gears[mate], gears[i], meshing.centre_distance, meshing.working_pressure_angle)
+        if cut < -TOLERANCE:
+            raise GeometryError(
+                f"{tip} interferes: the tip cuts {-cut * 1e6:.3g} um into the fillet of {names[mate]}; it"
+                f" must leave at least 0 um with {key}"
+            )
     if meshing.contact_ratio < 1.0:
         raise GeometryError(
-            f"{key} gives a contact ratio of {meshing.contact_ratio:.4f} (tip-edge arcs left out): it must be at least 1"
+            f"{key} gives a contact ratio of {meshing.contact_ratio:.4f} (tip-edge arcs left out): at least 1"
         )
 
 
-def _check_interference(meshing: Pair, key: str) -> None:
-    """Refuse a tip that would touch below the circle where its mate's involute begins."""
-    for name, gear, mate_name, mate, start in (
-        ("rig.driver", meshing.driver, "rig.driven", meshing.driven, meshing.active_driver[0]),
-        ("rig.driven", meshing.driven, "rig.driver", meshing.driver, meshing.active_driven[0]),
-    ):
-        if start < gear.rho_form - ROUNDING:
-            edge = mate.edge_radius
-            centre = meshing.line_of_action - gear.rho_form - edge  # roll length of the limiting arc's centre
-            limit = edge + sqrt(mate.base_radius**2 + max(centre, 0.0) ** 2)
-            raise GeometryError(
-                f"{mate_name}.tip_diameter_mm = {2e3 * mate.tip_radius:.6g} interferes: the tip reaches below the form"
-                f" circle of {name} ({2e3 * gear.form_radius:.6g} mm); at most {2e3 * limit:.6g} at {key}"
-            )
+def _tight_distance(meshing: Pair) -> float:
+    """Centre distance without backlash of the teeth as they are (thinned): the thicknesses on the working
+    pitch circles, 2 k z_i (psi_i - inv alpha_w) with the same k for both, fill the pitch 2 pi k."""
+    z1, z2 = meshing.driver.teeth, meshing.driven.teeth
+    rolled = (z1 * meshing.driver.psi_b + z2 * meshing.driven.psi_b - pi) / (z1 + z2)
+    slope = tan(inverse_involute(rolled))
+    return (meshing.driver.base_radius + meshing.driven.base_radius) * sqrt(1 + slope * slope)
+
+
+def _tip_reaching(gear: Profile, rho: float) -> float:
+    """Tip radius whose rounded edge ends the involute at the roll length `rho`."""
+    return gear.edge_radius + sqrt(gear.base_radius**2 + max(rho - gear.edge_radius, 0.0) ** 2)

@@ -1,9 +1,9 @@
 """The exact tooth profile: involute, trochoidal fillet of the rounded rack tip, rounded tip edge.
 
-Gear frame: origin at the gear's centre, tooth 0 centred on +x; the working flank is the counter-clockwise one.
-Lengths in m, angles in rad. Points and normals are arrays (..., 2); normals are unit vectors out of the material.
-Notation and formulas: ISO 21771:2007 (involute, generating profile shift); F. L. Litvin and A. Fuentes, Gear
-Geometry and Applied Theory (2004), chapters 5 and 10 (envelope of the rack's rounded tip).
+Gear frame: origin at the gear's centre, tooth 0 centred on +x; the working flank is the counter-clockwise
+one. Lengths in m, angles in rad. Points and normals are arrays (..., 2); normals are unit vectors out of the
+material. Notation and formulas: ISO 21771:2007 (involute, generating profile shift); F. L. Litvin and A.
+Fuentes, Gear Geometry and Applied Theory (2004), chapters 5 and 10 (envelope of the rack's rounded tip).
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 
 def involute(angle: float) -> float:
-    """inv(angle) = tan(angle) - angle, the polar angle swept by an involute up to that pressure angle [rad]."""
+    """inv(angle) = tan(angle) - angle: polar angle [rad] of an involute at that pressure angle."""
     return tan(angle) - angle
 
 
@@ -41,9 +41,10 @@ def tangential(angle: ArrayLike) -> Array:
 class Profile:
     """The boundary of one tooth; build it with `profile(gear)`.
 
-    Along the working flank, `rho` is the roll length on the base tangent and `s` the arc length from the involute's
-    (virtual) origin on the base circle, which goes on along the tip-edge arc. Along the fillet, `beta` is the angle
-    between the rack tip's normal and the centre line: 0 on the root circle, pi/2 - pressure_angle on the involute.
+    Along the working flank, `rho` is the roll length on the base tangent and `s` the arc length from the
+    involute's (virtual) origin on the base circle, which goes on along the tip-edge arc. Along the fillet,
+    `beta` is the angle between the rack tip's normal and the centre line: 0 on the root circle,
+    pi/2 - pressure_angle on the involute.
     """
 
     teeth: int
@@ -61,7 +62,7 @@ class Profile:
     rack_offset: float  # distance of that centre from the axis of the rack tooth
     rack_radius: float  # radius of the rack tip
 
-    # --- radii, angles and lengths -------------------------------------------------------------------------------
+    # --- radii, angles and lengths --------------------------------------------------------------------------
 
     @property
     def pitch_angle(self) -> float:
@@ -85,7 +86,7 @@ class Profile:
 
     @property
     def edge_centre(self) -> Array:
-        """Centre (2,) of the tip-edge arc of the working flank; the sharp corner itself if the radius is 0."""
+        """Centre (2,) of the working flank's tip-edge arc; the corner itself if the radius is 0."""
         phi = self.psi_b - self.rho_end / self.base_radius
         return self.base_radius * radial(phi) + (self.rho_end - self.edge_radius) * tangential(phi)
 
@@ -121,14 +122,15 @@ class Profile:
 
     def half_angle(self, radius: ArrayLike) -> Array:
         """Polar angle of the working involute at `radius` (half of the tooth's angle there)."""
-        roll = np.sqrt(np.maximum(np.asarray(radius, dtype=float) ** 2 - self.base_radius**2, 0.0)) / self.base_radius
+        relative = np.asarray(radius, dtype=float) / self.base_radius
+        roll = np.sqrt(np.maximum(relative**2 - 1, 0.0))
         return self.psi_b - (roll - np.arctan(roll))
 
     def thickness(self, radius: ArrayLike) -> Array:
         """Tooth thickness (arc) on the circle of that radius, between the form and the tip form circle."""
         return 2 * np.asarray(radius, dtype=float) * self.half_angle(radius)
 
-    # --- working flank: involute and tip-edge arc ----------------------------------------------------------------
+    # --- working flank: involute and tip-edge arc -----------------------------------------------------------
 
     def involute(self, rho: ArrayLike) -> Array:
         """Points of the working involute at the roll lengths `rho`."""
@@ -156,7 +158,7 @@ class Profile:
         turned = np.maximum(s - self.s_end, 0.0) / self.edge_radius if self.edge_radius > 0.0 else 0.0
         return tangential(self.psi_b - self.roll(s) / self.base_radius - turned)
 
-    # --- fillet on the counter-clockwise side of tooth 0 ---------------------------------------------------------
+    # --- fillet on the counter-clockwise side of tooth 0 ----------------------------------------------------
 
     @property
     def beta_form(self) -> float:
@@ -170,15 +172,14 @@ class Profile:
     def fillet(self, beta: ArrayLike) -> Array:
         """Points of the fillet at `beta` in [0, beta_form].
 
-        The common normal of rack and gear passes through the pitch point (law of gearing), which fixes how far the
-        rack has rolled when its tip touches with the normal `beta`.
+        The common normal of rack and gear passes through the pitch point (law of gearing), which fixes how
+        far the rack has rolled when its tip touches with the normal `beta`.
         """
         beta = np.asarray(beta, dtype=float)
         angle = self._rolling(beta)
         depth = self.rack_depth + self.rack_radius * np.cos(beta)
-        return (self.reference_radius - depth)[..., None] * radial(angle) - (depth * np.tan(beta))[..., None] * tangential(
-            angle
-        )
+        across = (depth * np.tan(beta))[..., None]
+        return (self.reference_radius - depth)[..., None] * radial(angle) - across * tangential(angle)
 
     def fillet_normals(self, beta: ArrayLike) -> Array:
         """Normals of the fillet at `beta`, out of the material (into the tooth space)."""
@@ -188,8 +189,9 @@ class Profile:
     def fillet_length(self, beta: ArrayLike) -> Array:
         """Arc length of the fillet from the root circle to `beta`.
 
-        The tip's centre turns about the pitch point at a distance depth/cos(beta) while the tip's normal turns by
-        d beta + d angle: ds/d beta = depth^2/(r cos^3 beta) + radius (1 + depth/(r cos^2 beta)), here integrated.
+        The tip's centre turns about the pitch point at a distance depth/cos(beta) while the tip's normal
+        turns by d beta + d angle: ds/d beta = depth^2/(r cos^3 beta) + radius (1 + depth/(r cos^2 beta)),
+        here integrated.
         """
         beta = np.asarray(beta, dtype=float)
         t, c = np.tan(beta), 1 / np.cos(beta)
@@ -215,7 +217,8 @@ class Profile:
         beta = np.interp(length, self.fillet_length(table), table)
         for _ in range(4):
             speed = self.fillet_speed(beta)
-            step = np.where(speed > 0.0, (length - self.fillet_length(beta)) / np.where(speed > 0.0, speed, 1.0), 0.0)
+            # The speed vanishes only where the fillet has no length at all.
+            step = (length - self.fillet_length(beta)) / np.where(speed > 0.0, speed, np.inf)
             beta = np.clip(beta + step, 0.0, self.beta_form)
         return beta
 
@@ -223,9 +226,9 @@ class Profile:
 def profile(gear: Gear, name: str = "gear") -> Profile:
     """The profile of a gear. `name` is the gear's key in the case, used in the sentence of a `GeometryError`.
 
-    The gear is cut by its rack down to the generating profile shift x_E = x - thinning/(2 m tan alpha) (ISO 21771),
-    so thinning lowers the root with the flank. Raises GeometryError on undercut, a rack tip radius or a tip edge that
-    does not fit, a pointed tip, and a hub or bore that does not fit.
+    The gear is cut by its rack down to the generating profile shift x_E = x - thinning/(2 m tan alpha) (ISO
+    21771), so thinning lowers the root with the flank. Raises GeometryError on undercut, a rack tip radius or
+    a tip edge that does not fit, a pointed tip, and a hub or bore that does not fit.
     """
     m, alpha = gear.module, gear.pressure_angle
     reference = m * gear.teeth / 2
@@ -236,7 +239,9 @@ def profile(gear: Gear, name: str = "gear") -> Profile:
     offset = m * pi / 4 - (gear.dedendum * m - rack_radius) * tan(alpha) - rack_radius / cos(alpha)
     rho_form = reference * sin(alpha) - depth / sin(alpha) - rack_radius
     psi_b = (pi / 2 + 2 * shift * tan(alpha)) / gear.teeth + involute(alpha)
-    tip = gear.tip_diameter / 2 if gear.tip_diameter is not None else reference + (gear.addendum + gear.profile_shift) * m
+    tip = reference + (gear.addendum + gear.profile_shift) * m
+    if gear.tip_diameter is not None:
+        tip = gear.tip_diameter / 2
     check_rack(gear, name, offset)
     check_undercut(gear, name, rho_form)
     check_tip(gear, name, tip=tip, base=base, psi_b=psi_b, rho_form=rho_form)

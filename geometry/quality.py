@@ -10,16 +10,18 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-# The determinant of the map of a quadratic triangle is a quadratic polynomial: its Bernstein coefficients bound it.
+# The determinant of the map of a quadratic triangle is a quadratic polynomial: its Bernstein coefficients
+# bound it.
 _NODES = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [0.5, 0.0], [0.5, 0.5], [0.0, 0.5]])
 
 
 @dataclass(frozen=True)
 class Quality:
-    """Measured on every triangle; the worst is kept. `jacobian`: lower bound of the map's determinant over the
-    triangle, relative to twice its area (1 for straight sides with centred middles; <= 0: folded). `angle`: smallest
-    corner angle of the straight-sided triangle [rad]. `aspect`: inradius over circumradius, twice (1: equilateral).
-    `growth`: largest ratio of the square roots of the areas of two triangles that share an edge."""
+    """Measured on every triangle; the worst is kept. `jacobian`: lower bound of the map's determinant over
+    the triangle, relative to twice its area (1 for straight sides with centred middles; <= 0: folded).
+    `angle`: smallest corner angle of the straight-sided triangle [rad]. `aspect`: inradius over circumradius,
+    twice (1: equilateral). `growth`: largest ratio of the square roots of the areas of two triangles that
+    share an edge."""
 
     triangles: int
     nodes: int

@@ -1,0 +1,47 @@
+"""Whether the tip of one gear cuts into the fillet of its mate while the two roll on each other."""
+
+from __future__ import annotations
+
+from math import atan2, tan
+
+import numpy as np
+from scipy.spatial.distance import cdist
+
+from gearbench.geometry.profile import Array, Profile, involute, radial
+
+# Points on the fillet and on the path of the tip: the clearance is then right to better than TOLERANCE [m].
+SAMPLES = 400
+TOLERANCE = 1e-7
+
+
+def tip_path(gear: Profile, mate: Profile, distance: float, working_pressure_angle: float) -> Array:
+    """Path (n, 2) of the centre of the mate's tip-edge arc in the frame of `gear`, from below the mate's
+    contact with the working flank of tooth 0 to as far beyond the line of centres."""
+    ratio = gear.teeth / mate.teeth
+    at_pitch = involute(working_pressure_angle)
+    centre = mate.edge_centre
+    radius, ahead = float(np.hypot(*centre)), atan2(centre[1], centre[0]) + at_pitch - mate.psi_b
+    # The gear's rotation when the arc begins to touch at the end of the mate's involute, and on the line of
+    # centres.
+    roll_pitch = gear.base_radius * tan(working_pressure_angle)
+    roll_start = roll_pitch + mate.base_radius * tan(working_pressure_angle) - mate.rho_end
+    begin, middle = (roll_start - roll_pitch) / gear.base_radius, ahead / ratio
+    turned = np.linspace(begin, 2 * middle - begin, SAMPLES)
+    own = -(at_pitch - gear.psi_b + turned)  # from the world to the gear's frame
+    return distance * radial(own) - radius * radial(own + ahead - ratio * turned)
+
+
+def fillet_clearance(gear: Profile, mate: Profile, distance: float, working_pressure_angle: float) -> float:
+    """Smallest gap [m] between the mate's tip-edge arc and the fillet of `gear`; negative: it cuts in.
+
+    Signed along the fillet's normals, so that an error of the nearest sample counts only in second order.
+    """
+    path = tip_path(gear, mate, distance, working_pressure_angle)
+    beta = np.linspace(0.0, gear.beta_form, SAMPLES)
+    points, normals = gear.fillet(beta), gear.fillet_normals(beta)
+    nearest = np.argmin(cdist(path, points), axis=1)
+    inside = nearest < SAMPLES - 1  # beyond the form point the arc faces the involute
+    if not inside.any():
+        return float("inf")
+    path, nearest = path[inside], nearest[inside]
+    return float(np.min(np.einsum("ij,ij->i", path - points[nearest], normals[nearest]))) - mate.edge_radius
