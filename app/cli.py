@@ -15,6 +15,7 @@ from gearbench.failure import INTERRUPTED, guarded
 from gearbench.mesh_command import mesh
 from gearbench.options import expand_lists
 from gearbench.schema_command import schema
+from gearbench.simulate_command import simulate
 
 app = typer.Typer(
     name="gearbench",
@@ -25,7 +26,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
-for command in (check, mesh, cases, schema):
+for command in (simulate, check, mesh, cases, schema):
     app.command()(command)
 
 # Options that take several numbers in a row.

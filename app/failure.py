@@ -22,6 +22,7 @@ USER_ERRORS = (
     ("gearbench.fem.static", "ContactError"),
     ("gearbench.identification.multisine", "MultisineError"),
     ("gearbench.identification.periodic", "PeriodicSystemError"),
+    ("gearbench.bench.errors", "BenchError"),
     ("gearbench.failure", "InputError"),
 )
 
