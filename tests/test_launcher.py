@@ -5,7 +5,6 @@ The real installation is what `.ci/run` does.
 
 from __future__ import annotations
 
-import fcntl
 import os
 import shutil
 import signal
@@ -21,7 +20,7 @@ LIBRARIES = ["libgl1", "libegl1", "libglu1-mesa", "libxcursor1", "libxft2", "lib
 SONAMES = ["libGL.so.1", "libEGL.so.1", "libGLU.so.1", "libXcursor.so.1"]
 SONAMES += ["libXft.so.2", "libXinerama.so.1", "libgomp.so.1"]
 
-# Stands in for python3: reports FAKE_VERSION, makes a virtual environment that is a copy of itself, and writes
+# Stands in for python3: reports FAKE_VERSION, makes a virtual environment that is a copy of itself and writes
 # down what pip is asked for. Scripts given with -c run in the real Python, so the lock is a real lock.
 PYTHON = f"""#!/bin/sh
 : "${{FAKE_VERSION:=3.11.9}}"
@@ -96,6 +95,13 @@ class Checkout:
         process = self.start(*args, launcher=launcher, **extra)
         out, err = process.communicate(stdin, timeout=60)
         return process.returncode, out, err
+
+    def wait_for(self, word: str) -> None:
+        """Wait until a stand-in has written the word down."""
+        deadline = time.monotonic() + 20
+        while not (self.log.exists() and word in self.log.read_text(encoding="utf-8")):
+            assert time.monotonic() < deadline
+            time.sleep(0.02)
 
     def asked(self) -> list[str]:
         """What the stand-ins were asked to do since the last call."""
@@ -228,10 +234,7 @@ def test_code_of_another_checkout_is_refused(checkout: Checkout) -> None:
 
 def test_interrupted_set_up_is_no_set_up(checkout: Checkout) -> None:
     process = checkout.start("cases", FAKE_PIP_SECONDS="30")
-    deadline = time.monotonic() + 20
-    while not (checkout.log.exists() and "pip" in checkout.log.read_text(encoding="utf-8")):
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
+    checkout.wait_for("pip")
     os.killpg(process.pid, signal.SIGINT)
     out, _ = process.communicate(timeout=20)
     assert process.returncode != 0 and out == ""
@@ -240,16 +243,15 @@ def test_interrupted_set_up_is_no_set_up(checkout: Checkout) -> None:
 
 
 def test_second_set_up_waits_and_uses_the_first(checkout: Checkout) -> None:
-    with (checkout.home / ".venv.lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        processes = [checkout.start("cases") for _ in range(2)]
-        for process in processes:
-            assert process.stderr is not None
-            assert process.stderr.readline() == "gearbench: waiting for another set-up of this checkout\n"
-        assert not (checkout.home / ".venv").exists()
-    for process in processes:
+    first = checkout.start("cases", FAKE_PIP_SECONDS="1")
+    checkout.wait_for("pip")
+    second = checkout.start("check")
+    assert second.stderr is not None
+    assert second.stderr.readline() == "gearbench: waiting for another set-up of this checkout\n"
+    assert first.poll() is None
+    for process, command in ((first, "cases"), (second, "check")):
         out, _ = process.communicate(timeout=20)
-        assert process.returncode == 0 and out.endswith("-P -m gearbench cases\n")
+        assert process.returncode == 0 and out.endswith(f"-P -m gearbench {command}\n")
     assert [line.split()[0] for line in checkout.asked()] == ["venv", "pip"]
 
 
