@@ -83,13 +83,15 @@ def test_version_is_written_once() -> None:
     assert homes == ["app/__init__.py"]
 
 
-def test_links_for_type_checkers_are_complete() -> None:
-    """Renewed by `python tools/link_typing.py`."""
-    tree = ROOT / "tools" / "typing" / "gearbench"
-    app = [*(ROOT / "app").glob("*.py"), *(marker.parent for marker in (ROOT / "app").glob("*/__init__.py"))]
-    expected = {path.name: path for path in app} | {top: ROOT / top for top in top_folders() - {"app"}}
-    assert {path.name: path.resolve() for path in tree.iterdir()} == expected
-    assert all(path.is_symlink() and not path.readlink().is_absolute() for path in tree.iterdir())
+def test_type_checkers_see_every_package() -> None:
+    assert PYPROJECT["tool"]["mypy"]["packages"] == SETUPTOOLS["packages"]
+    tree = ROOT / "tools" / "typing"
+    links = {path.relative_to(tree).as_posix(): path for path in tree.glob("*/*") if path.is_symlink()}
+    links |= {path.relative_to(tree).as_posix(): path for path in tree.glob("packages/gearbench/*")}
+    expected = {f"packages/gearbench/{top}": ROOT / top for top in top_folders() - {"app"}}
+    expected["namespace/gearbench"] = ROOT / "app"
+    assert {name: path.resolve() for name, path in links.items()} == expected
+    assert not any(path.readlink().is_absolute() for path in links.values())
 
 
 def test_every_direct_dependency_is_pinned() -> None:

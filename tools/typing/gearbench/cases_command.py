@@ -1,1 +1,0 @@
-../../../app/cases_command.py

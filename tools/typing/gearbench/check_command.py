@@ -1,1 +1,0 @@
-../../../app/check_command.py

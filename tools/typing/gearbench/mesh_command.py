@@ -1,1 +1,0 @@
-../../../app/mesh_command.py

@@ -1,1 +1,0 @@
-../../../app/schema_command.py

@@ -1,1 +1,0 @@
-../../../app/simulate_command.py
