@@ -119,28 +119,38 @@ def static_cycle(
     return StaticCycle(kind, loads, np.asarray(phases), te, t1, t2, tangent, secant, share)
 
 
-def _at(law: Law, phase: float, dte: float):  # type: ignore[no-untyped-def]
+STILL = np.zeros(2)
+
+
+def _at(law: Law, phase: float, dte: float, x: Array = STILL, y: Array = STILL):  # type: ignore[no-untyped-def]
     theta1 = phase * law.driver.pitch + dte / law.driver.rb
-    return position(law, theta1, phase * law.driven.pitch, 0.0, 0.0, 0.0, 0.0, np.zeros(PAIRS))
+    return position(law, theta1, phase * law.driven.pitch, x[0], y[0], x[1], y[1], np.zeros(PAIRS))
 
 
-def solve_torque(law: Law, phase: float, torque: float, guess: float = 0.0) -> float:
-    """DTE [m] at which the driver carries `torque` [N m]: safeguarded Newton iteration."""
+def solve_torque(
+    law: Law, phase: float, torque: float, guess: float = 0.0, x: Array = STILL, y: Array = STILL
+) -> float:
+    """Driver rotation times its base radius [m] at which it carries `torque` [N m]: safeguarded Newton iteration.
+
+    With the centres held (x = y = 0, the displacements of driver and driven centre [m]) this is the DTE.
+    """
     rb = law.driver.rb
-    dte = guess if guess > 0 else torque / rb / 1e8
-    low, high = 0.0, np.inf
-    for _ in range(80):
-        result = _at(law, phase, dte)
+    # Moving the centres by y opens the pair by up to |y|, so the search starts from there.
+    opened = float(np.abs(y).sum() + np.abs(x).sum())
+    dte = guess if guess > 0 else opened + torque / rb / 1e8
+    low, high = -opened, np.inf
+    for _ in range(200):
+        result = _at(law, phase, dte, x, y)
         t1, slope, ok = result[6], result[8] / rb, result[9]
         if not ok:
             raise ContactError(f"no static equilibrium at mesh phase {phase:g} and DTE {dte:g} m")
         if abs(t1 - torque) <= 1e-12 * torque:
             return dte
         low, high = (dte, high) if t1 < torque else (low, dte)
-        step = dte + (torque - t1) / slope if slope > 0 else 2 * dte
+        step = dte + (torque - t1) / slope if slope > 0 else dte + opened + abs(dte)
         if not low < step < high:
-            step = 0.5 * (low + high) if np.isfinite(high) else 2 * dte
-        if abs(step - dte) <= 1e-15 * dte or high - low <= 1e-15 * high:
+            step = 0.5 * (low + high) if np.isfinite(high) else dte + opened + abs(dte)
+        if abs(step - dte) <= 1e-15 * abs(dte) or (np.isfinite(high) and high - low <= 1e-15 * abs(high)):
             return step
         dte = step
     raise ContactError(f"the DTE at mesh phase {phase:g} and {torque:g} N m did not converge")

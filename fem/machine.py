@@ -1,0 +1,176 @@
+"""The reduced rig: rigid hubs on supports, fixed-hub modes and the contact law, as one set of equations of motion.
+
+Unknowns d: driver rotation beyond its nominal angle [rad]; the driven gear's likewise where its speed is not
+prescribed; support motions of driver and driven gear [m]; modal coordinates of both gears [kg^1/2 m].
+Coriolis and centrifugal terms of the elastic displacement (not of the hubs, which are kept in inertial coordinates)
+are left out: relative to the elastic forces they are of the order (speed of rotation / lowest modal frequency)^2.
+"""
+
+from __future__ import annotations
+
+from math import cos, pi, sin
+from typing import NamedTuple
+
+import numpy as np
+from gearbench.fem.body import CondensedGear
+from gearbench.fem.kernel import grid_position, row_at
+from gearbench.fem.law import Law
+from gearbench.geometry.pair import Pair
+from gearbench.rig import Rig
+from numba import njit
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class Machine(NamedTuple):
+    """Equations of motion of the reduced rig.
+
+    rotations: 1 where the driven speed is prescribed, 2 where both gears turn freely. axis_x, axis_y: direction of the
+    support motion. mass (d, d): constant part; damping, stiffness (d, d); hub1, hub2 (modes, 3): coupling mass of
+    modes and hub; inertia2 [kg m^2]; speed1, speed2: nominal speeds [rad/s]; beta [s]: stiffness-proportional damping.
+    """
+
+    law: Law
+    rotations: int
+    axis_x: float
+    axis_y: float
+    mass: Array
+    damping: Array
+    stiffness: Array
+    hub1: Array
+    hub2: Array
+    omega1: Array
+    omega2: Array
+    inertia2: float
+    speed1: float
+    speed2: float
+    beta: float
+
+
+def make_machine(
+    rig: Rig, pair: Pair, law: Law, driver: CondensedGear, driven: CondensedGear, mesh_frequency: float
+) -> Machine:
+    """The reduced model of a rig at a mesh frequency [Hz]."""
+    rotations = 1 if rig.load.boundary == "speed" else 2
+    n1, n2 = len(driver.omega), len(driven.omega)
+    size = rotations + 2 + n1 + n2
+    mass, damping, stiffness = (np.zeros((size, size)) for _ in range(3))
+    mass[0, 0] = driver.inertia
+    if rotations == 2:
+        mass[1, 1] = driven.inertia
+    for i, (gear, support) in enumerate(
+        ((driver, rig.support.driver), (driven, rig.support.driven)), start=rotations
+    ):
+        mass[i, i], damping[i, i], stiffness[i, i] = gear.mass, support.damping, support.stiffness
+    modal = np.arange(rotations + 2, size)
+    squares = np.concatenate([driver.omega, driven.omega]) ** 2
+    mass[modal, modal] = 1.0
+    stiffness[modal, modal] = squares
+    damping[modal, modal] = rig.damping.beta * squares
+    alpha = pair.working_pressure_angle if rig.support.direction == "line-of-action" else 0.0
+    return Machine(
+        law=law,
+        rotations=rotations,
+        axis_x=sin(alpha),
+        axis_y=cos(alpha),
+        mass=mass,
+        damping=damping,
+        stiffness=stiffness,
+        hub1=driver.mode_hub,
+        hub2=driven.mode_hub,
+        omega1=driver.omega,
+        omega2=driven.omega,
+        inertia2=driven.inertia,
+        speed1=2 * pi * mesh_frequency / driver.teeth,
+        speed2=2 * pi * mesh_frequency / driven.teeth,
+        beta=rig.damping.beta,
+    )
+
+
+@njit(cache=True)
+def mass_matrix(machine: Machine, theta1: float, theta2: float) -> Array:
+    """Mass matrix at given gear angles: the modes turn with their gear, the supports do not."""
+    m = machine.mass.copy()
+    r = machine.rotations
+    chi1 = theta1 + machine.law.driver.zero
+    chi2 = machine.law.driven.zero - theta2 + pi
+    for k in range(len(machine.omega1)):
+        i = r + 2 + k
+        x = machine.axis_x * cos(chi1) + machine.axis_y * sin(chi1)
+        y = -machine.axis_x * sin(chi1) + machine.axis_y * cos(chi1)
+        m[i, 0] = m[0, i] = machine.hub1[k, 2]
+        m[i, r] = m[r, i] = machine.hub1[k, 0] * x + machine.hub1[k, 1] * y
+    for k in range(len(machine.omega2)):
+        i = r + 2 + len(machine.omega1) + k
+        x = machine.axis_x * cos(chi2) + machine.axis_y * sin(chi2)
+        y = -machine.axis_x * sin(chi2) + machine.axis_y * cos(chi2)
+        if r == 2:
+            m[i, 1] = m[1, i] = -machine.hub2[k, 2]
+        m[i, r + 1] = m[r + 1, i] = machine.hub2[k, 0] * x + machine.hub2[k, 1] * y
+    return m
+
+
+@njit(cache=True)
+def angles(machine: Machine, d: Array, t: float):  # type: ignore[no-untyped-def]
+    """Angles of driver and driven gear [rad] at time t."""
+    theta1 = machine.speed1 * t + d[0]
+    theta2 = machine.speed2 * t
+    return theta1, theta2 + d[1] if machine.rotations == 2 else theta2
+
+
+@njit(cache=True)
+def contact_rows(machine: Machine, sides, teeth, found, n: int) -> Array:  # type: ignore[no-untyped-def]
+    """Derivative of every pair's gap by the unknowns, which is also the direction of its force; (n, d)."""
+    r = machine.rotations
+    n1, n2 = len(machine.omega1), len(machine.omega2)
+    k1, k2 = machine.law.k1, machine.law.k2
+    z1 = k1.modes_front.shape[1]
+    z2 = k2.modes_front.shape[1]
+    rows = np.zeros((n, r + 2 + n1 + n2))
+    for p in range(n):
+        k = found[p]
+        sign = 1.0 - 2.0 * sides[p]
+        rows[p, 0] = -sign * k.lever1
+        if r == 2:
+            rows[p, 1] = sign * k.lever2
+        along = k.nx * machine.axis_x + k.ny * machine.axis_y
+        rows[p, r] = -along
+        rows[p, r + 1] = along
+        x1 = grid_position(k1, k.s1)
+        x2 = grid_position(k2, k.s2)
+        tooth1 = (-teeth[p]) % z1
+        tooth2 = (teeth[p] + sides[p]) % z2
+        for q in range(n1):
+            table = k1.modes_front if sides[p] == 0 else k1.modes_back
+            rows[p, r + 2 + q] = row_at(table[q, tooth1], x1)
+        for q in range(n2):
+            table = k2.modes_front if sides[p] == 0 else k2.modes_back
+            rows[p, r + 2 + n1 + q] = row_at(table[q, tooth2], x2)
+    return rows
+
+
+@njit(cache=True)
+def modal_flexibility(machine: Machine, rows: Array) -> Array:
+    """Static flexibility of the kept modes between the pairs [m/N], which the residual must not count again."""
+    n = rows.shape[0]
+    first = machine.rotations + 2
+    out = np.zeros((n, n))
+    for k in range(first, rows.shape[1]):
+        w2 = machine.stiffness[k, k]
+        for p in range(n):
+            for q in range(n):
+                out[p, q] += rows[p, k] * rows[q, k] / w2
+    return out
+
+
+@njit(cache=True)
+def reaction(machine: Machine, rows: Array, sides, found, force: Array, acceleration: Array, n: int) -> float:  # type: ignore[no-untyped-def]
+    """Moment [N m] that holds the driven gear against its rotation where its speed is prescribed."""
+    total = 0.0
+    for p in range(n):
+        total += (1.0 - 2.0 * sides[p]) * found[p].lever2 * force[p]
+    first = machine.rotations + 2 + len(machine.omega1)
+    for k in range(len(machine.omega2)):
+        total += machine.hub2[k, 2] * acceleration[first + k]
+    return total
