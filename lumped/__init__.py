@@ -1,1 +1,38 @@
-"""gearbench.lumped"""
+"""The lumped model: mesh stiffness, equations of motion, Runge-Kutta integration.
+
+`gearbench.lumped.runge_kutta` loads Numba and is therefore imported by its own name only.
+"""
+
+from gearbench.lumped.errors import LumpedError
+from gearbench.lumped.mesh_stiffness import (
+    MeshStiffness,
+    PairStiffness,
+    TabulatedStiffness,
+    mesh_stiffness,
+    potential_energy_stiffness,
+    rectangular_stiffness,
+    tabulated_stiffness,
+)
+from gearbench.lumped.model import Lumped, equivalent_mass, lumped_model, periodic_matrices
+from gearbench.lumped.potential_energy import ToothCompliance, pair_stiffness, tooth_compliance
+from gearbench.lumped.time_step import choose_substeps, largest_step
+
+__all__ = [
+    "Lumped",
+    "LumpedError",
+    "MeshStiffness",
+    "PairStiffness",
+    "TabulatedStiffness",
+    "ToothCompliance",
+    "choose_substeps",
+    "equivalent_mass",
+    "largest_step",
+    "lumped_model",
+    "mesh_stiffness",
+    "pair_stiffness",
+    "periodic_matrices",
+    "potential_energy_stiffness",
+    "rectangular_stiffness",
+    "tabulated_stiffness",
+    "tooth_compliance",
+]

@@ -14,7 +14,7 @@ from gearbench.records.record import validate_record
 
 
 def write_atomically(path: str | Path, write: Callable[[Path], None]) -> None:
-    """Let `write` fill a temporary file beside `path`, then rename it: readers see either the old or the new."""
+    """Let `write` fill a temporary file beside `path`, then rename it: readers see the old or the new."""
     target = Path(path)
     if not target.parent.is_dir():
         raise RecordError(f"cannot write {target}: folder {target.parent} does not exist")
