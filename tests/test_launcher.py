@@ -297,3 +297,10 @@ def test_set_up_does_not_wait_for_answers(checkout: Checkout) -> None:
     greedy = PYTHON.replace("echo noise;", "cat;").replace('echo "ran in $(pwd):" "$@"', "cat")
     checkout.fake("python3", greedy)
     assert checkout.run("identify", stdin="for the command")[:2] == (0, "for the command")
+
+
+def test_mesher_asks_for_the_libraries_the_launcher_installs() -> None:
+    words = (ROOT / "geometry" / "mesh.py").read_text(encoding="utf-8").replace('"', " ").split()
+    assert set(LIBRARIES) <= {word.strip(",;:.)") for word in words}
+    launcher = (ROOT / "gearbench").read_text(encoding="utf-8")
+    assert all(f"{soname}={package}" in launcher for soname, package in zip(SONAMES, LIBRARIES, strict=True))
