@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from math import ceil, pi, sin
 
 import numpy as np
@@ -148,12 +149,16 @@ def half_boundary(tooth: Profile, hub_radius: float, element_size: float) -> Hal
     return HalfBoundary(_outline(pieces, cloud), cut, _hub(cloud, hub_radius, half, coarsest), axis)
 
 
+def _size_on(piece: Segment, cloud: _Cloud, t: Array) -> Array:
+    return cloud.at(piece.points(t))
+
+
 def _outline(pieces: list[Segment], cloud: _Cloud) -> Chain:
     """Nodes of the outline; every joint of two pieces is a corner."""
     corners, mids = [], []
     for piece in pieces:
-        t, size = _march(piece.length, lambda t, piece=piece: cloud.at(piece.points(t)))
-        nodes, between = _nodes(t, size, 2 if piece.name == "tip edge" else 1)
+        reach = _march(piece.length, partial(_size_on, piece, cloud))
+        nodes, between = _nodes(*reach, 2 if piece.name == "tip edge" else 1)
         corners.append(piece.points(nodes)[:-1])
         mids.append(piece.points(between))
     last = pieces[-1]

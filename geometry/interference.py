@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from math import atan2, tan
+from dataclasses import replace
+from math import atan2, sqrt, tan
 
 import numpy as np
 from scipy.spatial.distance import cdist
@@ -40,8 +41,26 @@ def fillet_clearance(gear: Profile, mate: Profile, distance: float, working_pres
     beta = np.linspace(0.0, gear.beta_form, SAMPLES)
     points, normals = gear.fillet(beta), gear.fillet_normals(beta)
     nearest = np.argmin(cdist(path, points), axis=1)
-    inside = nearest < SAMPLES - 1  # beyond the form point the arc faces the involute
+    # Beyond the ends the arc faces the involute or the root circle, which have their own checks.
+    inside = (nearest > 0) & (nearest < SAMPLES - 1)
     if not inside.any():
         return float("inf")
     path, nearest = path[inside], nearest[inside]
     return float(np.min(np.einsum("ij,ij->i", path - points[nearest], normals[nearest]))) - mate.edge_radius
+
+
+def with_tip(gear: Profile, radius: float) -> Profile:
+    """The gear turned down (or left longer) to another tip radius [m]."""
+    edge = gear.edge_radius
+    rho_end = edge + sqrt(max((radius - edge) ** 2 - gear.base_radius**2, 0.0))
+    return replace(gear, tip_radius=radius, rho_end=rho_end)
+
+
+def largest_tip(gear: Profile, mate: Profile, distance: float, working_pressure_angle: float) -> float:
+    """Largest tip radius [m] of the mate that clears the fillet of `gear`, by bisection to 1 nm or better."""
+    clear, cutting = mate.form_radius, mate.tip_radius
+    for _ in range(24):
+        middle = 0.5 * (clear + cutting)
+        gap = fillet_clearance(gear, with_tip(mate, middle), distance, working_pressure_angle)
+        clear, cutting = (middle, cutting) if gap >= 0.0 else (clear, middle)
+    return clear

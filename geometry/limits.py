@@ -34,13 +34,13 @@ def check_rack(gear: Gear, name: str, offset: float) -> None:
 
 
 def check_undercut(gear: Gear, name: str, rho_form: float) -> None:
-    """Refuse a tooth whose fillet cuts into the involute: form point behind the base circle, `rho_form` < 0."""
+    """Refuse a tooth whose fillet cuts into the involute: form point behind the base, `rho_form` < 0."""
     if rho_form < -ROUNDING * gear.module:
         limit = gear.profile_shift - rho_form * sin(gear.pressure_angle) / gear.module
         raise GeometryError(
             f"{name}.profile_shift = {gear.profile_shift:g} undercuts the teeth: at least"
-            f" {at_least(limit, 4)} with teeth = {gear.teeth}, dedendum = {gear.dedendum:g}, rack_tip_radius ="
-            f" {gear.rack_tip_radius:g}, thinning_um = {gear.thinning * 1e6:g}"
+            f" {at_least(limit, 4)} with teeth = {gear.teeth}, dedendum = {gear.dedendum:g},"
+            f" rack_tip_radius = {gear.rack_tip_radius:g}, thinning_um = {gear.thinning * 1e6:g}"
         )
 
 
@@ -98,7 +98,8 @@ def check_body(gear: Gear, name: str, root: float) -> None:
     if gear.hub_radius > limit:
         raise GeometryError(
             f"{name}.hub_radius_mm = {gear.hub_radius * 1e3:g} is too large: at most"
-            f" {at_most(limit * 1e3, 4)}, that is the root radius of {root * 1e3:.6g} mm less {RIM_MODULES:g} modules"
+            f" {at_most(limit * 1e3, 4)}, that is the root radius of {root * 1e3:.6g} mm less {RIM_MODULES:g}"
+            " modules"
         )
     if gear.bore_radius > gear.hub_radius:
         raise GeometryError(

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from math import acos, atan, pi, sin, sqrt, tan
 
 from gearbench.geometry.error import GeometryError, at_least, at_most
-from gearbench.geometry.interference import TOLERANCE, fillet_clearance
+from gearbench.geometry.interference import TOLERANCE, fillet_clearance, largest_tip
 from gearbench.geometry.profile import Profile, involute, profile
 from gearbench.rig import Rig
 
@@ -211,11 +211,13 @@ def _check(meshing: Pair, rig: Rig) -> None:
                 f"{tip} interferes: the tip reaches below the form circle of {form};"
                 f" at most {limit} with {key}"
             )
-        cut = fillet_clearance(gears[mate], gears[i], meshing.centre_distance, meshing.working_pressure_angle)
-        if cut < -TOLERANCE:
+        place = (meshing.centre_distance, meshing.working_pressure_angle)
+        gap = fillet_clearance(gears[mate], gears[i], *place)
+        if gap < -TOLERANCE:
+            limit = at_most(2e3 * largest_tip(gears[mate], gears[i], *place), 4)
             raise GeometryError(
-                f"{tip} interferes: the tip cuts {-cut * 1e6:.3g} um into the fillet of {names[mate]}; it"
-                f" must leave at least 0 um with {key}"
+                f"{tip} interferes: the tip cuts {-gap * 1e6:.3g} um into the fillet of {names[mate]};"
+                f" at most {limit} with {key}"
             )
     if meshing.contact_ratio < 1.0:
         raise GeometryError(
