@@ -14,6 +14,8 @@ from dataclasses import dataclass
 from math import pi
 
 import numpy as np
+from numpy.typing import NDArray
+
 from gearbench.fem.elasticity import PlaneModuli, assemble, plane_moduli
 from gearbench.fem.flamant import LineLoad
 from gearbench.fem.flank import (
@@ -26,7 +28,6 @@ from gearbench.fem.ring import Ring, make_ring, ring_modes, ring_response, rotat
 from gearbench.geometry.mesh import SectorMesh, sector_mesh
 from gearbench.geometry.profile import Profile, profile
 from gearbench.rig import Gear, Material
-from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
@@ -44,7 +45,7 @@ class CondensedGear:
         m - reach teeth counter-clockwise of the loaded one, [m, load at s_i, response at s_j]; front[reach] is G.
     omega (q,) [rad/s]; mode_front, mode_back (q, teeth, n): inward normal modal displacement [kg^-1/2];
     mode_hub (q, 3): coupling mass with the hub's x, y (gear frame) and rotation [kg^1/2, kg^1/2 m].
-    mass [kg], inertia [kg m^2]: totals of the gear, hub included.
+    unknowns: of the whole gear's mesh.
     """
 
     teeth: int
@@ -57,8 +58,6 @@ class CondensedGear:
     mode_front: Array
     mode_back: Array
     mode_hub: Array
-    mass: float
-    inertia: float
     unknowns: int
 
     @property
@@ -112,11 +111,6 @@ def condense(
     found = ring_modes(ring, areal, gear.face_width, modes)
     traces = [flank_trace(shape, mesh.points, mesh.boundary_edges, s, side) for side in (0, 1)]
     rigid = _rigid_shapes(mesh.points, gear.teeth)
-    fe_mass, fe_inertia = (
-        areal * float(np.einsum("ju,ju->", r, (mass @ r.T).T)) for r in (rigid[0], rigid[2])
-    )
-    disc = areal * pi * (gear.hub_radius**2 - gear.bore_radius**2)
-    disc_inertia = disc * (gear.hub_radius**2 + gear.bore_radius**2) / 2
     n = len(s)
     return CondensedGear(
         teeth=gear.teeth,
@@ -128,11 +122,9 @@ def condense(
         omega=np.array([m.omega for m in found]),
         mode_front=np.array([(traces[0] @ m.shape.T).T for m in found]).reshape(-1, gear.teeth, n),
         mode_back=np.array([(traces[1] @ m.shape.T).T for m in found]).reshape(-1, gear.teeth, n),
-        mode_hub=np.array(
-            [[areal * np.sum(r * (mass @ m.shape.T).T) for r in rigid] for m in found]
-        ).reshape(-1, 3),
-        mass=gear.mass if gear.mass is not None else fe_mass + disc,
-        inertia=gear.inertia if gear.inertia is not None else fe_inertia + disc_inertia,
+        mode_hub=np.array([[areal * np.sum(r * (mass @ m.shape.T).T) for r in rigid] for m in found]).reshape(
+            -1, 3
+        ),
         unknowns=gear.teeth * (stiffness.shape[0] - len(ring.low) - len(ring.hub)),
     )
 
@@ -160,14 +152,14 @@ def flank_kernels(
 
     def loads_in(j: int) -> list[LineLoad]:
         turn = rotation(-2 * pi * j / teeth)
-        return [
-            LineLoad(turn @ x, -(turn @ n), turn @ space) for x, n in zip(at, normal, strict=True)
-        ]
+        return [LineLoad(turn @ x, -(turn @ n), turn @ space) for x, n in zip(at, normal, strict=True)]
 
     hub_points = mesh.points[mesh.hub]
 
     def hub(j: int) -> Array:
-        fields = [-load.displacement(hub_points, moduli.modulus, moduli.poisson).ravel() for load in loads_in(j)]
+        fields = [
+            -load.displacement(hub_points, moduli.modulus, moduli.poisson).ravel() for load in loads_in(j)
+        ]
         return np.array(fields).T
 
     def forces(j: int) -> Array:

@@ -5,13 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from gearbench.rig import Material
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
 from skfem import Basis, BilinearForm, ElementTriP2, ElementVector, MeshTri2
 from skfem.helpers import dot
 from skfem.models.elasticity import linear_elasticity
+
+from gearbench.rig import Material
 
 Array = NDArray[np.float64]
 
@@ -38,7 +39,9 @@ def plane_moduli(material: Material) -> PlaneModuli:
     return PlaneModuli(e / (1 - nu**2), nu / (1 - nu))
 
 
-def assemble(points: Array, triangles: NDArray[np.int64], moduli: PlaneModuli) -> tuple[csr_matrix, csr_matrix]:
+def assemble(
+    points: Array, triangles: NDArray[np.int64], moduli: PlaneModuli
+) -> tuple[csr_matrix, csr_matrix]:
     """Stiffness and mass (unit thickness, unit density) on P2 triangles; unknown 2 n + c is component c of node n.
 
     points: (n, 2) [m]; triangles: (m, 6), corners then mid-side nodes of edges 01, 12, 20.

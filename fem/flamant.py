@@ -32,9 +32,7 @@ class LineLoad:
         r = np.hypot(d[..., 0], d[..., 1])
         back = -self.branch
         omega = np.arctan2(back[0] * d[..., 1] - back[1] * d[..., 0], d @ back)
-        offset = np.arctan2(
-            self.into[0] * back[1] - self.into[1] * back[0], float(self.into @ back)
-        )
+        offset = np.arctan2(self.into[0] * back[1] - self.into[1] * back[0], float(self.into @ back))
         return d, r, omega + offset
 
     def displacement(self, x: Array, modulus: float, poisson: float) -> Array:

@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from gearbench.geometry.profile import Profile
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
+
+from gearbench.geometry.profile import Profile
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -91,9 +92,7 @@ def flank_coordinate(profile: Profile, points: Array) -> Array:
     return np.where(on, s, np.nan)
 
 
-def flank_trace(
-    profile: Profile, points: Array, edges: Indices, s: Array, side: int
-) -> csr_matrix:
+def flank_trace(profile: Profile, points: Array, edges: Indices, s: Array, side: int) -> csr_matrix:
     """Matrix (len(s), unknowns) that gives the displacement along the inward normal at arc lengths s.
 
     side 0: working flank (counter-clockwise), side 1: back flank (its mirror image).

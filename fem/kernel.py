@@ -6,10 +6,11 @@ from math import log
 from typing import NamedTuple
 
 import numpy as np
-from gearbench.fem.body import CondensedGear
-from numba import njit
 from numpy.typing import NDArray
 from scipy.interpolate import RectBivariateSpline, make_interp_spline
+
+from gearbench.fem.body import CondensedGear
+from gearbench.fem.compiled import compiled
 
 Array = NDArray[np.float64]
 
@@ -51,20 +52,23 @@ def make_kernel(gear: CondensedGear) -> Kernel:
     pieces = [(arc_from, gear.s[arc_from], arc_to), (flank_from, zeta, zeta_to)]
 
     def resample(table: Array) -> Array:
-        return np.array(
-            [
-                np.block(
-                    [
+        return (
+            np.array(
+                [
+                    np.block(
                         [
-                            RectBivariateSpline(xi, xj, k[np.ix_(i, j)], kx=3, ky=3, s=0)(ti, tj)
-                            for j, xj, tj in pieces
+                            [
+                                RectBivariateSpline(xi, xj, k[np.ix_(i, j)], kx=3, ky=3, s=0)(ti, tj)
+                                for j, xj, tj in pieces
+                            ]
+                            for i, xi, ti in pieces
                         ]
-                        for i, xi, ti in pieces
-                    ]
-                )
-                for k in table
-            ]
-        ) / gear.face_width
+                    )
+                    for k in table
+                ]
+            )
+            / gear.face_width
+        )
 
     def resample_modes(table: Array) -> Array:
         if not len(table):
@@ -86,7 +90,7 @@ def make_kernel(gear: CondensedGear) -> Kernel:
     )
 
 
-@njit(cache=True)
+@compiled
 def grid_position(kernel: Kernel, s: float) -> float:
     """Position of arc length s on the grid, in grid steps, clipped to the grid."""
     if s > kernel.s_end:
@@ -95,7 +99,7 @@ def grid_position(kernel: Kernel, s: float) -> float:
     return ARC_POINTS + min(zeta / kernel.zeta_max, 1.0) * (FLANK_POINTS - 1)
 
 
-@njit(cache=True)
+@compiled
 def lagrange(t: float):  # type: ignore[no-untyped-def]
     """Cubic Lagrange weights at t for nodes 0, 1, 2, 3."""
     return (
@@ -106,7 +110,7 @@ def lagrange(t: float):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(cache=True)
+@compiled
 def first_node(x: float) -> int:
     """First of the four nodes of the piece that holds grid position x."""
     if x < ARC_POINTS:
@@ -114,7 +118,7 @@ def first_node(x: float) -> int:
     return min(max(int(x) - 1, ARC_POINTS), POINTS - 4)
 
 
-@njit(cache=True)
+@compiled
 def table_at(table: Array, x: float, y: float) -> float:
     """Bicubic value of a (n, n) table at grid positions x, y."""
     i, j = first_node(x), first_node(y)
@@ -126,7 +130,7 @@ def table_at(table: Array, x: float, y: float) -> float:
     return total
 
 
-@njit(cache=True)
+@compiled
 def row_at(row: Array, x: float) -> float:
     """Cubic value of a (n,) row at grid position x."""
     j = first_node(x)
@@ -134,7 +138,7 @@ def row_at(row: Array, x: float) -> float:
     return b0 * row[j] + b1 * row[j + 1] + b2 * row[j + 2] + b3 * row[j + 3]
 
 
-@njit(cache=True)
+@compiled
 def cross_flexibility(
     kernel: Kernel, side_load: int, s_load: float, side: int, s: float, teeth_apart: int
 ) -> float:

@@ -10,9 +10,10 @@ from math import acos, atan2, cos, hypot, pi, sin, sqrt, tan
 from typing import NamedTuple
 
 import numpy as np
+
+from gearbench.fem.compiled import compiled
 from gearbench.geometry.pair import Pair
 from gearbench.geometry.profile import Profile
-from numba import njit
 
 
 class Tooth(NamedTuple):
@@ -77,7 +78,7 @@ def teeth_of(pair: Pair) -> tuple[Tooth, Tooth]:
     return tooth_of(pair.driver, alpha), tooth_of(pair.driven, alpha)
 
 
-@njit(cache=True)
+@compiled
 def edge_contact(slave: Tooth, master: Tooth, c_slave: float, c_master: float, dx: float, dy: float):  # type: ignore[no-untyped-def]
     """Gap of the slave's tip edge to the master's involute (physics 4): rb (angle + inv(alpha) - psi_b) - radius.
 
@@ -102,7 +103,7 @@ def edge_contact(slave: Tooth, master: Tooth, c_slave: float, c_master: float, d
     return to_centre - slave.edge_radius, phi, foot, lever, moved
 
 
-@njit(cache=True)
+@compiled
 def contact(t1: Tooth, t2: Tooth, c1: float, c2: float, dx: float, dy: float) -> Contact:
     """Contact of one pair: c1, c2 are the teeth's angles in their frames; (dx, dy) from driver to driven centre."""
     a = hypot(dx, dy)
@@ -137,7 +138,7 @@ def contact(t1: Tooth, t2: Tooth, c1: float, c2: float, dx: float, dy: float) ->
     )
 
 
-@njit(cache=True)
+@compiled
 def pair_contact(
     t1: Tooth, t2: Tooth, side: int, tooth: int, theta1: float, theta2: float, dx: float, dy: float
 ) -> Contact:
@@ -150,6 +151,4 @@ def pair_contact(
         return contact(t1, t2, c1, t2.zero - theta2 + tooth * t2.pitch, dx, dy)
     c2 = t2.zero - theta2 + (tooth + 1) * t2.pitch
     k = contact(t1, t2, -c1, -c2, dx, -dy)
-    return Contact(
-        k.gap, k.slave, k.xi1, k.xi2, k.s1, k.s2, k.lever1, k.lever2, k.nx, -k.ny
-    )
+    return Contact(k.gap, k.slave, k.xi1, k.xi2, k.s1, k.s2, k.lever1, k.lever2, k.nx, -k.ny)

@@ -6,21 +6,22 @@ from math import acos, exp, log, pi, sin
 from typing import NamedTuple
 
 import numpy as np
-from gearbench.fem.body import CondensedGear
-from gearbench.fem.elasticity import plane_moduli
-from gearbench.fem.kernel import Kernel, cross_flexibility, lagrange, make_kernel
-from gearbench.fem.kinematics import Contact, Tooth, edge_contact, pair_contact, teeth_of
-from gearbench.fem.line import gap_to_master, line_contact, touching_point
-from gearbench.geometry.pair import Pair
-from gearbench.rig import Material
-from numba import njit
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
+
+from gearbench.fem.body import CondensedGear, rounded
+from gearbench.fem.compiled import compiled
+from gearbench.fem.elasticity import plane_moduli
+from gearbench.fem.kernel import Kernel, cross_flexibility, lagrange, make_kernel
+from gearbench.fem.kinematics import Contact, Tooth, pair_contact, teeth_of
+from gearbench.fem.line import gap_to_master, line_contact, touching_point
+from gearbench.geometry.pair import Pair, pair
+from gearbench.rig import Material, Rig
 
 Array = NDArray[np.float64]
 
 LOADS = 15
-LOAD_RANGE = (1e1, 1e7)  # per unit of common face width [N/m]
+LOAD_RANGE = (1e1, 3e6)  # per unit of common face width [N/m]
 PAIRS = 8  # tooth pairs, both flank sides together, that may touch at once
 
 
@@ -53,27 +54,32 @@ class Law(NamedTuple):
     reach2: float
 
 
-def make_law(pair: Pair, driver: CondensedGear, driven: CondensedGear, material: Material) -> Law:
-    """The contact law of a pair of condensed gears; the lines are solved here, once."""
-    t1, t2 = teeth_of(pair)
+def elastic_pair(rig: Rig) -> Pair:
+    """The pair as the elastic gears see it: a tip edge sharper than elasticity can resolve is rounded."""
+    return pair(rig.model_copy(update={"driver": rounded(rig.driver), "driven": rounded(rig.driven)}))
+
+
+def make_law(
+    meshing: Pair,
+    driver: CondensedGear,
+    driven: CondensedGear,
+    material: Material,
+    curves: tuple[Curve, Curve] | None = None,
+) -> Law:
+    """The contact law of an `elastic_pair` of condensed gears; the lines are solved here unless `curves` are given."""
+    t1, t2 = teeth_of(meshing)
     moduli = plane_moduli(material)
     half_plane = 4.0 / (pi * moduli.modulus * min(driver.face_width, driven.face_width))
-    a = pair.centre_distance
-    approach_max = 0.05 * pair.driver.module
+    a = meshing.centre_distance
+    approach_max = 0.05 * meshing.driver.module
     k1, k2 = make_kernel(driver), make_kernel(driven)
     reach1, reach2 = _edge_reach(t1, t2, a, approach_max), _edge_reach(t2, t1, a, approach_max)
-    return Law(
-        driver=t1,
-        driven=t2,
-        k1=k1,
-        k2=k2,
-        centre=a,
-        half_plane=half_plane,
-        curve1=_tabulate(t1, t2, k1, k2, half_plane, a, reach1),
-        curve2=_tabulate(t2, t1, k2, k1, half_plane, a, reach2),
-        reach1=reach1,
-        reach2=reach2,
-    )
+    if curves is None:
+        curves = (
+            _tabulate(t1, t2, k1, k2, half_plane, a, reach1),
+            _tabulate(t2, t1, k2, k1, half_plane, a, reach2),
+        )
+    return Law(t1, t2, k1, k2, a, half_plane, *curves, reach1, reach2)
 
 
 def _edge_reach(slave: Tooth, master: Tooth, a: float, separation: float) -> float:
@@ -93,7 +99,9 @@ def _edge_reach(slave: Tooth, master: Tooth, a: float, separation: float) -> flo
             return xi - step
 
 
-def _tabulate(slave: Tooth, master: Tooth, ks: Kernel, km: Kernel, half_plane: float, a: float, reach: float) -> Curve:
+def _tabulate(
+    slave: Tooth, master: Tooth, ks: Kernel, km: Kernel, half_plane: float, a: float, reach: float
+) -> Curve:
     """The line's approach at every node of load and roll length."""
     width = min(ks.width, km.width)
     logs = np.linspace(log(LOAD_RANGE[0] * width), log(LOAD_RANGE[1] * width), LOADS)
@@ -129,7 +137,7 @@ def _curve_nodes(slave: Tooth, middle: float, reach: float) -> Array:
     return np.unique(np.concatenate([[middle], below, above, [reach]]))
 
 
-@njit(cache=True)
+@compiled
 def curve_at(curve: Curve, xi: float, force: float):  # type: ignore[no-untyped-def]
     """Approach [m] and slope [m/N] from a tabulated curve."""
     nodes = curve.xi
@@ -147,12 +155,16 @@ def curve_at(curve: Curve, xi: float, force: float):  # type: ignore[no-untyped-
     y = (log(f) - curve.log_low) / curve.log_step
     if y < 0.0:
         first = (
-            h00 * curve.value[0, i] + h01 * curve.value[0, i + 1]
-            + h10 * curve.slope[0, i] + h11 * curve.slope[0, i + 1]
+            h00 * curve.value[0, i]
+            + h01 * curve.value[0, i + 1]
+            + h10 * curve.slope[0, i]
+            + h11 * curve.slope[0, i + 1]
         )
         second = (
-            h00 * curve.value[1, i] + h01 * curve.value[1, i + 1]
-            + h10 * curve.slope[1, i] + h11 * curve.slope[1, i + 1]
+            h00 * curve.value[1, i]
+            + h01 * curve.value[1, i + 1]
+            + h10 * curve.slope[1, i]
+            + h11 * curve.slope[1, i + 1]
         )
         c = first + y * (second - first)
         return c * f, c + (second - first) / curve.log_step
@@ -168,26 +180,26 @@ def curve_at(curve: Curve, xi: float, force: float):  # type: ignore[no-untyped-
     dc = 0.0
     for p in range(4):
         v = (
-            h00 * curve.value[j + p, i] + h01 * curve.value[j + p, i + 1]
-            + h10 * curve.slope[j + p, i] + h11 * curve.slope[j + p, i + 1]
+            h00 * curve.value[j + p, i]
+            + h01 * curve.value[j + p, i + 1]
+            + h10 * curve.slope[j + p, i]
+            + h11 * curve.slope[j + p, i + 1]
         )
         c += weights[p] * v
         dc += rates[p] * v
     return c * f, c + dc / curve.log_step
 
 
-@njit(cache=True)
+@compiled
 def lone_approach(law: Law, k: Contact, force: float):  # type: ignore[no-untyped-def]
     """Approach [m] of a lone pair under a force, and its slope [m/N]."""
-    driver_slave = k.slave == 1 or (
-        k.slave == 0 and law.driver.rho_end - k.xi1 < law.driven.rho_end - k.xi2
-    )
+    driver_slave = k.slave == 1 or (k.slave == 0 and law.driver.rho_end - k.xi1 < law.driven.rho_end - k.xi2)
     if driver_slave:
         return curve_at(law.curve1, k.xi1, force)
     return curve_at(law.curve2, k.xi2, force)
 
 
-@njit(cache=True)
+@compiled
 def reachable(law: Law, k: Contact) -> bool:
     """Whether both contact points lie on the modelled flanks."""
     if k.slave == 1 and k.xi1 > law.reach1:
@@ -197,7 +209,7 @@ def reachable(law: Law, k: Contact) -> bool:
     return k.s1 >= law.driver.s_form and k.s2 >= law.driven.s_form
 
 
-@njit(cache=True)
+@compiled
 def find_pairs(law: Law, theta1: float, theta2: float, dx: float, dy: float, margin: float):  # type: ignore[no-untyped-def]
     """Tooth pairs whose gap is below `margin`: sides, driver teeth, contacts (arrays of PAIRS) and their number.
 
@@ -219,7 +231,7 @@ def find_pairs(law: Law, theta1: float, theta2: float, dx: float, dy: float, mar
     return sides, teeth, found, n
 
 
-@njit(cache=True)
+@compiled
 def coupling(law: Law, sides, teeth, found, n: int) -> Array:  # type: ignore[no-untyped-def]
     """Approach at pair p per force on pair q [m/N]; zero diagonal (that is the pair's own curve)."""
     out = np.zeros((n, n))
@@ -237,7 +249,7 @@ def coupling(law: Law, sides, teeth, found, n: int) -> Array:  # type: ignore[no
     return out
 
 
-@njit(cache=True)
+@compiled
 def share_load(law: Law, found, c: Array, n: int, guess: Array):  # type: ignore[no-untyped-def]
     """Forces >= 0 of n pairs whose overlaps are given by their gaps: Newton with an active set.
 
@@ -296,9 +308,3 @@ def share_load(law: Law, found, c: Array, n: int, guess: Array):  # type: ignore
         if not changed and worst < 1e-11:
             return force, flex, active, True
     return force, flex, active, False
-
-
-@njit(cache=True)
-def edge_probe(slave: Tooth, master: Tooth, c_slave: float, c_master: float, dx: float, dy: float):  # type: ignore[no-untyped-def]
-    """`edge_contact`, exposed for tests."""
-    return edge_contact(slave, master, c_slave, c_master, dx, dy)

@@ -10,19 +10,21 @@ from __future__ import annotations
 from math import acos, atan2, cos, hypot, log, pi, sin, sqrt, tan
 
 import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.fem.compiled import compiled
 from gearbench.fem.kernel import Kernel, grid_position, table_at
 from gearbench.fem.kinematics import Tooth, edge_contact
-from numba import njit
-from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
 CELLS = 32
 CELLS_EDGE = 64
 REFITS = 4
+OUT_OF_REACH = 1.0  # [m]
 
 
-@njit(cache=True)
+@compiled
 def boundary_point(tooth: Tooth, s: float):  # type: ignore[no-untyped-def]
     """Point (x, y) of the working boundary at arc length s, in the tooth's frame (tooth centre at polar angle 0)."""
     if s <= tooth.s_end:
@@ -34,18 +36,21 @@ def boundary_point(tooth: Tooth, s: float):  # type: ignore[no-untyped-def]
     return x, tooth.edge_r * sin(tooth.edge_angle) + tooth.edge_radius * cos(phi)
 
 
-@njit(cache=True)
+@compiled
 def gap_to_master(slave: Tooth, master: Tooth, c: float, a: float, s: float):  # type: ignore[no-untyped-def]
     """Gap of the slave's boundary point s to the master's involute (up to the master's rotation) and its foot."""
     x, y = boundary_point(slave, s)
     vx = a - (x * cos(c) - y * sin(c))
     vy = -(x * sin(c) + y * cos(c))
     v = hypot(vx, vy)
+    if v <= master.rb:
+        # Inside the base circle there is no involute to touch; no load that gears carry reaches that far.
+        return OUT_OF_REACH, 0.0
     alpha = acos(master.rb / v)
     return master.rb * (atan2(vy, vx) + tan(alpha) - alpha), sqrt(v * v - master.rb**2)
 
 
-@njit(cache=True)
+@compiled
 def touching_point(slave: Tooth, master: Tooth, xi: float, a: float):  # type: ignore[no-untyped-def]
     """Slave angle, arc length and gap reference of the point that touches when the slave's roll length is xi."""
     phi = -acos((slave.rb + master.rb) / a)
@@ -59,7 +64,7 @@ def touching_point(slave: Tooth, master: Tooth, xi: float, a: float):  # type: i
     return c, s, reference
 
 
-@njit(cache=True)
+@compiled
 def window(slave: Tooth, master: Tooth, xi: float, a: float, force: float, compliance: float):  # type: ignore[no-untyped-def]
     """First guess of the loaded stretch of the slave's boundary, and whether it reaches the tip edge.
 
@@ -75,11 +80,15 @@ def window(slave: Tooth, master: Tooth, xi: float, a: float, force: float, compl
     if edge:
         narrow = sqrt(compliance * force * max(slave.edge_radius, 1e-6))
         low = min(s0, slave.s_end) - 2.0 * half
-        high = min(s0 + 2.5 * narrow, slave.s_tip) if s0 > slave.s_end else min(slave.s_end + 2.5 * narrow, slave.s_tip)
+        high = (
+            min(s0 + 2.5 * narrow, slave.s_tip)
+            if s0 > slave.s_end
+            else min(slave.s_end + 2.5 * narrow, slave.s_tip)
+        )
     return max(low, slave.s_form), high, edge
 
 
-@njit(cache=True)
+@compiled
 def cell_edges(low: float, high: float, n: int) -> Array:
     """Cells that shrink towards both ends, where the pressure changes fastest."""
     out = np.empty(n + 1)
@@ -89,7 +98,7 @@ def cell_edges(low: float, high: float, n: int) -> Array:
     return out
 
 
-@njit(cache=True)
+@compiled
 def log_integral(a: float, b: float) -> float:
     """Integral of ln|t| from a to b."""
     out = b - a
@@ -98,8 +107,10 @@ def log_integral(a: float, b: float) -> float:
     return fb - fa - out
 
 
-@njit(cache=True)
-def flexibility_matrix(k_slave: Kernel, k_master: Kernel, edges: Array, centres: Array, feet: Array, s0: float, half_plane: float) -> Array:
+@compiled
+def flexibility_matrix(
+    k_slave: Kernel, k_master: Kernel, edges: Array, centres: Array, feet: Array, s0: float, half_plane: float
+) -> Array:
     """Approach at cell centres per force on each cell [m/N]; half_plane: 2/(pi E* b).
 
     The force has one direction, the common normal at the touching point s0. On the tip edge the slave's own normal
@@ -129,7 +140,7 @@ def flexibility_matrix(k_slave: Kernel, k_master: Kernel, edges: Array, centres:
     return a
 
 
-@njit(cache=True)
+@compiled
 def complementarity(a: Array, h: Array, force: float):  # type: ignore[no-untyped-def]
     """Cell forces >= 0 with sum `force` and common approach u: u <= h + A q, equal where q > 0. Returns q, u, du/dF."""
     n = len(h)
@@ -175,8 +186,17 @@ def complementarity(a: Array, h: Array, force: float):  # type: ignore[no-untype
     return q, u, slope
 
 
-@njit(cache=True)
-def line_contact(slave: Tooth, master: Tooth, k_slave: Kernel, k_master: Kernel, half_plane: float, a: float, xi: float, force: float):  # type: ignore[no-untyped-def]
+@compiled
+def line_contact(
+    slave: Tooth,
+    master: Tooth,
+    k_slave: Kernel,
+    k_master: Kernel,
+    half_plane: float,
+    a: float,
+    xi: float,
+    force: float,
+):  # type: ignore[no-untyped-def]
     """Elastic approach of one pair under a force, neighbours unloaded.
 
     half_plane: 2/(pi E* b) [m/N]; a: centre distance; xi: roll length of the contact on the slave (beyond rho_end on

@@ -12,13 +12,15 @@ from math import cos, pi, sin
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
+
 from gearbench.fem.body import CondensedGear
+from gearbench.fem.compiled import compiled
 from gearbench.fem.kernel import grid_position, row_at
 from gearbench.fem.law import Law
+from gearbench.geometry.body import Body
 from gearbench.geometry.pair import Pair
 from gearbench.rig import Rig
-from numba import njit
-from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
@@ -28,7 +30,7 @@ class Machine(NamedTuple):
 
     rotations: 1 where the driven speed is prescribed, 2 where both gears turn freely. axis_x, axis_y: direction of the
     support motion. mass (d, d): constant part; damping, stiffness (d, d); hub1, hub2 (modes, 3): coupling mass of
-    modes and hub; inertia2 [kg m^2]; speed1, speed2: nominal speeds [rad/s]; beta [s]: stiffness-proportional damping.
+    modes and hub; speed1, speed2: nominal speeds [rad/s]; beta [s]: stiffness-proportional damping.
     """
 
     law: Law
@@ -42,27 +44,31 @@ class Machine(NamedTuple):
     hub2: Array
     omega1: Array
     omega2: Array
-    inertia2: float
     speed1: float
     speed2: float
     beta: float
 
 
 def make_machine(
-    rig: Rig, pair: Pair, law: Law, driver: CondensedGear, driven: CondensedGear, mesh_frequency: float
+    rig: Rig,
+    pair: Pair,
+    law: Law,
+    gears: tuple[CondensedGear, CondensedGear],
+    bodies: tuple[Body, Body],
+    mesh_frequency: float,
 ) -> Machine:
-    """The reduced model of a rig at a mesh frequency [Hz]."""
+    """The reduced model of a rig at a mesh frequency [Hz]; gears and bodies: driver first."""
+    driver, driven = gears
     rotations = 1 if rig.load.boundary == "speed" else 2
     n1, n2 = len(driver.omega), len(driven.omega)
     size = rotations + 2 + n1 + n2
     mass, damping, stiffness = (np.zeros((size, size)) for _ in range(3))
-    mass[0, 0] = driver.inertia
+    mass[0, 0] = bodies[0].inertia
     if rotations == 2:
-        mass[1, 1] = driven.inertia
-    for i, (gear, support) in enumerate(
-        ((driver, rig.support.driver), (driven, rig.support.driven)), start=rotations
-    ):
-        mass[i, i], damping[i, i], stiffness[i, i] = gear.mass, support.damping, support.stiffness
+        mass[1, 1] = bodies[1].inertia
+    for i, support in enumerate((rig.support.driver, rig.support.driven)):
+        k = rotations + i
+        mass[k, k], damping[k, k], stiffness[k, k] = bodies[i].mass, support.damping, support.stiffness
     modal = np.arange(rotations + 2, size)
     squares = np.concatenate([driver.omega, driven.omega]) ** 2
     mass[modal, modal] = 1.0
@@ -81,14 +87,13 @@ def make_machine(
         hub2=driven.mode_hub,
         omega1=driver.omega,
         omega2=driven.omega,
-        inertia2=driven.inertia,
         speed1=2 * pi * mesh_frequency / driver.teeth,
         speed2=2 * pi * mesh_frequency / driven.teeth,
         beta=rig.damping.beta,
     )
 
 
-@njit(cache=True)
+@compiled
 def mass_matrix(machine: Machine, theta1: float, theta2: float) -> Array:
     """Mass matrix at given gear angles: the modes turn with their gear, the supports do not."""
     m = machine.mass.copy()
@@ -111,7 +116,7 @@ def mass_matrix(machine: Machine, theta1: float, theta2: float) -> Array:
     return m
 
 
-@njit(cache=True)
+@compiled
 def angles(machine: Machine, d: Array, t: float):  # type: ignore[no-untyped-def]
     """Angles of driver and driven gear [rad] at time t."""
     theta1 = machine.speed1 * t + d[0]
@@ -119,7 +124,7 @@ def angles(machine: Machine, d: Array, t: float):  # type: ignore[no-untyped-def
     return theta1, theta2 + d[1] if machine.rotations == 2 else theta2
 
 
-@njit(cache=True)
+@compiled
 def contact_rows(machine: Machine, sides, teeth, found, n: int) -> Array:  # type: ignore[no-untyped-def]
     """Derivative of every pair's gap by the unknowns, which is also the direction of its force; (n, d)."""
     r = machine.rotations
@@ -150,7 +155,7 @@ def contact_rows(machine: Machine, sides, teeth, found, n: int) -> Array:  # typ
     return rows
 
 
-@njit(cache=True)
+@compiled
 def modal_flexibility(machine: Machine, rows: Array) -> Array:
     """Static flexibility of the kept modes between the pairs [m/N], which the residual must not count again."""
     n = rows.shape[0]
@@ -164,7 +169,7 @@ def modal_flexibility(machine: Machine, rows: Array) -> Array:
     return out
 
 
-@njit(cache=True)
+@compiled
 def reaction(machine: Machine, rows: Array, sides, found, force: Array, acceleration: Array, n: int) -> float:  # type: ignore[no-untyped-def]
     """Moment [N m] that holds the driven gear against its rotation where its speed is prescribed."""
     total = 0.0

@@ -99,9 +99,7 @@ def make_ring(
     solve = factorise(k_ii.tocsc())
     modes = solve(k_ic.toarray())
     condensed = stiffness[cuts][:, cuts].toarray() - k_ic.T @ modes
-    return Ring(
-        teeth, stiffness, mass, hub, low, high, inner, solve, modes, 0.5 * (condensed + condensed.T)
-    )
+    return Ring(teeth, stiffness, mass, hub, low, high, inner, solve, modes, 0.5 * (condensed + condensed.T))
 
 
 def ring_response(ring: Ring, forces: SectorField, hub: SectorField, wanted: Indices) -> Array:
@@ -195,9 +193,7 @@ def _harmonic_modes(ring: Ring, h: int, density: float, thickness: float, count:
     rows = np.concatenate([ring.low, ring.inner])
     tie = csr_matrix((np.ones(len(free), complex), (rows, np.arange(len(free)))), shape=(size, len(free)))
     turn = csr_matrix(ring.turn * phase)
-    expand = csr_matrix(
-        (np.ones(n_low), (ring.high, np.arange(n_low))), shape=(size, n_low)
-    )
+    expand = csr_matrix((np.ones(n_low), (ring.high, np.arange(n_low))), shape=(size, n_low))
     pick = csr_matrix((np.ones(n_low), (np.arange(n_low), np.arange(n_low))), shape=(n_low, len(free)))
     tie = tie + expand @ turn @ pick
     real = h == 0 or 2 * h == ring.teeth

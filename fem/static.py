@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from gearbench.fem.law import PAIRS, Law, coupling, find_pairs, share_load
-from numba import njit
 from numpy.typing import NDArray
+
+from gearbench.fem.compiled import compiled
+from gearbench.fem.law import PAIRS, Law, coupling, find_pairs, share_load
 
 Array = NDArray[np.float64]
 
@@ -40,8 +41,10 @@ class StaticCycle:
     load_share: Array
 
 
-@njit(cache=True)
-def position(law: Law, theta1: float, theta2: float, x1: float, y1: float, x2: float, y2: float, guess: Array):  # type: ignore[no-untyped-def]
+@compiled
+def position(
+    law: Law, theta1: float, theta2: float, x1: float, y1: float, x2: float, y2: float, guess: Array
+):  # type: ignore[no-untyped-def]
     """Equilibrium of all pairs at given hub positions.
 
     Returns number of pairs, sides, teeth, contacts, forces, active flags, driver torque, driven torque, tangent

@@ -9,11 +9,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.fem.compiled import compiled
 from gearbench.fem.law import PAIRS, Law, coupling, find_pairs, lone_approach
 from gearbench.fem.machine import Machine, angles, contact_rows, mass_matrix, modal_flexibility, reaction
 from gearbench.fem.static import MARGIN, ContactError, position, solve_torque
-from numba import njit
-from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
@@ -83,8 +84,13 @@ def initial_state(machine: Machine, torque: float, t: float = 0.0) -> State:
         dte = solve_torque(law, phase, torque, dte, machine.axis_x * y, machine.axis_y * y)
         theta1 = phase * law.driver.pitch + dte / law.driver.rb
         result = position(
-            law, theta1, phase * law.driven.pitch,
-            machine.axis_x * y[0], machine.axis_y * y[0], machine.axis_x * y[1], machine.axis_y * y[1],
+            law,
+            theta1,
+            phase * law.driven.pitch,
+            machine.axis_x * y[0],
+            machine.axis_y * y[0],
+            machine.axis_x * y[1],
+            machine.axis_y * y[1],
             np.zeros(PAIRS),
         )
         n, sides, teeth, found, force = result[:5]
@@ -117,7 +123,7 @@ def initial_state(machine: Machine, torque: float, t: float = 0.0) -> State:
     return State(t, d, zero, zero.copy(), load, sides, teeth, padded, residual, residual.copy(), n)
 
 
-@njit(cache=True)
+@compiled
 def history(state: State, sides, teeth, n: int):  # type: ignore[no-untyped-def]
     """Force and residuals of the listed pairs at the last step; NaN residuals mark pairs that are new."""
     force = np.zeros(n)
@@ -132,8 +138,10 @@ def history(state: State, sides, teeth, n: int):  # type: ignore[no-untyped-def]
     return force, residual, older
 
 
-@njit(cache=True)
-def solve_contact(law: Law, found, over: Array, hub: Array, cross: Array, memory: Array, gain: float, guess: Array, n: int):  # type: ignore[no-untyped-def]
+@compiled
+def solve_contact(
+    law: Law, found, over: Array, hub: Array, cross: Array, memory: Array, gain: float, guess: Array, n: int
+):  # type: ignore[no-untyped-def]
     """Forces >= 0 with over - hub F = gain (D(F) + cross F) + memory on loaded pairs; Newton with an active set.
 
     over (n,): overlap that free motion would give; hub (n, n): flexibility of hubs and modes over one step; cross:
@@ -190,7 +198,7 @@ def solve_contact(law: Law, found, over: Array, hub: Array, cross: Array, memory
     return force, False
 
 
-@njit(cache=True)
+@compiled
 def take_step(machine: Machine, scheme: Scheme, inverse: Array, mass: Array, state: State, torque: float):  # type: ignore[no-untyped-def]
     """One step under the driver torque at its end. Returns the new state, the reaction moment and success."""
     h, am, af = scheme.step, scheme.alpha_m, scheme.alpha_f
@@ -204,7 +212,9 @@ def take_step(machine: Machine, scheme: Scheme, inverse: Array, mass: Array, sta
     d0 = state.d + h * state.v + h * h * (0.5 - scheme.beta) * state.a
     v0 = state.v + h * (1 - scheme.gamma) * state.a
     rhs = (
-        (1 - af) * external + af * state.load - am * (mass @ state.a)
+        (1 - af) * external
+        + af * state.load
+        - am * (mass @ state.a)
         - machine.damping @ ((1 - af) * v0 + af * state.v)
         - machine.stiffness @ ((1 - af) * d0 + af * state.d)
     )
@@ -248,13 +258,22 @@ def take_step(machine: Machine, scheme: Scheme, inverse: Array, mass: Array, sta
         new_residual[p] = fresh[p]
         new_older[p] = residual[p]
     new = State(
-        t, d0 + scheme.beta * h * h * a, v0 + h * scheme.gamma * a, a, external + push,
-        sides, teeth, padded, new_residual, new_older, n,
+        t,
+        d0 + scheme.beta * h * h * a,
+        v0 + h * scheme.gamma * a,
+        a,
+        external + push,
+        sides,
+        teeth,
+        padded,
+        new_residual,
+        new_older,
+        n,
     )
     return new, reaction(machine, rows, sides, found, force, a, n), ok
 
 
-@njit(cache=True)
+@compiled
 def effective_inverse(machine: Machine, scheme: Scheme, mass: Array) -> Array:
     """Inverse of the scheme's effective mass matrix."""
     h, af = scheme.step, scheme.alpha_f
@@ -266,7 +285,7 @@ def effective_inverse(machine: Machine, scheme: Scheme, mass: Array) -> Array:
     return np.linalg.inv(effective)
 
 
-@njit(cache=True)
+@compiled
 def advance(machine: Machine, scheme: Scheme, state: State, torque: Array, substeps: int):  # type: ignore[no-untyped-def]
     """Integrate over len(torque) steps, `torque` being the driver torque at the end of each.
 

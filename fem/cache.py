@@ -1,0 +1,123 @@
+"""Condensed gears and contact curves on disk, under a hash of all that they depend on, our sources included."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import tempfile
+import zipfile
+from collections.abc import Callable, Mapping
+from dataclasses import Field, fields
+from functools import lru_cache
+from importlib.metadata import version
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.fem.body import CondensedGear, condense, rounded
+from gearbench.fem.compiled import cache_folder
+from gearbench.fem.law import Curve, Law, elastic_pair, make_law
+from gearbench.rig import Gear, Material, Rig
+from gearbench.rig.value import Value
+
+Arrays = dict[str, NDArray[Any]]
+
+SOURCES = ("gearbench.geometry", "gearbench.fem")
+LIBRARIES = ("numpy", "scipy", "scikit-fem", "gmsh")
+
+
+@lru_cache(maxsize=1)
+def code_digest() -> str:
+    """Hash of the sources and library versions that a condensed gear depends on."""
+    digest = hashlib.sha256()
+    for package in SOURCES:
+        spec = find_spec(package)
+        for folder in (spec.submodule_search_locations or []) if spec else []:
+            for source in sorted(Path(folder).glob("*.py")):
+                digest.update(source.read_bytes())
+    for library in LIBRARIES:
+        digest.update(f"{library} {version(library)}".encode())
+    return digest.hexdigest()
+
+
+def key_for(kind: str, values: Mapping[str, Value | float | int | str | None]) -> str:
+    """Name of a cache entry: hash of the code and of the values it is made from."""
+    plain = {k: v.model_dump(mode="json") if isinstance(v, Value) else v for k, v in values.items()}
+    text = json.dumps([kind, code_digest(), plain], sort_keys=True)
+    return f"{kind}-{hashlib.sha256(text.encode()).hexdigest()[:32]}"
+
+
+def cached(key: str, make: Callable[[], Arrays]) -> Arrays:
+    """Arrays stored under `key`, made and stored where absent; a damaged entry is made again.
+
+    A cache that cannot be written costs time, never the result.
+    """
+    path = cache_folder() / f"{key}.npz"
+    try:
+        with np.load(path, allow_pickle=False) as stored:
+            return {name: stored[name] for name in stored.files}
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile):
+        arrays = make()
+    temporary = None
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.NamedTemporaryFile(dir=path.parent, suffix=".tmp", delete=False) as handle:
+            temporary = handle.name
+            np.savez(handle, **arrays)
+        os.replace(temporary, path)
+    except OSError:
+        if temporary and os.path.exists(temporary):
+            os.unlink(temporary)
+    return arrays
+
+
+def stored_gear(
+    gear: Gear, material: Material, element_size: float | None = None, modes: int = 8
+) -> CondensedGear:
+    """`condense(...)`, from disk where it has been done before."""
+    key = _gear_key(gear, material, element_size, modes)
+    arrays = cached(
+        key,
+        lambda: {f.name: np.asarray(v) for f, v in _fields(condense(gear, material, element_size, modes))},
+    )
+    scalars = {"teeth": int, "last": int, "unknowns": int, "face_width": float}
+    return CondensedGear(**{name: scalars[name](v) if name in scalars else v for name, v in arrays.items()})
+
+
+def stored_law(
+    rig: Rig, gears: tuple[CondensedGear, CondensedGear], element_size: float | None = None, modes: int = 8
+) -> Law:
+    """`make_law(...)` of a rig's pair, its load-approach curves from disk where they have been solved before."""
+    meshing = elastic_pair(rig)
+    parts = [_gear_key(g, rig.material, element_size, modes) for g in (rig.driver, rig.driven)]
+    key = key_for("law", {"driver": parts[0], "driven": parts[1], "centre": meshing.centre_distance})
+    made: list[Law] = []
+
+    def make() -> Arrays:
+        made.append(make_law(meshing, *gears, rig.material))
+        curves = made[0].curve1, made[0].curve2
+        return {f"{name}{i}": np.asarray(v) for i, c in enumerate(curves) for name, v in c._asdict().items()}
+
+    arrays = cached(key, make)
+    if made:
+        return made[0]
+    names = ("xi", "value", "slope", "log_low", "log_step")
+    first, second = (
+        Curve(*(float(v) if v.ndim == 0 else v for v in (arrays[f"{name}{i}"] for name in names)))
+        for i in range(2)
+    )
+    return make_law(meshing, *gears, rig.material, curves=(first, second))
+
+
+def _fields(gear: CondensedGear) -> list[tuple[Field[Any], Any]]:
+    return [(f, getattr(gear, f.name)) for f in fields(gear)]
+
+
+def _gear_key(gear: Gear, material: Material, element_size: float | None, modes: int) -> str:
+    """Cache entry of a condensed gear; totals of mass and inertia do not enter the condensation."""
+    bare = rounded(gear).model_copy(update={"mass": None, "inertia": None, "bore_radius": 0.0})
+    return key_for("gear", {"gear": bare, "material": material, "element_size": element_size, "modes": modes})

@@ -1,0 +1,47 @@
+"""Compilation of the inner loops.
+
+Numba renews a cached function when its own file changes, not when a function that it calls in another file does. Each
+state of these sources therefore has a cache folder of its own: machine code can never be older than what it calls.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Callable
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numba
+
+
+def cache_folder() -> Path:
+    """GEARBENCH_CACHE, or `gearbench` in the user's cache folder."""
+    if own := os.environ.get("GEARBENCH_CACHE"):
+        return Path(own)
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "gearbench"
+
+
+@lru_cache(maxsize=1)
+def sources_digest() -> str:
+    """Hash of the Python sources of this package."""
+    digest = hashlib.sha256()
+    for source in sorted(Path(__file__).parent.glob("*.py")):
+        digest.update(source.name.encode() + b"\0" + source.read_bytes() + b"\0")
+    return digest.hexdigest()
+
+
+def compiled(function: Callable[..., Any]) -> Any:
+    """`numba.njit` that releases the interpreter lock and keeps its machine code in this state's folder.
+
+    Where that folder cannot be written the function is compiled anew in every process.
+    """
+    before = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = str(cache_folder() / f"compiled-{sources_digest()[:16]}")
+    try:
+        return numba.njit(function, cache=True, nogil=True)
+    except RuntimeError:
+        return numba.njit(function, nogil=True)
+    finally:
+        numba.config.CACHE_DIR = before
