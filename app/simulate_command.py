@@ -52,7 +52,7 @@ def simulate(
 
 
 def experiments(case: Case, out: Path) -> list[tuple[Case, Path]]:
-    """The case under each of its conditions with the record that belongs to it; without conditions, the case."""
+    """The case under each of its conditions (or as it is, without any) and the record that belongs to it."""
     if not case.conditions:
         return [(case, out)]
     names = [

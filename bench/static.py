@@ -1,0 +1,87 @@
+"""Static response over the mesh cycle, hub centres held: transmission error, stiffness, load sharing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from importlib import import_module
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from gearbench.bench.errors import BenchError
+from gearbench.bench.schedule import ProgressReport
+from gearbench.rig import Case
+
+Array = NDArray[np.float64]
+
+SCHEMA = "gearbench-static/1"
+
+Loads = tuple[str, Array]  # "N m" (driver torque) or "m" (dte), and values
+StaticSolver = Callable[[Case, Loads, Array, ProgressReport | None], xr.Dataset]
+
+# Each model: module and function. Imported on use: one brings in the mesher.
+SOLVERS: dict[str, tuple[str, str]] = {
+    "lumped": ("gearbench.bench.lumped_static", "static_lumped"),
+}
+
+
+def static(
+    case: Case,
+    model: str | None = None,
+    *,
+    torque: Sequence[float] = (),
+    dte: Sequence[float] = (),
+    positions: int = 64,
+    progress: ProgressReport | None = None,
+) -> xr.Dataset:
+    """Static response of the case's pair at `positions` uniform mesh phases.
+
+    Loads are driver torques [N m] or transmission errors [m]; without either, the experiment's mean torque.
+    Raises BenchError for bad loads or an unknown model, and what the solver raises.
+    """
+    name = model or case.simulation.model
+    if name not in SOLVERS:
+        raise BenchError(
+            f"simulation.model = {name!r} has no static solution, unlike {', '.join(sorted(SOLVERS))}"
+        )
+    if len(torque) and len(dte):
+        raise BenchError("static loads are torques or transmission errors: give one kind")
+    if positions < 2:
+        raise BenchError(f"positions = {positions} must be at least 2")
+    unit, values = ("m", dte) if len(dte) else ("N m", torque or (case.experiment.torque_mean,))
+    loads = np.asarray(values, dtype=float)
+    for load in loads:
+        if not (np.isfinite(load) and load > 0):
+            raise BenchError(f"static load = {load:g} {unit} must be greater than 0 {unit}")
+    module, function = SOLVERS[name]
+    solver: StaticSolver = getattr(import_module(module), function)
+    return solver(case, (unit, loads), np.arange(positions) / positions, progress)
+
+
+def static_dataset(
+    loads: Loads,
+    phase: Array,
+    *,
+    transmission_error: Array,
+    torque: Array,
+    secant: Array,
+    tangent: Array,
+    attributes: dict[str, object],
+    share: Array | None = None,
+) -> xr.Dataset:
+    """The results as a dataset (DESIGN: static.nc); arrays (load, phase), `share` (load, phase, pair)."""
+    unit, values = loads
+    fields = {
+        "transmission_error": (transmission_error, "m"),
+        "torque": (torque, "N m"),
+        "stiffness_secant": (secant, "N/m"),
+        "stiffness_tangent": (tangent, "N/m"),
+    }
+    variables: dict[str, tuple[tuple[str, ...], Array, dict[str, str]]] = {
+        name: (("load", "phase"), data, {"units": units}) for name, (data, units) in fields.items()
+    }
+    coordinates = {"load": ("load", values, {"units": unit}), "phase": ("phase", phase, {"units": "cycles"})}
+    if share is not None:
+        variables["load_share"] = (("load", "phase", "pair"), share, {"units": "1"})
+    return xr.Dataset(variables, coords=coordinates, attrs={"schema": SCHEMA, **attributes})
