@@ -48,7 +48,7 @@ def position(
     """Equilibrium of all pairs at given hub positions.
 
     Returns number of pairs, sides, teeth, contacts, forces, active flags, driver torque, driven torque, tangent
-    d(driver torque)/d theta1 and whether it converged.
+    d(driver torque)/d theta1, tangent flexibility between the pairs and whether it converged.
     """
     sides, teeth, found, n = find_pairs(law, theta1, theta2, law.centre + x2 - x1, y2 - y1, MARGIN)
     c = coupling(law, sides, teeth, found, n)
@@ -72,7 +72,7 @@ def position(
     if n > 0:
         rhs = np.where(active[:n], lever, 0.0)
         tangent = np.sum(lever * np.linalg.solve(system, rhs))
-    return n, sides, teeth, found, force, active, t1, t2, tangent, ok
+    return n, sides, teeth, found, force, active, t1, t2, tangent, flex, ok
 
 
 def static_cycle(
@@ -104,7 +104,7 @@ def static_cycle(
                 guess = solve_torque(law, float(phase), float(load), guess)
             else:
                 guess = float(load)
-            n, sides, teeth, _, force, _, a, b, slope, ok = _at(law, float(phase), guess)
+            n, sides, teeth, _, force, _, a, b, slope, _, ok = _at(law, float(phase), guess)
             if not ok:
                 raise ContactError(f"no static equilibrium at mesh phase {phase:g} and load {load:g}")
             te[i, j], t1[i, j], t2[i, j] = guess, a, b
@@ -144,7 +144,7 @@ def solve_torque(
     low, high = -opened, np.inf
     for _ in range(200):
         result = _at(law, phase, dte, x, y)
-        t1, slope, ok = result[6], result[8] / rb, result[9]
+        t1, slope, ok = result[6], result[8] / rb, result[10]
         if not ok:
             raise ContactError(f"no static equilibrium at mesh phase {phase:g} and DTE {dte:g} m")
         if abs(t1 - torque) <= 1e-12 * torque:

@@ -1,0 +1,213 @@
+"""A whole experiment on the reduced finite-element model: settle, record, and say how steady it was."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from gearbench.bench.attributes import rig_attributes
+from gearbench.bench.errors import BenchError
+from gearbench.bench.excitation import Torque, torque_realisation
+from gearbench.bench.reduced_rig import ElasticRig, choose_substeps, elastic_rig, machine_for
+from gearbench.bench.schedule import ProgressReport, Schedule, schedule
+from gearbench.bench.workers import realisations
+from gearbench.fem.machine import Machine
+from gearbench.fem.transient import CHANNELS, Scheme, State, advance, initial_state, make_scheme
+from gearbench.records import make_record, provenance
+from gearbench.rig import Case, Experiment, dump_case
+
+Array = NDArray[np.float64]
+
+CHUNK = 512  # samples between two looks at progress and interruption
+
+
+@dataclass(frozen=True)
+class Run:
+    """Recorded blocks of one realisation: samples (n, CHANNELS), torque (n,) [N m], start time [s] of the record,
+    period-to-period change of the DTE over its standard deviation."""
+
+    samples: Array
+    torque: Array
+    start: float
+    residual: float
+
+
+def simulate_reduced(case: Case, progress: ProgressReport | None = None) -> xr.Dataset:
+    """Record of the case's experiment on the reduced finite-element model, all recorded periods kept.
+
+    Raises GeometryError, BenchError or ContactError (each one sentence) for what cannot be simulated.
+    """
+    report = progress or (lambda fraction, note: None)
+    plan = schedule(case.experiment, case.rig)
+    elastic = elastic_rig(case.rig, case.simulation, lambda note: report(0.0, note))
+    machine = machine_for(elastic, plan.mesh_frequency)
+    substeps = choose_substeps(machine, case, plan)
+    scheme = make_scheme(1.0 / (plan.sampling_rate * substeps), case.simulation.spectral_radius)
+    report(0.0, f"integrating with {substeps} steps a sample")
+    start = initial_state(machine, case.experiment.torque_mean, -plan.block_samples / plan.sampling_rate)
+    total = case.experiment.realisations
+    done = np.zeros(total)
+    lock = threading.Lock()
+
+    def run(number: int) -> Run:
+        def tell(fraction: float) -> None:
+            with lock:
+                done[number] = fraction
+                report(float(done.mean()), f"realisation {number + 1} of {total}")
+
+        torque = torque_realisation(case.experiment, number)
+        return _run(machine, scheme, start, plan, case.experiment, torque, substeps, tell)
+
+    runs = realisations(run, total)
+    return _record(case, elastic, plan, runs, substeps)
+
+
+def _run(
+    machine: Machine,
+    scheme: Scheme,
+    state: State,
+    plan: Schedule,
+    experiment: Experiment,
+    torque: Torque,
+    substeps: int,
+    tell: Callable[[float], None],
+) -> Run:
+    """Settle for one block, then record until the wanted blocks follow one another without change."""
+    period = torque.sample(plan.samples_per_period * substeps)
+    # Entry k of the shifted signal is the torque at the end of step k.
+    fine = np.roll(np.tile(period, plan.block_periods), -1)
+    coarse = np.tile(period[::substeps], plan.block_periods)
+    # One block more than recorded shows the change from block to block where only one is wanted.
+    wanted = max(plan.blocks, 2)
+    budget = 1 + wanted
+    blocks: list[Array] = []
+    residual = np.inf
+    finished = 0
+    last = _sample(machine, state)
+    while len(blocks) < wanted:
+        state, samples = _block(
+            machine, scheme, state, fine, substeps, lambda f, n=finished: tell(min((n + f) / budget, 1.0))
+        )
+        # The last sample of a block is the first one of the next.
+        block, last = np.vstack([last[None], samples[:-1]]), samples[-1]
+        finished += 1
+        if finished == 1:
+            continue
+        blocks.append(block)
+        if len(blocks) == 2:
+            residual = _change(machine, blocks[0], blocks[1])
+            if residual > experiment.settling_tolerance:
+                settling = (finished - 1) * plan.block_periods
+                if settling >= experiment.settling_periods_max:
+                    raise BenchError(
+                        f"no steady state: after {settling} excitation periods the DTE still changes by"
+                        f" {residual:.3g} of its standard deviation from period to period"
+                        f" (experiment.settling_tolerance = {experiment.settling_tolerance:g}); raise"
+                        f" settling_periods_max = {experiment.settling_periods_max} or the damping"
+                    )
+                blocks.pop(0)
+                budget += 1
+    kept = blocks[len(blocks) - plan.blocks :]
+    duration = plan.block_samples / plan.sampling_rate
+    start = (finished - len(kept) - 1) * duration
+    return Run(np.vstack(kept), np.tile(coarse, plan.blocks), start, residual)
+
+
+def _sample(machine: Machine, state: State) -> Array:
+    """Channels of the initial state, which is never recorded: the first block only settles."""
+    return np.zeros(CHANNELS)
+
+
+def _block(
+    machine: Machine,
+    scheme: Scheme,
+    state: State,
+    torque: Array,
+    substeps: int,
+    tell: Callable[[float], None],
+) -> tuple[State, Array]:
+    """One block, in chunks between which progress is told and an interruption takes effect."""
+    parts = []
+    for at in range(0, len(torque), CHUNK * substeps):
+        piece = torque[at : at + CHUNK * substeps]
+        state, samples, failed = advance(machine, scheme, state, piece, substeps)
+        if failed >= 0:
+            raise BenchError(
+                f"contact was not found at t = {state.t:.6g} s; more simulation.substeps than {substeps} may help"
+            )
+        if not np.isfinite(samples).all():
+            raise BenchError(f"the integration diverged before t = {state.t:.6g} s")
+        parts.append(samples)
+        tell((at + len(piece)) / len(torque))
+    return state, np.vstack(parts)
+
+
+def _dte(machine: Machine, samples: Array) -> Array:
+    """DTE [m] but for the supports' part, whose period-to-period change the angles mirror."""
+    law = machine.law
+    return law.driver.rb * samples[:, 0] - law.driven.rb * samples[:, 1]
+
+
+def _change(machine: Machine, before: Array, after: Array) -> float:
+    first, second = _dte(machine, before), _dte(machine, after)
+    # Both gears advance by whole tooth pitches from block to block: the mean difference is rounding only.
+    scale = max(float(second.std()), 1e-6 * abs(float(second.mean())), np.finfo(float).tiny)
+    return float(np.abs(second - first).max()) / scale
+
+
+def _record(case: Case, elastic: ElasticRig, plan: Schedule, runs: list[Run], substeps: int) -> xr.Dataset:
+    samples = np.stack([run.samples for run in runs])
+    starts = {run.start for run in runs}
+    if len(starts) > 1:
+        # Later starts are whole blocks later: bring every record to the latest one's angles.
+        samples = _aligned(samples, runs, plan)
+    start = max(starts)
+    count = samples.shape[1]
+    phase = (start + np.arange(count) / plan.sampling_rate) * plan.mesh_frequency
+    channels = {
+        "torque_driver": np.stack([run.torque for run in runs]),
+        "torque_driven": samples[:, :, 4],
+        "angle_driver": samples[:, :, 0],
+        "angle_driven": samples[:, :, 1],
+        "y_driver": samples[:, :, 2],
+        "y_driven": samples[:, :, 3],
+        "mesh_phase": np.broadcast_to(phase, samples.shape[:2]),
+    }
+    settings = {
+        "model": "reduced",
+        "substeps": substeps,
+        "modes_driver": len(elastic.gears[0].omega),
+        "modes_driven": len(elastic.gears[1].omega),
+        "unknowns_driver": elastic.gears[0].unknowns,
+        "unknowns_driven": elastic.gears[1].unknowns,
+    }
+    attributes = {
+        **rig_attributes(case.rig, elastic.pair, elastic.bodies),
+        "sampling_rate": plan.sampling_rate,
+        "samples_per_period": plan.samples_per_period,
+        "periods": plan.blocks * plan.block_periods,
+        "mesh_period": plan.mesh_period,
+        "mesh_phase_origin": "geometry",
+        "torque_mean": case.experiment.torque_mean,
+        "settling_residual": max(run.residual for run in runs),
+        "settling_periods": round((start * plan.sampling_rate / plan.block_samples + 1) * plan.block_periods),
+        "contact_lost_samples": int(np.sum(samples[:, :, 5] == 0)),
+        "model": "reduced",
+        "substeps": substeps,
+        "provenance": provenance(dump_case(case), case.experiment.seed, settings),
+    }
+    return make_record(channels, attributes, start=start)
+
+
+def _aligned(samples: Array, runs: list[Run], plan: Schedule) -> Array:
+    latest = max(run.start for run in runs)
+    out = samples.copy()
+    for row, run in enumerate(runs):
+        out[row, :, 0] += (latest - run.start) * plan.speed_driver
+        out[row, :, 1] += (latest - run.start) * plan.speed_driven
+    return out

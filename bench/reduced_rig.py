@@ -1,0 +1,116 @@
+"""A rig made ready for the reduced finite-element model: gears condensed, contact tabulated, step chosen."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import ceil, pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.bench.errors import BenchError
+from gearbench.bench.schedule import ProgressReport, Schedule
+from gearbench.fem.body import CondensedGear
+from gearbench.fem.cache import stored_gear, stored_law
+from gearbench.fem.law import Law, elastic_pair
+from gearbench.fem.machine import Machine, contact_rows, make_machine, mass_matrix
+from gearbench.fem.static import position, static_cycle
+from gearbench.fem.transient import frequency_error, make_scheme
+from gearbench.geometry import Body, Pair, body
+from gearbench.rig import Case, Rig, Simulation
+
+Array = NDArray[np.float64]
+
+FREQUENCY_ERROR = 5e-4  # of the highest identified mode (physics, section 4)
+STEPS_PER_MESH_PERIOD = 200
+
+
+@dataclass(frozen=True)
+class ElasticRig:
+    """Pair, condensed gears and contact law of a rig; `bodies` hold the gears' total masses and inertias."""
+
+    rig: Rig
+    pair: Pair
+    gears: tuple[CondensedGear, CondensedGear]
+    bodies: tuple[Body, Body]
+    law: Law
+
+
+def elastic_rig(
+    rig: Rig, simulation: Simulation, progress: Callable[[str], None] | None = None
+) -> ElasticRig:
+    """Mesh, condense and tabulate, each from disk where it has been done before. Raises GeometryError."""
+    say = progress or (lambda note: None)
+    meshing = elastic_pair(rig)
+    density = rig.material.density
+    bodies = (
+        body(meshing.driver, rig.driver, density, "rig.driver"),
+        body(meshing.driven, rig.driven, density, "rig.driven"),
+    )
+    size, modes = simulation.element_size, simulation.modes
+    say("condensing the driver")
+    driver = stored_gear(rig.driver, rig.material, size, modes)
+    say("condensing the driven gear")
+    driven = stored_gear(rig.driven, rig.material, size, modes)
+    say("solving contact lines")
+    law = stored_law(rig, (driver, driven), size, modes)
+    return ElasticRig(rig, meshing, (driver, driven), bodies, law)
+
+
+def machine_for(elastic: ElasticRig, mesh_frequency: float) -> Machine:
+    """Equations of motion at a mesh frequency [Hz]."""
+    return make_machine(elastic.rig, elastic.pair, elastic.law, elastic.gears, elastic.bodies, mesh_frequency)
+
+
+def natural_frequencies(machine: Machine, torque: float, phase: float) -> Array:
+    """Natural frequencies [Hz] of the undamped rig, linearised about static equilibrium at a mesh phase."""
+    law = machine.law
+    dte = static_cycle(law, np.array([phase]), torque=[torque]).transmission_error[0, 0]
+    theta1 = phase * law.driver.pitch + dte / law.driver.rb
+    theta2 = phase * law.driven.pitch
+    n, sides, teeth, found, force, active, _, _, _, flex, _ = position(
+        law, theta1, theta2, 0.0, 0.0, 0.0, 0.0, np.zeros(8)
+    )
+    rows = contact_rows(machine, sides, teeth, found, n)[active[:n]]
+    # Modes are unknowns of their own here, so the pairs keep only the residual's flexibility.
+    modal = rows[:, machine.rotations + 2 :]
+    squares = np.diag(machine.stiffness)[machine.rotations + 2 :]
+    residual = flex[np.ix_(active[:n], active[:n])] - (modal / squares) @ modal.T
+    stiffness = machine.stiffness + rows.T @ np.linalg.solve(residual, rows)
+    mass = mass_matrix(machine, theta1, theta2)
+    values = np.linalg.eigvals(np.linalg.solve(mass, stiffness)).real
+    return np.sqrt(np.sort(np.maximum(values, 0.0))) / (2 * pi)
+
+
+def choose_substeps(machine: Machine, case: Case, plan: Schedule) -> int:
+    """Steps per sample, so that the highest mode within the identified band is off by at most FREQUENCY_ERROR.
+
+    Raises BenchError where the case asks for fewer.
+    """
+    band = case.identification.band or (
+        case.experiment.multisine.band
+        if case.experiment.multisine
+        else (0.0, case.experiment.sampling_rate / 2)
+    )
+    modes = np.concatenate(
+        [natural_frequencies(machine, case.experiment.torque_mean, phase) for phase in (0.0, 0.25, 0.5)]
+    )
+    inside = modes[modes <= band[1]]
+    highest = float(inside.max()) if len(inside) else band[1]
+    least = ceil(STEPS_PER_MESH_PERIOD / (plan.mesh_period * plan.sampling_rate))
+
+    def error(substeps: int) -> float:
+        step = 1.0 / (plan.sampling_rate * substeps)
+        return frequency_error(highest, make_scheme(step, case.simulation.spectral_radius))
+
+    needed = least
+    while error(needed) > FREQUENCY_ERROR:
+        needed = ceil(needed * 1.1)
+    asked = case.simulation.substeps
+    if asked and asked < needed:
+        raise BenchError(
+            f"simulation.substeps = {asked} is too few: a frequency error of at most {FREQUENCY_ERROR:.2%} at"
+            f" {highest:.0f} Hz and {STEPS_PER_MESH_PERIOD} steps a mesh period need {needed} (0 chooses them)"
+        )
+    return asked or needed
