@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 BLUE, ORANGE, GREEN, GREY = "#0b5c9e", "#d1600a", "#2d7d46", "#6b6b6b"
 SINGLE_ZONE = "#f3e3c3"
 
-_STYLE = {
+_STYLE: dict[Any, Any] = {
     "figure.dpi": 130,
     "savefig.dpi": 130,
     "font.size": 10,

@@ -20,9 +20,11 @@ SCHEMA = "gearbench-static/1"
 Loads = tuple[str, Array]  # "N m" (driver torque) or "m" (dte), and values
 StaticSolver = Callable[[Case, Loads, Array, ProgressReport | None], xr.Dataset]
 
-# Each model: module and function. Imported on use: one brings in the mesher.
+# Each model: module and function. Imported on use: one brings in Numba and the mesher.
 SOLVERS: dict[str, tuple[str, str]] = {
     "lumped": ("gearbench.bench.lumped_static", "static_lumped"),
+    "reduced": ("gearbench.bench.reduced_static", "static_reduced"),
+    "reduced": ("gearbench.bench.reduced_static", "static_reduced"),
 }
 
 
