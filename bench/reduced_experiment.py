@@ -5,6 +5,8 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
+from math import cos
 
 import numpy as np
 import xarray as xr
@@ -18,6 +20,7 @@ from gearbench.bench.schedule import ProgressReport, Schedule, schedule
 from gearbench.bench.workers import realisations
 from gearbench.fem.machine import Machine
 from gearbench.fem.transient import CHANNELS, Scheme, State, advance, initial_state, make_scheme
+from gearbench.geometry import Pair
 from gearbench.records import make_record, provenance
 from gearbench.rig import Case, Experiment, dump_case
 
@@ -28,8 +31,11 @@ CHUNK = 512  # samples between two looks at progress and interruption
 
 @dataclass(frozen=True)
 class Run:
-    """Recorded blocks of one realisation: samples (n, CHANNELS), torque (n,) [N m], start time [s] of the record,
-    period-to-period change of the DTE over its standard deviation."""
+    """Recorded blocks of one realisation.
+
+    samples (n, CHANNELS); torque (n,) [N m]; start [s] of the record, the simulation having begun one block before
+    0; residual: period-to-period change of the DTE over its standard deviation.
+    """
 
     samples: Array
     torque: Array
@@ -84,14 +90,13 @@ def _run(
     coarse = np.tile(period[::substeps], plan.block_periods)
     # One block more than recorded shows the change from block to block where only one is wanted.
     wanted = max(plan.blocks, 2)
-    budget = 1 + wanted
     blocks: list[Array] = []
     residual = np.inf
     finished = 0
-    last = _sample(machine, state)
+    last = np.zeros(CHANNELS)  # belongs to the first block, which only settles
     while len(blocks) < wanted:
         state, samples = _block(
-            machine, scheme, state, fine, substeps, lambda f, n=finished: tell(min((n + f) / budget, 1.0))
+            machine, scheme, state, fine, substeps, partial(_tell_part, tell, finished, wanted)
         )
         # The last sample of a block is the first one of the next.
         block, last = np.vstack([last[None], samples[:-1]]), samples[-1]
@@ -111,16 +116,15 @@ def _run(
                         f" settling_periods_max = {experiment.settling_periods_max} or the damping"
                     )
                 blocks.pop(0)
-                budget += 1
     kept = blocks[len(blocks) - plan.blocks :]
     duration = plan.block_samples / plan.sampling_rate
     start = (finished - len(kept) - 1) * duration
     return Run(np.vstack(kept), np.tile(coarse, plan.blocks), start, residual)
 
 
-def _sample(machine: Machine, state: State) -> Array:
-    """Channels of the initial state, which is never recorded: the first block only settles."""
-    return np.zeros(CHANNELS)
+def _tell_part(tell: Callable[[float], None], finished: int, wanted: int, fraction: float) -> None:
+    """Progress while block number `finished` runs; further settling blocks leave it at the end."""
+    tell(min((finished + fraction) / (1 + wanted), 1.0))
 
 
 def _block(
@@ -138,7 +142,8 @@ def _block(
         state, samples, failed = advance(machine, scheme, state, piece, substeps)
         if failed >= 0:
             raise BenchError(
-                f"contact was not found at t = {state.t:.6g} s; more simulation.substeps than {substeps} may help"
+                f"contact was not found at t = {state.t:.6g} s; more simulation.substeps than {substeps} may"
+                " help"
             )
         if not np.isfinite(samples).all():
             raise BenchError(f"the integration diverged before t = {state.t:.6g} s")
@@ -147,15 +152,21 @@ def _block(
     return state, np.vstack(parts)
 
 
-def _dte(machine: Machine, samples: Array) -> Array:
-    """DTE [m] but for the supports' part, whose period-to-period change the angles mirror."""
+def _dte(case: Case, meshing: Pair, samples: Array) -> Array:
+    """DTE [m] of samples (..., CHANNELS), see physics, section 1."""
+    along = 1.0 if case.rig.support.direction == "line-of-action" else cos(meshing.working_pressure_angle)
+    turned = meshing.driver.base_radius * samples[..., 0] - meshing.driven.base_radius * samples[..., 1]
+    return np.asarray(turned + along * (samples[..., 2] - samples[..., 3]))
+
+
+def _rolled(machine: Machine, samples: Array) -> Array:
+    """What the angles alone contribute to the DTE [m]."""
     law = machine.law
-    return law.driver.rb * samples[:, 0] - law.driven.rb * samples[:, 1]
+    return np.asarray(law.driver.rb * samples[:, 0] - law.driven.rb * samples[:, 1])
 
 
 def _change(machine: Machine, before: Array, after: Array) -> float:
-    first, second = _dte(machine, before), _dte(machine, after)
-    # Both gears advance by whole tooth pitches from block to block: the mean difference is rounding only.
+    first, second = _rolled(machine, before), _rolled(machine, after)
     scale = max(float(second.std()), 1e-6 * abs(float(second.mean())), np.finfo(float).tiny)
     return float(np.abs(second - first).max()) / scale
 
@@ -169,14 +180,18 @@ def _record(case: Case, elastic: ElasticRig, plan: Schedule, runs: list[Run], su
     start = max(starts)
     count = samples.shape[1]
     phase = (start + np.arange(count) / plan.sampling_rate) * plan.mesh_frequency
+    torque = np.stack([run.torque for run in runs])
     channels = {
-        "torque_driver": np.stack([run.torque for run in runs]),
+        "torque_driver": torque,
         "torque_driven": samples[:, :, 4],
         "angle_driver": samples[:, :, 0],
         "angle_driven": samples[:, :, 1],
         "y_driver": samples[:, :, 2],
         "y_driven": samples[:, :, 3],
         "mesh_phase": np.broadcast_to(phase, samples.shape[:2]),
+        "dte": _dte(case, elastic.pair, samples),
+        # Also where both gears turn freely, since the driven torque then balances the driver's.
+        "force": torque / elastic.pair.driver.base_radius,
     }
     settings = {
         "model": "reduced",

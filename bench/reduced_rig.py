@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.bench.errors import BenchError
-from gearbench.bench.schedule import ProgressReport, Schedule
+from gearbench.bench.schedule import Schedule
 from gearbench.fem.body import CondensedGear
 from gearbench.fem.cache import stored_gear, stored_law
 from gearbench.fem.law import Law, elastic_pair
@@ -64,12 +64,15 @@ def machine_for(elastic: ElasticRig, mesh_frequency: float) -> Machine:
 
 
 def natural_frequencies(machine: Machine, torque: float, phase: float) -> Array:
-    """Natural frequencies [Hz] of the undamped rig, linearised about static equilibrium at a mesh phase."""
+    """Frequencies [Hz] of the rig's oscillatory eigenvalues, linearised about static equilibrium.
+
+    The supports' damping is part of them: it may be so strong that their motions do not oscillate.
+    """
     law = machine.law
     dte = static_cycle(law, np.array([phase]), torque=[torque]).transmission_error[0, 0]
     theta1 = phase * law.driver.pitch + dte / law.driver.rb
     theta2 = phase * law.driven.pitch
-    n, sides, teeth, found, force, active, _, _, _, flex, _ = position(
+    n, sides, teeth, found, _, active, _, _, _, flex, _ = position(
         law, theta1, theta2, 0.0, 0.0, 0.0, 0.0, np.zeros(8)
     )
     rows = contact_rows(machine, sides, teeth, found, n)[active[:n]]
@@ -79,12 +82,19 @@ def natural_frequencies(machine: Machine, torque: float, phase: float) -> Array:
     residual = flex[np.ix_(active[:n], active[:n])] - (modal / squares) @ modal.T
     stiffness = machine.stiffness + rows.T @ np.linalg.solve(residual, rows)
     mass = mass_matrix(machine, theta1, theta2)
-    values = np.linalg.eigvals(np.linalg.solve(mass, stiffness)).real
-    return np.sqrt(np.sort(np.maximum(values, 0.0))) / (2 * pi)
+    size = len(mass)
+    system = np.block(
+        [
+            [np.zeros((size, size)), np.eye(size)],
+            [-np.linalg.solve(mass, stiffness), -np.linalg.solve(mass, machine.damping)],
+        ]
+    )
+    values = np.linalg.eigvals(system)
+    return np.sort(np.abs(values[values.imag > 1e-6 * np.abs(values)])) / (2 * pi)
 
 
 def choose_substeps(machine: Machine, case: Case, plan: Schedule) -> int:
-    """Steps per sample, so that the highest mode within the identified band is off by at most FREQUENCY_ERROR.
+    """Steps per sample that keep the highest mode within the identified band to FREQUENCY_ERROR.
 
     Raises BenchError where the case asks for fewer.
     """
@@ -110,7 +120,8 @@ def choose_substeps(machine: Machine, case: Case, plan: Schedule) -> int:
     asked = case.simulation.substeps
     if asked and asked < needed:
         raise BenchError(
-            f"simulation.substeps = {asked} is too few: a frequency error of at most {FREQUENCY_ERROR:.2%} at"
-            f" {highest:.0f} Hz and {STEPS_PER_MESH_PERIOD} steps a mesh period need {needed} (0 chooses them)"
+            f"simulation.substeps = {asked} is too few: a frequency error of at most"
+            f" {FREQUENCY_ERROR:.2%} at {highest:.0f} Hz and {STEPS_PER_MESH_PERIOD} steps a mesh period need"
+            f" {needed} (0 chooses them)"
         )
     return asked or needed

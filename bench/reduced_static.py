@@ -18,7 +18,10 @@ Array = NDArray[np.float64]
 def static_reduced(
     case: Case, loads: Loads, phase: Array, progress: ProgressReport | None = None
 ) -> xr.Dataset:
-    """Static cycle with tip-edge contact, backlash and load sharing. Raises GeometryError and ContactError."""
+    """Static cycle with tip-edge contact, backlash and load sharing.
+
+    Raises GeometryError, and ContactError where contact leaves the modelled flanks.
+    """
     report = progress or (lambda fraction, note: None)
     elastic = elastic_rig(case.rig, case.simulation, lambda note: report(0.0, note))
     unit, values = loads

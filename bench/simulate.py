@@ -16,6 +16,7 @@ Simulator = Callable[[Case, ProgressReport | None], xr.Dataset]
 # Each model: module and function. Imported on use: one brings in Numba, the other the mesher.
 SIMULATORS: dict[str, tuple[str, str]] = {
     "lumped": ("gearbench.bench.lumped_experiment", "simulate_lumped"),
+    "reduced": ("gearbench.bench.reduced_experiment", "simulate_reduced"),
 }
 
 

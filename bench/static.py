@@ -24,7 +24,6 @@ StaticSolver = Callable[[Case, Loads, Array, ProgressReport | None], xr.Dataset]
 SOLVERS: dict[str, tuple[str, str]] = {
     "lumped": ("gearbench.bench.lumped_static", "static_lumped"),
     "reduced": ("gearbench.bench.reduced_static", "static_reduced"),
-    "reduced": ("gearbench.bench.reduced_static", "static_reduced"),
 }
 
 
