@@ -16,6 +16,7 @@ from gearbench.mesh_command import mesh
 from gearbench.options import expand_lists
 from gearbench.schema_command import schema
 from gearbench.simulate_command import simulate
+from gearbench.static_command import static
 
 app = typer.Typer(
     name="gearbench",
@@ -26,7 +27,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
-for command in (simulate, check, mesh, cases, schema):
+for command in (simulate, static, check, mesh, cases, schema):
     app.command()(command)
 
 # Options that take several numbers in a row.
