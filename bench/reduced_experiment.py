@@ -33,8 +33,8 @@ CHUNK = 512  # samples between two looks at progress and interruption
 class Run:
     """Recorded blocks of one realisation.
 
-    samples (n, CHANNELS); torque (n,) [N m]; start [s] of the record, the simulation having begun one block before
-    0; residual: period-to-period change of the DTE over its standard deviation.
+    samples (n, CHANNELS); torque (n,) [N m]; start [s] of the record, the simulation having begun one block
+    before 0; residual: period-to-period change of the DTE over its standard deviation.
     """
 
     samples: Array

@@ -6,13 +6,29 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from gearbench.bench.reduced_rig import elastic_rig
+from gearbench.bench.errors import BenchError
+from gearbench.bench.reduced_rig import ElasticRig, elastic_rig
 from gearbench.bench.schedule import ProgressReport
 from gearbench.bench.static import Loads, static_dataset
+from gearbench.fem.law import EDGE_SEPARATION, LOAD_RANGE
 from gearbench.fem.static import static_cycle
 from gearbench.rig import Case
 
 Array = NDArray[np.float64]
+
+
+def _check_range(elastic: ElasticRig, unit: str, values: Array) -> None:
+    """Refuse loads beyond the range for which contact lines have been solved."""
+    if unit == "N m":
+        width = min(gear.face_width for gear in elastic.gears)
+        most, key = LOAD_RANGE[1] * width * elastic.pair.driver.base_radius, "torque"
+    else:
+        most, key = EDGE_SEPARATION * elastic.pair.driver.module, "transmission error"
+    if values.max() > most:
+        raise BenchError(
+            f"static {key} = {values.max():g} {unit} is more than the modelled flanks can carry: at most"
+            f" {most:.4g} {unit} for this pair"
+        )
 
 
 def static_reduced(
@@ -25,9 +41,13 @@ def static_reduced(
     report = progress or (lambda fraction, note: None)
     elastic = elastic_rig(case.rig, case.simulation, lambda note: report(0.0, note))
     unit, values = loads
-    by_kind = {"torque": values} if unit == "N m" else {"dte": values}
+    _check_range(elastic, unit, values)
     cycle = static_cycle(
-        elastic.law, phase, **by_kind, progress=lambda done: report(done, "static equilibrium")
+        elastic.law,
+        phase,
+        torque=values.tolist() if unit == "N m" else None,
+        dte=values.tolist() if unit == "m" else None,
+        progress=lambda done: report(done, "static equilibrium"),
     )
     return static_dataset(
         loads,

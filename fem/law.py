@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 
 LOADS = 15
 LOAD_RANGE = (1e1, 3e6)  # per unit of common face width [N/m]
+EDGE_SEPARATION = 0.05  # of the module: how far a tip edge is followed beyond the line of action
 PAIRS = 8  # tooth pairs, both flank sides together, that may touch at once
 
 
@@ -71,7 +72,7 @@ def make_law(
     moduli = plane_moduli(material)
     half_plane = 4.0 / (pi * moduli.modulus * min(driver.face_width, driven.face_width))
     a = meshing.centre_distance
-    approach_max = 0.05 * meshing.driver.module
+    approach_max = EDGE_SEPARATION * meshing.driver.module
     k1, k2 = make_kernel(driver), make_kernel(driven)
     reach1, reach2 = _edge_reach(t1, t2, a, approach_max), _edge_reach(t2, t1, a, approach_max)
     if curves is None:
