@@ -11,12 +11,14 @@ import typer
 from gearbench import __version__
 from gearbench.cases_command import cases
 from gearbench.check_command import check
+from gearbench.compare_command import compare
 from gearbench.failure import INTERRUPTED, guarded
 from gearbench.mesh_command import mesh
 from gearbench.options import expand_lists
 from gearbench.schema_command import schema
 from gearbench.simulate_command import simulate
 from gearbench.static_command import static
+from gearbench.validate_command import validate
 
 app = typer.Typer(
     name="gearbench",
@@ -27,7 +29,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
-for command in (simulate, static, check, mesh, cases, schema):
+for command in (simulate, static, compare, check, mesh, cases, schema, validate):
     app.command()(command)
 
 # Options that take several numbers in a row.
