@@ -84,4 +84,4 @@ def _growth(triangles: Index, area: Array) -> float:
     owner = np.repeat(np.arange(len(triangles)), 3)[order]
     shared = np.flatnonzero(np.diff(middle[order]) == 0)
     ratio = np.sqrt(area[owner[shared]] / area[owner[shared + 1]])
-    return float(np.maximum(ratio, 1 / ratio).max())
+    return float(np.maximum(ratio, 1 / ratio).max(initial=1.0))

@@ -83,12 +83,16 @@ def test_pair_is_placed_in_contact_without_overlap(gear: MakeGear, rig: MakeRig)
     # The pitch point lies on both flanks: between it and the nearest boundary edge's chord is at most its
     # bulge.
     point = np.array([meshing.pitch_radii[0], 0.0])
-    for number in (0, 1):
+    # The driver's material lies behind the common normal there, the driven gear's before it.
+    normal = np.array([np.sin(meshing.working_pressure_angle), np.cos(meshing.working_pressure_angle)])
+    for number, side in ((0, -1), (1, 1)):
         corners = plane.points[plane.triangles[plane.gear == number]]
-        closest = np.inf
+        closest, nearest = np.inf, 0
         for i, j in ((0, 1), (1, 2), (2, 0)):
             a, b = corners[:, i], corners[:, j]
             t = np.clip(np.einsum("ij,ij->i", point - a, b - a) / np.einsum("ij,ij->i", b - a, b - a), 0, 1)
             gap = np.linalg.norm(a + t[:, None] * (b - a) - point, axis=1)
-            closest = min(closest, gap.min())
+            if gap.min() < closest:
+                closest, nearest = gap.min(), int(gap.argmin())
         assert closest < 1e-6
+        assert side * ((corners[nearest, :3].mean(axis=0) - point) @ normal) > 0
