@@ -48,6 +48,10 @@ def folder() -> Path:
 
 def checks() -> list[Check]:
     """Every check of the modules rows_*.py in `folder()`, in the order of the files' names."""
+    # The checks share helpers with the tests.
+    shared = str(folder().parent)
+    if shared not in sys.path:
+        sys.path.append(shared)
     found: list[Check] = []
     for path in sorted(folder().glob("rows_*.py")):
         found.extend(_load(path))

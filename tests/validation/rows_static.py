@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
+
 from gearbench.fem.body import condense
 from gearbench.fem.law import Law, elastic_pair, make_law
 from gearbench.fem.static import static_cycle
@@ -65,9 +66,7 @@ def mesh_halved() -> float:
     """Largest change of TE when the elements of both gears are halved."""
     worst = 0.0
     for name in RIGS:
-        te = [
-            static_cycle(law(name, n), PHASES, torque=[torque(name)]).transmission_error for n in (1, 2)
-        ]
+        te = [static_cycle(law(name, n), PHASES, torque=[torque(name)]).transmission_error for n in (1, 2)]
         worst = max(worst, float(np.abs(te[0] / te[1] - 1).max()))
     return worst
 
@@ -75,9 +74,7 @@ def mesh_halved() -> float:
 def zones(name: str) -> list[tuple[float, float]]:
     """A span of phases well inside single, and one well inside double contact."""
     meshing: Pair = elastic_pair(RIGS[name])
-    start, stop = (
-        (rho - meshing.rho_pitch[0]) / meshing.base_pitch for rho in meshing.active_driver
-    )
+    start, stop = ((rho - meshing.rho_pitch[0]) / meshing.base_pitch for rho in meshing.active_driver)
     # Contact runs from start to stop; single contact lies between stop - 1 and start + 1.
     margin = 0.12
     double = (start + margin, stop - 1 - margin)

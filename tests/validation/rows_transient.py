@@ -7,12 +7,13 @@ from functools import cache
 from math import cos
 
 import numpy as np
+from numpy.typing import NDArray
+
 from gearbench.bench.reduced_rig import ElasticRig, elastic_rig, machine_for
 from gearbench.fem.static import static_cycle
 from gearbench.fem.transient import advance, initial_state, make_scheme
 from gearbench.rig import Gear, Rig, Simulation, Support, Supports
 from gearbench.validation import Check
-from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
@@ -45,7 +46,11 @@ def quasi_static() -> float:
     assert failed < 0
     law = bench.law
     along = cos(bench.pair.working_pressure_angle)
-    dte = law.driver.rb * samples[:, 0] - law.driven.rb * samples[:, 1] + along * (samples[:, 2] - samples[:, 3])
+    dte = (
+        law.driver.rb * samples[:, 0]
+        - law.driven.rb * samples[:, 1]
+        + along * (samples[:, 2] - samples[:, 3])
+    )
     chosen = np.arange(15, steps, 16)
     phases = frequency * (chosen + 1) / rate
     still = static_cycle(law, phases, torque=[torque]).transmission_error[0]
@@ -91,5 +96,12 @@ def real_time() -> float:
 CHECKS = [
     Check("transient-quasi-static", "slow transient against static TE", 1e-3, "", quasi_static),
     Check("transient-order", "order of the time integration", 1.9, "", integration_order, least=True),
-    Check("transient-real-time", "rig time over wall time, 65 536 steps a second", 1.0, "", real_time, least=True),
+    Check(
+        "transient-real-time",
+        "rig time over wall time, 65 536 steps a second",
+        1.0,
+        "",
+        real_time,
+        least=True,
+    ),
 ]
