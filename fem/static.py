@@ -142,6 +142,8 @@ def solve_torque(
     opened = float(np.abs(y).sum() + np.abs(x).sum())
     dte = guess if guess > 0 else opened + torque / rb / 1e8
     low, high = -opened, np.inf
+    # Gaps are differences of angles that grow with the phase: below this the DTE is rounding.
+    finest = 1e-15 * (1.0 + abs(phase) * law.driver.pitch) * rb
     for _ in range(200):
         result = _at(law, phase, dte, x, y)
         t1, slope, ok = result[6], result[8] / rb, result[10]
@@ -153,7 +155,7 @@ def solve_torque(
         step = dte + (torque - t1) / slope if slope > 0 else dte + opened + abs(dte)
         if not low < step < high:
             step = 0.5 * (low + high) if np.isfinite(high) else dte + opened + abs(dte)
-        if abs(step - dte) <= 1e-15 * abs(dte) or (np.isfinite(high) and high - low <= 1e-15 * abs(high)):
+        if abs(step - dte) <= finest or (np.isfinite(high) and high - low <= finest):
             return step
         dte = step
     raise ContactError(f"the DTE at mesh phase {phase:g} and {torque:g} N m did not converge")
