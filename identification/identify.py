@@ -1,0 +1,220 @@
+"""Identification of a time-varying frequency response from records: the one public function."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from gearbench.identification.accuracy import Accuracy, RecordRule, expected_accuracy, record_rule
+from gearbench.identification.frf import make_frf
+from gearbench.identification.local_solve import LpmError
+from gearbench.identification.lpm import LpmResult, local_polynomial
+from gearbench.identification.modes import itf_modes
+from gearbench.identification.periodic import itf_from_htf
+from gearbench.identification.record_spectra import record_spectra
+from gearbench.identification.regression import Window
+from gearbench.identification.selection import LADDER, choose_window
+from gearbench.identification.spectra import Spectra
+
+Progress = Callable[[float, str], None]
+
+# About this many output frequencies unless a step is given.
+OUTPUT_LINES = 1500
+# Results beyond this expected error carry a warning.
+DOUBTFUL = 0.1
+# Missing branches beyond this part of the ITF are named.
+MISSING = 0.03
+
+
+@dataclass(frozen=True)
+class IdentificationSettings:
+    """How to identify. None: chosen from the record.
+
+    method "lpm"; `harmonics` L (branches on each side), `order` R, `window` n (half-width in lines); `band`
+    [Hz]: output frequencies (default: the excited band); `step`: lines between them; `phases`: of the ITF;
+    `transient`: "estimate" polynomials for it, "none", or "auto": only where the record does not prove its
+    steady state; `modes`: at most that many.
+    """
+
+    method: Literal["lpm"] = "lpm"
+    harmonics: int | None = None
+    order: int | None = None
+    window: int | None = None
+    band: tuple[float, float] | None = None
+    step: int | None = None
+    phases: int = 256
+    transient: Literal["auto", "estimate", "none"] = "auto"
+    modes: int | None = None
+
+    def __post_init__(self) -> None:
+        if self.method != "lpm":
+            raise LpmError(f"method = {self.method!r} is unknown; the only method is 'lpm'")
+        if self.transient not in ("auto", "estimate", "none"):
+            raise LpmError(f"transient = {self.transient!r} must be 'auto', 'estimate' or 'none'")
+        limits = {"harmonics": 0, "order": 0, "window": 1, "step": 1, "phases": 1, "modes": 0}
+        for name, least in limits.items():
+            value = getattr(self, name)
+            if value is not None and value < least:
+                raise LpmError(f"{name} = {value} must be at least {least}")
+        if self.order and self.window and self.order > 2 * self.window:
+            raise LpmError(f"order = {self.order} needs window = {self.window} of at least {-(-self.order // 2)}")
+        if self.band is not None and not 0 <= self.band[0] < self.band[1]:
+            raise LpmError(f"band = {self.band[0]:g}-{self.band[1]:g} Hz must rise from at least 0")
+
+
+def identify(
+    records: Sequence[xr.Dataset],
+    settings: IdentificationSettings | None = None,
+    *,
+    progress: Progress | None = None,
+) -> xr.Dataset:
+    """Frequency response (schema gearbench-frf/1, kind "identified") of records that are realisations of one condition.
+
+    Reports `progress(fraction, message)`. Raises SpectraError, TransmissionError or LpmError (all
+    ValueError) with one sentence when the records do not fit together or cannot support the request.
+    """
+    settings = settings or IdentificationSettings()
+    report = progress or (lambda fraction, message: None)
+    report(0.0, "spectra")
+    sidebands = settings.harmonics if settings.harmonics is not None else LADDER[-1]
+    spectra, excited, notes = record_spectra(
+        records, top=settings.band[1] if settings.band else None, sidebands=sidebands
+    )
+    band = settings.band or excited
+    lines = output_lines(spectra, band, excited, settings.step)
+    transient = settings.transient == "estimate" or (settings.transient == "auto" and not spectra.steady)
+    report(0.1, "choosing branches, order and window")
+    window = choose_window(
+        spectra,
+        lines,
+        transient=transient,
+        harmonics=settings.harmonics,
+        order=settings.order,
+        half_width=settings.window,
+    )
+    result = local_polynomial(spectra, lines, window, progress=lambda part, message: report(0.2 + 0.7 * part, message))
+    report(0.9, "modes")
+    frf = _dataset(spectra, settings, window, result, notes)
+    report(1.0, "identified")
+    return frf
+
+
+def output_lines(
+    spectra: Spectra, band: tuple[float, float], excited: tuple[float, float], step: int | None
+) -> NDArray[np.int64]:
+    """Output lines inside the band: multiples of `step`, by default about OUTPUT_LINES of them.
+
+    A step that divides d, or is a multiple of it, lets branches share rows. Raises LpmError for a band that
+    the record does not excite.
+    """
+    spacing, d = spectra.spacing, spectra.mesh_lines
+    slack = 1e-9 + 2.0  # the outermost lines may just miss a round band limit
+    if band[0] < excited[0] - slack * spacing or band[1] > excited[1] + slack * spacing:
+        raise LpmError(f"band {band[0]:g}-{band[1]:g} Hz leaves the excited band {excited[0]:g}-{excited[1]:g} Hz")
+    first = max(1, int(np.ceil(max(band[0], excited[0]) / spacing - 1e-6)))
+    last = int(np.floor(min(band[1], excited[1]) / spacing + 1e-6))
+    if step is None:
+        wanted = max(1, (last - first + 1) // OUTPUT_LINES)
+        step = max(s for s in range(1, wanted + 1) if d % s == 0 or s % d == 0)
+    lines = np.arange(-(-first // step) * step, last + 1, step)
+    if lines.size < 3:
+        raise LpmError(
+            f"band {band[0]:g}-{band[1]:g} Hz holds {lines.size} line(s) at a step of {step * spacing:g} Hz; at least 3"
+            " are needed"
+        )
+    return lines
+
+
+def _dataset(
+    spectra: Spectra,
+    settings: IdentificationSettings,
+    window: Window,
+    result: LpmResult,
+    notes: list[str],
+) -> xr.Dataset:
+    frequency = np.asarray(result.lines * spectra.spacing, dtype=float)
+    response = itf_from_htf(result.htf, settings.phases)
+    variance = result.itf_variance(settings.phases)
+    modes = itf_modes(frequency, response, variance, modes=settings.modes)
+    accuracy = expected_accuracy(result, _relative_noise(spectra, result))
+    rule = record_rule(spectra, window.harmonics, window.order, *modes)
+    warnings = [*notes, *_warnings(accuracy, rule, spectra)]
+    attributes: dict[str, Any] = {
+        "method": settings.method,
+        "settings": json.dumps(asdict(settings)),
+        "harmonics": window.harmonics,
+        "order": window.order,
+        "window": window.half_width,
+        "transient": "estimated" if window.transient else "none",
+        "unknowns": result.unknowns,
+        "equations": result.equations,
+        "windows": result.windows,
+        "condition_number": result.condition,
+        "residual": result.residual,
+        "variance_error": accuracy.variance,
+        "truncation_error": accuracy.truncation,
+        "expected_error": accuracy.expected,
+        "expected_error_bound": accuracy.bound,
+        "variance_sampled": result.variance_sampled,
+        "variance_cross_terms": result.cross_terms,
+        "mesh_frequency": spectra.mesh_lines * spectra.spacing,
+        "mesh_lines": spectra.mesh_lines,
+        "realisations": spectra.realisations,
+        "joint_period": spectra.duration,
+        "periods_averaged": spectra.periods,
+        "warnings": "\n".join(warnings),
+    }
+    if rule is not None:
+        attributes |= {
+            "record_duration": rule.duration,
+            "record_needed": rule.needed,
+            "bandwidth": rule.bandwidth,
+            "harmonics_needed": rule.harmonics_needed,
+        }
+    return make_frf(
+        "identified",
+        frequency=frequency,
+        itf=response,
+        htf=result.htf,
+        modes=modes,
+        itf_variance=variance,
+        htf_variance=result.htf_variance,
+        attributes=attributes,
+    )
+
+
+def _relative_noise(spectra: Spectra, result: LpmResult) -> float | None:
+    """Rms of the noise over the rms response in the output band, where repeated periods tell it."""
+    if spectra.noise is None:
+        return None
+    band = np.arange(result.lines[0], result.lines[-1] + 1)
+    if spectra.mesh_lines > 1:
+        band = band[band % spectra.mesh_lines != 0]
+    return float(np.sqrt(spectra.noise[band].mean() / np.mean(np.abs(spectra.dte[:, band]) ** 2)))
+
+
+def _warnings(accuracy: Accuracy, rule: RecordRule | None, spectra: Spectra) -> list[str]:
+    notes = []
+    if accuracy.expected > DOUBTFUL:
+        notes.append(
+            f"expected error of the ITF: {accuracy.expected:.0%} (variance {accuracy.variance:.0%}, missing branches"
+            f" {accuracy.truncation:.0%}); nothing has been smoothed"
+        )
+    if rule is not None and rule.factor > 1:
+        notes.append(
+            f"the record is short by a factor of {rule.factor:.3g}: {spectra.realisations} realisation(s) give"
+            f" {rule.duration:g} s of distinct excitation, {max(rule.harmonics, rule.harmonics_needed)} branches a side"
+            f" and a bandwidth of {rule.bandwidth:.3g} Hz ask for {rule.needed:.3g} s"
+        )
+    if rule is not None and rule.harmonics < rule.harmonics_needed and accuracy.truncation > MISSING:
+        notes.append(
+            f"{rule.harmonics} branches a side reach less far than the first mode travels;"
+            f" {rule.harmonics_needed} would"
+        )
+    return notes

@@ -1,0 +1,178 @@
+"""Random-phase multisines with flat amplitude and a clipped crest factor.
+
+Phases are drawn at random and then moved by alternating projection (Van der Ouderaa, Schoukens and
+Renneboog, IEEE Trans. Instrum. Meas. 37, 1988): clip the signal in time, keep the phases of its lines,
+restore the flat amplitude. Schroeder phases are refused: shifted copies of a chirp are nearly dependent,
+which makes the regression of a periodically time-varying system singular.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import irfft, next_fast_len, rfft
+
+Grid = Literal["full", "odd"]
+
+CLIPPING_ROUNDS = 400
+# Points per period of the highest line: coarse and fine clipping, and where the peak is measured.
+CLIPPING_POINTS = (4, 8)
+PEAK_POINTS = 32
+# How far above the wanted crest factor the result may end.
+CREST_SLACK = 1.02
+
+
+class MultisineError(ValueError):
+    """A multisine that cannot be made; the sentence names the value and the limit."""
+
+
+@dataclass(frozen=True)
+class MultisineSignal:
+    """One period of a multisine, u(t) = Re sum_k spectrum_k exp(2 pi j lines_k t / period).
+
+    `lines` (K,) are multiples of 1/period, `spectrum` (K,) complex amplitudes in the signal's unit;
+    `samples` points a period at `sampling_rate` [Hz]. Arrays are read-only.
+    """
+
+    samples: int
+    sampling_rate: float
+    lines: NDArray[np.int64]
+    spectrum: NDArray[np.complex128]
+
+    def __post_init__(self) -> None:
+        for value in (self.lines, self.spectrum):
+            value.setflags(write=False)
+
+    @property
+    def period(self) -> float:
+        """Period [s]."""
+        return self.samples / self.sampling_rate
+
+    @property
+    def frequency(self) -> NDArray[np.float64]:
+        """Frequencies of the lines [Hz]."""
+        return self.lines / self.period
+
+    @property
+    def rms(self) -> float:
+        """Root mean square."""
+        return float(np.sqrt(0.5 * np.sum(np.abs(self.spectrum) ** 2)))
+
+    @property
+    def peak(self) -> float:
+        """Largest magnitude of the continuous signal (to 0.5 % of the highest line's amplitude share)."""
+        return float(np.abs(self.sample(_points(int(self.lines[-1]), PEAK_POINTS))).max())
+
+    @property
+    def crest(self) -> float:
+        """Crest factor: peak over rms."""
+        return self.peak / self.rms
+
+    def sample(self, n: int, *, shift: float = 0.0) -> NDArray[np.float64]:
+        """The trigonometric sum, exact, at n equidistant points of one period: t = (i / n + shift) period.
+
+        n must exceed twice the highest line (MultisineError), or the points could not carry the signal.
+        """
+        highest = int(self.lines[-1])
+        if n <= 2 * highest:
+            raise MultisineError(f"{n} points a period cannot carry line {highest}; more than {2 * highest} can")
+        bins = np.zeros(n // 2 + 1, dtype=complex)
+        bins[self.lines] = 0.5 * n * self.spectrum * np.exp(2j * np.pi * self.lines * shift)
+        return irfft(bins, n)
+
+
+def random_phase_multisine(
+    samples: int,
+    sampling_rate: float,
+    band: tuple[float, float],
+    *,
+    amplitude: float | None = None,
+    rms: float | None = None,
+    grid: Grid = "full",
+    crest: float = 1.7,
+    phases: str = "random",
+    rng: np.random.Generator,
+) -> MultisineSignal:
+    """A multisine of equal amplitudes on the lines of `grid` inside `band` [Hz], crest factor at most about `crest`.
+
+    `samples` points a period at `sampling_rate` [Hz]; either `amplitude` (peak of the whole multisine) or
+    `rms` sets its size. Grid "full": every line of the band but 0; "odd": the odd ones. `phases` other than
+    "random" are refused. Raises MultisineError for an empty or unsampled band, sizes that are not positive,
+    or a crest factor that this number of lines cannot reach.
+    """
+    if phases != "random":
+        raise MultisineError(
+            f"phases = {phases!r} is refused: only random phases keep shifted spectra independent"
+            " (Schroeder phases give the time-varying regression a condition number near 1e12)"
+        )
+    if (amplitude is None) == (rms is None):
+        raise MultisineError("give exactly one of amplitude and rms of the multisine")
+    size = amplitude if amplitude is not None else rms
+    if not size or not np.isfinite(size) or size < 0:
+        raise MultisineError(f"the size of the multisine, {size!r}, must be positive")
+    lines = excited_lines(samples, sampling_rate, band, grid)
+    unit = _clip(lines, crest, rng)
+    signal = MultisineSignal(samples, sampling_rate, lines, unit)
+    peak = signal.peak
+    if peak > CREST_SLACK * crest * signal.rms:
+        raise MultisineError(
+            f"crest = {crest:g} cannot be reached with {lines.size} line(s) in {band[0]:g}-{band[1]:g} Hz;"
+            f" the best found is {peak / signal.rms:.3g}"
+        )
+    scale = size / (peak if amplitude is not None else signal.rms)
+    return MultisineSignal(samples, sampling_rate, lines, unit * scale)
+
+
+def excited_lines(samples: int, sampling_rate: float, band: tuple[float, float], grid: Grid) -> NDArray[np.int64]:
+    """Lines (multiples of sampling_rate / samples) inside `band` [Hz] that the grid excites; never line 0."""
+    if grid not in ("full", "odd"):
+        raise MultisineError(f"grid = {grid!r} is unknown; grids are 'full' and 'odd'")
+    low, high = band
+    if not (0 <= low <= high < sampling_rate / 2):
+        raise MultisineError(
+            f"band {low:g}-{high:g} Hz must rise and lie between 0 and half the sampling rate, {sampling_rate / 2:g} Hz"
+        )
+    spacing = sampling_rate / samples
+    first, last = int(np.ceil(low / spacing - 1e-9)), int(np.floor(high / spacing + 1e-9))
+    lines = np.arange(max(first, 1), last + 1)
+    lines = lines[lines % 2 == 1] if grid == "odd" else lines
+    if not lines.size:
+        raise MultisineError(f"band {low:g}-{high:g} Hz holds no line of grid {grid!r}; lines are {spacing:g} Hz apart")
+    return lines
+
+
+def _points(highest: int, per_period: int) -> int:
+    return int(next_fast_len(per_period * highest, real=True))
+
+
+def _clip(lines: NDArray[np.int64], crest: float, rng: np.random.Generator) -> NDArray[np.complex128]:
+    """Unit amplitudes whose phases give the lowest crest factor found, stopping once it is below `crest`."""
+    spectrum = np.exp(2j * np.pi * rng.random(lines.size))
+    for per_period in CLIPPING_POINTS:
+        spectrum = _clip_on_grid(lines, spectrum, crest, _points(int(lines[-1]), per_period))
+    return spectrum
+
+
+def _clip_on_grid(
+    lines: NDArray[np.int64], spectrum: NDArray[np.complex128], crest: float, points: int
+) -> NDArray[np.complex128]:
+    """One run of alternating projections with the signal seen at `points` points a period."""
+    bins = np.zeros(points // 2 + 1, dtype=complex)
+    rms = np.sqrt(0.5 * lines.size)
+    best, lowest = spectrum, np.inf
+    for _ in range(CLIPPING_ROUNDS):
+        bins[lines] = 0.5 * points * spectrum
+        signal = irfft(bins, points)
+        reached = float(np.abs(signal).max()) / rms
+        if reached < lowest:
+            best, lowest = spectrum, reached
+        if reached <= crest:
+            break
+        # Relative to the present peak at first, below the wanted one later: the rounds do not stall.
+        level = max(0.7 * reached, 0.85 * crest) * rms
+        moved = rfft(np.clip(signal, -level, level))[lines]
+        spectrum = moved / np.maximum(np.abs(moved), np.finfo(float).tiny)
+    return best
