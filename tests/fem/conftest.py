@@ -1,0 +1,115 @@
+"""Small gears, condensed once a session: z = 20 of 3 mm, meshed coarsely and kept with few modes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
+
+from gearbench.fem.body import CondensedGear, condense
+from gearbench.fem.elasticity import PlaneModuli, assemble, plane_moduli
+from gearbench.fem.law import Law, elastic_pair, make_law
+from gearbench.fem.ring import Ring, make_ring
+from gearbench.geometry.mesh import GearMesh, SectorMesh, full_mesh, sector_mesh
+from gearbench.geometry.pair import Pair
+from gearbench.geometry.profile import Profile, profile
+from gearbench.rig import Gear, Material, Rig, Support, Supports
+
+STEEL = Material()
+
+
+def make_gear(teeth: int = 20, **changes: Any) -> Gear:
+    data = {"module": 3e-3, "face_width": 0.02, "hub_radius": 0.35 * 3e-3 * teeth, "thinning": 40e-6}
+    return Gear(teeth=teeth, **{**data, **changes})
+
+
+def make_rig(driver: Gear, driven: Gear, **changes: Any) -> Rig:
+    support = Support(stiffness=2e8)
+    return Rig(driver=driver, driven=driven, support=Supports(driver=support, driven=support), **changes)
+
+
+@dataclass(frozen=True)
+class Coarse:
+    """A coarse ring and the same gear as one mesh, both of unit thickness and unit density."""
+
+    gear: Gear
+    shape: Profile
+    moduli: PlaneModuli
+    sector: SectorMesh
+    ring: Ring
+    full: GearMesh
+    stiffness: csr_matrix
+    mass: csr_matrix
+
+
+@dataclass(frozen=True)
+class Elastic:
+    """A rig with its condensed gears and contact law."""
+
+    rig: Rig
+    pair: Pair
+    gears: tuple[CondensedGear, CondensedGear]
+    law: Law
+
+
+def solve_elastic(rig: Rig, gears: tuple[CondensedGear, CondensedGear]) -> Elastic:
+    meshing = elastic_pair(rig)
+    return Elastic(rig, meshing, gears, make_law(meshing, *gears, rig.material))
+
+
+@pytest.fixture(scope="session")
+def gear() -> Callable[..., Gear]:
+    return make_gear
+
+
+@pytest.fixture(scope="session")
+def rig() -> Callable[..., Rig]:
+    return make_rig
+
+
+@pytest.fixture(scope="session")
+def coarse() -> Coarse:
+    gear = make_gear()
+    shape = profile(gear)
+    moduli = plane_moduli(STEEL)
+    sector = sector_mesh(shape, gear, gear.module / 3)
+    ring = make_ring(sector, gear.teeth, *assemble(sector.points, sector.triangles, moduli))
+    full = full_mesh(sector)
+    return Coarse(gear, shape, moduli, sector, ring, full, *assemble(full.points, full.triangles, moduli))
+
+
+@pytest.fixture(scope="session")
+def small() -> CondensedGear:
+    """z = 20, plane stress, four modes."""
+    return condense(make_gear(), STEEL, 0.5e-3, 4)
+
+
+@pytest.fixture(scope="session")
+def twins(small: CondensedGear) -> Elastic:
+    """Two equal gears of 20 teeth without backlash but for their thinning."""
+    return solve_elastic(make_rig(make_gear(), make_gear(), centre_distance=0.06), (small, small))
+
+
+@pytest.fixture(scope="session")
+def unequal(small: CondensedGear) -> Elastic:
+    """20 teeth drive 30."""
+    wheel = make_gear(30)
+    return solve_elastic(make_rig(make_gear(), wheel), (small, condense(wheel, STEEL, 0.5e-3, 4)))
+
+
+@pytest.fixture(scope="session")
+def rigid_motions() -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
+    """Translations in x and y and the rotation about the origin at points (n, 2): (2 n, 3)."""
+
+    def motions(points: NDArray[np.float64]) -> NDArray[np.float64]:
+        out = np.zeros((*points.shape, 3))
+        out[:, 0, 0] = out[:, 1, 1] = 1.0
+        out[:, 0, 2], out[:, 1, 2] = -points[:, 1], points[:, 0]
+        return out.reshape(-1, 3)
+
+    return motions

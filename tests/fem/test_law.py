@@ -1,0 +1,87 @@
+"""The tabulated law against the lines it was made from; coupling of tooth pairs through the gear bodies."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gearbench.fem.law import coupling, curve_at, find_pairs, lone_approach, make_law, share_load
+from gearbench.fem.line import line_contact
+
+
+@pytest.mark.parametrize("swap", [False, True])
+def test_curves_interpolate_the_contact_lines(unequal: Any, swap: bool) -> None:
+    """At random loads and places; on the tip edge the reach is 2e-3, elsewhere 3e-4."""
+    law = unequal.law
+    slave, master = (law.driven, law.driver) if swap else (law.driver, law.driven)
+    ks, km = (law.k2, law.k1) if swap else (law.k1, law.k2)
+    curve = law.curve2 if swap else law.curve1
+    rng = np.random.default_rng(11)
+    worst = {"inside": 0.0, "corner": 0.0}
+    for _ in range(60):
+        xi = rng.uniform(curve.xi[0], curve.xi[-1])
+        force = np.exp(rng.uniform(np.log(5.0), np.log(2e4)))
+        u = line_contact(slave, master, ks, km, law.half_plane, law.centre, xi, force)[0]
+        where = "corner" if xi > slave.rho_end - 2e-4 else "inside"
+        worst[where] = max(worst[where], abs(curve_at(curve, xi, force)[0] / u - 1))
+    assert worst["inside"] < 3e-4
+    assert worst["corner"] < 2e-3
+
+
+@pytest.mark.parametrize("force", [1e-4, 1.0, 300.0, 1e4])
+def test_curve_slope_is_its_derivative(unequal: Any, force: float) -> None:
+    curve = unequal.law.curve1
+    for xi in np.linspace(curve.xi[0], curve.xi[-1], 7):
+        u, slope = curve_at(curve, xi, force)
+        h = 1e-5 * force
+        found = (curve_at(curve, xi, force + h)[0] - curve_at(curve, xi, force - h)[0]) / (2 * h)
+        assert slope == pytest.approx(found, rel=1e-6)
+        assert u > 0 and slope > 0
+
+
+def test_coupling_is_reciprocal_on_both_flank_sides(twins: Any) -> None:
+    """Four pairs of which two touch with their back flanks: the flexibility matrix is symmetric (Maxwell)."""
+    law = twins.law
+    pitch = law.driver.pitch
+    sides, teeth, found, n = find_pairs(law, 0.3 * pitch, 0.3 * pitch, law.centre, 0.0, 2e-4)
+    assert n >= 3 and 0 in sides[:n] and 1 in sides[:n]
+    c = coupling(law, sides, teeth, found, n)
+    np.testing.assert_array_equal(np.diag(c), 0.0)
+    assert np.abs(c - c.T).max() < 1e-3 * np.abs(c).max()
+
+
+def test_the_same_force_on_both_flanks_of_a_tooth_squeezes_it_only(twins: Any) -> None:
+    """A push from behind moves the working flank outward, the one from the front inward."""
+    law = twins.law
+    sides, teeth, found, n = find_pairs(law, 0.0, 0.0, law.centre, 0.0, 2e-4)
+    c = coupling(law, sides, teeth, found, n)
+    front = next(p for p in range(n) if sides[p] == 0 and found[p].slave == 0 and teeth[p] == 0)
+    for p in range(n):
+        if sides[p] == 1 and teeth[p] in (0, -1):
+            # The driver's tooth 0 (or the driven one) is bent forward: overlap of the working flanks grows.
+            assert c[front, p] < 0
+
+
+def test_shared_load_closes_every_gap(unequal: Any) -> None:
+    """In double contact: the overlap of each pair is its own approach and the other's coupling."""
+    law = unequal.law
+    dte = 2e-5
+    theta1 = 0.5 * law.driver.pitch + dte / law.driver.rb
+    sides, teeth, found, n = find_pairs(law, theta1, 0.5 * law.driven.pitch, law.centre, 0.0, 2e-5)
+    c = coupling(law, sides, teeth, found, n)
+    force, flex, active, ok = share_load(law, found, c, n, np.zeros(n))
+    assert ok and active.sum() == 2
+    assert np.all(force[~active] == 0.0)
+    for p in range(n):
+        approach = lone_approach(law, found[p], force[p])[0] if active[p] else 0.0
+        left = -found[p].gap - c[p] @ force - approach
+        assert abs(left) < 1e-9 * dte if active[p] else left <= 1e-12
+    assert np.all(np.linalg.eigvalsh(0.5 * (flex + flex.T)) > 0)
+
+
+def test_given_curves_are_taken_over(twins: Any) -> None:
+    again = make_law(twins.pair, *twins.gears, twins.rig.material, curves=(twins.law.curve1, twins.law.curve2))
+    assert again.curve1 is twins.law.curve1
+    assert again.reach1 == twins.law.reach1
