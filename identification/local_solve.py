@@ -20,6 +20,8 @@ from gearbench.identification.spectra import Complexes, Floats
 CONDITION_LIMIT = 1e5
 # Largest one that is solved at all.
 SINGULAR = 1e9
+# Iterations of the condition estimate.
+POWER_ROUNDS = 30
 
 
 class LpmError(ValueError):
@@ -31,7 +33,7 @@ class LocalFit:
     """Solution of one window: coefficients (R+1, 2L+1), residual sum of squares, degrees of freedom.
 
     `factor` (unknowns, unknowns) is X with (A^H A)^-1 = X X^H, or None where it was not asked for;
-    `condition` the estimated condition number of the scaled regression (NaN without `factor`).
+    `condition` the estimated condition number of the scaled regression (NaN if not asked for).
     """
 
     coefficients: Complexes
@@ -42,7 +44,13 @@ class LocalFit:
 
 
 def solve_window(
-    regression: Regression, centre: int, window: Window, gram: Complexes, *, want_factor: bool
+    regression: Regression,
+    centre: int,
+    window: Window,
+    gram: Complexes,
+    *,
+    want_factor: bool,
+    want_condition: bool = False,
 ) -> LocalFit:
     """Fit the window around line `centre`; `gram` is its Gram matrix without the transients' part (overwritten).
 
@@ -55,6 +63,7 @@ def solve_window(
     freedom = regression.equations(centre, window) - int(keep.sum())
     data = regression.data(centre, window)
     scale = _scale(gram, keep)
+    kept = gram.copy() if want_condition else None
     # LAPACK reads the transposed, that is the conjugate matrix: solve the conjugate equations.
     triangle, failed = lapack.zpotrf(gram.T, lower=0, clean=0, overwrite_a=1)
     diagonal = np.abs(np.diagonal(triangle))
@@ -76,7 +85,8 @@ def solve_window(
     if want_factor:
         inverse, _ = lapack.ztrtri(triangle, lower=0)
         factor = np.triu(inverse).conj() * (scale * keep)[:, None]
-        condition = _condition(triangle)
+    if kept is not None:
+        condition = _condition(kept.conj(), triangle)
     return LocalFit(coefficients, _power(residual), freedom, factor, condition)
 
 
@@ -96,13 +106,22 @@ def _power(values: Complexes) -> float:
     return float(np.sum(values.real**2 + values.imag**2))
 
 
-def _condition(triangle: Complexes) -> float:
-    """Estimated condition number of the regression from the Cholesky factor of its Gram matrix (1-norm)."""
-    upper = np.triu(triangle)
-    largest = np.abs(upper.conj().T @ upper[:, -1:]).sum() if triangle.shape[0] == 1 else None
-    norm = largest if largest is not None else float(np.abs(upper).sum(axis=0).max()) ** 2
-    reciprocal, _ = lapack.zpocon(triangle, norm, uplo="U")
-    return float(np.sqrt(1.0 / max(reciprocal, np.finfo(float).tiny)))
+def _condition(gram: Complexes, triangle: Complexes) -> float:
+    """Condition number of the regression from its scaled Gram matrix and that one's (conjugate) Cholesky factor.
+
+    Power and inverse iteration from a fixed start: a lower estimate, within some per cent.
+    """
+    start = np.random.default_rng(0).standard_normal((2, gram.shape[0]))
+    largest = smallest = (start[0] + 1j * start[1]) / np.linalg.norm(start)
+    top = bottom = 1.0
+    for _ in range(POWER_ROUNDS):
+        largest = gram @ largest
+        top = float(np.linalg.norm(largest))
+        largest = largest / top
+        smallest, _ = lapack.zpotrs(triangle, smallest, lower=0)
+        bottom = float(np.linalg.norm(smallest))
+        smallest = smallest / bottom
+    return float(np.sqrt(top * bottom))
 
 
 def _solve_by_singular_values(

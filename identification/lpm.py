@@ -24,6 +24,8 @@ Lines = NDArray[np.int64]
 
 # Centres of one residue class that share a table of Gram matrices span at most this many mesh harmonics.
 TABLE_SPAN = 200
+# One window in so many tells its condition number.
+CONDITION_EVERY = 32
 # Work [floating-point operations] spent on variances before they are sampled, and before cross terms are left out.
 VARIANCE_WORK = 2e10
 CROSS_WORK = 1e11
@@ -166,10 +168,13 @@ class _Sweep:
         for done, (index, gram) in enumerate(self._grams()):
             centre, rows = self.centres[index]
             want = done % self.sampled == 0 or last is None
-            fit = solve_window(self.regression, centre, self.window, gram, want_factor=want)
+            # Condition numbers: of the edges, where branches fade out, and of some windows in between.
+            judged = index in (0, len(self.centres) - 1) or done % CONDITION_EVERY == 0
+            fit = solve_window(self.regression, centre, self.window, gram, want_factor=want, want_condition=judged)
+            if judged:
+                self.condition = max(self.condition, fit.condition)
             if want:
                 last = diagonal_variance(fit, self.window)
-                self.condition = max(self.condition, fit.condition)
             assert last is not None
             noise = self._account(fit, centre)
             self._read(fit, centre, rows, noise * last)

@@ -39,7 +39,8 @@ class _Pieces:
 def exact_itf(system: PeriodicSystem, frequency: ArrayLike, phase: ArrayLike, *, steps: int | None = None) -> Complexes:
     """Exact ITF (frequency, phase) [output/input] at the frequencies [Hz] and phases [cycles].
 
-    `steps` per period matters for trigonometric systems only (default: SMOOTH_STEP and one per grid point, good to about 1e-6);
+    `steps` per period matters for trigonometric systems only (default: SMOOTH_STEP, at least one per grid point;
+    good to about 1e-6);
     piecewise systems are exact. Raises PeriodicSystemError if the system is unstable (no steady state
     exists).
     """

@@ -136,10 +136,8 @@ def frozen_itf(system: PeriodicSystem, frequency: ArrayLike, phase: ArrayLike) -
     laplace = 2j * np.pi * np.atleast_1d(np.asarray(frequency, dtype=float))
     if np.linalg.cond(vectors).max() > 1e8:  # nearly defective: solve instead of diagonalising
         eye = np.eye(system.states)
-        return (
-            np.stack([np.einsum("pi,pi->p", c, np.linalg.solve(s * eye - a, b[:, :, None])[:, :, 0]) for s in laplace])
-            + system.d
-        )
+        states = [np.linalg.solve(s * eye - a, b[:, :, None])[:, :, 0] for s in laplace]
+        return np.asarray([np.einsum("pi,pi->p", c, x) + system.d for x in states], dtype=complex)
     residues = modal_c * modal_b
     result = np.full((laplace.size, a.shape[0]), system.d, dtype=complex)
     for mode in range(system.states):

@@ -157,7 +157,7 @@ class Regression:
         """The regression written down: (E, 2n+1, R+1, 2L+1), transients projected out."""
         reach = window.harmonics
         places = self.rows(centre, window)
-        inputs = np.stack([self.force[c][:, q - reach : q + reach + 1] for c, q in places], axis=1)
+        inputs: Complexes = np.stack([self.force[c][:, q - reach : q + reach + 1] for c, q in places], axis=1)
         full: Complexes = inputs[:, :, None, :] * window.basis()[None, :, :, None]
         if window.transient:
             basis = self.transient_basis(centre, window)
@@ -243,22 +243,21 @@ def prepare(spectra: Spectra, *, transient: bool, reach: int) -> Regression:
     """Sort the spectra by residue class; `reach` lines beyond the highest one are padded with zeros.
 
     Each record is shifted in time to mesh phase 0 at its start, so that branches refer to the mesh phase.
-    The mean force is set to 0: it belongs to the operating point.
     """
     d, highest = spectra.mesh_lines, spectra.highest
     phase = spectra.start_phase % 1.0
     same = bool(np.abs(spectra.relative()).max() < 1e-9) or not transient
     force, dte = (_two_sided(s, phase, d) for s in (spectra.force, spectra.dte))
-    force[:, highest] = 0.0
-    strength = np.sqrt(np.mean(np.abs(force) ** 2, axis=0))
-    excited = strength > EXCITATION_FLOOR * strength.max()
-    force[:, ~excited] = 0.0
     if spectra.realisations > 1 and same:
         force, dte = _rotate(force), _rotate(dte)
     lost = 1 if same else spectra.realisations
     operating = np.arange(-highest, highest + 1) % d == 0
     force[:lost, operating] = 0.0
     dte[:lost, operating] = 0.0
+    strength = np.sqrt(np.mean(np.abs(force) ** 2, axis=0))
+    # Line 0 holds what means differ by between records, which may be any size.
+    excited = strength > EXCITATION_FLOOR * np.delete(strength, highest).max()
+    force[:, ~excited] = 0.0
     origin = -((-highest - reach) // d)
     count = (highest + reach) // d + 1 + origin
     arrays = [np.zeros((d, spectra.realisations, count), dtype=complex) for _ in range(2)]
