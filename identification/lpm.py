@@ -83,7 +83,7 @@ def local_polynomial(
     require_lines(spectra, lines, window)
     regression = prepare(spectra, transient=window.transient, reach=window.harmonics * spectra.mesh_lines)
     rows = needed_rows(lines, window.harmonics, spectra.mesh_lines)
-    centres = plan_centres(rows, window, spectra.highest)
+    centres = plan_centres(rows, window, regression.last_row(window.harmonics))
     require_equations(regression, [centre for centre, _ in centres], window)
     return _Sweep(regression, window, lines, centres).run(progress)
 
@@ -127,8 +127,12 @@ def needed_rows(lines: Lines, harmonics: int, mesh_lines: int) -> Lines:
 
 
 def plan_centres(rows: Lines, window: Window, highest: int) -> list[tuple[int, Lines]]:
-    """Window centres and the rows each one serves: those in its middle third, more at the top edge of the spectra."""
+    """Window centres and the rows each one serves: those in its middle third, more at the top edge.
+
+    `highest`: last row that says anything; a window beyond it would be short of equations.
+    """
     inner = window.half_width // 3
+    highest = max(highest, int(rows[-1]))
     plan = []
     start = 0
     while start < rows.size:

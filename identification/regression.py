@@ -95,6 +95,14 @@ class Regression:
         """Mean of |U|^2 over experiments and excited lines [N^2]."""
         return float(np.sum(np.abs(self.force) ** 2) / (self.experiments * np.count_nonzero(self.excited)))
 
+    def last_row(self, harmonics: int) -> int:
+        """Highest line whose response any excited line reaches through `harmonics` branches."""
+        residue, position = np.nonzero(self.excited)
+        return min(
+            int(((position - self.origin) * self.mesh_lines + residue).max()) + harmonics * self.mesh_lines,
+            self.highest,
+        )
+
     def locate(self, line: int) -> tuple[int, int]:
         """Residue class and position inside it of a line."""
         return line % self.mesh_lines, line // self.mesh_lines + self.origin

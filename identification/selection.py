@@ -117,7 +117,10 @@ def _windows(
         widths = [half_width]
     for width in widths:
         window = Window(harmonics, order, width, transient)
-        work = len(plan_centres(rows, window, spectra.highest)) * 4 / 3 * window.unknowns**3
+        centres = plan_centres(rows, window, regression.last_row(harmonics))
+        if not all(_has_equations(regression, centre, window) for centre, _ in centres):
+            continue
+        work = len(centres) * 4 / 3 * window.unknowns**3
         if work <= WORK and harmonics * spectra.mesh_lines + max(width, lines[-1]) <= spectra.highest:
             yield window
 
@@ -142,14 +145,19 @@ def _supports(regression: Regression, centre: int, window: Window, half_width: i
     return regression.equations(centre, wide) >= MARGIN * unknowns + 1
 
 
+def _has_equations(regression: Regression, centre: int, window: Window) -> bool:
+    """Whether the window around a centre has an equation to spare."""
+    return regression.equations(centre, window) > int(regression.columns(centre, window).sum())
+
+
 def _predicted_error(regression: Regression, centres: list[int], window: Window) -> float:
     """Criterion of a candidate over the trial windows; infinite if one of them cannot be solved."""
     total = 0.0
     power = regression.input_power()
     at_centre = window.basis()[window.half_width]
     for wanted in centres:
-        centre = min(wanted, regression.highest - window.half_width)
-        if regression.equations(centre, window) <= int(regression.columns(centre, window).sum()):
+        centre = min(wanted, regression.last_row(window.harmonics) - window.half_width)
+        if not _has_equations(regression, centre, window):
             return np.inf
         gram = gram_of(regression.gram_table(centre, centre, window), 0, window)
         try:
