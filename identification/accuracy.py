@@ -87,6 +87,9 @@ def tail(htf: Complexes, variance: Floats) -> float:
     first, second = both[inner].mean(), both[outer].mean()
     if total <= 0 or first <= 0:
         return np.inf
+    # Where noise hides the last branches, they are taken to be as large as its uncertainty.
+    outside = np.abs(np.arange(-limit, limit + 1)) > 3 * limit / 4
+    second = max(second, float(np.sqrt(np.sum(variance[outside] ** 2)) / np.count_nonzero(outer)))
     if second <= 0:
         return 0.0
     slope = np.log(first / second) / np.log(order[outer].mean() / order[inner].mean())

@@ -20,9 +20,11 @@ from scipy.signal import find_peaks
 
 from gearbench.identification.periodic import Complexes, Floats, PeriodicSystem
 
-# A peak stands out of its surroundings by this factor in magnitude ...
+# A peak stands out of its surroundings by this factor in magnitude.
 PROMINENCE = 1.6
-# ... reaches this part of the phase's largest magnitude, and this multiple of its standard deviation.
+# A strongly damped mode makes a hump only: where nothing stands out so far, the highest hump of this factor counts.
+HUMP = 1.05
+# A peak reaches this part of the phase's largest magnitude of its phase, and this multiple of its standard deviation.
 HEIGHT = 0.03
 SIGNIFICANCE = 4.0
 # Peaks are looked for in |G|^2 averaged over this part of the frequency, to pass over noise.
@@ -88,9 +90,26 @@ def _peaks(frequency: Floats, response: Complexes, variance: Floats | None) -> n
     power = uniform_filter1d(np.abs(response) ** 2, width, mode="nearest")
     level = np.log(np.sqrt(np.maximum(power, 1e-300)))
     found, _ = find_peaks(level, prominence=np.log(PROMINENCE), height=level.max() + np.log(HEIGHT))
+    if not found.size:
+        found = _hump(level, power, width, variance)
     if variance is not None:
         found = found[power[found] > SIGNIFICANCE**2 * variance[found]]
     return found
+
+
+def _hump(level: Floats, power: Floats, width: int, variance: Floats | None) -> np.ndarray:
+    """Index of the most prominent hump of the log magnitude, if it stands out of the noise."""
+    found, about = find_peaks(level, prominence=np.log(HUMP), height=level.max() - np.log(2.0))
+    if not found.size:
+        return found
+    best = int(np.argmax(about["prominences"]))
+    chosen = found[best : best + 1]
+    if variance is not None:
+        # Smoothing over `width` lines takes this much of the noise away.
+        scatter = np.sqrt(variance[chosen[0]] / (power[chosen[0]] * width))
+        if about["prominences"][best] < SIGNIFICANCE * scatter:
+            return chosen[:0]
+    return chosen
 
 
 def _assign(peaks: list[np.ndarray], frequency: Floats, number: int) -> list[np.ndarray]:

@@ -2,7 +2,7 @@
 
 A few windows, placed where the response is, are fitted with each candidate. The least of
 
-    sum over windows of s^2 (1 + P_u sum_l g_l),   s^2: residual per degree of freedom, g_l: Var G_l for s = 1,
+    mean over windows of s^2 (1 + P_u sum_l g_l),   s^2: residual per degree of freedom, g_l: Var G_l for s = 1,
 
 wins: the residual is what the branches miss (plus noise, the same for all), the second term what their
 estimation adds, in the same unit (P_u: power of an input line). This is Akaike's final prediction error
@@ -34,7 +34,10 @@ WIDENING = (1.0, 1.6, 2.6)
 WIDEST = 0.05
 # Work of the whole identification [floating-point operations] that a candidate may cost.
 WORK = 3.0e11
+# Trial windows: at least so many, and as many as bring the degrees of freedom to FREEDOM, up to a limit.
 TRIALS = 6
+FREEDOM = 800
+TRIALS_MAX = 60
 # How many rungs of the ladder may fail to improve before the climb ends.
 PATIENCE = 2
 
@@ -62,14 +65,13 @@ def choose_window(
     reach = (spectra.highest - int(lines[-1])) // spectra.mesh_lines
     ladder = [harmonics] if harmonics is not None else [value for value in LADDER if value <= reach]
     regression = prepare(spectra, transient=transient, reach=max(ladder, default=0) * spectra.mesh_lines)
-    centres = trial_centres(spectra, lines)
     best: Choice | None = None
     for polynomial in ORDERS if order is None else (order,):
         failures = 0
         best_here = np.inf
         for branches in ladder:
             trials = [
-                Choice(window, _predicted_error(regression, centres, window))
+                Choice(window, _predicted_error(spectra, regression, lines, window))
                 for window in _windows(spectra, regression, lines, branches, polynomial, transient, half_width)
             ]
             least = min(trials, key=lambda choice: choice.error, default=None)
@@ -86,12 +88,12 @@ def choose_window(
     return best.window
 
 
-def trial_centres(spectra: Spectra, lines: NDArray[np.int64]) -> list[int]:
-    """Lines inside the output band that share its response power evenly."""
+def trial_centres(spectra: Spectra, lines: NDArray[np.int64], count: int) -> list[int]:
+    """Lines inside the output band, at most `count`, that share its response power evenly."""
     band = np.arange(lines[0], lines[-1] + 1)
     band = band[band % spectra.mesh_lines != 0] if spectra.mesh_lines > 1 else band
     power = np.cumsum(np.mean(np.abs(spectra.dte[:, band]) ** 2, axis=0))
-    targets = (np.arange(TRIALS) + 0.5) / TRIALS * power[-1]
+    targets = (np.arange(count) + 0.5) / count * power[-1]
     return sorted({int(line) for line in band[np.searchsorted(power, targets)]})
 
 
@@ -150,14 +152,22 @@ def _has_equations(regression: Regression, centre: int, window: Window) -> bool:
     return regression.equations(centre, window) > int(regression.columns(centre, window).sum())
 
 
-def _predicted_error(regression: Regression, centres: list[int], window: Window) -> float:
-    """Criterion of a candidate over the trial windows; infinite if one of them cannot be solved."""
-    total = 0.0
+def _predicted_error(spectra: Spectra, regression: Regression, lines: NDArray[np.int64], window: Window) -> float:
+    """Criterion of a candidate, mean over its trial windows plus one standard error of the residual.
+
+    Infinite if one of the windows cannot be solved. The standard error keeps small windows, whose residuals scatter,
+    from winning by luck.
+    """
+    middle = int(lines[lines.size // 2])
+    spare = regression.equations(middle, window) - int(regression.columns(middle, window).sum())
+    count = int(np.clip(FREEDOM / max(spare, 1), TRIALS, TRIALS_MAX))
+    centres = trial_centres(spectra, lines, count)
+    total, freedom = 0.0, 0
     power = regression.input_power()
     at_centre = window.basis()[window.half_width]
     for wanted in centres:
-        centre = min(wanted, regression.last_row(window.harmonics) - window.half_width)
-        if not _has_equations(regression, centre, window):
+        centre = min(wanted, regression.highest - window.half_width)
+        if regression.equations(centre, window) <= int(regression.columns(centre, window).sum()):
             return np.inf
         gram = gram_of(regression.gram_table(centre, centre, window), 0, window)
         try:
@@ -166,7 +176,8 @@ def _predicted_error(regression: Regression, centres: list[int], window: Window)
             return np.inf
         spread = np.einsum("p,psj,s->", at_centre, diagonal_variance(fit, window), at_centre)
         total += fit.residual / fit.freedom * (1.0 + power * spread)
-    return total
+        freedom += fit.freedom
+    return total / len(centres) * (1.0 + 1.0 / np.sqrt(freedom))
 
 
 def _refusal(

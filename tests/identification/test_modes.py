@@ -95,3 +95,22 @@ def test_overdamped_states_are_no_modes() -> None:
     assert natural[0, 0] == pytest.approx(200 / (2 * np.pi))
     assert damping[0, 0] == pytest.approx(0.1)
     assert np.isnan(natural[1, 0])
+
+
+@pytest.mark.parametrize(("natural", "ratio"), [(1410.0, 0.29), (1300.0, 0.2), (1775.0, 0.33)])
+def test_a_strongly_damped_mode_is_a_hump_and_is_found(natural: float, ratio: float) -> None:
+    """Over-damped supports make the mesh mode so broad that it hardly stands out; closed-form oscillator and lag."""
+    frequency = np.arange(2.0, 3000.0, 2.0)
+    s, w = 2j * np.pi * frequency, 2 * np.pi * natural
+    response = 1e-9 * w**2 / (s**2 + 2 * ratio * w * s + w**2) + 1e-10 / (1 + s / (2 * np.pi * 1500))
+    found, damping = itf_modes(frequency, np.tile(response[:, None], (1, 2)))
+    assert found[0] == pytest.approx(natural, rel=0.025)
+    assert damping[0] == pytest.approx(ratio, rel=0.025)
+
+
+def test_a_hump_within_the_noise_is_no_mode() -> None:
+    frequency = np.arange(2.0, 3000.0, 2.0)
+    noise = np.random.default_rng(4).standard_normal((2, frequency.size)) * 1e-10
+    response = 1e-9 / (1 + 2j * np.pi * frequency / (2 * np.pi * 4000)) + noise[0] + 1j * noise[1]
+    found, _ = itf_modes(frequency, np.tile(response[:, None], (1, 2)), np.full((frequency.size, 2), 2e-20))
+    assert found.size == 0 or np.isnan(found).all()
