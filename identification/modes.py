@@ -23,7 +23,9 @@ from gearbench.identification.periodic import Complexes, Floats, PeriodicSystem
 # A peak stands out of its surroundings by this factor in magnitude.
 PROMINENCE = 1.6
 # A strongly damped mode makes a hump only: where nothing stands out so far, the highest hump of this factor counts.
+# Of many smoothed values of noise the highest and the lowest lie six standard deviations apart.
 HUMP = 1.05
+HUMP_SIGNIFICANCE = 8.0
 # A peak reaches this part of the phase's largest magnitude of its phase, and this multiple of its standard deviation.
 HEIGHT = 0.03
 SIGNIFICANCE = 4.0
@@ -107,7 +109,7 @@ def _hump(level: Floats, power: Floats, width: int, variance: Floats | None) -> 
     if variance is not None:
         # Smoothing over `width` lines takes this much of the noise away.
         scatter = np.sqrt(variance[chosen[0]] / (power[chosen[0]] * width))
-        if about["prominences"][best] < SIGNIFICANCE * scatter:
+        if about["prominences"][best] < HUMP_SIGNIFICANCE * scatter:
             return chosen[:0]
     return chosen
 
