@@ -13,8 +13,10 @@ from gearbench.cases_command import cases
 from gearbench.check_command import check
 from gearbench.compare_command import compare
 from gearbench.failure import INTERRUPTED, guarded
+from gearbench.identify_command import identify
 from gearbench.mesh_command import mesh
 from gearbench.options import expand_lists
+from gearbench.run_command import run
 from gearbench.schema_command import schema
 from gearbench.simulate_command import simulate
 from gearbench.static_command import static
@@ -29,7 +31,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
-for command in (simulate, static, compare, check, mesh, cases, schema, validate):
+for command in (run, simulate, static, identify, compare, check, mesh, cases, schema, validate):
     app.command()(command)
 
 # Options that take several numbers in a row.

@@ -46,6 +46,7 @@ _EXAMPLES: dict[str, str] = {
     "simulation.stiffness_single_n_per_m": "2.5e8",
     "simulation.stiffness_double_n_per_m": "4.0e8",
     "simulation.element_size_um": "160.0",
+    "identification.order": "1",
     "identification.band_hz": "[1.0, 3000.0]",
 }
 
