@@ -9,21 +9,20 @@ in its middle third. Only rows m >= 0 are solved: G is real in time, Gs_l(-m) = 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.identification.covariance import CrossCovariance, diagonal_variance
+from gearbench.identification.gram import grams
 from gearbench.identification.local_solve import LocalFit, LpmError, solve_window
-from gearbench.identification.regression import Regression, Window, gram_of, prepare
+from gearbench.identification.regression import Regression, Window, prepare
 from gearbench.identification.spectra import Complexes, Floats, Spectra
 
 Lines = NDArray[np.int64]
 
-# Centres of one residue class that share a table of Gram matrices span at most this many mesh harmonics.
-TABLE_SPAN = 200
 # One window in so many tells its condition number.
 CONDITION_EVERY = 32
 # Work [floating-point operations] spent on variances before they are sampled, and before cross terms are left out.
@@ -169,7 +168,8 @@ class _Sweep:
     def run(self, progress: Callable[[float, str], None] | None) -> LpmResult:
         """Solve every window."""
         last: Floats | None = None
-        for done, (index, gram) in enumerate(self._grams()):
+        lines = [centre for centre, _ in self.centres]
+        for done, (index, gram) in enumerate(grams(self.regression, lines, self.window)):
             centre, rows = self.centres[index]
             want = done % self.sampled == 0 or last is None
             # Condition numbers: of the edges, where branches fade out, and of some windows in between.
@@ -187,19 +187,6 @@ class _Sweep:
             if progress is not None and done % 16 == 0:
                 progress(done / len(self.centres), f"window {done + 1} of {len(self.centres)}")
         return self._result()
-
-    def _grams(self) -> Iterator[tuple[int, Complexes]]:
-        """(index of the centre, its Gram matrix); class by class where tables pay, in rising order otherwise."""
-        d = self.regression.mesh_lines
-        for residue in range(d):
-            chosen = [i for i, (centre, _) in enumerate(self.centres) if centre % d == residue]
-            while chosen:
-                first = self.centres[chosen[0]][0]
-                span = [i for i in chosen if self.centres[i][0] <= first + TABLE_SPAN * d]
-                chosen = chosen[len(span) :]
-                table = self.regression.gram_table(first, self.centres[span[-1]][0], self.window)
-                for i in span:
-                    yield i, gram_of(table, (self.centres[i][0] - first) // d, self.window)
 
     def _account(self, fit: LocalFit, centre: int) -> float:
         """Residual variance of the window; adds to the overall ratio of residual to response."""

@@ -1,16 +1,12 @@
 """The local regression of a periodically time-varying system, without ever writing it down.
 
-Row m of the regression reads Y(m) = sum_j Gs_j(m) U(m + j d) + T(m), j = -l. Lines that differ by a
-multiple of d form a residue class; inside one, row m's regressors are 2L+1 successive elements. So the Gram
-matrix of a window is a slice of a larger matrix that neighbouring windows share,
+Row m of the regression reads Y(m) = sum_j Gs_j(m) U(m + j d) + T(m), j = -l. Lines that differ by a multiple of d form
+a residue class; inside one, row m's regressors are 2L+1 successive elements: products with the regression are small
+matrix-vector products on views.
 
-    W_pp'[a, b] = sum_r P_p(r) P_p'(r) C_r[a, b],   C_r = U_r^H U_r over the experiments,
-
-and products with the regression matrix are small matrix-vector products on views.
-
-Lines of residue class 0 carry the operating response, the same in each experiment. An orthogonal rotation
-of the experiments gathers it in the first one, whose class-0 rows are then dropped: the same as one free
-unknown a line. With a single experiment that means leaving class 0 out.
+Lines of residue class 0 carry the operating response, the same in each experiment. An orthogonal rotation of the
+experiments gathers it in the first one, whose class-0 rows are then dropped: the same as one free unknown a line. With
+a single experiment that means leaving class 0 out.
 """
 
 from __future__ import annotations
@@ -18,6 +14,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
@@ -75,6 +72,7 @@ class Regression:
     same_phase: bool
     start_phase: Floats
     _transients: dict[tuple[int, Window], Complexes] = field(default_factory=dict, repr=False)
+    _views: dict[int, tuple[Complexes, NDArray[np.bool_]]] = field(default_factory=dict, repr=False)
 
     @property
     def mesh_lines(self) -> int:
@@ -103,23 +101,46 @@ class Regression:
             self.highest,
         )
 
-    def locate(self, line: int) -> tuple[int, int]:
-        """Residue class and position inside it of a line."""
-        return line % self.mesh_lines, line // self.mesh_lines + self.origin
+    def runs(self, centre: int, window: Window) -> list[tuple[int, NDArray[np.int64], int]]:
+        """The window's rows by residue class: class, indices of its rows in the window, position of the first.
 
-    def rows(self, centre: int, window: Window) -> list[tuple[int, int]]:
-        """Residue class and position of each row of the window around `centre`."""
-        return [self.locate(centre + r) for r in range(-window.half_width, window.half_width + 1)]
+        Rows of one class follow each other at successive positions.
+        """
+        lines = np.arange(centre - window.half_width, centre + window.half_width + 1)
+        d = self.mesh_lines
+        return [
+            (int(first % d), np.arange(index, window.width, d), int(first // d) + self.origin)
+            for index, first in enumerate(lines[: min(d, window.width)])
+        ]
+
+    def inputs(self, residue: int, first: int, count: int, window: Window) -> Complexes:
+        """Regressors (count, E, 2L+1) of successive rows of one residue class; a view."""
+        reach = window.harmonics
+        force, _ = self._sliding(reach)
+        return force[residue, :, first - reach : first - reach + count].transpose(1, 0, 2)
+
+    def excitation(self, residue: int, first: int, count: int, window: Window) -> NDArray[np.bool_]:
+        """Which regressors (count, 2L+1) of successive rows of one residue class are excited; a view."""
+        reach = window.harmonics
+        _, excited = self._sliding(reach)
+        return excited[residue, first - reach : first - reach + count]
+
+    def _sliding(self, reach: int) -> tuple[Complexes, NDArray[np.bool_]]:
+        """All runs of 2L+1 successive elements of `force` and `excited`, as views."""
+        if reach not in self._views:
+            width = 2 * reach + 1
+            force = sliding_window_view(self.force, width, axis=2)
+            self._views[reach] = force, sliding_window_view(self.excited, width, axis=1)
+        return self._views[reach]
 
     def data(self, centre: int, window: Window) -> Complexes:
         """Y (E, 2n+1) of a window, transients projected out; without transients rows that no input excites are 0."""
-        places = self.rows(centre, window)
-        data = np.stack([self.dte[c][:, q] for c, q in places], axis=1)
-        if window.transient:
-            return self.project(data, centre, window)
-        reach = window.harmonics
-        data[:, [not self.excited[c, q - reach : q + reach + 1].any() for c, q in places]] = 0.0
-        return data
+        data = np.empty((self.experiments, window.width), dtype=complex)
+        for residue, rows, first in self.runs(centre, window):
+            data[:, rows] = self.dte[residue][:, first : first + rows.size]
+            if not window.transient:
+                data[:, rows] *= self.excitation(residue, first, rows.size, window).any(axis=1)
+        return self.project(data, centre, window)
 
     def project(self, data: Complexes, centre: int, window: Window) -> Complexes:
         """`data` (E, 2n+1) without its part in the space of the transients' polynomials."""
@@ -146,105 +167,65 @@ class Regression:
     def apply(self, coefficients: Complexes, centre: int, window: Window) -> Complexes:
         """Model output (E, 2n+1) of the coefficients (R+1, 2L+1), transients projected out."""
         local = window.basis() @ coefficients
-        reach = window.harmonics
         output = np.empty((self.experiments, window.width), dtype=complex)
-        for row, (c, q) in enumerate(self.rows(centre, window)):
-            output[:, row] = self.force[c][:, q - reach : q + reach + 1] @ local[row]
+        for residue, rows, first in self.runs(centre, window):
+            inputs = self.inputs(residue, first, rows.size, window)
+            output[:, rows] = (inputs @ local[rows, :, None])[:, :, 0].T
         return self.project(output, centre, window)
 
     def adjoint(self, data: Complexes, centre: int, window: Window) -> Complexes:
         """Product (R+1, 2L+1) of the regression's conjugate transpose with (projected) data (E, 2n+1)."""
-        reach = window.harmonics
         local = np.empty((window.width, window.branches), dtype=complex)
-        flipped = data.conj()
-        for row, (c, q) in enumerate(self.rows(centre, window)):
-            local[row] = flipped[:, row] @ self.force[c][:, q - reach : q + reach + 1]
+        for residue, rows, first in self.runs(centre, window):
+            inputs = self.inputs(residue, first, rows.size, window)
+            local[rows] = (data[:, rows].T.conj()[:, None, :] @ inputs)[:, 0]
         return np.asarray(window.basis().T @ local.conj(), dtype=complex)
 
-    def matrix(self, centre: int, window: Window) -> Complexes:
-        """The regression written down: (E, 2n+1, R+1, 2L+1), transients projected out."""
-        reach = window.harmonics
-        places = self.rows(centre, window)
-        inputs: Complexes = np.stack([self.force[c][:, q - reach : q + reach + 1] for c, q in places], axis=1)
-        full: Complexes = inputs[:, :, None, :] * window.basis()[None, :, :, None]
-        if window.transient:
+    def matrix(self, centre: int, window: Window, *, projected: bool = True) -> Complexes:
+        """The regression written down: (E, 2n+1, R+1, 2L+1); transients projected out unless told otherwise."""
+        inputs = np.empty((self.experiments, window.width, window.branches), dtype=complex)
+        for residue, rows, first in self.runs(centre, window):
+            inputs[:, rows] = self.inputs(residue, first, rows.size, window).transpose(1, 0, 2)
+        full = np.empty((self.experiments, window.width, window.order + 1, window.branches), dtype=complex)
+        np.multiply(inputs[:, :, None, :], window.basis()[None, :, :, None], out=full)
+        if window.transient and projected:
             basis = self.transient_basis(centre, window)
             full *= (np.abs(basis).sum(axis=2) > 0)[:, :, None, None]
             full -= np.einsum("erp,epsj->ersj", basis, np.einsum("erp,ersj->epsj", basis.conj(), full))
-        return np.asarray(full, dtype=complex)
+        return full
 
     def columns(self, centre: int, window: Window) -> NDArray[np.bool_]:
         """Which coefficients (R+1, 2L+1) the window can know: order p needs p+1 rows that excite the branch."""
-        reach = window.harmonics
         count = np.zeros(window.branches, dtype=int)
-        for c, q in self.rows(centre, window):
-            if c or self.experiments > self.operating_rows_lost:
-                count += self.excited[c, q - reach : q + reach + 1]
+        for residue, rows, first in self.runs(centre, window):
+            if residue or self.experiments > self.operating_rows_lost:
+                count += self.excitation(residue, first, rows.size, window).sum(axis=0)
         return np.arange(window.order + 1)[:, None] < count[None, :]
 
     def equations(self, centre: int, window: Window) -> int:
         """Complex equations of the window that are left once operating response and transients are taken out."""
-        reach = window.harmonics
         total = 0
-        for c, q in self.rows(centre, window):
-            if window.transient or self.excited[c, q - reach : q + reach + 1].any():
-                total += self.experiments - (self.operating_rows_lost if c == 0 else 0)
+        for residue, rows, first in self.runs(centre, window):
+            used = rows.size
+            if not window.transient:
+                used = int(self.excitation(residue, first, rows.size, window).any(axis=1).sum())
+            total += used * (self.experiments - (self.operating_rows_lost if residue == 0 else 0))
         if window.transient:
             basis = self.transient_basis(centre, window)
             total -= int(np.count_nonzero(np.abs(basis).sum(axis=1) > 0))
         return total
 
-    def gram_table(self, first: int, last: int, window: Window) -> Complexes:
-        """W_pp' (pairs p <= p', M, M) for the centres first, first + d, ..., last of one residue class.
-
-        The Gram matrix of the centre first + i d, without the transients' part, is W[:, i : i+2L+1, i :
-        i+2L+1].
-        """
-        basis, reach, d = window.basis(), window.harmonics, self.mesh_lines
-        pairs = _pairs(window.order)
-        weights = np.stack([basis[:, p] * basis[:, s] for p, s in pairs])
-        size = (last - first) // d + window.branches
-        table = np.zeros((len(pairs), size, size), dtype=complex)
-        rows = self.rows(first, window)
-        for c in sorted({c for c, _ in rows}):
-            positions = [q for cc, q in rows if cc == c]
-            begin = min(positions) - reach
-            inputs = self.force[c][:, begin : max(positions) - reach + size]
-            gram = inputs.conj().T @ inputs
-            for row, (cc, q) in enumerate(rows):
-                if cc == c:
-                    shift = q - reach - begin
-                    part = gram[shift : shift + size, shift : shift + size]
-                    for pair, weight in enumerate(weights[:, row]):
-                        if weight:
-                            table[pair] += weight * part
-        return table
-
     def transient_products(self, centre: int, window: Window) -> Complexes:
         """Q^H A (E (R+1), unknowns): what the projection takes from the Gram matrix is its own Gram matrix."""
-        reach, basis = window.harmonics, window.basis()
+        basis, order = window.basis(), window.order + 1
         transient = self.transient_basis(centre, window).conj()
-        result = np.zeros((self.experiments, window.order + 1, window.order + 1, window.branches), dtype=complex)
-        for row, (c, q) in enumerate(self.rows(centre, window)):
-            weight = transient[:, row, :, None] * basis[row]
-            result += weight[..., None] * self.force[c][:, None, None, q - reach : q + reach + 1]
+        result = np.zeros((self.experiments, order, order, window.branches), dtype=complex)
+        for residue, rows, first in self.runs(centre, window):
+            inputs = self.inputs(residue, first, rows.size, window)
+            for own, row in enumerate(rows):
+                weight = transient[:, row, :, None] * basis[row]
+                result += weight[..., None] * inputs[own][:, None, None, :]
         return result.reshape(-1, window.unknowns)
-
-
-def _pairs(order: int) -> list[tuple[int, int]]:
-    return [(p, s) for p in range(order + 1) for s in range(p, order + 1)]
-
-
-def gram_of(table: Complexes, index: int, window: Window) -> Complexes:
-    """Gram matrix (unknowns, unknowns) of the centre first + index d from `Regression.gram_table`."""
-    size = window.branches
-    gram = np.empty((window.order + 1, size, window.order + 1, size), dtype=complex)
-    for pair, (p, s) in enumerate(_pairs(window.order)):
-        part = table[pair, index : index + size, index : index + size]
-        gram[p, :, s, :] = part
-        if p != s:
-            gram[s, :, p, :] = part
-    return gram.reshape(window.unknowns, window.unknowns)
 
 
 def prepare(spectra: Spectra, *, transient: bool, reach: int) -> Regression:

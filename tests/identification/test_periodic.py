@@ -172,6 +172,18 @@ def test_truncation_error_is_the_norm_of_what_is_left_out() -> None:
     assert truncation_error(full, 4) < 1e-14
 
 
+def test_trigonometric_coefficients_pass_through_their_samples() -> None:
+    """Even number of samples with content at half their rate; between them the closed form."""
+    grid = np.arange(8) / 8
+    wave = 4e7 * (1 + 0.2 * np.cos(2 * np.pi * grid) + 0.1 * np.cos(8 * np.pi * grid))
+    system = oscillator(wave, period=0.01, interpolation="trigonometric")
+    assert -system.at(grid)[0][:, 1, 0] == pytest.approx(wave)
+    phase = np.array([0.03, 0.41])
+    wanted = 4e7 * (1 + 0.2 * np.cos(2 * np.pi * phase) + 0.1 * np.cos(8 * np.pi * phase))
+    assert -system.at(phase)[0][:, 1, 0] == pytest.approx(wanted)
+    assert -system.at(grid + 0.03)[0][0, 1, 0] == pytest.approx(wanted[0])  # the uniform grid takes another way
+
+
 def test_malformed_systems_are_refused() -> None:
     a = np.zeros((4, 2, 2))
     good = np.zeros(2)

@@ -1,12 +1,17 @@
 """Predicted variances against the scatter of repeated noisy identifications."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from shared.ptv import periodic_filter, spectra_of
 
-from gearbench.identification.lpm import LpmResult, local_polynomial
+from gearbench.identification.covariance import CrossCovariance, diagonal_variance
+from gearbench.identification.gram import grams
+from gearbench.identification.local_solve import solve_window
+from gearbench.identification.lpm import LpmResult, local_polynomial, needed_rows, plan_centres
 from gearbench.identification.periodic import itf_from_htf
-from gearbench.identification.regression import Window
+from gearbench.identification.regression import Window, prepare
 
 RUNS = 150
 NOISE = 0.3
@@ -49,6 +54,41 @@ def test_variances_are_those_of_the_errors(experiments: int, period: int, transi
     assert ratio.mean() == pytest.approx(1.0, abs=0.04)
     assert np.abs(ratio - 1).max() < 5 / np.sqrt(RUNS)
     assert results[0].cross_terms == ("none" if period == 16 else "exact")
+
+
+def test_itf_variance_of_overlapping_windows_by_brute_force() -> None:
+    """Variance for unit noise on each line of each experiment, one line after another: the estimate is linear."""
+    force = np.random.default_rng(2).standard_normal((2, 128))
+    window, lines, phases = Window(3, 1, 12, transient=False), np.arange(40, 44), 8
+    spectra = spectra_of(force, np.zeros_like(force), 2)
+    regression = prepare(spectra, transient=False, reach=6)
+    place = np.full(44, -1)
+    place[lines] = np.arange(4)
+    cross = CrossCovariance(regression, window, place, shifts=6)
+    plan = plan_centres(needed_rows(lines, 3, 2), window, spectra.highest)
+    diagonal = np.zeros(4)
+    for index, gram in grams(regression, [centre for centre, _ in plan], window):
+        centre, rows = plan[index]
+        fit = solve_window(regression, centre, window, gram, want_factor=True)
+        cross.add(fit, centre, rows, 1.0)
+        unit = diagonal_variance(fit, window)
+        for m in rows:
+            weight = window.basis()[m - centre + 12]
+            for j in range(-3, 4):
+                if 40 <= m + 2 * j < 44:
+                    diagonal[m + 2 * j - 40] += weight @ unit[:, :, j + 3] @ weight
+    turn = np.exp(-2j * np.pi * np.outer(np.arange(1, 7), np.arange(phases) / phases))
+    predicted = diagonal[:, None] + 2 * (cross.sums.T @ turn).real
+
+    brute = np.zeros((4, phases))
+    for experiment in range(2):
+        for line in range(16, spectra.highest + 1):
+            impulse = np.zeros_like(spectra.dte)
+            impulse[experiment, line] = 1.0
+            one = replace(spectra, dte=impulse)
+            brute += np.abs(itf_from_htf(local_polynomial(one, lines, window).htf, phases)) ** 2
+    assert predicted == pytest.approx(brute, rel=1e-9)
+    assert np.abs(predicted / diagonal[:, None] - 1).max() > 0.2  # the cross terms matter here
 
 
 def test_residual_tells_the_noise() -> None:
