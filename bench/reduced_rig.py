@@ -78,15 +78,15 @@ def natural_frequencies(machine: Machine, torque: float, phase: float) -> Array:
     rows = contact_rows(machine, sides, teeth, found, n)[active[:n]]
     # Modes are unknowns of their own here, so the pairs keep only the residual's flexibility.
     modal = rows[:, machine.rotations + 2 :]
-    squares = np.diag(machine.stiffness)[machine.rotations + 2 :]
+    squares = machine.stiffness[machine.rotations + 2 :]
     residual = flex[np.ix_(active[:n], active[:n])] - (modal / squares) @ modal.T
-    stiffness = machine.stiffness + rows.T @ np.linalg.solve(residual, rows)
+    stiffness = np.diag(machine.stiffness) + rows.T @ np.linalg.solve(residual, rows)
     mass = mass_matrix(machine, theta1, theta2)
     size = len(mass)
     system = np.block(
         [
             [np.zeros((size, size)), np.eye(size)],
-            [-np.linalg.solve(mass, stiffness), -np.linalg.solve(mass, machine.damping)],
+            [-np.linalg.solve(mass, stiffness), -np.linalg.solve(mass, np.diag(machine.damping))],
         ]
     )
     values = np.linalg.eigvals(system)

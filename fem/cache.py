@@ -99,7 +99,7 @@ def stored_law(
 
     def make() -> Arrays:
         made.append(make_law(meshing, *gears, rig.material))
-        curves = made[0].curve1, made[0].curve2
+        curves = made[0].curves.driver, made[0].curves.driven
         return {f"{name}{i}": np.asarray(v) for i, c in enumerate(curves) for name, v in c._asdict().items()}
 
     arrays = cached(key, make)

@@ -40,8 +40,8 @@ def compiled(function: Callable[..., Any]) -> Any:
     before = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(cache_folder() / f"compiled-{sources_digest()[:16]}")
     try:
-        return numba.njit(function, cache=True, nogil=True)
+        return numba.njit(function, cache=True, nogil=True, error_model="numpy", no_cfunc_wrapper=True)
     except RuntimeError:
-        return numba.njit(function, nogil=True)
+        return numba.njit(function, nogil=True, error_model="numpy", no_cfunc_wrapper=True)
     finally:
         numba.config.CACHE_DIR = before

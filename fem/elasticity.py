@@ -51,7 +51,7 @@ def assemble(
     lame, shear = moduli.lame
 
     @BilinearForm
-    def inertia(u, v, w):  # type: ignore[no-untyped-def]
+    def inertia(u, v, w):
         return dot(u, v)
 
     stiffness = linear_elasticity(lame, shear).assemble(basis)

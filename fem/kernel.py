@@ -100,7 +100,7 @@ def grid_position(kernel: Kernel, s: float) -> float:
 
 
 @compiled
-def lagrange(t: float):  # type: ignore[no-untyped-def]
+def lagrange(t: float):
     """Cubic Lagrange weights at t for nodes 0, 1, 2, 3."""
     return (
         -(t - 1) * (t - 2) * (t - 3) / 6,
@@ -125,8 +125,8 @@ def table_at(table: Array, x: float, y: float) -> float:
     b0, b1, b2, b3 = lagrange(y - j)
     total = 0.0
     for p, a in enumerate(lagrange(x - i)):
-        row = table[i + p]
-        total += a * (b0 * row[j] + b1 * row[j + 1] + b2 * row[j + 2] + b3 * row[j + 3])
+        n = i + p
+        total += a * (b0 * table[n, j] + b1 * table[n, j + 1] + b2 * table[n, j + 2] + b3 * table[n, j + 3])
     return total
 
 
@@ -139,17 +139,15 @@ def row_at(row: Array, x: float) -> float:
 
 
 @compiled
-def cross_flexibility(
-    kernel: Kernel, side_load: int, s_load: float, side: int, s: float, teeth_apart: int
-) -> float:
-    """Inward displacement at s on one flank per total force at s_load on another, `teeth_apart` teeth ccw [m/N].
+def cross_flexibility(kernel: Kernel, side_load: int, x_load: float, side: int, x: float, teeth_apart: int) -> float:
+    """Inward displacement at grid position x of one flank per total force at x_load on another, `teeth_apart` teeth
+    ccw [m/N].
 
     Only for different flanks; a back-flank load is the mirror image of a working-flank one.
     """
     m = teeth_apart if side_load == 0 else -teeth_apart
     if m < -kernel.reach or m > kernel.reach:
         return 0.0
-    x, y = grid_position(kernel, s_load), grid_position(kernel, s)
     if side == side_load:
-        return table_at(kernel.front[m + kernel.reach], x, y)
-    return table_at(kernel.back[m + kernel.reach], x, y)
+        return table_at(kernel.front[m + kernel.reach], x_load, x)
+    return table_at(kernel.back[m + kernel.reach], x_load, x)

@@ -79,7 +79,7 @@ def teeth_of(pair: Pair) -> tuple[Tooth, Tooth]:
 
 
 @compiled
-def edge_contact(slave: Tooth, master: Tooth, c_slave: float, c_master: float, dx: float, dy: float):  # type: ignore[no-untyped-def]
+def edge_contact(slave: Tooth, master: Tooth, c_slave: float, c_master: float, dx: float, dy: float):
     """Gap of the slave's tip edge to the master's involute (physics 4): rb (angle + inv(alpha) - psi_b) - radius.
 
     Returns gap, tangent angle of the master's normal, roll length of the master's foot, lever on the slave and the

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from gearbench.fem.compiled import compiled
 from gearbench.fem.kernel import Kernel, grid_position, table_at
 from gearbench.fem.kinematics import Tooth, edge_contact
+from gearbench.fem.small import eliminate
 
 Array = NDArray[np.float64]
 
@@ -25,7 +26,7 @@ OUT_OF_REACH = 1.0  # [m]
 
 
 @compiled
-def boundary_point(tooth: Tooth, s: float):  # type: ignore[no-untyped-def]
+def boundary_point(tooth: Tooth, s: float):
     """Point (x, y) of the working boundary at arc length s, in the tooth's frame (tooth centre at polar angle 0)."""
     if s <= tooth.s_end:
         rho = sqrt(2 * tooth.rb * max(s, 0.0))
@@ -37,7 +38,7 @@ def boundary_point(tooth: Tooth, s: float):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def gap_to_master(slave: Tooth, master: Tooth, c: float, a: float, s: float):  # type: ignore[no-untyped-def]
+def gap_to_master(slave: Tooth, master: Tooth, c: float, a: float, s: float):
     """Gap of the slave's boundary point s to the master's involute (up to the master's rotation) and its foot."""
     x, y = boundary_point(slave, s)
     vx = a - (x * cos(c) - y * sin(c))
@@ -51,7 +52,7 @@ def gap_to_master(slave: Tooth, master: Tooth, c: float, a: float, s: float):  #
 
 
 @compiled
-def touching_point(slave: Tooth, master: Tooth, xi: float, a: float):  # type: ignore[no-untyped-def]
+def touching_point(slave: Tooth, master: Tooth, xi: float, a: float):
     """Slave angle, arc length and gap reference of the point that touches when the slave's roll length is xi."""
     phi = -acos((slave.rb + master.rb) / a)
     c = xi / slave.rb + phi - slave.psi
@@ -65,7 +66,7 @@ def touching_point(slave: Tooth, master: Tooth, xi: float, a: float):  # type: i
 
 
 @compiled
-def window(slave: Tooth, master: Tooth, xi: float, a: float, force: float, compliance: float):  # type: ignore[no-untyped-def]
+def window(slave: Tooth, master: Tooth, xi: float, a: float, force: float, compliance: float):
     """First guess of the loaded stretch of the slave's boundary, and whether it reaches the tip edge.
 
     compliance: 4/(pi E* b) [m/N], so that the Hertz half-width is sqrt(compliance R force).
@@ -80,11 +81,7 @@ def window(slave: Tooth, master: Tooth, xi: float, a: float, force: float, compl
     if edge:
         narrow = sqrt(compliance * force * max(slave.edge_radius, 1e-6))
         low = min(s0, slave.s_end) - 2.0 * half
-        high = (
-            min(s0 + 2.5 * narrow, slave.s_tip)
-            if s0 > slave.s_end
-            else min(slave.s_end + 2.5 * narrow, slave.s_tip)
-        )
+        high = min(s0 + 2.5 * narrow, slave.s_tip) if s0 > slave.s_end else min(slave.s_end + 2.5 * narrow, slave.s_tip)
     return max(low, slave.s_form), high, edge
 
 
@@ -134,14 +131,12 @@ def flexibility_matrix(
         width = edges[j + 1] - edges[j]
         for i in range(n):
             singular = log_integral(edges[j] - centres[i], edges[j + 1] - centres[i]) / width
-            a[i, j] = (
-                table_at(own_s, xs[j], xs[i]) + turned + table_at(own_m, xm[j], xm[i]) - half_plane * singular
-            )
+            a[i, j] = table_at(own_s, xs[j], xs[i]) + turned + table_at(own_m, xm[j], xm[i]) - half_plane * singular
     return a
 
 
 @compiled
-def complementarity(a: Array, h: Array, force: float):  # type: ignore[no-untyped-def]
+def complementarity(a: Array, h: Array, force: float):
     """Cell forces >= 0 with sum `force` and common approach u: u <= h + A q, equal where q > 0. Returns q, u, du/dF."""
     n = len(h)
     active = np.ones(n, np.bool_)
@@ -151,17 +146,17 @@ def complementarity(a: Array, h: Array, force: float):  # type: ignore[no-untype
     for _ in range(60):
         idx = np.nonzero(active)[0]
         m = len(idx)
-        system = np.zeros((m + 1, m + 1))
-        rhs = np.zeros((m + 1, 2))
+        # Unknowns: the loaded cells' forces and the approach; right-hand sides: the gaps, and one unit of force.
+        system = np.zeros((m + 1, m + 3))
         for p in range(m):
             for r in range(m):
                 system[p, r] = a[idx[p], idx[r]]
             system[p, m] = -1.0
             system[m, p] = 1.0
-            rhs[p, 0] = -h[idx[p]]
-        rhs[m, 0] = force
-        rhs[m, 1] = 1.0
-        solution = np.linalg.solve(system, rhs)
+            system[p, m + 1] = -h[idx[p]]
+        system[m, m + 1] = force
+        system[m, m + 2] = 1.0
+        solution = eliminate(system)
         u = solution[m, 0]
         slope = solution[m, 1]
         q[:] = 0.0
@@ -188,15 +183,8 @@ def complementarity(a: Array, h: Array, force: float):  # type: ignore[no-untype
 
 @compiled
 def line_contact(
-    slave: Tooth,
-    master: Tooth,
-    k_slave: Kernel,
-    k_master: Kernel,
-    half_plane: float,
-    a: float,
-    xi: float,
-    force: float,
-):  # type: ignore[no-untyped-def]
+    slave: Tooth, master: Tooth, k_slave: Kernel, k_master: Kernel, half_plane: float, a: float, xi: float, force: float
+):
     """Elastic approach of one pair under a force, neighbours unloaded.
 
     half_plane: 2/(pi E* b) [m/N]; a: centre distance; xi: roll length of the contact on the slave (beyond rho_end on

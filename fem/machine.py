@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from gearbench.fem.body import CondensedGear
 from gearbench.fem.compiled import compiled
 from gearbench.fem.kernel import grid_position, row_at
-from gearbench.fem.law import Law
+from gearbench.fem.law import Law, contact_in
 from gearbench.geometry.body import Body
 from gearbench.geometry.pair import Pair
 from gearbench.rig import Rig
@@ -29,8 +29,9 @@ class Machine(NamedTuple):
     """Equations of motion of the reduced rig.
 
     rotations: 1 where the driven speed is prescribed, 2 where both gears turn freely. axis_x, axis_y: direction of the
-    support motion. mass (d, d): constant part; damping, stiffness (d, d); hub1, hub2 (modes, 3): coupling mass of
-    modes and hub; speed1, speed2: nominal speeds [rad/s]; beta [s]: stiffness-proportional damping.
+    support motion. mass, damping, stiffness (d,): diagonals (the rest of the mass matrix is `hub_coupling`); hub1,
+    hub2 (modes, 3): coupling mass of modes and hub; speed1, speed2: nominal speeds [rad/s]; beta [s]:
+    stiffness-proportional damping.
     """
 
     law: Law
@@ -62,18 +63,18 @@ def make_machine(
     rotations = 1 if rig.load.boundary == "speed" else 2
     n1, n2 = len(driver.omega), len(driven.omega)
     size = rotations + 2 + n1 + n2
-    mass, damping, stiffness = (np.zeros((size, size)) for _ in range(3))
-    mass[0, 0] = bodies[0].inertia
+    mass, damping, stiffness = (np.zeros(size) for _ in range(3))
+    mass[0] = bodies[0].inertia
     if rotations == 2:
-        mass[1, 1] = bodies[1].inertia
+        mass[1] = bodies[1].inertia
     for i, support in enumerate((rig.support.driver, rig.support.driven)):
         k = rotations + i
-        mass[k, k], damping[k, k], stiffness[k, k] = bodies[i].mass, support.damping, support.stiffness
-    modal = np.arange(rotations + 2, size)
+        mass[k], damping[k], stiffness[k] = (bodies[i].mass, support.damping, support.stiffness)
+    modal = slice(rotations + 2, size)
     squares = np.concatenate([driver.omega, driven.omega]) ** 2
-    mass[modal, modal] = 1.0
-    stiffness[modal, modal] = squares
-    damping[modal, modal] = rig.damping.beta * squares
+    mass[modal] = 1.0
+    stiffness[modal] = squares
+    damping[modal] = rig.damping.beta * squares
     alpha = pair.working_pressure_angle if rig.support.direction == "line-of-action" else 0.0
     return Machine(
         law=law,
@@ -94,30 +95,47 @@ def make_machine(
 
 
 @compiled
-def mass_matrix(machine: Machine, theta1: float, theta2: float) -> Array:
-    """Mass matrix at given gear angles: the modes turn with their gear, the supports do not."""
-    m = machine.mass.copy()
-    r = machine.rotations
-    chi1 = theta1 + machine.law.driver.zero
-    chi2 = machine.law.driven.zero - theta2 + pi
-    for k in range(len(machine.omega1)):
-        i = r + 2 + k
-        x = machine.axis_x * cos(chi1) + machine.axis_y * sin(chi1)
-        y = -machine.axis_x * sin(chi1) + machine.axis_y * cos(chi1)
-        m[i, 0] = m[0, i] = machine.hub1[k, 2]
-        m[i, r] = m[r, i] = machine.hub1[k, 0] * x + machine.hub1[k, 1] * y
-    for k in range(len(machine.omega2)):
-        i = r + 2 + len(machine.omega1) + k
-        x = machine.axis_x * cos(chi2) + machine.axis_y * sin(chi2)
-        y = -machine.axis_x * sin(chi2) + machine.axis_y * cos(chi2)
-        if r == 2:
-            m[i, 1] = m[1, i] = -machine.hub2[k, 2]
-        m[i, r + 1] = m[r + 1, i] = machine.hub2[k, 0] * x + machine.hub2[k, 1] * y
-    return m
+def seen_from(x: float, y: float, chi: float):
+    """World direction in the frame of a gear turned by chi."""
+    return x * cos(chi) + y * sin(chi), -x * sin(chi) + y * cos(chi)
 
 
 @compiled
-def angles(machine: Machine, d: Array, t: float):  # type: ignore[no-untyped-def]
+def hub_coupling(hub1: Array, hub2: Array, rotations: int, axis1, axis2) -> Array:
+    """Coupling mass of the hubs' unknowns and the modes, (hub unknowns, modes), the supports' direction being axis1
+    (axis2) in the frame of the driver (driven gear): the modes turn with their gear, the supports do not."""
+    n1, n2 = len(hub1), len(hub2)
+    out = np.zeros((rotations + 2, n1 + n2))
+    for k in range(n1):
+        out[0, k] = hub1[k, 2]
+        out[rotations, k] = hub1[k, 0] * axis1[0] + hub1[k, 1] * axis1[1]
+    for k in range(n2):
+        if rotations == 2:
+            out[1, n1 + k] = -hub2[k, 2]
+        out[rotations + 1, n1 + k] = hub2[k, 0] * axis2[0] + hub2[k, 1] * axis2[1]
+    return out
+
+
+@compiled
+def support_axes(machine: Machine, theta1: float, theta2: float):
+    """The supports' direction in the frames of driver and driven gear."""
+    x, y = machine.axis_x, machine.axis_y
+    chi1, chi2 = theta1 + machine.law.driver.zero, machine.law.driven.zero - theta2 + pi
+    return seen_from(x, y, chi1), seen_from(x, y, chi2)
+
+
+def mass_matrix(machine: Machine, theta1: float, theta2: float) -> Array:
+    """Mass matrix (d, d) at given gear angles."""
+    out = np.diag(machine.mass)
+    first = machine.rotations + 2
+    axis1, axis2 = support_axes(machine, theta1, theta2)
+    out[:first, first:] = hub_coupling(machine.hub1, machine.hub2, machine.rotations, axis1, axis2)
+    out[first:, :first] = out[:first, first:].T
+    return out
+
+
+@compiled
+def angles(machine: Machine, d: Array, t: float):
     """Angles of driver and driven gear [rad] at time t."""
     theta1 = machine.speed1 * t + d[0]
     theta2 = machine.speed2 * t
@@ -125,7 +143,7 @@ def angles(machine: Machine, d: Array, t: float):  # type: ignore[no-untyped-def
 
 
 @compiled
-def contact_rows(machine: Machine, sides, teeth, found, n: int) -> Array:  # type: ignore[no-untyped-def]
+def contact_rows(machine: Machine, sides, teeth, found, n: int) -> Array:
     """Derivative of every pair's gap by the unknowns, which is also the direction of its force; (n, d)."""
     r = machine.rotations
     n1, n2 = len(machine.omega1), len(machine.omega2)
@@ -134,7 +152,7 @@ def contact_rows(machine: Machine, sides, teeth, found, n: int) -> Array:  # typ
     z2 = k2.modes_front.shape[1]
     rows = np.zeros((n, r + 2 + n1 + n2))
     for p in range(n):
-        k = found[p]
+        k = contact_in(found, p)
         sign = 1.0 - 2.0 * sides[p]
         rows[p, 0] = -sign * k.lever1
         if r == 2:
@@ -156,26 +174,28 @@ def contact_rows(machine: Machine, sides, teeth, found, n: int) -> Array:  # typ
 
 
 @compiled
-def modal_flexibility(machine: Machine, rows: Array) -> Array:
-    """Static flexibility of the kept modes between the pairs [m/N], which the residual must not count again."""
+def modal_flexibility(rows: Array, stiffness: Array, first: int) -> Array:
+    """Static flexibility of the kept modes (unknowns from `first` on) between the pairs [m/N], which the residual must
+    not count again."""
     n = rows.shape[0]
-    first = machine.rotations + 2
     out = np.zeros((n, n))
     for k in range(first, rows.shape[1]):
-        w2 = machine.stiffness[k, k]
         for p in range(n):
             for q in range(n):
-                out[p, q] += rows[p, k] * rows[q, k] / w2
+                out[p, q] += rows[p, k] * rows[q, k] / stiffness[k]
     return out
 
 
 @compiled
-def reaction(machine: Machine, rows: Array, sides, found, force: Array, acceleration: Array, n: int) -> float:  # type: ignore[no-untyped-def]
-    """Moment [N m] that holds the driven gear against its rotation where its speed is prescribed."""
+def reaction(hub: Array, sides, found: Array, force: Array, acceleration: Array, n: int) -> float:
+    """Moment [N m] that holds the driven gear against its rotation where its speed is prescribed.
+
+    hub (modes, 3): coupling mass of the driven gear's modes, the last of the accelerations.
+    """
     total = 0.0
     for p in range(n):
-        total += (1.0 - 2.0 * sides[p]) * found[p].lever2 * force[p]
-    first = machine.rotations + 2 + len(machine.omega1)
-    for k in range(len(machine.omega2)):
-        total += machine.hub2[k, 2] * acceleration[first + k]
+        total += (1.0 - 2.0 * sides[p]) * contact_in(found, p).lever2 * force[p]
+    first = len(acceleration) - len(hub)
+    for k in range(len(hub)):
+        total += hub[k, 2] * acceleration[first + k]
     return total

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.fem.compiled import compiled
-from gearbench.fem.law import PAIRS, Law, coupling, find_pairs, share_load
+from gearbench.fem.law import PAIRS, Law, contact_in, coupling, find_pairs, newton_step, overlaps, share_load
 
 Array = NDArray[np.float64]
 
@@ -42,9 +42,7 @@ class StaticCycle:
 
 
 @compiled
-def position(
-    law: Law, theta1: float, theta2: float, x1: float, y1: float, x2: float, y2: float, guess: Array
-):  # type: ignore[no-untyped-def]
+def position(law: Law, theta1: float, theta2: float, x1: float, y1: float, x2: float, y2: float, guess: Array):
     """Equilibrium of all pairs at given hub positions.
 
     Returns number of pairs, sides, teeth, contacts, forces, active flags, driver torque, driven torque, tangent
@@ -52,26 +50,20 @@ def position(
     """
     sides, teeth, found, n = find_pairs(law, theta1, theta2, law.centre + x2 - x1, y2 - y1, MARGIN)
     c = coupling(law, sides, teeth, found, n)
-    force, flex, active, ok = share_load(law, found, c, n, guess[:n])
+    force, flex, active, ok = share_load(law.curves, found, overlaps(found, n), c, 1.0, guess[:n])
     t1 = 0.0
     t2 = 0.0
     lever = np.zeros(n)
-    system = np.zeros((n, n))
     for p in range(n):
+        k = contact_in(found, p)
         sign = 1.0 - 2.0 * sides[p]
-        lever[p] = sign * found[p].lever1
+        lever[p] = sign * k.lever1
         t1 += lever[p] * force[p]
-        t2 += sign * found[p].lever2 * force[p]
-        if active[p]:
-            for q in range(n):
-                if active[q]:
-                    system[p, q] = flex[p, q]
-        else:
-            system[p, p] = 1.0
+        t2 += sign * k.lever2 * force[p]
+    stiff = newton_step(lever, flex, active)
     tangent = 0.0
-    if n > 0:
-        rhs = np.where(active[:n], lever, 0.0)
-        tangent = np.sum(lever * np.linalg.solve(system, rhs))
+    for p in range(n):
+        tangent += lever[p] * stiff[p, 0]
     return n, sides, teeth, found, force, active, t1, t2, tangent, flex, ok
 
 
@@ -125,7 +117,7 @@ def static_cycle(
 STILL = np.zeros(2)
 
 
-def _at(law: Law, phase: float, dte: float, x: Array = STILL, y: Array = STILL):  # type: ignore[no-untyped-def]
+def _at(law: Law, phase: float, dte: float, x: Array = STILL, y: Array = STILL):
     theta1 = phase * law.driver.pitch + dte / law.driver.rb
     return position(law, theta1, phase * law.driven.pitch, x[0], y[0], x[1], y[1], np.zeros(PAIRS))
 

@@ -12,13 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.fem.compiled import compiled
-from gearbench.fem.law import PAIRS, Law, coupling, find_pairs, lone_approach
-from gearbench.fem.machine import Machine, angles, contact_rows, mass_matrix, modal_flexibility, reaction
+from gearbench.fem.curve import lone_approach
+from gearbench.fem.law import PAIRS, contact_in, coupling, find_pairs, overlaps, share_load
+from gearbench.fem.machine import Machine, angles, contact_rows, hub_coupling, modal_flexibility, reaction, support_axes
+from gearbench.fem.small import arrow_factor, arrow_solve, arrow_times, plus, times
 from gearbench.fem.static import MARGIN, ContactError, position, solve_torque
 
 Array = NDArray[np.float64]
 
-REBASE = 1e-3  # change of gear angle after which the mass matrix is renewed [rad]
 CHANNELS = 6  # angle_driver, angle_driven, y_driver, y_driven, torque_driven, number of pairs
 
 
@@ -75,9 +76,9 @@ def frequency_error(frequency: float, scheme: Scheme) -> float:
 def initial_state(machine: Machine, torque: float, t: float = 0.0) -> State:
     """Static equilibrium under a constant driver torque [N m], the gears turning at their nominal speeds."""
     law, r = machine.law, machine.rotations
-    size = machine.mass.shape[0]
+    size = len(machine.mass)
     d = np.zeros(size)
-    k1, k2 = machine.stiffness[r, r], machine.stiffness[r + 1, r + 1]
+    k1, k2 = machine.stiffness[r : r + 2]
     phase = machine.speed1 * t / law.driver.pitch
     dte, y = 0.0, np.zeros(2)
     for _ in range(30):
@@ -106,15 +107,15 @@ def initial_state(machine: Machine, torque: float, t: float = 0.0) -> State:
     d[0] = dte / law.driver.rb
     d[r : r + 2] = y
     modes = slice(r + 2, size)
-    d[modes] = push[modes] / np.diag(machine.stiffness)[modes]
+    d[modes] = push[modes] / machine.stiffness[modes]
     load = push.copy()
     load[0] += torque
     if r == 2:
         load[1] -= torque * law.driven.rb / law.driver.rb
     pad = np.zeros(PAIRS)
     residual = pad.copy()
-    modal = modal_flexibility(machine, rows)
-    overlap = np.array([-found[p].gap for p in range(n)]) - modal @ force[:n]
+    modal = modal_flexibility(rows, machine.stiffness, r + 2)
+    overlap = -found[:n, 0] - modal @ force[:n]
     pushed = (coupling(law, sides, teeth, found, n) - modal) @ force[:n]
     residual[:n] = np.where(force[:n] > 0.0, overlap, pushed)
     padded = pad.copy()
@@ -124,196 +125,138 @@ def initial_state(machine: Machine, torque: float, t: float = 0.0) -> State:
 
 
 @compiled
-def history(state: State, sides, teeth, n: int):  # type: ignore[no-untyped-def]
-    """Force and residuals of the listed pairs at the last step; NaN residuals mark pairs that are new."""
-    force = np.zeros(n)
-    residual = np.full(n, np.nan)
-    older = np.full(n, np.nan)
+def predict(mass: Array, damping: Array, stiffness: Array, corner: Array, scheme: Scheme, state: State, outer: Array):
+    """What the next step would bring without new accelerations: displacements and rates, and the forces that the new
+    accelerations must balance (contact's new ones left out); with the diagonal of their effective mass. All (d,)."""
+    h, am, af, gamma, beta = scheme.step, scheme.alpha_m, scheme.alpha_f, scheme.gamma, scheme.beta
+    late = 1.0 - af
+    size = len(mass)
+    d, v, rest, diagonal = np.empty(size), np.empty(size), np.empty(size), np.empty(size)
+    inertia = arrow_times(mass, corner, state.a)
+    for i in range(size):
+        d[i] = state.d[i] + h * state.v[i] + h * h * (0.5 - beta) * state.a[i]
+        v[i] = state.v[i] + h * (1.0 - gamma) * state.a[i]
+        rest[i] = late * outer[i] + af * state.load[i] - am * inertia[i]
+        rest[i] -= damping[i] * (late * v[i] + af * state.v[i]) + stiffness[i] * (late * d[i] + af * state.d[i])
+        diagonal[i] = (1.0 - am) * mass[i] + late * h * (gamma * damping[i] + beta * h * stiffness[i])
+    return d, v, rest, diagonal
+
+
+@compiled
+def history(state: State, cross: Array, sides, teeth, kappa: float):
+    """Forces and residuals of the listed pairs at the last step, and the residual that they carry over.
+
+    The backward difference of u + beta u' = R is (1 + 3 kappa) u = R + kappa (4 u_1 - u_2), kappa = beta/2h. Pairs
+    that are new come with the residual that their neighbours' forces hold them at.
+    """
+    n = len(cross)
+    force, known = np.zeros(n), np.zeros(n, np.bool_)
+    residual, memory = np.zeros(n), np.empty(n)
     for p in range(n):
         for q in range(state.count):
             if state.sides[q] == sides[p] and state.teeth[q] == teeth[p]:
-                force[p] = state.force[q]
-                residual[p] = state.residual[q]
-                older[p] = state.older[q]
-    return force, residual, older
-
-
-@compiled
-def solve_contact(
-    law: Law, found, over: Array, hub: Array, cross: Array, memory: Array, gain: float, guess: Array, n: int
-):  # type: ignore[no-untyped-def]
-    """Forces >= 0 with over - hub F = gain (D(F) + cross F) + memory on loaded pairs; Newton with an active set.
-
-    over (n,): overlap that free motion would give; hub (n, n): flexibility of hubs and modes over one step; cross:
-    residual coupling; memory: damped residual carried over. Returns forces and whether it converged.
-    """
-    force = guess.copy()
-    active = np.zeros(n, np.bool_)
+                force[p], residual[p], known[p] = state.force[q], state.residual[q], True
+                memory[p] = kappa * (4.0 * state.residual[q] - state.older[q])
     for p in range(n):
-        active[p] = force[p] > 0.0 or over[p] > memory[p]
-        if active[p] and force[p] <= 0.0:
-            force[p] = 1e-3
-    for _ in range(100):
-        system = np.zeros((n, n))
-        rhs = np.zeros(n)
-        for p in range(n):
-            value = over[p] - memory[p]
+        if not known[p]:
             for q in range(n):
-                value -= (hub[p, q] + gain * cross[p, q]) * force[q]
-                if active[p] and active[q]:
-                    system[p, q] = hub[p, q] + gain * cross[p, q]
-            if active[p]:
-                u, slope = lone_approach(law, found[p], force[p])
-                value -= gain * u
-                system[p, p] += gain * slope
-            else:
-                system[p, p] = 1.0
-            rhs[p] = value
-        changed = False
-        for p in range(n):
-            if not active[p]:
-                if rhs[p] > 1e-16:
-                    active[p] = True
-                    force[p] = 1e-6
-                    changed = True
-                rhs[p] = 0.0
-        if changed:
-            continue
-        step = np.linalg.solve(system, rhs)
-        worst = 0.0
-        for p in range(n):
-            if not active[p]:
-                continue
-            new = force[p] + step[p]
-            if new <= 0.0:
-                new = 0.1 * force[p]
-                if new < 1e-9:
-                    active[p] = False
-                    new = 0.0
-                changed = True
-            worst = max(worst, abs(new - force[p]) / max(new, 1e-3))
-            force[p] = new
-        if not changed and worst < 1e-10:
-            return force, True
-    return force, False
+                residual[p] += cross[p, q] * force[q]
+            memory[p] = 3.0 * kappa * residual[p]
+        memory[p] /= 1.0 + 3.0 * kappa
+    return force, residual, memory
 
 
 @compiled
-def take_step(machine: Machine, scheme: Scheme, inverse: Array, mass: Array, state: State, torque: float):  # type: ignore[no-untyped-def]
-    """One step under the driver torque at its end. Returns the new state, the reaction moment and success."""
-    h, am, af = scheme.step, scheme.alpha_m, scheme.alpha_f
-    r = machine.rotations
-    law = machine.law
-    t = state.t + h
-    external = np.zeros(len(state.d))
-    external[0] = torque
-    if r == 2:
-        external[1] = -torque * law.driven.rb / law.driver.rb
-    d0 = state.d + h * state.v + h * h * (0.5 - scheme.beta) * state.a
-    v0 = state.v + h * (1 - scheme.gamma) * state.a
-    rhs = (
-        (1 - af) * external
-        + af * state.load
-        - am * (mass @ state.a)
-        - machine.damping @ ((1 - af) * v0 + af * state.v)
-        - machine.stiffness @ ((1 - af) * d0 + af * state.d)
-    )
-    a_free = inverse @ rhs
-    d_free = d0 + scheme.beta * h * h * a_free
-    theta1, theta2 = angles(machine, d_free, t)
-    y = d_free[r + 1] - d_free[r]
-    sides, teeth, found, n = find_pairs(
-        law, theta1, theta2, law.centre + machine.axis_x * y, machine.axis_y * y, MARGIN
-    )
+def padded(values: Array) -> Array:
+    """The values, followed by zeros up to PAIRS."""
+    out = np.zeros(PAIRS)
+    for p in range(len(values)):
+        out[p] = values[p]
+    return out
+
+
+@compiled
+def meet(machine: Machine, d: Array, t: float):
+    """Tooth pairs at the unknowns d: sides, teeth, contacts, number, contact rows, overlaps that rigid motion and
+    modes leave (n,) and residual coupling (n, n) of the flanks."""
+    first = machine.rotations + 2
+    theta1, theta2 = angles(machine, d, t)
+    y = d[first - 1] - d[first - 2]
+    dx, dy = machine.law.centre + machine.axis_x * y, machine.axis_y * y
+    sides, teeth, found, n = find_pairs(machine.law, theta1, theta2, dx, dy, MARGIN)
     rows = contact_rows(machine, sides, teeth, found, n)
-    moved = inverse @ rows.T
-    hub = scheme.beta * h * h * (1 - af) * (rows @ moved)
-    cross = coupling(law, sides, teeth, found, n) - modal_flexibility(machine, rows)
-    over = np.zeros(n)
+    cross, modal = coupling(machine.law, sides, teeth, found, n), modal_flexibility(rows, machine.stiffness, first)
+    over = overlaps(found, n)
     for p in range(n):
-        over[p] = -found[p].gap
-        for k in range(r + 2, len(d_free)):
-            over[p] -= rows[p, k] * d_free[k]
-    guess, residual, older = history(state, sides, teeth, n)
-    start = cross @ guess
-    for p in range(n):
-        if np.isnan(residual[p]):
-            residual[p] = start[p]
-            older[p] = start[p]
-    kappa = machine.beta / (2 * h)
+        for k in range(first, len(d)):
+            over[p] -= rows[p, k] * d[k]
+        for q in range(n):
+            cross[p, q] -= modal[p, q]
+    return sides, teeth, found, n, rows, over, cross
+
+
+@compiled
+def take_step(machine: Machine, scheme: Scheme, state: State, torque: float):
+    """One step under the driver torque at its end. Returns the new state, the driven gear's torque and success."""
+    h, late, r = scheme.step, 1.0 - scheme.alpha_f, machine.rotations
+    square = scheme.beta * h * h
+    t = state.t + h
+    outer = np.zeros(len(state.d))
+    outer[0] = torque
+    if r == 2:
+        outer[1] = -torque * machine.law.driven.rb / machine.law.driver.rb
+    axis1, axis2 = support_axes(machine, *angles(machine, state.d, state.t))
+    corner = hub_coupling(machine.hub1, machine.hub2, r, axis1, axis2)
+    d0, v0, rest, diagonal = predict(machine.mass, machine.damping, machine.stiffness, corner, scheme, state, outer)
+    factor = arrow_factor(diagonal, corner, 1.0 - scheme.alpha_m)
+    a = arrow_solve(factor, diagonal, corner, 1.0 - scheme.alpha_m, rest)
+
+    sides, teeth, found, n, rows, over, cross = meet(machine, plus(d0, square, a), t)
+    kappa = machine.beta / (2.0 * h)
     gain = 1.0 / (1.0 + 3.0 * kappa)
-    memory = gain * kappa * (4.0 * residual - older)
-    force, ok = solve_contact(law, found, over, hub, cross, memory, gain, guess, n)
-    push = rows.T @ force
-    a = a_free + (1 - af) * (inverse @ push)
-    fresh = memory + gain * (cross @ force)
-    padded = np.zeros(PAIRS)
-    new_residual = np.zeros(PAIRS)
-    new_older = np.zeros(PAIRS)
+    guess, residual, memory = history(state, cross, sides, teeth, kappa)
+    flexibility = np.empty((n, n))
+    moved = [a] * n
     for p in range(n):
+        over[p] -= memory[p]
+        moved[p] = arrow_solve(factor, diagonal, corner, 1.0 - scheme.alpha_m, rows[p])
+        shift = times(rows, moved[p])
+        for q in range(n):
+            flexibility[p, q] = gain * cross[p, q] + square * late * shift[q]
+    force, _, _, ok = share_load(machine.law.curves, found, over, flexibility, gain, guess)
+
+    load = outer
+    fresh = times(cross, force)
+    for p in range(n):
+        load = plus(load, force[p], rows[p])
+        a = plus(a, late * force[p], moved[p])
         if force[p] > 0.0:
-            u, _ = lone_approach(law, found[p], force[p])
-            fresh[p] += gain * u
-        padded[p] = force[p]
-        new_residual[p] = fresh[p]
-        new_older[p] = residual[p]
-    new = State(
-        t,
-        d0 + scheme.beta * h * h * a,
-        v0 + h * scheme.gamma * a,
-        a,
-        external + push,
-        sides,
-        teeth,
-        padded,
-        new_residual,
-        new_older,
-        n,
-    )
-    return new, reaction(machine, rows, sides, found, force, a, n), ok
+            fresh[p] += lone_approach(machine.law.curves, contact_in(found, p), force[p])[0]
+        fresh[p] = memory[p] + gain * fresh[p]
+    d, v = plus(d0, square, a), plus(v0, h * scheme.gamma, a)
+    new = State(t, d, v, a, load, sides, teeth, padded(force), padded(fresh), padded(residual), n)
+    moment = -outer[1] if r == 2 else reaction(machine.hub2, sides, found, force, a, n)
+    return new, moment, ok
 
 
 @compiled
-def effective_inverse(machine: Machine, scheme: Scheme, mass: Array) -> Array:
-    """Inverse of the scheme's effective mass matrix."""
-    h, af = scheme.step, scheme.alpha_f
-    effective = (
-        (1 - scheme.alpha_m) * mass
-        + (1 - af) * scheme.gamma * h * machine.damping
-        + (1 - af) * scheme.beta * h * h * machine.stiffness
-    )
-    return np.linalg.inv(effective)
-
-
-@compiled
-def advance(machine: Machine, scheme: Scheme, state: State, torque: Array, substeps: int):  # type: ignore[no-untyped-def]
+def advance(machine: Machine, scheme: Scheme, state: State, torque: Array, substeps: int):
     """Integrate over len(torque) steps, `torque` being the driver torque at the end of each.
 
     Returns the state at the end, samples (len(torque)/substeps, CHANNELS) taken after every `substeps` steps, and the
     step at which contact was not found (-1: none).
     """
     samples = np.zeros((len(torque) // substeps, CHANNELS))
-    theta1, theta2 = angles(machine, state.d, state.t)
-    base1, base2 = theta1, theta2
-    mass = mass_matrix(machine, theta1, theta2)
-    inverse = effective_inverse(machine, scheme, mass)
+    r = machine.rotations
     for i in range(len(torque)):
-        theta1, theta2 = angles(machine, state.d, state.t)
-        if abs(theta1 - base1) > REBASE or abs(theta2 - base2) > REBASE:
-            base1, base2 = theta1, theta2
-            mass = mass_matrix(machine, theta1, theta2)
-            inverse = effective_inverse(machine, scheme, mass)
-        state, moment, ok = take_step(machine, scheme, inverse, mass, state, torque[i])
+        state, moment, ok = take_step(machine, scheme, state, torque[i])
         if not ok:
             return state, samples, i
         if (i + 1) % substeps == 0:
             k = (i + 1) // substeps - 1
-            theta1, theta2 = angles(machine, state.d, state.t)
-            r = machine.rotations
-            samples[k, 0] = theta1
-            samples[k, 1] = theta2
-            samples[k, 2] = state.d[r]
-            samples[k, 3] = state.d[r + 1]
+            samples[k, 0], samples[k, 1] = angles(machine, state.d, state.t)
+            samples[k, 2], samples[k, 3] = state.d[r], state.d[r + 1]
             samples[k, 4] = moment
-            samples[k, 5] = np.sum(state.force > 0.0)
+            for p in range(state.count):
+                samples[k, 5] += state.force[p] > 0.0
     return state, samples, -1

@@ -236,18 +236,18 @@ def test_resampling_keeps_the_kernel(small: CondensedGear) -> None:
             assert own == pytest.approx(small.front[small.reach, i, j] / small.face_width, abs=5e-4 * scale)
             for apart in (-1, 1):
                 expected = small.front[small.reach + apart, i, j] / small.face_width
-                got = cross_flexibility(kernel, 0, small.s[i], 0, small.s[j], apart)
+                got = cross_flexibility(kernel, 0, x, 0, y, apart)
                 assert got == pytest.approx(expected, abs=2e-4 * scale)
                 expected = small.back[small.reach + apart, i, j] / small.face_width
-                got = cross_flexibility(kernel, 0, small.s[i], 1, small.s[j], apart)
+                got = cross_flexibility(kernel, 0, x, 1, y, apart)
                 assert got == pytest.approx(expected, abs=2e-4 * scale)
-    assert cross_flexibility(kernel, 0, small.s[3], 0, small.s[3], small.reach + 1) == 0.0
+    assert cross_flexibility(kernel, 0, x, 0, x, small.reach + 1) == 0.0
 
 
 def test_back_loads_mirror_front_loads(small: CondensedGear) -> None:
     """A load on the back flank moves the working flank m teeth on as the reverse does m teeth back (Betti)."""
     kernel = make_kernel(small)
-    a, b = small.s[4], small.s[12]
+    a, b = grid_position(kernel, small.s[4]), grid_position(kernel, small.s[12])
     for apart in (-2, -1, 0, 1, 2):
         there = cross_flexibility(kernel, 1, a, 0, b, apart)
         back = cross_flexibility(kernel, 0, b, 1, a, -apart)

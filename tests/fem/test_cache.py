@@ -111,7 +111,7 @@ def test_a_stored_gear_and_law_are_those_made(
         np.testing.assert_array_equal(getattr(found, name), value)
         assert type(getattr(found, name)) is type(value)
     again = stored_law(own, (found, found), 1e-3, 2)
-    for one, two in zip(law.curve1, again.curve1, strict=True):
+    for one, two in zip(law.curves.driver, again.curves.driver, strict=True):
         np.testing.assert_array_equal(one, two)
         assert type(one) is type(two)
     assert again.reach2 == law.reach2

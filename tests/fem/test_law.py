@@ -7,7 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gearbench.fem.law import coupling, curve_at, find_pairs, lone_approach, make_law, share_load
+from gearbench.fem.curve import curve_at, lone_approach
+from gearbench.fem.kinematics import pair_contact
+from gearbench.fem.law import contact_in, coupling, find_pairs, make_law, overlaps, share_load
 from gearbench.fem.line import line_contact
 
 
@@ -17,7 +19,7 @@ def test_curves_interpolate_the_contact_lines(unequal: Any, swap: bool) -> None:
     law = unequal.law
     slave, master = (law.driven, law.driver) if swap else (law.driver, law.driven)
     ks, km = (law.k2, law.k1) if swap else (law.k1, law.k2)
-    curve = law.curve2 if swap else law.curve1
+    curve = law.curves.driven if swap else law.curves.driver
     rng = np.random.default_rng(11)
     worst = {"inside": 0.0, "corner": 0.0}
     for _ in range(60):
@@ -32,7 +34,7 @@ def test_curves_interpolate_the_contact_lines(unequal: Any, swap: bool) -> None:
 
 @pytest.mark.parametrize("force", [1e-4, 1.0, 300.0, 1e4])
 def test_curve_slope_is_its_derivative(unequal: Any, force: float) -> None:
-    curve = unequal.law.curve1
+    curve = unequal.law.curves.driver
     for xi in np.linspace(curve.xi[0], curve.xi[-1], 7):
         u, slope = curve_at(curve, xi, force)
         h = 1e-5 * force
@@ -57,7 +59,7 @@ def test_the_same_force_on_both_flanks_of_a_tooth_squeezes_it_only(twins: Any) -
     law = twins.law
     sides, teeth, found, n = find_pairs(law, 0.0, 0.0, law.centre, 0.0, 2e-4)
     c = coupling(law, sides, teeth, found, n)
-    front = next(p for p in range(n) if sides[p] == 0 and found[p].slave == 0 and teeth[p] == 0)
+    front = next(p for p in range(n) if sides[p] == 0 and contact_in(found, p).slave == 0 and teeth[p] == 0)
     for p in range(n):
         if sides[p] == 1 and teeth[p] in (0, -1):
             # The driver's tooth 0 (or the driven one) is bent forward: overlap of the working flanks grows.
@@ -71,17 +73,39 @@ def test_shared_load_closes_every_gap(unequal: Any) -> None:
     theta1 = 0.5 * law.driver.pitch + dte / law.driver.rb
     sides, teeth, found, n = find_pairs(law, theta1, 0.5 * law.driven.pitch, law.centre, 0.0, 2e-5)
     c = coupling(law, sides, teeth, found, n)
-    force, flex, active, ok = share_load(law, found, c, n, np.zeros(n))
+    force, flex, active, ok = share_load(law.curves, found, overlaps(found, n), c, 1.0, np.zeros(n))
     assert ok and active.sum() == 2
     assert np.all(force[~active] == 0.0)
     for p in range(n):
-        approach = lone_approach(law, found[p], force[p])[0] if active[p] else 0.0
-        left = -found[p].gap - c[p] @ force - approach
+        approach = lone_approach(law.curves, contact_in(found, p), force[p])[0] if active[p] else 0.0
+        left = -found[p, 0] - c[p] @ force - approach
         assert abs(left) < 1e-9 * dte if active[p] else left <= 1e-12
     assert np.all(np.linalg.eigvalsh(0.5 * (flex + flex.T)) > 0)
 
 
 def test_given_curves_are_taken_over(twins: Any) -> None:
-    again = make_law(twins.pair, *twins.gears, twins.rig.material, curves=(twins.law.curve1, twins.law.curve2))
-    assert again.curve1 is twins.law.curve1
+    again = make_law(twins.pair, *twins.gears, twins.rig.material, curves=twins.law.curves[:2])
+    assert again.curves.driver is twins.law.curves.driver
     assert again.reach1 == twins.law.reach1
+
+
+@pytest.mark.parametrize("margin", [2e-5, 2e-4])
+def test_no_pair_is_overlooked(unequal: Any, margin: float) -> None:
+    """Against a search of all teeth within half a turn of the pitch point, at positions all over the cycle."""
+    law = unequal.law
+    rng = np.random.default_rng(2)
+    for _ in range(200):
+        phase = rng.uniform(-40.0, 40.0)
+        theta1 = phase * law.driver.pitch + rng.uniform(-1e-4, 5e-5) / law.driver.rb
+        theta2 = phase * law.driven.pitch
+        dx, dy = law.centre + rng.uniform(-2e-5, 5e-5), rng.uniform(-5e-5, 5e-5)
+        expected = set()
+        for side in (0, 1):
+            for j in range(round(phase) - 4, round(phase) + 5):
+                k = pair_contact(law.driver, law.driven, side, j, theta1, theta2, dx, dy)
+                reach = (np.inf, law.reach1, law.reach2)[k.slave]
+                on = (k.xi1 if k.slave == 1 else k.xi2) <= reach
+                if k.gap < margin and on and k.s1 >= law.driver.s_form and k.s2 >= law.driven.s_form:
+                    expected.add((side, j))
+        sides, teeth, _, n = find_pairs(law, theta1, theta2, dx, dy, margin)
+        assert {(int(sides[p]), int(teeth[p])) for p in range(n)} == expected

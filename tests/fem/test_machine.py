@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from gearbench.fem.body import condense
-from gearbench.fem.kernel import cross_flexibility
-from gearbench.fem.law import coupling, find_pairs, make_law
+from gearbench.fem.kernel import cross_flexibility, grid_position
+from gearbench.fem.law import contact_in, coupling, find_pairs, make_law
 from gearbench.fem.machine import contact_rows, make_machine, mass_matrix, modal_flexibility
 from gearbench.geometry.body import body
 from gearbench.rig import Load
@@ -29,7 +29,7 @@ def test_contact_rows_are_the_gaps_derivatives(unequal: Any) -> None:
 
     def gaps(q: np.ndarray) -> dict:
         sides, teeth, found, n = find_pairs(law, q[0], q[1], law.centre, q[3] - q[2], 5e-4)
-        return {(sides[p], teeth[p]): found[p].gap for p in range(n)}
+        return {(sides[p], teeth[p]): found[p, 0] for p in range(n)}
 
     sides, teeth, found, n = find_pairs(law, q[0], q[1], law.centre, q[3] - q[2], 4e-4)
     rows = contact_rows(machine, sides, teeth, found, n)
@@ -47,7 +47,7 @@ def test_modes_and_coupling_count_the_teeth_alike(gear: Any, twins: Any) -> None
     Both flank sides and neighbouring teeth: a wrong tooth, sense or sign puts other modes' values there.
     """
     slender = condense(gear(hub_radius=3e-3), twins.rig.material, 0.7e-3, 30)
-    curves = twins.law.curve1, twins.law.curve2
+    curves = twins.law.curves[:2]
     law = make_law(twins.pair, slender, slender, twins.rig.material, curves=curves)
     rig = twins.rig.model_copy(update={"driver": gear(hub_radius=3e-3), "driven": gear(hub_radius=3e-3)})
     bodies = tuple(body(twins.pair.driver, rig.driver, rig.material.density) for _ in range(2))
@@ -55,7 +55,8 @@ def test_modes_and_coupling_count_the_teeth_alike(gear: Any, twins: Any) -> None
     at = 0.5 * law.driver.pitch
     sides, teeth, found, n = find_pairs(law, at, at, law.centre, 0.0, 2e-4)
     assert n >= 3 and set(sides[:n]) == {0, 1}
-    modal = modal_flexibility(machine, contact_rows(machine, sides, teeth, found, n))
+    rows = contact_rows(machine, sides, teeth, found, n)
+    modal = modal_flexibility(rows, machine.stiffness, 4 if machine.rotations == 2 else 3)
     static = coupling(law, sides, teeth, found, n)
     off = ~np.eye(n, dtype=bool)
     same = sides[:n][:, None] == sides[:n][None]
@@ -76,10 +77,19 @@ def test_coupling_takes_the_teeth_in_their_order(unequal: Any) -> None:
     zero, one = number[0, 0], number[0, 1]
 
     def flexibility(p: int, q: int, apart1: int, apart2: int) -> float:
-        a, b = found[q], found[p]
-        return cross_flexibility(k1, int(sides[q]), a.s1, int(sides[p]), b.s1, apart1) + cross_flexibility(
-            k2, int(sides[q]), a.s2, int(sides[p]), b.s2, apart2
+        load, at = contact_in(found, q), contact_in(found, p)
+        one, two = (
+            cross_flexibility(
+                kernel,
+                int(sides[q]),
+                grid_position(kernel, s_load),
+                int(sides[p]),
+                grid_position(kernel, s),
+                apart,
+            )
+            for kernel, s_load, s, apart in ((k1, load.s1, at.s1, apart1), (k2, load.s2, at.s2, apart2))
         )
+        return one + two
 
     assert c[one, zero] == pytest.approx(flexibility(one, zero, -1, 1), rel=1e-12)
     assert c[zero, one] == pytest.approx(flexibility(zero, one, 1, -1), rel=1e-12)
