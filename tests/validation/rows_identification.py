@@ -5,6 +5,8 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
+
 from gearbench.identification import (
     IdentificationSettings,
     exact_itf,
@@ -15,7 +17,6 @@ from gearbench.identification import (
 )
 from gearbench.identification.reference import ReferenceRig, reference_record
 from gearbench.validation import Check, NotRun
-from numpy.typing import NDArray
 
 BAND = (700.0, 2500.0)
 FREQUENCIES = np.arange(BAND[0], BAND[1] + 1, 4.0)
