@@ -92,9 +92,7 @@ def rounded(gear: Gear) -> Gear:
     return gear.model_copy(update={"tip_edge_radius": max(gear.tip_edge_radius, EDGE_RADIUS_LEAST)})
 
 
-def condense(
-    gear: Gear, material: Material, element_size: float | None = None, modes: int = 8
-) -> CondensedGear:
+def condense(gear: Gear, material: Material, element_size: float | None = None, modes: int = 8) -> CondensedGear:
     """Mesh one sector of the gear and condense the whole gear to hub and flanks.
 
     element_size [m] on the flanks (None: module / 12). Raises GeometryError for an impossible gear.
@@ -122,9 +120,7 @@ def condense(
         omega=np.array([m.omega for m in found]),
         mode_front=np.array([(traces[0] @ m.shape.T).T for m in found]).reshape(-1, gear.teeth, n),
         mode_back=np.array([(traces[1] @ m.shape.T).T for m in found]).reshape(-1, gear.teeth, n),
-        mode_hub=np.array([[areal * np.sum(r * (mass @ m.shape.T).T) for r in rigid] for m in found]).reshape(
-            -1, 3
-        ),
+        mode_hub=np.array([[areal * np.sum(r * (mass @ m.shape.T).T) for r in rigid] for m in found]).reshape(-1, 3),
         unknowns=gear.teeth * (stiffness.shape[0] - len(ring.low) - len(ring.hub)),
     )
 
@@ -141,9 +137,7 @@ def _rigid_shapes(points: Array, teeth: int) -> Array:
     return out
 
 
-def flank_kernels(
-    ring: Ring, mesh: SectorMesh, shape: Profile, moduli: PlaneModuli, s: Array
-) -> tuple[Array, Array]:
+def flank_kernels(ring: Ring, mesh: SectorMesh, shape: Profile, moduli: PlaneModuli, s: Array) -> tuple[Array, Array]:
     """Kernels (front, back) of `CondensedGear`, by exact subtraction of Flamant's field."""
     teeth = ring.teeth
     quadrature = boundary_quadrature(shape, mesh.points, mesh.triangles, mesh.boundary_edges)
@@ -157,9 +151,7 @@ def flank_kernels(
     hub_points = mesh.points[mesh.hub]
 
     def hub(j: int) -> Array:
-        fields = [
-            -load.displacement(hub_points, moduli.modulus, moduli.poisson).ravel() for load in loads_in(j)
-        ]
+        fields = [-load.displacement(hub_points, moduli.modulus, moduli.poisson).ravel() for load in loads_in(j)]
         return np.array(fields).T
 
     def forces(j: int) -> Array:
@@ -187,9 +179,7 @@ def _regular_forces(quadrature: BoundaryQuadrature, loads: list[LineLoad]) -> Ar
     return np.asarray(quadrature.load @ np.array(tractions).T)
 
 
-def _half_plane(
-    load: LineLoad, points: Array, inward: Array, moduli: PlaneModuli, s: Array, own: int | None
-) -> Array:
+def _half_plane(load: LineLoad, points: Array, inward: Array, moduli: PlaneModuli, s: Array, own: int | None) -> Array:
     """Flamant's inward normal displacement at flank points; on the loaded flank without its logarithm."""
     out = np.empty(len(points))
     other = np.arange(len(points)) != own if own is not None else np.ones(len(points), bool)

@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gearbench.fem.body import CondensedGear, condense, rounded
 from gearbench.fem.compiled import cache_folder
@@ -24,7 +23,7 @@ from gearbench.fem.law import Curve, Law, elastic_pair, make_law
 from gearbench.rig import Gear, Material, Rig
 from gearbench.rig.value import Value
 
-Arrays = dict[str, NDArray[Any]]
+Arrays = Mapping[str, Any]  # of numpy arrays
 
 SOURCES = ("gearbench.geometry", "gearbench.fem")
 LIBRARIES = ("numpy", "scipy", "scikit-fem", "gmsh")
@@ -75,9 +74,7 @@ def cached(key: str, make: Callable[[], Arrays]) -> Arrays:
     return arrays
 
 
-def stored_gear(
-    gear: Gear, material: Material, element_size: float | None = None, modes: int = 8
-) -> CondensedGear:
+def stored_gear(gear: Gear, material: Material, element_size: float | None = None, modes: int = 8) -> CondensedGear:
     """`condense(...)`, from disk where it has been done before."""
     key = _gear_key(gear, material, element_size, modes)
     arrays = cached(
@@ -85,7 +82,8 @@ def stored_gear(
         lambda: {f.name: np.asarray(v) for f, v in _fields(condense(gear, material, element_size, modes))},
     )
     scalars = {"teeth": int, "last": int, "unknowns": int, "face_width": float}
-    return CondensedGear(**{name: scalars[name](v) if name in scalars else v for name, v in arrays.items()})
+    values: dict[str, Any] = {name: scalars[name](v) if name in scalars else v for name, v in arrays.items()}
+    return CondensedGear(**values)
 
 
 def stored_law(
@@ -106,11 +104,13 @@ def stored_law(
     if made:
         return made[0]
     names = ("xi", "value", "slope", "log_low", "log_step")
-    first, second = (
-        Curve(*(float(v) if v.ndim == 0 else v for v in (arrays[f"{name}{i}"] for name in names)))
-        for i in range(2)
-    )
-    return make_law(meshing, *gears, rig.material, curves=(first, second))
+
+    def curve(number: int) -> Curve:
+        values: list[Any] = [arrays[f"{name}{number}"] for name in names]
+        plain: list[Any] = [float(v) if v.ndim == 0 else v for v in values]
+        return Curve(*plain)
+
+    return make_law(meshing, *gears, rig.material, curves=(curve(0), curve(1)))
 
 
 def _fields(gear: CondensedGear) -> list[tuple[Field[Any], Any]]:

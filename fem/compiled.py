@@ -15,6 +15,9 @@ from typing import Any
 
 import numba
 
+# Division by zero gives infinity, as in numpy; nobody calls these through C function pointers.
+OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+
 
 def cache_folder() -> Path:
     """GEARBENCH_CACHE, or `gearbench` in the user's cache folder."""
@@ -37,11 +40,12 @@ def compiled(function: Callable[..., Any]) -> Any:
 
     Where that folder cannot be written the function is compiled anew in every process.
     """
-    before = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = str(cache_folder() / f"compiled-{sources_digest()[:16]}")
+    config: Any = numba.config
+    before = config.CACHE_DIR
+    config.CACHE_DIR = str(cache_folder() / f"compiled-{sources_digest()[:16]}")
     try:
-        return numba.njit(function, cache=True, nogil=True, error_model="numpy", no_cfunc_wrapper=True)
+        return numba.njit(function, cache=True, **OPTIONS)
     except RuntimeError:
-        return numba.njit(function, nogil=True, error_model="numpy", no_cfunc_wrapper=True)
+        return numba.njit(function, **OPTIONS)
     finally:
-        numba.config.CACHE_DIR = before
+        config.CACHE_DIR = before

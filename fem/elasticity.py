@@ -39,9 +39,7 @@ def plane_moduli(material: Material) -> PlaneModuli:
     return PlaneModuli(e / (1 - nu**2), nu / (1 - nu))
 
 
-def assemble(
-    points: Array, triangles: NDArray[np.int64], moduli: PlaneModuli
-) -> tuple[csr_matrix, csr_matrix]:
+def assemble(points: Array, triangles: NDArray[np.int64], moduli: PlaneModuli) -> tuple[csr_matrix, csr_matrix]:
     """Stiffness and mass (unit thickness, unit density) on P2 triangles; unknown 2 n + c is component c of node n.
 
     points: (n, 2) [m]; triangles: (m, 6), corners then mid-side nodes of edges 01, 12, 20.

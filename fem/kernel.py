@@ -73,9 +73,7 @@ def make_kernel(gear: CondensedGear) -> Kernel:
     def resample_modes(table: Array) -> Array:
         if not len(table):
             return np.zeros((0, gear.teeth, POINTS))
-        return np.concatenate(
-            [make_interp_spline(x, table[:, :, i], k=3, axis=2)(t) for i, x, t in pieces], axis=2
-        )
+        return np.concatenate([make_interp_spline(x, table[:, :, i], k=3, axis=2)(t) for i, x, t in pieces], axis=2)
 
     return Kernel(
         resample(gear.front),

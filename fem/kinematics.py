@@ -125,17 +125,13 @@ def contact(t1: Tooth, t2: Tooth, c1: float, c2: float, dx: float, dy: float) ->
         moved = min(max(moved, 0.0), 1.5)
         s2 = min(t2.s_end + t2.edge_radius * moved, t2.s_tip)
         foot = max(foot, 0.0)
-        return Contact(
-            gap, 2, foot, rho2 + shift, foot * foot / (2 * t1.rb), s2, t1.rb, lever, -sin(phi), cos(phi)
-        )
+        return Contact(gap, 2, foot, rho2 + shift, foot * foot / (2 * t1.rb), s2, t1.rb, lever, -sin(phi), cos(phi))
     gap, phi, foot, lever, moved = edge_contact(t1, t2, c1, c2, dx, dy)
     shift = 0.5 * min(gap, 0.0)
     moved = min(max(moved, 0.0), 1.5)
     s1 = min(t1.s_end + t1.edge_radius * moved, t1.s_tip)
     foot = max(foot, 0.0)
-    return Contact(
-        gap, 1, rho1 + shift, foot, s1, foot * foot / (2 * t2.rb), lever, t2.rb, -sin(phi), cos(phi)
-    )
+    return Contact(gap, 1, rho1 + shift, foot, s1, foot * foot / (2 * t2.rb), lever, t2.rb, -sin(phi), cos(phi))
 
 
 @compiled

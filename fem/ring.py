@@ -37,9 +37,7 @@ class SectorLike(Protocol):
 
 def symmetric_lu(matrix: csc_matrix) -> Solver:
     """Factorise a symmetric sparse matrix with SuperLU's symmetric mode."""
-    factor = splu(
-        _narrow(matrix), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
-    )
+    factor = splu(_narrow(matrix), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
     return factor.solve
 
 
@@ -77,7 +75,7 @@ class Ring:
     @property
     def turn(self) -> Array:
         """Block rotation that takes a cut's displacement from the next sector's frame to this one's."""
-        return np.kron(np.eye(len(self.low) // 2), rotation(2 * pi / self.teeth))
+        return np.asarray(np.kron(np.eye(len(self.low) // 2), rotation(2 * pi / self.teeth)), dtype=np.float64)
 
 
 def make_ring(

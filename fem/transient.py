@@ -37,7 +37,7 @@ class State(NamedTuple):
     """State of the integration at time `t` [s].
 
     d, v, a, load (d,): unknowns, rates, accelerations and generalised forces; sides, teeth (PAIRS,): tooth pairs near
-    contact; force [N], residual and older residual [m] of each; count: number of pairs.
+    contact; force [N], residual and older residual [m] of each; pairs: their number.
     """
 
     t: float
@@ -50,7 +50,7 @@ class State(NamedTuple):
     force: Array
     residual: Array
     older: Array
-    count: int
+    pairs: int
 
 
 def make_scheme(step: float, spectral_radius: float) -> Scheme:
@@ -153,7 +153,7 @@ def history(state: State, cross: Array, sides, teeth, kappa: float):
     force, known = np.zeros(n), np.zeros(n, np.bool_)
     residual, memory = np.zeros(n), np.empty(n)
     for p in range(n):
-        for q in range(state.count):
+        for q in range(state.pairs):
             if state.sides[q] == sides[p] and state.teeth[q] == teeth[p]:
                 force[p], residual[p], known[p] = state.force[q], state.residual[q], True
                 memory[p] = kappa * (4.0 * state.residual[q] - state.older[q])
@@ -257,6 +257,6 @@ def advance(machine: Machine, scheme: Scheme, state: State, torque: Array, subst
             samples[k, 0], samples[k, 1] = angles(machine, state.d, state.t)
             samples[k, 2], samples[k, 3] = state.d[r], state.d[r + 1]
             samples[k, 4] = moment
-            for p in range(state.count):
+            for p in range(state.pairs):
                 samples[k, 5] += state.force[p] > 0.0
     return state, samples, -1
