@@ -14,9 +14,7 @@ def check(case: CaseArgument, settings: SetOption = None, as_json: JsonOption = 
 
     rows = data_sheet(loaded.rig)
     if as_json:
-        print_json(
-            {"case": loaded.name, "data": {row.name: {"value": row.value, "unit": row.unit} for row in rows}}
-        )
+        print_json({"case": loaded.name, "data": {row.name: {"value": row.value, "unit": row.unit} for row in rows}})
         return
     typer.echo(f"{loaded.name}\n")
     shared = [row for row in rows if not row.name.startswith(("driver ", "driven "))]

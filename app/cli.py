@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Sequence
 from typing import Annotated
@@ -70,4 +71,8 @@ def run_command_line(arguments: Sequence[str]) -> int:
 
 def main() -> None:
     """Entry point of the `gearbench` script."""
+    # The matrices are many and small: on them several BLAS threads wait for one another, ten times as long as
+    # one needs on a busy machine. Takes effect because NumPy is not imported yet.
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
     sys.exit(run_command_line(sys.argv[1:]))

@@ -17,12 +17,8 @@ if TYPE_CHECKING:
 def compare(
     a: Annotated[Path, typer.Argument(metavar="A", help="folder of a run, a record, or a result")],
     b: Annotated[Path, typer.Argument(metavar="B", help="what it is compared with")],
-    out: Annotated[Path, typer.Option("--out", help="folder for compare.csv and pictures")] = Path(
-        "out_compare"
-    ),
-    force: Annotated[
-        bool, typer.Option("--force", help="replace an earlier comparison of other things")
-    ] = False,
+    out: Annotated[Path, typer.Option("--out", help="folder for compare.csv and pictures")] = Path("out_compare"),
+    force: Annotated[bool, typer.Option("--force", help="replace an earlier comparison of other things")] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Compare two runs, records or results: compare.csv and one picture a quantity."""

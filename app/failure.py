@@ -78,9 +78,7 @@ def report(error: Exception) -> int:
         return BAD_INPUT
     place = traceback.extract_tb(error.__traceback__)[-1] if error.__traceback__ else None
     where = f" ({os.path.basename(place.filename)}, line {place.lineno})" if place else ""
-    say(
-        f"defect of gearbench: {type(error).__name__}: {_one_line(error)}{where}; GEARBENCH_DEBUG=1 shows all"
-    )
+    say(f"defect of gearbench: {type(error).__name__}: {_one_line(error)}{where}; GEARBENCH_DEBUG=1 shows all")
     return DEFECT
 
 

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import ceil
 from pathlib import Path
 from textwrap import fill
+from typing import Any
 
 import numpy as np
 import xarray as xr
 from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator
 from numpy.typing import NDArray
 
 from gearbench.plotting import BLUE, GREEN, GREY, ORANGE, figure, save, shade
@@ -16,11 +20,12 @@ from gearbench.zones import Span
 
 Array = NDArray[np.float64]
 
-_COLOURS = {"identified": BLUE, "exact": ORANGE, "frozen": GREEN}
+_COLOURS = {"identified": BLUE, "exact": ORANGE, "frozen": GREEN, "linearised": GREEN}
 _TITLES = {
     "identified": "Identified from the record",
     "exact": "Exact ITF of the model",
     "frozen": "Frozen coefficients (not the truth)",
+    "linearised": "Linearised model, frozen at each phase",
 }
 _PIXELS = 700  # a map needs no more rows or columns than this
 
@@ -44,9 +49,16 @@ def draw_itf(path: Path, results: Mapping[str, xr.Dataset], warning: str = "") -
             panel.set_xlabel("mesh phase [cycles]")
             panel.grid(False)
         axes[0, 0].set_ylabel("frequency [Hz]")
-        drawing.colorbar(image, ax=axes[0, :].tolist(), label="|ITF| = |DTE / F| [nm/N]", extend="both")
+        drawing.colorbar(
+            image,
+            ax=axes[0, :].tolist(),
+            label="|ITF| = |DTE / F| [nm/N]",
+            extend="both",
+            ticks=LogLocator(subs=(1, 2, 5)),
+            format=FuncFormatter(lambda value, _: f"{value:g}"),
+        )
         if warning:
-            drawing.suptitle(fill(warning, int(12 * max(width, 6.6))), color="#a01010", fontsize=9.5)
+            _warn(drawing, warning, int(12 * max(width, 6.6)))
         save(drawing, path)
 
 
@@ -66,12 +78,29 @@ def draw_natural_frequencies(
         axes.set_xlim(0, 1)
         axes.set_xlabel("mesh phase [cycles]; 0: contact at the pitch point")
         axes.set_ylabel("natural frequency [Hz]")
+        _zoom_on_found(axes, results)
         axes.set_title("Natural frequencies over one mesh period")
-        axes.margins(y=0.25)
         axes.legend(loc="upper center", ncols=2, frameon=True, framealpha=0.9)
         if warning:
-            drawing.suptitle(fill(warning, 96), color="#a01010", fontsize=9.5)
+            _warn(drawing, warning, 100)
         save(drawing, path)
+
+
+def _warn(drawing: Figure, warning: str, width: int) -> None:
+    """A warning on top of a picture, in lines of about the same length."""
+    lines = ceil(len(warning) / width)
+    text = fill(warning, min(width, ceil(len(warning) / lines) + 8))
+    drawing.suptitle(text, color="#a01010", fontsize=9.5)
+
+
+def _zoom_on_found(axes: Any, results: Mapping[str, xr.Dataset]) -> None:
+    """Limit the ordinate to the modes that a response shows: eigenvalues may hold ones that nothing excites."""
+    shown = [frf["natural_frequency"].values for name, frf in results.items() if name in ("identified", "exact")]
+    found = np.concatenate([values[np.isfinite(values)] for values in shown]) if shown else np.empty(0)
+    if found.size:
+        low, high = found.min(), found.max()
+        margin = max(0.25 * (high - low), 0.02 * high)
+        axes.set_ylim(low - margin, high + 1.6 * margin)
 
 
 def _coarse(frf: xr.Dataset, values: Array) -> tuple[Array, Array, Array]:

@@ -25,8 +25,7 @@ def draw_pair(path: Path, rig: Rig, meshing: Pair, mesh: PlaneMesh | None) -> No
         _draw_outlines(whole, rig, meshing)
         _draw_circles(whole, rig, meshing)
         whole.set_title(
-            f"Gear pair z = {rig.driver.teeth}/{rig.driven.teeth}, m = {rig.driver.module * 1e3:g} mm,"
-            " mesh phase 0"
+            f"Gear pair z = {rig.driver.teeth}/{rig.driven.teeth}, m = {rig.driver.module * 1e3:g} mm, mesh phase 0"
         )
         largest = 1e3 * max(meshing.driver.tip_radius, meshing.driven.tip_radius)
         whole.set_ylim(-1.75 * largest, 1.1 * largest)

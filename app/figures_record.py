@@ -28,9 +28,7 @@ def draw_stiffness(path: Path, static: xr.Dataset, zones: Sequence[Span], label:
             colour = colours[number % len(colours)]
             tangent = static["stiffness_tangent"].values[number]
             secant = static["stiffness_secant"].values[number]
-            axes.plot(
-                *_closed(phase, tangent / 1e6), color=colour, label=f"tangent dF/d dte at {load:g} {unit}"
-            )
+            axes.plot(*_closed(phase, tangent / 1e6), color=colour, label=f"tangent dF/d dte at {load:g} {unit}")
             if np.abs(secant - tangent).max() > 1e-6 * tangent.max():
                 text = f"secant F/dte at {load:g} {unit}"
                 axes.plot(*_closed(phase, secant / 1e6), color=colour, ls="--", label=text)

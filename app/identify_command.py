@@ -15,9 +15,7 @@ if TYPE_CHECKING:
 
 
 def identify(
-    records: Annotated[
-        list[Path], typer.Argument(metavar="RECORD...", help="records: realisations of one condition")
-    ],
+    records: Annotated[list[Path], typer.Argument(metavar="RECORD...", help="records: realisations of one condition")],
     out: Annotated[Path, typer.Option("--out", help="frequency response to write (NetCDF-4)")],
     method: Annotated[Literal["lpm"], typer.Option("--method", help="estimator")] = "lpm",
     band_hz: Annotated[
@@ -39,9 +37,7 @@ def identify(
     from gearbench.identification import identify as estimate
     from gearbench.records import read_record
 
-    settings = IdentificationSettings(
-        method=method, harmonics=harmonics, order=order, window=window, band=band_hz
-    )
+    settings = IdentificationSettings(method=method, harmonics=harmonics, order=order, window=window, band=band_hz)
     with Progress("identify") as progress:
         progress.step("reading")
         loaded = [read_record(path) for path in records]

@@ -31,16 +31,19 @@ def load_case(name: str, settings: Sequence[str] | None) -> Case:
     if not path.exists():
         shipped = case_files()
         if name not in shipped:
-            raise CaseError(
-                f"case file {name} does not exist, and the shipped cases are {', '.join(shipped)}"
-            )
+            raise CaseError(f"case file {name} does not exist, and the shipped cases are {', '.join(shipped)}")
         path = shipped[name]
     return read_case(path, settings or ())
 
 
 def print_json(summary: Any) -> None:
-    """A summary to stdout as JSON; numbers that are not finite become null."""
-    typer.echo(json.dumps(_finite(summary), indent=2))
+    """A summary to stdout as JSON."""
+    typer.echo(json_text(summary))
+
+
+def json_text(summary: Any) -> str:
+    """JSON; numbers that are not finite become null."""
+    return json.dumps(_finite(summary), indent=2, allow_nan=False)
 
 
 def _finite(value: Any) -> Any:

@@ -17,9 +17,7 @@ if TYPE_CHECKING:
 
 def simulate(
     case: CaseArgument,
-    out: Annotated[
-        Path, typer.Option("--out", help="record to write (NetCDF-4); NAME-CONDITION.nc with conditions")
-    ],
+    out: Annotated[Path, typer.Option("--out", help="record to write (NetCDF-4); NAME-CONDITION.nc with conditions")],
     model: Annotated[
         Literal["lumped", "reduced"] | None,
         typer.Option("--model", help="absent: the case's simulation.model"),
@@ -55,10 +53,7 @@ def experiments(case: Case, out: Path) -> list[tuple[Case, Path]]:
     """The case under each of its conditions (or as it is, without any) and the record that belongs to it."""
     if not case.conditions:
         return [(case, out)]
-    names = [
-        (condition, out.with_name(f"{out.stem}-{condition.name}{out.suffix}"))
-        for condition in case.conditions
-    ]
+    names = [(condition, out.with_name(f"{out.stem}-{condition.name}{out.suffix}")) for condition in case.conditions]
     return [(case.under(condition), path) for condition, path in names]
 
 

@@ -15,9 +15,7 @@ Span = tuple[float, float]
 def contact_span(meshing: Pair) -> Span:
     """Mesh phases [cycles] at which tooth pair 0 comes into contact and leaves it; 0 is the pitch point."""
     start, stop = meshing.active_driver
-    return (start - meshing.rho_pitch[0]) / meshing.base_pitch, (
-        stop - meshing.rho_pitch[0]
-    ) / meshing.base_pitch
+    return (start - meshing.rho_pitch[0]) / meshing.base_pitch, (stop - meshing.rho_pitch[0]) / meshing.base_pitch
 
 
 def pairs_in_contact(span: Span, phase: float) -> int:

@@ -38,6 +38,25 @@ def exact_frequencies(identified: xr.Dataset) -> NDArray[np.float64]:
     return frequency[:: max(1, frequency.size // EXACT_FREQUENCIES)]
 
 
+def linearised_modes(case: Case, phases: int = 64) -> xr.Dataset:
+    """First natural frequency [Hz] of the elastic rig, linearised under the mean torque at each mesh phase.
+
+    Variables `natural_frequency` (mode, phase). What an identified response tends to for an infinitely slow mesh.
+    """
+    from gearbench.bench.reduced_rig import elastic_rig, machine_for, natural_frequencies
+    from gearbench.bench.schedule import schedule
+
+    machine = machine_for(elastic_rig(case.rig, case.simulation), schedule(case.experiment, case.rig).mesh_frequency)
+    phase = np.arange(phases) / phases
+    found = [natural_frequencies(machine, case.experiment.torque_mean, float(at))[:1] for at in phase]
+    values = np.array([float(modes[0]) if modes.size else np.nan for modes in found])
+    return xr.Dataset(
+        {"natural_frequency": (("mode", "phase"), values[None], {"units": "Hz"})},
+        coords={"phase": ("phase", phase, {"units": "cycles"}), "mode": ("mode", np.arange(1))},
+        attrs={"schema": "gearbench-modes/1", "model": "reduced", "mesh_phase_origin": "geometry"},
+    )
+
+
 def reference_results(case: Case, identified: xr.Dataset) -> dict[str, xr.Dataset]:
     """The exact and the frozen response of a lumped case, on frequencies and phases of the identified one."""
     system = lumped_periodic_system(case)

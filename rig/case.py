@@ -48,9 +48,7 @@ class Case(Value):
         names = [condition.name for condition in self.conditions]
         for name in names:
             if names.count(name) > 1:
-                raise ValueError(
-                    f'condition name "{name}" is given {names.count(name)} times, must be given once'
-                )
+                raise ValueError(f'condition name "{name}" is given {names.count(name)} times, must be given once')
         return self
 
     def under(self, condition: Condition) -> Case:

@@ -33,9 +33,7 @@ class Experiment(Value):
     """Speed, torque, excitation and sampling. Exactly one of mesh_frequency and speed_driver is given."""
 
     groups: ClassVar[tuple[tuple[str, ...], ...]] = (("mesh_frequency", "speed_driver"),)
-    mesh_frequency: float | None = quantity(
-        None, "hz", gt=0.0, doc="tooth mesh frequency (or give speed_driver)"
-    )
+    mesh_frequency: float | None = quantity(None, "hz", gt=0.0, doc="tooth mesh frequency (or give speed_driver)")
     speed_driver: float | None = quantity(None, "rpm", gt=0.0, doc="driver speed (or give mesh_frequency)")
     torque_mean: float = quantity(unit="nm", gt=0.0, doc="mean driver torque")
     sampling_rate: float = quantity(unit="hz", gt=0.0, doc="sampling rate of the record")
@@ -76,21 +74,13 @@ class Experiment(Value):
 class Simulation(Value):
     """How the experiment is simulated."""
 
-    model: Literal["lumped", "reduced"] = quantity(
-        "reduced", doc="lumped 3-DOF model or reduced finite elements"
-    )
-    substeps: int = quantity(
-        0, ge=0, le=1024, doc="integration steps per sample; 0: as many as the error bound needs"
-    )
+    model: Literal["lumped", "reduced"] = quantity("reduced", doc="lumped 3-DOF model or reduced finite elements")
+    substeps: int = quantity(0, ge=0, le=1024, doc="integration steps per sample; 0: as many as the error bound needs")
     mesh_stiffness: Literal["potential-energy", "rectangular"] = quantity(
         "potential-energy", doc="lumped model: law of k(t)"
     )
-    stiffness_single: float | None = quantity(
-        None, "n_per_m", gt=0.0, doc="rectangular k(t): one pair in contact"
-    )
-    stiffness_double: float | None = quantity(
-        None, "n_per_m", gt=0.0, doc="rectangular k(t): two pairs in contact"
-    )
+    stiffness_single: float | None = quantity(None, "n_per_m", gt=0.0, doc="rectangular k(t): one pair in contact")
+    stiffness_double: float | None = quantity(None, "n_per_m", gt=0.0, doc="rectangular k(t): two pairs in contact")
     stiffness_edge: float = quantity(
         0.02, ge=0.0, le=0.5, doc="lumped model: width of the switches of k(t) in mesh periods; 0: sharp"
     )
@@ -114,9 +104,7 @@ class Identification(Value):
     """Local polynomial method for periodically time-varying systems."""
 
     method: Literal["lpm"] = quantity("lpm", doc="estimator")
-    harmonics: int = quantity(
-        0, ge=0, le=2000, doc="branches L on each side; 0: as many as the record supports"
-    )
+    harmonics: int = quantity(0, ge=0, le=2000, doc="branches L on each side; 0: as many as the record supports")
     order: int | None = quantity(None, ge=0, le=6, doc="polynomial order R; absent: chosen by predicted error")
     window: int = quantity(0, ge=0, le=500, doc="half-width n of the local window, in lines; 0: chosen")
     band: tuple[float, float] | None = quantity(None, "hz", doc="identified band; absent: the multisine's")

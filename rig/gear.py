@@ -19,12 +19,8 @@ class Gear(Value):
     addendum: float = quantity(1.0, gt=0.0, le=2.0, doc="rack addendum (of the gear tooth), in modules")
     dedendum: float = quantity(1.25, gt=0.0, le=2.5, doc="rack dedendum (of the gear tooth), in modules")
     rack_tip_radius: float = quantity(0.38, ge=0.0, le=0.6, doc="tip radius of the cutting rack, in modules")
-    tip_diameter: float | None = quantity(
-        None, "mm", gt=0.0, doc="tip diameter; absent: from addendum and shift"
-    )
-    tip_edge_radius: float = quantity(
-        50e-6, "um", ge=0.0, le=1e-3, doc="radius of the edge of flank and tip land"
-    )
+    tip_diameter: float | None = quantity(None, "mm", gt=0.0, doc="tip diameter; absent: from addendum and shift")
+    tip_edge_radius: float = quantity(50e-6, "um", ge=0.0, le=1e-3, doc="radius of the edge of flank and tip land")
     thinning: float = quantity(
         0.0, "um", ge=0.0, le=5e-3, doc="tooth thinning: transverse arc at the reference circle, per gear"
     )
@@ -32,6 +28,4 @@ class Gear(Value):
     bore_radius: float = quantity(0.0, "mm", ge=0.0, doc="bore radius; no material inside")
     hub_radius: float = quantity(unit="mm", gt=0.0, doc="radius of the rigid hub circle")
     mass: float | None = quantity(None, "kg", gt=0.0, doc="total mass; absent: from the geometry")
-    inertia: float | None = quantity(
-        None, "kg_m2", gt=0.0, doc="total moment of inertia; absent: from the geometry"
-    )
+    inertia: float | None = quantity(None, "kg_m2", gt=0.0, doc="total moment of inertia; absent: from the geometry")

@@ -30,9 +30,7 @@ class Reader:
     root: type[Value]
     uncertainty: dict[str, float] = field(default_factory=dict)
 
-    def table(
-        self, model: type[Value], table: Any, where: str, path: str, partial: bool = False
-    ) -> dict[str, Any]:
+    def table(self, model: type[Value], table: Any, where: str, path: str, partial: bool = False) -> dict[str, Any]:
         """SI fields of `model` from `table`; `where` is its dotted TOML key, `path` its dotted field path.
 
         `partial` leaves missing keys to the caller. Raises CaseError at the first bad key.
@@ -51,9 +49,7 @@ class Reader:
                 result[name] = self._with_common(inner, table, key, where, f"{_dot(path)}{name}")
             elif key in table:
                 place = f"{_dot(where)}{key}"
-                result[name] = self.value(
-                    info, unit_of(model, name), table[key], place, f"{_dot(path)}{name}"
-                )
+                result[name] = self.value(info, unit_of(model, name), table[key], place, f"{_dot(path)}{name}")
             elif info.is_required() and not partial:
                 raise CaseError(f"{_dot(where)}{key} is missing ({info.description or 'a table'})")
         return result
@@ -67,9 +63,7 @@ class Reader:
         result |= self.table(inner, own, f"{_dot(where)}{key}", path, partial=True)
         for name, (attribute, info) in fields_of(inner).items():
             if info.is_required() and attribute not in result:
-                raise CaseError(
-                    f"{where}.{name} is missing ({info.description}; or {where}.{key}.{name} for one gear)"
-                )
+                raise CaseError(f"{where}.{name} is missing ({info.description}; or {where}.{key}.{name} for one gear)")
             if name in own and not isinstance(own[name], Mapping):
                 self.uncertainty.pop(f"{path}.{attribute}", None)
         return result
@@ -194,9 +188,7 @@ def _plain(raw: Any, unit: str, where: str, whole: bool) -> float:
         raise CaseError(f"{where} = {show(raw)} must be a whole number")
     value: float = to_si(raw, unit)
     if not isfinite(value):
-        raise CaseError(
-            f"{where} = {show(raw)} must be a finite number{f' in {SYMBOLS[unit]}' if unit else ''}"
-        )
+        raise CaseError(f"{where} = {show(raw)} must be a finite number{f' in {SYMBOLS[unit]}' if unit else ''}")
     return int(raw) if whole else value
 
 
@@ -207,9 +199,7 @@ def show(raw: Any) -> str:
     elif isinstance(raw, str):
         text = '"' + " ".join(raw.split()) + '"'
     elif isinstance(raw, Mapping):
-        text = (
-            "{ " + ", ".join(f"{key} = {show(value)}" for key, value in raw.items()) + " }" if raw else "{}"
-        )
+        text = "{ " + ", ".join(f"{key} = {show(value)}" for key, value in raw.items()) + " }" if raw else "{}"
     elif isinstance(raw, list):
         text = "[" + ", ".join(show(value) for value in raw[:8]) + (", ..]" if len(raw) > 8 else "]")
     elif isinstance(raw, Decimal) and raw.is_nan():

@@ -15,9 +15,7 @@ class Material(Value):
     youngs_modulus: float = quantity(206e9, "gpa", gt=0.0, le=2e12, doc="Young's modulus")
     poisson: float = quantity(0.3, ge=0.0, lt=0.5, doc="Poisson's ratio")
     density: float = quantity(7810.0, "kg_m3", gt=0.0, le=3e4, doc="density")
-    state: Literal["plane-stress", "plane-strain"] = quantity(
-        "plane-stress", doc="stress state of the 2-D model"
-    )
+    state: Literal["plane-stress", "plane-strain"] = quantity("plane-stress", doc="stress state of the 2-D model")
 
 
 class Support(Value):
@@ -57,12 +55,8 @@ class Damping(Value):
         lt=0.5,
         doc="damping ratio of the elastic gears at `material_frequency` (stiffness-proportional)",
     )
-    material_frequency: float = quantity(
-        1250.0, "hz", gt=0.0, doc="frequency at which `material_ratio` holds"
-    )
-    mesh_ratio: float = quantity(
-        0.05, ge=0.0, lt=0.5, doc="lumped model: zeta in c(t) = 2 zeta sqrt(k(t) m_e)"
-    )
+    material_frequency: float = quantity(1250.0, "hz", gt=0.0, doc="frequency at which `material_ratio` holds")
+    mesh_ratio: float = quantity(0.05, ge=0.0, lt=0.5, doc="lumped model: zeta in c(t) = 2 zeta sqrt(k(t) m_e)")
 
     @property
     def beta(self) -> float:

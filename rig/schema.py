@@ -24,9 +24,7 @@ def case_schema() -> dict[str, Any]:
             "oneOf": [{"type": "string", "description": "gear file, relative to the case file"}, gears[side]],
         }
     variation = _table(Experiment, full=False)
-    variation["properties"] = {"name": {"type": "string", "description": "names the record"}} | variation[
-        "properties"
-    ]
+    variation["properties"] = {"name": {"type": "string", "description": "names the record"}} | variation["properties"]
     schema["properties"]["condition"] = {
         "type": "array",
         "description": "named variations of the experiment: the keys that differ",
@@ -37,9 +35,7 @@ def case_schema() -> dict[str, Any]:
 
 def _table(model: type[Value], full: bool) -> dict[str, Any]:
     """Schema of one table; `full` = False leaves out what is required."""
-    properties = {
-        key: _field(info, unit_of(model, name), full) for key, (name, info) in fields_of(model).items()
-    }
+    properties = {key: _field(info, unit_of(model, name), full) for key, (name, info) in fields_of(model).items()}
     required = [key for key, (_, info) in fields_of(model).items() if info.is_required()]
     if model.common is not None:
         shared = {
@@ -65,9 +61,7 @@ def _field(info: FieldInfo, unit: str, full: bool) -> dict[str, Any]:
         text["unit"] = SYMBOLS[unit]
     schema: dict[str, Any] = text | _type(kind, info, unit)
     if info.default is not None and not info.is_required():
-        schema["default"] = (
-            info.default if isinstance(info.default, str | int) else _number(info.default, unit)
-        )
+        schema["default"] = info.default if isinstance(info.default, str | int) else _number(info.default, unit)
     return schema
 
 

@@ -100,7 +100,5 @@ def _enter(table: Any, key: str, where: str, setting: str) -> Any:
 
 def _position(table: list[Any], key: str, where: str, setting: str) -> int:
     if not key.isdecimal() or int(key) >= len(table):
-        raise CaseError(
-            f"setting {setting!r}: {where} must be a position in a list of {len(table)}, from 0 on"
-        )
+        raise CaseError(f"setting {setting!r}: {where} must be a position in a list of {len(table)}, from 0 on")
     return int(key)

@@ -20,11 +20,7 @@ def write_value(value: Any, unit: str, path: str, uncertainty: Mapping[str, floa
     if isinstance(value, str):
         return write_text(value)
     if isinstance(value, tuple):
-        return (
-            "["
-            + ", ".join(write_value(v, unit, f"{path}.{i}", uncertainty) for i, v in enumerate(value))
-            + "]"
-        )
+        return "[" + ", ".join(write_value(v, unit, f"{path}.{i}", uncertainty) for i, v in enumerate(value)) + "]"
     text = str(value) if isinstance(value, int) else format_number(value, unit)
     if path in uncertainty:
         return f"{{ value = {text}, sd = {format_number(uncertainty[path], unit)} }}"
@@ -37,9 +33,7 @@ def write_lines(model: type[Value], value: Value, path: str, uncertainty: Mappin
     for key, (name, _) in fields_of(model).items():
         held = getattr(value, name)
         if held is not None and not isinstance(held, Value):
-            lines.append(
-                f"{key} = {write_value(held, unit_of(model, name), f'{_dot(path)}{name}', uncertainty)}"
-            )
+            lines.append(f"{key} = {write_value(held, unit_of(model, name), f'{_dot(path)}{name}', uncertainty)}")
     return lines
 
 
@@ -67,9 +61,7 @@ def write_conditions(conditions: Sequence[Condition], uncertainty: Mapping[str, 
         ]
         text += "[[condition]]\n" + "".join(f"{line}\n" for line in lines) + "\n"
         if experiment.multisine is not None:
-            inner = write_lines(
-                type(experiment.multisine), experiment.multisine, f"{path}.multisine", uncertainty
-            )
+            inner = write_lines(type(experiment.multisine), experiment.multisine, f"{path}.multisine", uncertainty)
             text += "[condition.multisine]\n" + "".join(f"{line}\n" for line in inner) + "\n"
     return text
 

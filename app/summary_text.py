@@ -1,0 +1,120 @@
+"""The words of summary.md."""
+
+from __future__ import annotations
+
+from typing import Any
+
+_ENOUGH = 0.1  # expected error of the ITF above which a figure carries a warning
+
+
+def honest_warning(numbers: dict[str, Any]) -> str:
+    """One sentence for the pictures where the record cannot support the ITF, else nothing."""
+    found = numbers["identification"]
+    duration, needed = found.get("record_duration"), found.get("record_needed")
+    short = duration is not None and needed is not None and needed > duration
+    expected = found["expected_error"]
+    if not short and expected <= _ENOUGH:
+        return ""
+    words = []
+    if short:
+        words.append(
+            f"This record cannot support the ITF: {numbers['realisations']} realisation(s) give {duration:g} s of"
+            f" distinct excitation where about {needed:.3g} s are needed."
+        )
+    words.append(
+        f"Estimated error {expected:.0%} or more with {found['harmonics']} branches a side; nothing is smoothed or"
+        " masked."
+    )
+    return " ".join(words)
+
+
+def headline(numbers: dict[str, Any]) -> list[str]:
+    """The first lines of a summary: peak-to-peak TE, mesh orders 1-3, range of the first mode."""
+    orders = ", ".join(f"{value:.4g}" for value in numbers["te_mesh_orders_um"])
+    fewest, most = numbers["first_mode_fewest_pairs_hz"], numbers["first_mode_most_pairs_hz"]
+    return [
+        f"Peak-to-peak TE: {numbers['te_peak_to_peak_um']:.4g} um (static, {numbers['torque_mean_nm']:g} N m)",
+        f"TE mesh orders 1-3: {orders} um",
+        f"First mode: {_range(numbers['first_mode_hz'])} Hz over the mesh period (medians {fewest:.0f} Hz where the"
+        f" fewest tooth pairs are in contact, {most:.0f} Hz elsewhere)",
+    ]
+
+
+def summary_text(numbers: dict[str, Any]) -> str:
+    """summary.md: the answers first, then the account of how far they go."""
+    parts = ["  \n".join(headline(numbers)), f"# {numbers['case']}", *_account(numbers), *_what(numbers)]
+    return "\n\n".join([*(part for part in parts if part), *_files(numbers)]) + "\n"
+
+
+def _range(limits: tuple[float, float]) -> str:
+    return f"{limits[0]:.0f}-{limits[1]:.0f}"
+
+
+def _what(numbers: dict[str, Any]) -> list[str]:
+    model = {"lumped": "lumped model", "reduced": "reduced finite-element model"}.get(numbers["model"], "model")
+    stiffness = numbers["stiffness_n_per_um"]
+    fewest, most = numbers["first_mode_fewest_pairs_hz"], numbers["first_mode_most_pairs_hz"]
+    law = "lower" if fewest < most else "NOT lower"
+    lines = [
+        "## What was done and found",
+        f"The {model} ran {numbers['realisations']} realisation(s) of {numbers['duration_s']:g} s at"
+        f" {numbers['sampling_rate_hz']:g} Hz, {numbers['torque_mean_nm']:g} N m mean torque and"
+        f" {numbers['mesh_frequency_hz']:g} Hz mesh frequency.",
+        "TE is the static transmission error under the mean torque with the gear centres held; a mesh order is the"
+        " amplitude of its sine. In the record, with multisine and supports, the DTE spans"
+        f" {numbers['dte_record_peak_to_peak_um']:.4g} um. The tangent mesh stiffness runs from {stiffness[0]:.4g} to"
+        f" {stiffness[1]:.4g} N/um over the mesh period.",
+        f"The first mode is {law} where the fewest tooth pairs carry. Its damping ratio is about"
+        f" {numbers['first_mode_damping']:.2g}.",
+    ]
+    corner = numbers["support_corner_hz"]
+    if corner is not None and corner < 0.1 * fewest:
+        lines.append(
+            f"The supports are over-damped: above k/(2 pi c) = {corner:.3g} Hz their dampers and not their springs"
+            " carry the gears, which shows in the damping of the first mode."
+        )
+    for name, words in (
+        ("exact", "the exact ITF"),
+        ("frozen", "frozen coefficients (not the truth)"),
+        ("linearised", "the finite-element model, linearised at each phase (frozen)"),
+    ):
+        if f"first_mode_{name}_hz" in numbers:
+            lines.append(f"First-mode range from {words}: {_range(numbers[f'first_mode_{name}_hz'])} Hz.")
+    if numbers["settling_residual"] is not None:
+        lines.append(
+            f"Steady state: from period to period the DTE changes by {numbers['settling_residual']:.2g} of its"
+            " standard deviation."
+        )
+    return lines
+
+
+def _account(numbers: dict[str, Any]) -> list[str]:
+    found = numbers["identification"]
+    lines = [
+        "## How far to trust the identified response",
+        f"Local polynomial method with {found['harmonics']} branches on each side, order {found['order']} and"
+        f" {2 * found['window'] + 1} lines a window: {found['unknowns']} unknowns from {found['equations']} equations"
+        f" in each of {found['windows']} windows; condition number {found['condition_number']:.3g}.",
+        f"Expected error of the ITF: {found['expected_error']:.2%} of its rms (variance"
+        f" {found['variance_error']:.2%}, missing branches {found['truncation_error']:.2%}); at most"
+        f" {found['expected_error_bound']:.2%} if the whole residual is missing response.",
+    ]
+    if "itf_error_against_exact" in numbers:
+        lines.append(
+            f"Measured against the exact ITF the identified one errs by {numbers['itf_error_against_exact']:.2%};"
+            f" the frozen one differs from the exact by {numbers['frozen_against_exact']:.1%} and is no reference."
+        )
+    else:
+        lines.append("This model has no exact response to measure against: the error is an estimate.")
+    warnings = [line for line in str(found.get("warnings", "")).splitlines() if line]
+    warnings += [line for line in str(numbers["record_warnings"] or "").split("; ") if line]
+    warnings = [f"**{honest_warning(numbers)}**" if honest_warning(numbers) else "", *warnings]
+    lines.append("\n".join(f"- {line}" for line in warnings if line))
+    return lines
+
+
+def _files(numbers: dict[str, Any]) -> list[str]:
+    rows = [f"| `{name}` | {about} |" for name, about in numbers["files"].items() if not name.endswith(".png")]
+    table = "\n".join(["| file | what it holds |", "|---|---|", *rows])
+    pictures = [f"![{about}]({name})" for name, about in numbers["files"].items() if name.endswith(".png")]
+    return ["## Files", table, "## Pictures", *pictures]
