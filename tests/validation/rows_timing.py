@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 import numpy as np
+
 from gearbench.bench.excitation import torque_realisation
 from gearbench.bench.lumped_run import tables_for
 from gearbench.bench.reduced_rig import elastic_rig

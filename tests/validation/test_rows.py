@@ -1,6 +1,7 @@
 """Every row of `gearbench validate`, as a test (long: run with `-m validation`)."""
 
 import pytest
+
 from gearbench.validation import Check, checks, run
 
 
