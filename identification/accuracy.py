@@ -16,6 +16,8 @@ from gearbench.identification.spectra import Complexes, Floats, Spectra
 RULE = 3.0
 # L f_mesh >= (highest - lowest natural frequency) + BANDWIDTHS half-power bandwidths.
 BANDWIDTHS = 1.5
+# Missing branches beyond this part of the ITF matter.
+MISSING = 0.03
 
 
 @dataclass(frozen=True)
@@ -98,10 +100,13 @@ def tail(htf: Complexes, variance: Floats) -> float:
     return float(np.sqrt(second * order[outer].mean() ** slope * limit ** (1 - slope) / (slope - 1) / total))
 
 
-def record_rule(spectra: Spectra, harmonics: int, order: int, natural: Floats, damping: Floats) -> RecordRule | None:
+def record_rule(
+    spectra: Spectra, harmonics: int, order: int, natural: Floats, damping: Floats, truncation: float
+) -> RecordRule | None:
     """The rule for natural frequencies [Hz] and damping ratios (mode, phase); None where no mode was found.
 
-    The branches that count are the larger of those used and those that the mode's travel asks for.
+    `truncation`: expected part of the ITF beyond +-L. Where it matters, the branches that count are those that the
+    first mode's travel asks for, if they are more than the L used.
     """
     if not natural.size or not np.isfinite(natural[0]).any():
         return None
@@ -109,6 +114,6 @@ def record_rule(spectra: Spectra, harmonics: int, order: int, natural: Floats, d
     bandwidth = float(np.nanmedian(2 * damping[0] * natural[0]))
     mesh_frequency = spectra.mesh_lines * spectra.spacing
     wanted = int(np.ceil((high - low + BANDWIDTHS * bandwidth) / mesh_frequency))
-    branches = 2 * max(harmonics, wanted) + 1
+    branches = 2 * (max(harmonics, wanted) if truncation > MISSING else harmonics) + 1
     duration = spectra.realisations * spectra.duration / spectra.repeats
     return RecordRule(duration, RULE * branches * (order + 1) / bandwidth, bandwidth, harmonics, wanted)

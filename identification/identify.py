@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from gearbench.identification.accuracy import Accuracy, RecordRule, expected_accuracy, record_rule
+from gearbench.identification.accuracy import MISSING, Accuracy, RecordRule, expected_accuracy, record_rule
 from gearbench.identification.frf import make_frf
 from gearbench.identification.local_solve import LpmError
 from gearbench.identification.lpm import LpmResult, local_polynomial
@@ -28,8 +28,6 @@ Progress = Callable[[float, str], None]
 OUTPUT_LINES = 1500
 # Results beyond this expected error carry a warning.
 DOUBTFUL = 0.1
-# Missing branches beyond this part of the ITF are named.
-MISSING = 0.03
 
 
 @dataclass(frozen=True)
@@ -143,7 +141,7 @@ def _dataset(
     variance = result.itf_variance(settings.phases)
     modes = itf_modes(frequency, response, variance, modes=settings.modes)
     accuracy = expected_accuracy(result, _relative_noise(spectra, result))
-    rule = record_rule(spectra, window.harmonics, window.order, *modes)
+    rule = record_rule(spectra, window.harmonics, window.order, *modes, accuracy.truncation)
     warnings = [*notes, *_warnings(accuracy, rule, spectra)]
     attributes: dict[str, Any] = {
         "method": settings.method,
@@ -206,15 +204,18 @@ def _warnings(accuracy: Accuracy, rule: RecordRule | None, spectra: Spectra) -> 
             f"expected error of the ITF: {accuracy.expected:.0%} (variance {accuracy.variance:.0%}, missing branches"
             f" {accuracy.truncation:.0%}); nothing has been smoothed"
         )
-    if rule is not None and rule.factor > 1:
-        notes.append(
-            f"the record is short by a factor of {rule.factor:.3g}: {spectra.realisations} realisation(s) give"
-            f" {rule.duration:g} s of distinct excitation, {max(rule.harmonics, rule.harmonics_needed)} branches a side"
-            f" and a bandwidth of {rule.bandwidth:.3g} Hz ask for {rule.needed:.3g} s"
-        )
-    if rule is not None and rule.harmonics < rule.harmonics_needed and accuracy.truncation > MISSING:
-        notes.append(
-            f"{rule.harmonics} branches a side reach less far than the first mode travels;"
-            f" {rule.harmonics_needed} would"
-        )
+    if rule is not None:
+        lacking = accuracy.truncation > MISSING and rule.harmonics < rule.harmonics_needed
+        if rule.factor > 1:
+            branches = rule.harmonics_needed if lacking else rule.harmonics
+            notes.append(
+                f"the record is short by a factor of {rule.factor:.3g}: {spectra.realisations} realisation(s) give"
+                f" {rule.duration:g} s of distinct excitation, {branches} branches a side and a bandwidth of"
+                f" {rule.bandwidth:.3g} Hz ask for {rule.needed:.3g} s"
+            )
+        if lacking:
+            notes.append(
+                f"{rule.harmonics} branches a side reach less far than the first mode travels;"
+                f" {rule.harmonics_needed} would"
+            )
     return notes

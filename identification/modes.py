@@ -11,8 +11,6 @@ output error, which does not pull the pole where the ITF is noisy.
 
 from __future__ import annotations
 
-from collections import Counter
-
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.ndimage import uniform_filter1d
@@ -29,6 +27,8 @@ HUMP_SIGNIFICANCE = 8.0
 # A peak reaches this part of the phase's largest magnitude of its phase, and this multiple of its standard deviation.
 HEIGHT = 0.03
 SIGNIFICANCE = 4.0
+# A mode counts if at least this part of the phases show it.
+MODE_SHARE = 0.2
 # Peaks are looked for in |G|^2 averaged over this part of the frequency, to pass over noise.
 SMOOTHING = 0.01
 # The fit takes this many half-power bandwidths on each side of the peak, and at least MIN_LINES lines.
@@ -62,12 +62,12 @@ def itf_modes(
     """Natural frequencies [Hz] and damping ratios (mode, phase) of an ITF (frequency, phase), rising in frequency.
 
     `frequency` [Hz] uniform and rising; `variance` (frequency, phase) = E|error|^2 rules out peaks that are
-    noise. `modes` keeps the lowest ones; by default there are as many as most phases show. NaN where a mode
+    noise. `modes` keeps the lowest ones; by default there are as many as a fifth of the phases show. NaN where a mode
     has no peak or no stable pole can be fitted.
     """
     peaks = [_peaks(frequency, itf[:, p], None if variance is None else variance[:, p]) for p in range(itf.shape[1])]
-    count = Counter(len(found) for found in peaks if found.size).most_common(1)
-    number = count[0][0] if count else 0
+    sizes = np.array([found.size for found in peaks])
+    number = int(np.quantile(sizes, 1.0 - MODE_SHARE, method="inverted_cdf"))
     if modes is not None:
         number = min(number, modes)
     natural = np.full((number, itf.shape[1]), np.nan)

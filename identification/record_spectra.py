@@ -193,8 +193,8 @@ def _scatter(record: xr.Dataset) -> float | None:
 
 def _declared_steady(record: xr.Dataset) -> bool:
     """Whether the record itself vouches for a steady state: the simulation's residual, or averaged periods' scatter."""
-    if "settling_residual" in record.attrs:
-        return float(record.attrs["settling_residual"]) <= STEADY
+    if float(record.attrs.get("settling_residual", np.inf)) <= STEADY:
+        return True
     scatter = _scatter(record)
     if scatter is None:
         return False

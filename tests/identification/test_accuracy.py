@@ -67,20 +67,23 @@ def test_record_length_rule() -> None:
     empty = np.zeros((100, 3), complex)
     spectra = Spectra(empty, empty, 1.0, 2, np.zeros(100), True)
     natural = np.linspace(1000.0, 1200.0, 1001)[None, :]
-    rule = record_rule(spectra, 300, 1, natural, 50.0 / natural)
+    rule = record_rule(spectra, 300, 1, natural, 50.0 / natural, 0.1)
     assert rule is not None
     assert rule.bandwidth == pytest.approx(100.0)
     assert rule.duration == 100.0
     assert rule.needed == pytest.approx(3 * 601 * 2 / 100)
     # Travel of 2 % to 98 %: 192 Hz, and 1.5 bandwidths, at 2 Hz a branch.
     assert rule.harmonics_needed == pytest.approx((192 + 150) / 2, abs=1)
-    few = record_rule(spectra, 3, 1, natural, 50.0 / natural)
+    few = record_rule(spectra, 3, 1, natural, 50.0 / natural, 0.1)
     assert few is not None and few.needed == pytest.approx(3 * (2 * few.harmonics_needed + 1) * 2 / 100)
+    # Where nothing is missing, the branches in use count.
+    enough = record_rule(spectra, 3, 1, natural, 50.0 / natural, 0.01)
+    assert enough is not None and enough.needed == pytest.approx(3 * 7 * 2 / 100)
     # Repeated excitation is not distinct.
     twice = Spectra(empty, empty, 1.0, 2, np.zeros(100), True, repeats=2)
-    repeated = record_rule(twice, 300, 1, natural, 50.0 / natural)
+    repeated = record_rule(twice, 300, 1, natural, 50.0 / natural, 0.1)
     assert repeated is not None and repeated.duration == 50.0
-    assert record_rule(spectra, 3, 1, np.empty((0, 5)), np.empty((0, 5))) is None
+    assert record_rule(spectra, 3, 1, np.empty((0, 5)), np.empty((0, 5)), 0.1) is None
 
 
 def noisy(noise: float, experiments: int = 3, harmonics: int = 4) -> tuple[Spectra, np.ndarray]:
