@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import warnings
 from collections.abc import Sequence
 from typing import Annotated
 
@@ -13,7 +14,7 @@ from gearbench import __version__
 from gearbench.cases_command import cases
 from gearbench.check_command import check
 from gearbench.compare_command import compare
-from gearbench.failure import INTERRUPTED, guarded
+from gearbench.failure import INTERRUPTED, guarded, show_warning
 from gearbench.identify_command import identify
 from gearbench.mesh_command import mesh
 from gearbench.options import expand_lists
@@ -75,4 +76,5 @@ def main() -> None:
     # one needs on a busy machine. Takes effect because NumPy is not imported yet.
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
         os.environ.setdefault(name, "1")
+    warnings.showwarning = show_warning
     sys.exit(run_command_line(sys.argv[1:]))

@@ -8,6 +8,7 @@ import sys
 import traceback
 from collections.abc import Callable
 from types import FrameType
+from typing import TextIO
 
 DONE, DEFECT, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130  # DEFECT: one of ours
 
@@ -22,6 +23,10 @@ USER_ERRORS = (
     ("gearbench.fem.static", "ContactError"),
     ("gearbench.identification.multisine", "MultisineError"),
     ("gearbench.identification.periodic", "PeriodicSystemError"),
+    ("gearbench.identification.spectra", "SpectraError"),
+    ("gearbench.identification.local_solve", "LpmError"),
+    ("gearbench.identification.frf", "FrfError"),
+    ("gearbench.identification.transmission_error", "TransmissionError"),
     ("gearbench.bench.errors", "BenchError"),
     ("gearbench.failure", "InputError"),
 )
@@ -80,6 +85,18 @@ def report(error: Exception) -> int:
     where = f" ({os.path.basename(place.filename)}, line {place.lineno})" if place else ""
     say(f"defect of gearbench: {type(error).__name__}: {_one_line(error)}{where}; GEARBENCH_DEBUG=1 shows all")
     return DEFECT
+
+
+def show_warning(
+    message: Warning | str,
+    category: type[Warning],
+    filename: str,
+    lineno: int,
+    file: TextIO | None = None,
+    line: str | None = None,
+) -> None:
+    """A warning of ours as one line to stderr, in place of Python's own form with file and line."""
+    say(f"warning: {message}")
 
 
 def say(sentence: str) -> None:

@@ -56,8 +56,12 @@ def draw_comparison(output: Output, one: Results, two: Results) -> list[str]:
             output.write(written[-1], partial(_draw_curves, title=title, unit=unit, curves=curves))
     if one.frf is not None and two.frf is not None:
         written.append("itf.png")
-        panels: dict[str, Any] = {f"a: {one.name}": _shifted(one), f"b: {two.name}": _shifted(two)}
-        output.write(written[-1], lambda path: draw_itf(path, panels))
+        panels = {f"{letter}: {_name(result)}": _shifted(result) for letter, result in (("a", one), ("b", two))}
+        low = max(float(frf["frequency"].min()) for frf in panels.values())
+        high = min(float(frf["frequency"].max()) for frf in panels.values())
+        common = {name: frf.sel(frequency=slice(low, high)) for name, frf in panels.items()}
+        warning = " ".join(note for letter, result in (("a", one), ("b", two)) if (note := _short(letter, result)))
+        output.write(written[-1], lambda path: draw_itf(path, common, warning))
     return written
 
 
@@ -65,6 +69,15 @@ def _name(result: Results) -> str:
     held = result.record if result.record is not None else result.frf
     model = held.attrs.get("model", "") if held is not None else ""
     return f"{result.name}, {model} model" if model else result.name
+
+
+def _short(letter: str, result: Results) -> str:
+    """Whether the record behind a response is long enough for it."""
+    about = result.frf.attrs if result.frf is not None else {}
+    duration, needed = about.get("record_duration"), about.get("record_needed")
+    if duration is None or needed is None or needed <= duration:
+        return ""
+    return f"{letter}: {duration:g} s of distinct excitation cannot support its ITF, about {needed:.3g} s are needed."
 
 
 def _draw_curves(path: Path, title: str, unit: str, curves: list[tuple[str, Array]]) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from math import pi
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -96,7 +97,7 @@ def run_experiment(job: Job) -> dict[str, Any]:
             return made[kind]
 
         for kind in ("exact", "frozen"):
-            results[kind] = job.dataset(f"{kind}.nc", read_frf, lambda kind=kind: reference(kind), write_frf)
+            results[kind] = job.dataset(f"{kind}.nc", read_frf, partial(reference, kind), write_frf)
     else:
         modes["linearised"] = job.dataset("linearised.nc", _read, lambda: linearised_modes(case), _write)
     span = contact_span(meshing)

@@ -66,17 +66,16 @@ def load_results(path: Path) -> Results:
     if path.is_dir():
         found = {kind: _read(path / name) for kind, name in _FILES.items() if (path / name).is_file()}
         if not found:
-            raise BenchError(
-                f"{path} holds none of {', '.join(_FILES.values())}: it is not the folder of a run"
-            )
-        return Results(path.name, **found)
+            raise BenchError(f"{path} holds none of {', '.join(_FILES.values())}: it is not the folder of a run")
+        return Results(path.name, found.get("record"), found.get("static"), found.get("frf"))
     if not path.is_file():
         raise BenchError(f"{path} does not exist")
     result = _read(path)
     schema = str(result.attrs.get("schema", "none"))
     if schema not in _SCHEMAS:
         raise BenchError(f"{path} has schema {schema}, which is not one of {', '.join(_SCHEMAS)}")
-    return Results(path.stem, **{_SCHEMAS[schema]: result})
+    found = {_SCHEMAS[schema]: result}
+    return Results(path.stem, found.get("record"), found.get("static"), found.get("frf"))
 
 
 def _read(path: Path) -> xr.Dataset:
@@ -94,9 +93,7 @@ def align(one: Results, two: Results) -> tuple[Results, str]:
         first, second = curves(one, 256), curves(two, 256)
         if first is not None and second is not None:
             shift = best_shift(first, second)
-            sentence = (
-                f"the mesh phase of one result is arbitrary; b is shifted by {shift:+.4f} cycles ({what})"
-            )
+            sentence = f"the mesh phase of one result is arbitrary; b is shifted by {shift:+.4f} cycles ({what})"
             return replace(two, shift=shift), sentence
     return two, "the mesh phase of one result is arbitrary and nothing allows to estimate the shift"
 
@@ -187,9 +184,7 @@ def _itf_rows(one: Results, two: Results) -> list[Row]:
     rows = []
     for start, stop in pairwise(edges):
         sizes = [_rms_in(frf, start, stop) for frf in (one.frf, two.frf)]
-        rows.append(
-            Row("ITF, rms over phase and band", f"{start:.4g}-{stop:.4g} Hz", "nm/N", sizes[0], sizes[1])
-        )
+        rows.append(Row("ITF, rms over phase and band", f"{start:.4g}-{stop:.4g} Hz", "nm/N", sizes[0], sizes[1]))
     return rows
 
 

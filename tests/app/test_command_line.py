@@ -23,9 +23,7 @@ from gearbench.rig import read_case
 def test_check_prints_the_data_sheet(capsys: pytest.CaptureFixture[str]) -> None:
     assert run_command_line(["check", str(case_path("paper_fe"))]) == 0
     out = capsys.readouterr().out
-    rows = {
-        line.strip().rsplit("  ", 2)[0].strip(): line.split() for line in out.splitlines() if line.strip()
-    }
+    rows = {line.strip().rsplit("  ", 2)[0].strip(): line.split() for line in out.splitlines() if line.strip()}
     assert rows["centre distance"][-2:] == ["124", "mm"]  # m (z1 + z2) / 2
     assert "116.522" in out  # base diameter 124 cos 20 deg
     assert "contact ratio" in out and "backlash" in out and "inertia" in out
@@ -86,9 +84,7 @@ def test_bad_input_is_one_sentence_and_exit_2(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_defect_is_told_from_bad_input(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_defect_is_told_from_bad_input(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     def broken(path: object, overrides: object = ()) -> None:
         raise ValueError("no error of ours is a plain ValueError")
 

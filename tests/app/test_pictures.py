@@ -1,0 +1,120 @@
+"""Pictures are reproducible and carry their warning; thinning keeps cells; words follow the numbers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from matplotlib.figure import Figure
+
+from gearbench import figures_frf
+from gearbench.cases import case_path
+from gearbench.figures_frf import draw_itf, draw_natural_frequencies
+from gearbench.figures_gear import draw_pair
+from gearbench.figures_record import draw_record
+from gearbench.geometry import pair
+from gearbench.rig import read_case
+from gearbench.summary_text import headline, honest_warning
+
+
+def frf(rows: int = 40, phases: int = 32, scale: float = 1.0) -> xr.Dataset:
+    frequency, phase = np.linspace(10, 500, rows), np.arange(phases) / phases
+    itf = scale * np.outer(1e-9 / (1 + (frequency / 200) ** 2), 2 + np.cos(2 * np.pi * phase))
+    natural = 200 + 20 * np.cos(2 * np.pi * phase)
+    return xr.Dataset(
+        {
+            "itf_re": (("frequency", "phase"), itf),
+            "itf_im": (("frequency", "phase"), 0 * itf),
+            "natural_frequency": (("mode", "phase"), natural[None]),
+        },
+        coords={"frequency": frequency, "phase": phase},
+    )
+
+
+@pytest.fixture
+def drawn(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
+    """The figures that are saved."""
+    figures: list[Figure] = []
+    monkeypatch.setattr(figures_frf, "save", lambda figure, path: figures.append(figure))
+    return figures
+
+
+def test_all_panels_share_one_scale_and_the_warning_is_on_the_picture(drawn: list[Figure]) -> None:
+    results = {"identified": frf(scale=3.0), "exact": frf(), "frozen": frf()}
+    draw_itf(Path("itf.png"), results, "This record cannot support the ITF")
+    (figure,) = drawn
+    images = [axes.collections[0] for axes in figure.axes[:3]]
+    limits = {image.get_clim() for image in images}
+    assert len(limits) == 1
+    ((_, high),) = limits
+    assert high == pytest.approx(3.0, rel=0.1)  # nm/N: the truth's largest, not the threefold identified one
+    assert "cannot support" in figure.get_suptitle()
+    assert [axes.get_title() for axes in figure.axes[:3]] == [figures_frf._TITLES[name] for name in results]
+
+
+def test_natural_frequencies_zoom_on_what_was_found(drawn: list[Figure]) -> None:
+    frozen = frf()
+    extra = xr.concat([frozen["natural_frequency"], 10 * frozen["natural_frequency"]], dim="mode")
+    results = {"identified": frf(), "frozen": frozen.drop_vars("natural_frequency").assign(natural_frequency=extra)}
+    draw_natural_frequencies(Path("n.png"), results, [(0.0, 0.2)], "1 tooth pair in contact")
+    low, high = drawn[0].axes[0].get_ylim()
+    assert 100 < low < 180 and 220 < high < 400
+    words = [text.get_text() for text in drawn[0].axes[0].get_legend().get_texts()]
+    assert "1 tooth pair in contact" in words and len(words) == 3
+
+
+def test_maps_are_thinned_without_averaging() -> None:
+    large = frf(rows=3000, phases=64)
+    phase, frequency, values = figures_frf._coarse(large, figures_frf.magnitude(large))
+    assert values.shape == (frequency.size, phase.size) and frequency.size <= 1000
+    whole = figures_frf.magnitude(large)
+    rows = np.searchsorted(large["frequency"].values, frequency)
+    assert np.array_equal(values, whole[rows])
+
+
+def test_the_same_picture_gives_the_same_file(tmp_path: Path) -> None:
+    case = read_case(case_path("quick_lumped"))
+    time = np.arange(100) / 1000
+    wave = np.sin(2 * np.pi * 50 * time)[None]
+    record = xr.Dataset(
+        {"torque_driver": (("realisation", "time"), wave), "dte": (("realisation", "time"), 1e-6 * wave)},
+        coords={"time": time},
+        attrs={"sampling_rate": 1000.0},
+    )
+    for number in (1, 2):
+        draw_pair(tmp_path / f"pair{number}.png", case.rig, pair(case.rig), None)
+        draw_record(tmp_path / f"record{number}.png", record)
+    for name in ("pair", "record"):
+        first, second = (tmp_path / f"{name}{number}.png" for number in (1, 2))
+        assert first.read_bytes() == second.read_bytes() and first.stat().st_size > 10_000
+
+
+def numbers(**found: float) -> dict:
+    about = {"expected_error": 0.02, "harmonics": 7} | found
+    return {"realisations": 1, "identification": about}
+
+
+def test_warning_is_given_when_the_record_is_short_or_the_error_large() -> None:
+    assert honest_warning(numbers()) == ""
+    assert honest_warning(numbers(record_duration=5.0, record_needed=4.0)) == ""
+    short = honest_warning(numbers(record_duration=1.0, record_needed=30.0))
+    assert "cannot support the ITF" in short and "1 s" in short and "30 s" in short and "smoothed" in short
+    assert "25%" in honest_warning(numbers(expected_error=0.25))
+
+
+def test_headline_orders_the_answers() -> None:
+    lines = headline(
+        {
+            "te_peak_to_peak_um": 1.23456,
+            "torque_mean_nm": 2.0,
+            "te_mesh_orders_um": [0.5, 0.25, 0.125],
+            "first_mode_hz": (1005.4, 1556.4),
+            "first_mode_fewest_pairs_hz": 1010.0,
+            "first_mode_most_pairs_hz": 1550.0,
+        }
+    )
+    assert lines[0].startswith("Peak-to-peak TE: 1.235 um")
+    assert lines[1] == "TE mesh orders 1-3: 0.5, 0.25, 0.125 um"
+    assert lines[2].startswith("First mode: 1005-1556 Hz")
