@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -119,6 +120,45 @@ def test_the_mass_matrix_moves_the_gears_as_wholes(unequal: Any) -> None:
             np.testing.assert_allclose(m[axis, modes], expected, atol=1e-12 * np.abs(hub).max())
         np.testing.assert_allclose(m[0, 4 : 4 + n1], machine.hub1[:, 2])
         np.testing.assert_allclose(m[1, 4 + n1 :], -machine.hub2[:, 2])
+
+
+def test_supports_along_the_line_of_action_move_the_modes_along_it(unequal: Any) -> None:
+    """The hub's coupling mass on the support's direction, seen in the frame of each gear."""
+    support = unequal.rig.support.model_copy(update={"direction": "line-of-action"})
+    rig = unequal.rig.model_copy(update={"support": support})
+    tilted = replace(unequal, rig=rig)
+    machine, _ = machine_of(tilted)
+    alpha = unequal.pair.working_pressure_angle
+    m = mass_matrix(machine, 0.3, 0.2)
+    n1 = len(machine.omega1)
+    for axis, hub, modes, chi in (
+        (2, machine.hub1, slice(4, 4 + n1), unequal.pair.driver_angle + 0.3),
+        (3, machine.hub2, slice(4 + n1, None), np.pi + unequal.pair.driven_angle - 0.2),
+    ):
+        turn = np.array([[np.cos(chi), np.sin(chi)], [-np.sin(chi), np.cos(chi)]])
+        expected = hub[:, :2] @ turn @ [np.sin(alpha), np.cos(alpha)]
+        np.testing.assert_allclose(m[axis, modes], expected, atol=1e-12 * np.abs(hub).max())
+
+
+@pytest.mark.parametrize("side", [0, 1])
+def test_every_tooth_sees_the_same_gear(unequal: Any, side: int) -> None:
+    """One pitch on, the next tooth stands where this one stood: how its force shakes the hub has not changed.
+
+    That holds only if teeth, modes and the sense of rotation are numbered alike.
+    """
+    machine, _ = machine_of(unequal)
+    law = unequal.law
+    seen = []
+    for number in (0, 1, 2, 7):
+        phase = 0.1 + number
+        theta1, theta2 = phase * law.driver.pitch, phase * law.driven.pitch
+        sides, teeth, found, n = find_pairs(law, theta1, theta2, law.centre, 0.0, 3e-4)
+        rows = contact_rows(machine, sides, teeth, found, n)
+        p = next(p for p in range(n) if sides[p] == side and teeth[p] == number)
+        hubs = mass_matrix(machine, theta1, theta2)[:4, 4:]
+        seen.append(hubs / machine.stiffness[4:] @ rows[p, 4:])
+    for other in seen[1:]:
+        np.testing.assert_allclose(other, seen[0], rtol=1e-6, atol=1e-9 * np.abs(seen[0]).max())
 
 
 def test_prescribed_speed_leaves_one_rotation(unequal: Any) -> None:

@@ -81,7 +81,7 @@ def test_tangent_stiffness_is_the_slope_of_force_over_dte(unequal: Any, cycle: A
         step = 1e-4 * te
         t = static_cycle(unequal.law, cycle.phase[[at]], dte=[te - step, te + step]).torque_driver[:, 0]
         slope = (t[1] - t[0]) / (2 * step) / unequal.law.driver.rb
-        assert cycle.stiffness_tangent[0, at] == pytest.approx(slope, rel=1e-2)
+        assert cycle.stiffness_tangent[0, at] == pytest.approx(slope, rel=2e-3)
 
 
 def test_te_does_not_depend_on_the_mesh(gear: Any, twins: Any) -> None:
@@ -90,7 +90,7 @@ def test_te_does_not_depend_on_the_mesh(gear: Any, twins: Any) -> None:
     # Line of action, both tip edges, and the handovers.
     phases = np.linspace(-0.5, 0.5, 25)
     coarse = static_cycle(twins.law, phases, torque=[TORQUE]).transmission_error
-    np.testing.assert_allclose(static_cycle(fine, phases, torque=[TORQUE]).transmission_error, coarse, rtol=2e-3)
+    np.testing.assert_allclose(static_cycle(fine, phases, torque=[TORQUE]).transmission_error, coarse, rtol=5e-4)
 
 
 def zones(law: Any, phases: NDArray[np.float64]) -> NDArray[np.int64]:
@@ -127,7 +127,7 @@ def test_equal_gears_see_each_other_alike(twins: Any) -> None:
     shift = dte / (law.driver.rb * law.driver.pitch)
     for phase in np.linspace(-0.5, 0.5, 11):
         there, back = held(law, phase, dte), held(law, -phase - shift, dte)
-        assert there[6] == pytest.approx(back[7], rel=3e-4)
+        assert there[6] == pytest.approx(back[7], rel=1e-9)
 
 
 def test_back_flanks_mirror_working_flanks(twins: Any) -> None:

@@ -128,13 +128,22 @@ def test_energy_of_a_free_oscillation_is_kept_to_second_order(twins: Any) -> Non
 
 
 def test_damping_takes_what_the_energy_loses(twins: Any) -> None:
-    """Supports and modes lose v.C v; the flanks lose what the damped force does beyond the elastic one."""
+    """Supports and modes lose v.C v; the flanks lose what the damped force does beyond the elastic one.
+
+    The flanks' own equation u + beta u' = R(F) holds at every step (second-order backward difference).
+    """
     machine = build(twins, beta=2e-7, damping=3e3)
     steps = 400
     scheme = make_scheme(DURATION / steps, 1.0)
     start = initial_state(machine, TORQUE)
     kept, lost = [], []
-    previous = {"force": start.force.copy(), "u": start.residual.copy(), "spare": 0.0, "v": start.v}
+    previous = {
+        "force": start.force.copy(),
+        "u": start.residual.copy(),
+        "spare": 0.0,
+        "v": start.v,
+        "older": start.older[0],
+    }
 
     def elastic(met: Meeting, u: float) -> float:
         """Force of the lone pair at rest under the overlap u."""
@@ -147,14 +156,18 @@ def test_damping_takes_what_the_energy_loses(twins: Any) -> None:
     def look(state: State, _: float) -> None:
         met = Meeting(machine, state)
         assert met.count == 1
-        rest = elastic(met, state.residual[0])
+        u = state.residual[0]
+        rate = (3 * u - 4 * state.older[0] + previous["older"]) / (2 * scheme.step)
+        static = met.approach(0, state.force[0]) + met.cross[0, 0] * state.force[0]
+        assert u + machine.beta * rate == pytest.approx(static, rel=1e-5)
+        rest = elastic(met, u)
         kept.append(energy(machine, state, 1.2 * TORQUE, np.array([rest])))
         spare = state.force[0] - rest
         loss = 0.5 * (spare + previous["spare"]) * (state.residual[0] - previous["u"][0])
         v = 0.5 * (state.v + previous["v"])
         loss += scheme.step * machine.damping @ v**2
         lost.append(loss)
-        previous.update(spare=spare, u=state.residual, v=state.v)
+        previous.update(spare=spare, u=state.residual, v=state.v, older=state.older[0])
 
     march(machine, scheme, start, 1.2 * TORQUE, steps, look)
     first = energy(machine, start, 1.2 * TORQUE)
