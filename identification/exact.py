@@ -20,8 +20,10 @@ from gearbench.identification.periodic import (
     truncation_error,
 )
 
-# Phases on which the ITF is computed, per branch kept: enough that aliased branches do not matter.
+# Phases on which the ITF is computed: so many per branch kept, and at least so many, that aliased branches do not
+# matter.
 OVERSAMPLING = 4
+FEWEST_PHASES = 512
 
 
 def exact_frf(
@@ -39,7 +41,7 @@ def exact_frf(
     system.
     """
     frequencies = np.atleast_1d(np.asarray(frequency, dtype=float))
-    fine = phases * max(1, -(-OVERSAMPLING * harmonics // phases))
+    fine = phases * -(-max(OVERSAMPLING * harmonics, FEWEST_PHASES, phases) // phases)
     response = exact_itf(system, frequencies, np.arange(fine) / fine)
     kept = response[:, :: fine // phases]
     return make_frf(

@@ -106,7 +106,11 @@ def test_branches_refer_to_the_mesh_phase_of_each_record(transient: bool) -> Non
 
 def test_odd_grid_leaves_even_rows_out() -> None:
     spectra, truth = polynomial_spectra(experiments=4, mesh_lines=4, harmonics=2, order=1, grid=2)
-    assert worst(local_polynomial(spectra, LINES, Window(2, 1, 8, transient=False)), truth) < 1e-10
+    # What appears on rows that no input reaches (noise, even distortion) is not the linear model's residual.
+    spectra.dte[:, 1::2][:, spectra.force[0, 1::2] == 0] += 100.0
+    result = local_polynomial(spectra, LINES, Window(2, 1, 8, transient=False))
+    assert worst(result, truth) < 1e-10
+    assert result.residual < 1e-10
     regression = prepare(spectra, transient=False, reach=8)
     # Of the 17 lines around line 50 (even, no multiple of 4 is odd) 8 are odd: 8 x 4 equations.
     assert regression.equations(50, Window(2, 1, 8, transient=False)) == 8 * 4

@@ -41,7 +41,8 @@ def test_modes_of_a_noisy_response() -> None:
     found, ratio = itf_modes(FREQUENCY, clean + noise, np.full(clean.shape, size**2))
     assert found.shape == (2, 64)
     assert np.nanmedian(np.abs(found[0] / natural[0] - 1)) < 0.003
-    assert np.nanmedian(np.abs(ratio[0] / damping[0] - 1)) < 0.15
+    # The output error leaves the damping ratio without bias; the linearised fit alone is 10 % low here.
+    assert np.nanmean(ratio[0] / damping[0] - 1) == pytest.approx(0.0, abs=0.03)
     assert np.isnan(found[0]).sum() == 0
 
 

@@ -77,8 +77,8 @@ def test_itf_variance_of_overlapping_windows_by_brute_force() -> None:
             for j in range(-3, 4):
                 if 40 <= m + 2 * j < 44:
                     diagonal[m + 2 * j - 40] += weight @ unit[:, :, j + 3] @ weight
-    turn = np.exp(-2j * np.pi * np.outer(np.arange(1, 7), np.arange(phases) / phases))
-    predicted = diagonal[:, None] + 2 * (cross.sums.T @ turn).real
+    sums = np.concatenate([diagonal[None, :], cross.sums])
+    predicted = replace(local_polynomial(spectra, lines, window), itf_covariance=sums).itf_variance(phases)
 
     brute = np.zeros((4, phases))
     for experiment in range(2):
