@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gearbench.figures_frf import draw_itf
 from gearbench.plotting import BLUE, ORANGE, figure, save
+from gearbench.summary_text import ENOUGH
 
 if TYPE_CHECKING:
     from gearbench.bench.compare import Results
@@ -72,12 +73,14 @@ def _name(result: Results) -> str:
 
 
 def _short(letter: str, result: Results) -> str:
-    """Whether the record behind a response is long enough for it."""
+    """The expected error of a response whose record cannot support it in full."""
     about = result.frf.attrs if result.frf is not None else {}
-    duration, needed = about.get("record_duration"), about.get("record_needed")
-    if duration is None or needed is None or needed <= duration:
+    if about.get("expected_error", 0.0) <= ENOUGH:
         return ""
-    return f"{letter}: {duration:g} s of distinct excitation cannot support its ITF, about {needed:.3g} s are needed."
+    return (
+        f"{letter}: its record cannot support the ITF in full, expected error {about['expected_error']:.0%} rms and"
+        " several times that at the switches."
+    )
 
 
 def _draw_curves(path: Path, title: str, unit: str, curves: list[tuple[str, Array]]) -> None:

@@ -2,41 +2,36 @@
 
 from __future__ import annotations
 
+from math import isfinite
 from typing import Any
 
-_ENOUGH = 0.1  # expected error of the ITF above which a figure carries a warning
+ENOUGH = 0.02  # expected rms error of the ITF above which pictures carry a warning
 
 
 def honest_warning(numbers: dict[str, Any]) -> str:
-    """One sentence for the pictures where the record cannot support the ITF, else nothing."""
+    """A sentence or two for the pictures where the record cannot support the ITF, else nothing."""
     found = numbers["identification"]
-    duration, needed = found.get("record_duration"), found.get("record_needed")
-    short = duration is not None and needed is not None and needed > duration
-    expected = found["expected_error"]
-    if not short and expected <= _ENOUGH:
+    duration = found.get("record_duration", numbers["realisations"] * found["joint_period"])
+    needed = found.get("record_needed", 0.0)
+    expected, branches = found["expected_error"], found["harmonics"]
+    if needed <= duration and expected <= ENOUGH:
         return ""
-    words = []
-    if short:
-        words.append(
-            f"This record cannot support the ITF: {numbers['realisations']} realisation(s) give {duration:g} s of"
-            f" distinct excitation where about {needed:.3g} s are needed."
-        )
-    words.append(
-        f"Estimated error {expected:.0%} or more with {found['harmonics']} branches a side; nothing is smoothed or"
-        " masked."
+    wanted = f" where about {needed:.3g} s are needed" if needed > duration else ""
+    smear = f", which smear the switches over {1 / (2 * branches):.2g} mesh periods" if branches else ""
+    return (
+        f"This record cannot support the ITF in full: {numbers['realisations']} realisation(s) give {duration:g} s of"
+        f" distinct excitation{wanted}, enough for {branches} branches a side{smear}. Expected error"
+        f" {expected:.0%} rms, several times that at the switches; nothing is smoothed or masked."
     )
-    return " ".join(words)
 
 
 def headline(numbers: dict[str, Any]) -> list[str]:
     """The first lines of a summary: peak-to-peak TE, mesh orders 1-3, range of the first mode."""
     orders = ", ".join(f"{value:.4g}" for value in numbers["te_mesh_orders_um"])
-    fewest, most = numbers["first_mode_fewest_pairs_hz"], numbers["first_mode_most_pairs_hz"]
     return [
         f"Peak-to-peak TE: {numbers['te_peak_to_peak_um']:.4g} um (static, {numbers['torque_mean_nm']:g} N m)",
         f"TE mesh orders 1-3: {orders} um",
-        f"First mode: {_range(numbers['first_mode_hz'])} Hz over the mesh period (medians {fewest:.0f} Hz where the"
-        f" fewest tooth pairs are in contact, {most:.0f} Hz elsewhere)",
+        f"First mode: {_first_mode(numbers)}",
     ]
 
 
@@ -46,6 +41,16 @@ def summary_text(numbers: dict[str, Any]) -> str:
     return "\n\n".join([*(part for part in parts if part), *_files(numbers)]) + "\n"
 
 
+def _first_mode(numbers: dict[str, Any]) -> str:
+    if not isfinite(numbers["first_mode_hz"][0]):
+        return "none in the identified band"
+    text = f"{_range(numbers['first_mode_hz'])} Hz over the mesh period"
+    fewest, most = numbers["first_mode_fewest_pairs_hz"], numbers["first_mode_most_pairs_hz"]
+    if isfinite(fewest) and isfinite(most):
+        text += f" (medians {fewest:.0f} Hz where the fewest tooth pairs are in contact, {most:.0f} Hz elsewhere)"
+    return text
+
+
 def _range(limits: tuple[float, float]) -> str:
     return f"{limits[0]:.0f}-{limits[1]:.0f}"
 
@@ -53,8 +58,6 @@ def _range(limits: tuple[float, float]) -> str:
 def _what(numbers: dict[str, Any]) -> list[str]:
     model = {"lumped": "lumped model", "reduced": "reduced finite-element model"}.get(numbers["model"], "model")
     stiffness = numbers["stiffness_n_per_um"]
-    fewest, most = numbers["first_mode_fewest_pairs_hz"], numbers["first_mode_most_pairs_hz"]
-    law = "lower" if fewest < most else "NOT lower"
     lines = [
         "## What was done and found",
         f"The {model} ran {numbers['realisations']} realisation(s) of {numbers['duration_s']:g} s at"
@@ -64,11 +67,10 @@ def _what(numbers: dict[str, Any]) -> list[str]:
         " amplitude of its sine. In the record, with multisine and supports, the DTE spans"
         f" {numbers['dte_record_peak_to_peak_um']:.4g} um. The tangent mesh stiffness runs from {stiffness[0]:.4g} to"
         f" {stiffness[1]:.4g} N/um over the mesh period.",
-        f"The first mode is {law} where the fewest tooth pairs carry. Its damping ratio is about"
-        f" {numbers['first_mode_damping']:.2g}.",
+        *_law(numbers),
     ]
     corner = numbers["support_corner_hz"]
-    if corner is not None and corner < 0.1 * fewest:
+    if corner is not None and corner < 0.1 * numbers["first_mode_hz"][0]:
         lines.append(
             f"The supports are over-damped: above k/(2 pi c) = {corner:.3g} Hz their dampers and not their springs"
             " carry the gears, which shows in the damping of the first mode."
@@ -78,7 +80,7 @@ def _what(numbers: dict[str, Any]) -> list[str]:
         ("frozen", "frozen coefficients (not the truth)"),
         ("linearised", "the finite-element model, linearised at each phase (frozen)"),
     ):
-        if f"first_mode_{name}_hz" in numbers:
+        if isfinite(numbers.get(f"first_mode_{name}_hz", (float("nan"),))[0]):
             lines.append(f"First-mode range from {words}: {_range(numbers[f'first_mode_{name}_hz'])} Hz.")
     if numbers["settling_residual"] is not None:
         lines.append(
@@ -86,6 +88,18 @@ def _what(numbers: dict[str, Any]) -> list[str]:
             " standard deviation."
         )
     return lines
+
+
+def _law(numbers: dict[str, Any]) -> list[str]:
+    """Whether the first mode follows the number of tooth pairs."""
+    fewest, most = numbers["first_mode_fewest_pairs_hz"], numbers["first_mode_most_pairs_hz"]
+    if not (isfinite(fewest) and isfinite(most)):
+        return []
+    law = "lower" if fewest < most else "NOT lower"
+    return [
+        f"The first mode is {law} where the fewest tooth pairs carry. Its damping ratio is about"
+        f" {numbers['first_mode_damping']:.2g}."
+    ]
 
 
 def _account(numbers: dict[str, Any]) -> list[str]:

@@ -92,7 +92,7 @@ def test_the_same_picture_gives_the_same_file(tmp_path: Path) -> None:
 
 
 def numbers(**found: float) -> dict:
-    about = {"expected_error": 0.02, "harmonics": 7} | found
+    about = {"expected_error": 0.02, "harmonics": 7, "joint_period": 1.0} | found
     return {"realisations": 1, "identification": about}
 
 
@@ -101,7 +101,8 @@ def test_warning_is_given_when_the_record_is_short_or_the_error_large() -> None:
     assert honest_warning(numbers(record_duration=5.0, record_needed=4.0)) == ""
     short = honest_warning(numbers(record_duration=1.0, record_needed=30.0))
     assert "cannot support the ITF" in short and "1 s" in short and "30 s" in short and "smoothed" in short
-    assert "25%" in honest_warning(numbers(expected_error=0.25))
+    large = honest_warning(numbers(expected_error=0.25))
+    assert "25%" in large and "7 branches" in large and "needed" not in large
 
 
 def test_headline_orders_the_answers() -> None:
@@ -118,3 +119,10 @@ def test_headline_orders_the_answers() -> None:
     assert lines[0].startswith("Peak-to-peak TE: 1.235 um")
     assert lines[1] == "TE mesh orders 1-3: 0.5, 0.25, 0.125 um"
     assert lines[2].startswith("First mode: 1005-1556 Hz")
+
+
+def test_a_band_without_a_mode_is_said_in_words() -> None:
+    nan = float("nan")
+    answers = {"te_peak_to_peak_um": 1.0, "torque_mean_nm": 2.0, "te_mesh_orders_um": [1.0, 1.0, 1.0]}
+    modes = {"first_mode_hz": (nan, nan), "first_mode_fewest_pairs_hz": nan, "first_mode_most_pairs_hz": nan}
+    assert headline(answers | modes)[2] == "First mode: none in the identified band"
