@@ -52,23 +52,17 @@ def make_frf(
     not fit.
     """
     limit, phases = htf.shape[0] // 2, itf.shape[1]
-    zero = np.zeros
     values = {
         "itf_re": itf.real,
         "itf_im": itf.imag,
-        "itf_var": zero(itf.shape) if itf_variance is None else itf_variance,
+        "itf_var": np.zeros(itf.shape) if itf_variance is None else itf_variance,
         "htf_re": htf.real,
         "htf_im": htf.imag,
-        "htf_var": zero(htf.shape) if htf_variance is None else htf_variance,
+        "htf_var": np.zeros(htf.shape) if htf_variance is None else htf_variance,
         "natural_frequency": modes[0],
         "damping_ratio": modes[1],
     }
-    sizes = {
-        "frequency": frequency.size,
-        "phase": phases,
-        "harmonic": 2 * limit + 1,
-        "mode": modes[0].shape[0],
-    }
+    sizes = {"frequency": frequency.size, "phase": phases, "harmonic": 2 * limit + 1, "mode": modes[0].shape[0]}
     for name, value in values.items():
         wanted = tuple(sizes[dimension] for dimension in VARIABLES[name][0])
         if value.shape != wanted:
