@@ -18,6 +18,7 @@ from gearbench.bench.excitation import Torque, torque_realisation
 from gearbench.bench.reduced_rig import ElasticRig, choose_substeps, elastic_rig, machine_for
 from gearbench.bench.schedule import ProgressReport, Schedule, schedule
 from gearbench.bench.workers import realisations
+from gearbench.fem.curve import EDGE_SEPARATION
 from gearbench.fem.machine import Machine
 from gearbench.fem.transient import CHANNELS, Scheme, State, advance, initial_state, make_scheme
 from gearbench.geometry import Pair
@@ -159,6 +160,16 @@ def _dte(case: Case, meshing: Pair, samples: Array) -> Array:
     return np.asarray(turned + along * (samples[..., 2] - samples[..., 3]))
 
 
+def _check_reach(elastic: ElasticRig, dte: Array) -> None:
+    """Refuse a record in which the flanks overlapped further than tip edges are followed."""
+    most = EDGE_SEPARATION * elastic.pair.driver.module
+    if dte.max() > most:
+        raise BenchError(
+            f"the DTE reaches {1e6 * dte.max():.4g} um, beyond the {1e6 * most:.4g} um to which contact off the line of"
+            " action is modelled for this module: lower experiment.torque_mean_nm or the multisine"
+        )
+
+
 def _rolled(machine: Machine, samples: Array) -> Array:
     """What the angles alone contribute to the DTE [m]."""
     law = machine.law
@@ -181,6 +192,8 @@ def _record(case: Case, elastic: ElasticRig, plan: Schedule, runs: list[Run], su
     count = samples.shape[1]
     phase = (start + np.arange(count) / plan.sampling_rate) * plan.mesh_frequency
     torque = np.stack([run.torque for run in runs])
+    dte = _dte(case, elastic.pair, samples)
+    _check_reach(elastic, dte)
     channels = {
         "torque_driver": torque,
         "torque_driven": samples[:, :, 4],
@@ -189,7 +202,7 @@ def _record(case: Case, elastic: ElasticRig, plan: Schedule, runs: list[Run], su
         "y_driver": samples[:, :, 2],
         "y_driven": samples[:, :, 3],
         "mesh_phase": np.broadcast_to(phase, samples.shape[:2]),
-        "dte": _dte(case, elastic.pair, samples),
+        "dte": dte,
         # Also where both gears turn freely, since the driven torque then balances the driver's.
         "force": torque / elastic.pair.driver.base_radius,
     }
