@@ -77,16 +77,21 @@ class Checkout:
     def start(self, *args: str, launcher: Path | None = None, **extra: str) -> subprocess.Popen[str]:
         """The launcher as a process with pipes and a process group of its own, beside the checkout."""
         launcher = launcher or self.home / "gearbench"
-        return subprocess.Popen(
-            [str(launcher), *args],
-            cwd=launcher.parent.parent,
-            env=self.environment(**extra),
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-            start_new_session=True,
-        )
+        # Tests started in the background ignore interrupts, and a child inherits that unless a handler is set.
+        before = signal.signal(signal.SIGINT, signal.default_int_handler)
+        try:
+            return subprocess.Popen(
+                [str(launcher), *args],
+                cwd=launcher.parent.parent,
+                env=self.environment(**extra),
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                text=True,
+                start_new_session=True,
+            )
+        finally:
+            signal.signal(signal.SIGINT, before)
 
     def run(
         self, *args: str, launcher: Path | None = None, stdin: str = "", **extra: str
