@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import typer
 
 from gearbench.options import CaseArgument, JsonOption, SetOption, load_case, print_json
+from gearbench.simulate_command import experiments
 
 
 def check(case: CaseArgument, settings: SetOption = None, as_json: JsonOption = False) -> None:
     """Print the data sheet of a case: diameters, contact ratio, backlash, masses; or say what is wrong."""
     loaded = load_case(case, settings)
+    from gearbench.bench.schedule import schedule
     from gearbench.geometry import data_sheet
 
     rows = data_sheet(loaded.rig)
+    for experiment, _ in experiments(loaded, Path("record.nc")):
+        schedule(experiment.experiment, experiment.rig)
     if as_json:
         print_json({"case": loaded.name, "data": {row.name: {"value": row.value, "unit": row.unit} for row in rows}})
         return

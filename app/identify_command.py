@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from gearbench.options import JsonOption, print_json
+from gearbench.failure import InputError
+from gearbench.options import JsonOption, check_out, print_json
 from gearbench.progress import Progress
 
 if TYPE_CHECKING:
@@ -37,6 +38,10 @@ def identify(
     from gearbench.identification import identify as estimate
     from gearbench.records import read_record
 
+    check_out(out, records)
+    seen = {path.resolve() for path in records}
+    if len(seen) < len(records):
+        raise InputError(f"RECORD is given {len(records)} times but names {len(seen)} file(s): each one counts once")
     settings = IdentificationSettings(method=method, harmonics=harmonics, order=order, window=window, band=band_hz)
     with Progress("identify") as progress:
         progress.step("reading")

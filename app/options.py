@@ -22,6 +22,18 @@ SetOption = Annotated[
 JsonOption = Annotated[bool, typer.Option("--json", help="print the summary as JSON")]
 
 
+def check_out(out: Path, inputs: Sequence[Path | str] = ()) -> None:
+    """Refuse an output file that would replace an input or a file of another kind, before any work is done."""
+    from gearbench.failure import InputError
+
+    if not out.parent.is_dir():
+        raise InputError(f"--out {out} cannot be written: the folder {out.parent} must exist")
+    if out.suffix != ".nc":
+        raise InputError(f"--out {out} must end in .nc: the result is a NetCDF-4 file")
+    if any(out.resolve() == Path(path).resolve() for path in inputs):
+        raise InputError(f"--out {out} is one of the inputs, which it would replace: choose another name")
+
+
 def load_case(name: str, settings: Sequence[str] | None) -> Case:
     """The case in a file or, where there is no such file, the shipped case of that name."""
     from gearbench.cases import case_files

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from gearbench.failure import InputError
 from gearbench.options import CaseArgument, JsonOption, SetOption, load_case, print_json
 from gearbench.output import claimed, fingerprint
 from gearbench.progress import Progress
@@ -26,12 +27,21 @@ def run(
 ) -> None:
     """Run a case: geometry, mesh, simulation, identification, pictures, summary. Resumes in its own folder."""
     loaded = load_case(case, settings)
+    from gearbench.bench.schedule import schedule
     from gearbench.geometry import pair
     from gearbench.pipeline import Job, run_experiment
     from gearbench.records.provenance import source_digest
     from gearbench.rig import dump_case
 
-    pair(loaded.rig)  # an impossible pair is refused before a folder is made
+    # What cannot be run is refused before a folder is made.
+    pair(loaded.rig)
+    for experiment, _ in experiments(loaded, Path("record.nc")):
+        schedule(experiment.experiment, experiment.rig)
+        if experiment.experiment.multisine is None:
+            raise InputError(
+                "experiment.multisine is missing: without excitation run has nothing to identify; `simulate` and"
+                " `static` need none"
+            )
     folder = out or Path(f"out_{re.sub(r'[^A-Za-z0-9._-]+', '_', loaded.name)}")
     summaries = []
     with (

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from gearbench.failure import InputError
-from gearbench.options import CaseArgument, JsonOption, SetOption, load_case, print_json
+from gearbench.options import CaseArgument, JsonOption, SetOption, check_out, load_case, print_json
 from gearbench.progress import Progress
 
 if TYPE_CHECKING:
@@ -27,8 +26,7 @@ def simulate(
 ) -> None:
     """Carry out the experiment of a case on a model and write the record."""
     loaded = load_case(case, settings)
-    if not out.parent.is_dir():
-        raise InputError(f"--out {out} cannot be written: the folder {out.parent} must exist")
+    check_out(out, [case])
     from gearbench.bench import simulate as carry_out
     from gearbench.records import write_record
 

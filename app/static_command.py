@@ -7,8 +7,7 @@ from typing import Annotated, Any, Literal
 
 import typer
 
-from gearbench.failure import InputError
-from gearbench.options import CaseArgument, JsonOption, SetOption, load_case, print_json
+from gearbench.options import CaseArgument, JsonOption, SetOption, check_out, load_case, print_json
 from gearbench.progress import Progress
 
 
@@ -31,8 +30,7 @@ def static(
 ) -> None:
     """Static response of the pair over one mesh cycle, hub centres held."""
     loaded = load_case(case, settings)
-    if not out.parent.is_dir():
-        raise InputError(f"--out {out} cannot be written: the folder {out.parent} must exist")
+    check_out(out, [case])
     from gearbench.bench.static import static as solve
     from gearbench.records.storage import write_atomically
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import isfinite
 from typing import Any
 
+AGREES = 0.75  # identified and linearised ranges further apart than this ratio are not the same mode
 ENOUGH = 0.02  # expected rms error of the ITF above which pictures carry a warning
 
 
@@ -44,6 +45,13 @@ def summary_text(numbers: dict[str, Any]) -> str:
 def _first_mode(numbers: dict[str, Any]) -> str:
     if not isfinite(numbers["first_mode_hz"][0]):
         return "none in the identified band"
+    low, high = numbers["first_mode_hz"]
+    linearised = numbers.get("first_mode_linearised_hz", (float("nan"),) * 2)
+    if high < AGREES * linearised[0] or AGREES * low > linearised[1]:
+        return (
+            f"none that the model confirms: the record has a hump at {_range((low, high))} Hz, the linearised model its"
+            f" first mode at {_range(linearised)} Hz"
+        )
     text = f"{_range(numbers['first_mode_hz'])} Hz over the mesh period"
     fewest, most = numbers["first_mode_fewest_pairs_hz"], numbers["first_mode_most_pairs_hz"]
     if isfinite(fewest) and isfinite(most):

@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 
 from gearbench.bench.errors import BenchError
 from gearbench.bench.measures import mesh_orders, mode_range, synchronous_mean
+from gearbench.records import SCHEMA as RECORD_SCHEMA
+from gearbench.records import read_record
 
 Array = NDArray[np.float64]
 
@@ -80,9 +82,10 @@ def load_results(path: Path) -> Results:
 
 def _read(path: Path) -> xr.Dataset:
     try:
-        return xr.load_dataset(path, engine="h5netcdf", decode_cf=False)
+        found = xr.load_dataset(path, engine="h5netcdf", decode_cf=False)
     except (OSError, ValueError, KeyError, RuntimeError) as error:
         raise BenchError(f"{path} is truncated or no NetCDF-4 file ({error})") from error
+    return read_record(path) if found.attrs.get("schema") == RECORD_SCHEMA else found
 
 
 def align(one: Results, two: Results) -> tuple[Results, str]:

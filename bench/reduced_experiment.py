@@ -60,9 +60,12 @@ def simulate_reduced(case: Case, progress: ProgressReport | None = None) -> xr.D
     total = case.experiment.realisations
     done = np.zeros(total)
     lock = threading.Lock()
+    stop = threading.Event()
 
     def run(number: int) -> Run:
         def tell(fraction: float) -> None:
+            if stop.is_set():
+                raise InterruptedError("another realisation has failed, or the run was interrupted")
             with lock:
                 done[number] = fraction
                 report(float(done.mean()), f"realisation {number + 1} of {total}")
@@ -70,7 +73,7 @@ def simulate_reduced(case: Case, progress: ProgressReport | None = None) -> xr.D
         torque = torque_realisation(case.experiment, number)
         return _run(machine, scheme, start, plan, case.experiment, torque, substeps, tell)
 
-    runs = realisations(run, total)
+    runs = realisations(run, total, stop)
     return _record(case, elastic, plan, runs, substeps)
 
 
@@ -160,6 +163,16 @@ def _dte(case: Case, meshing: Pair, samples: Array) -> Array:
     return np.asarray(turned + along * (samples[..., 2] - samples[..., 3]))
 
 
+def _lost_contact(lost: int, total: int) -> str | None:
+    """Warning where the teeth separate: the response then is not that of a linear system."""
+    if not lost:
+        return None
+    return (
+        f"the teeth are out of contact in {lost} of {total} samples, so the rig is not linear and its identified"
+        " response depends on the excitation"
+    )
+
+
 def _check_reach(elastic: ElasticRig, dte: Array) -> None:
     """Refuse a record in which the flanks overlapped further than tip edges are followed."""
     most = EDGE_SEPARATION * elastic.pair.driver.module
@@ -192,6 +205,7 @@ def _record(case: Case, elastic: ElasticRig, plan: Schedule, runs: list[Run], su
     count = samples.shape[1]
     phase = (start + np.arange(count) / plan.sampling_rate) * plan.mesh_frequency
     torque = np.stack([run.torque for run in runs])
+    lost = int(np.sum(samples[:, :, 5] == 0))
     dte = _dte(case, elastic.pair, samples)
     _check_reach(elastic, dte)
     channels = {
@@ -224,7 +238,8 @@ def _record(case: Case, elastic: ElasticRig, plan: Schedule, runs: list[Run], su
         "torque_mean": case.experiment.torque_mean,
         "settling_residual": max(run.residual for run in runs),
         "settling_periods": round((start * plan.sampling_rate / plan.block_samples + 1) * plan.block_periods),
-        "contact_lost_samples": int(np.sum(samples[:, :, 5] == 0)),
+        "contact_lost_samples": lost,
+        "warnings": _lost_contact(lost, samples.shape[0] * samples.shape[1]),
         "model": "reduced",
         "substeps": substeps,
         "provenance": provenance(dump_case(case), case.experiment.seed, settings),

@@ -56,6 +56,11 @@ def schedule(experiment: Experiment, rig: Rig) -> Schedule:
     Raises BenchError unless the record holds a whole number of mesh periods.
     """
     wanted = experiment.mesh_frequency_for(rig.driver.teeth)
+    if wanted >= experiment.sampling_rate / 2:
+        raise BenchError(
+            f"the mesh frequency of {wanted:g} Hz (experiment.mesh_frequency_hz or speed_driver_rpm) must lie below"
+            f" half of experiment.sampling_rate_hz, {experiment.sampling_rate / 2:g} Hz"
+        )
     period = experiment.samples_per_period / experiment.sampling_rate
     record = experiment.periods * period
     cycles = round(wanted * record)

@@ -15,6 +15,7 @@ from gearbench.rig import Case
 
 Array = NDArray[np.float64]
 
+MOST_POSITIONS = 65_536
 SCHEMA = "gearbench-static/1"
 
 Loads = tuple[str, Array]  # "N m" (driver torque) or "m" (dte), and values
@@ -50,6 +51,8 @@ def static(
         raise BenchError("static loads are torques or transmission errors: give one kind")
     if positions < 2:
         raise BenchError(f"positions = {positions} must be at least 2")
+    if positions > MOST_POSITIONS:
+        raise BenchError(f"positions = {positions} must be at most {MOST_POSITIONS}")
     unit, values = ("m", dte) if len(dte) else ("N m", torque or (case.experiment.torque_mean,))
     loads = np.asarray(values, dtype=float)
     for load in loads:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from threading import Event
 from typing import TypeVar
 
 Result = TypeVar("Result")
@@ -15,13 +16,17 @@ def processors() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def realisations(run: Callable[[int], Result], total: int) -> list[Result]:
+def realisations(run: Callable[[int], Result], total: int, stop: Event) -> list[Result]:
     """Results of run(0) .. run(total - 1), in order, on as many threads as there are processors.
 
-    What has not begun is dropped when one fails or the caller is interrupted.
+    When one fails or the caller is interrupted, what has not begun is dropped and `stop` is set: `run` looks at it
+    now and then, or the end of what has begun would have to be waited for.
     """
     pool = ThreadPoolExecutor(min(total, processors()))
     try:
         return [future.result() for future in [pool.submit(run, number) for number in range(total)]]
+    except BaseException:
+        stop.set()
+        raise
     finally:
         pool.shutdown(wait=True, cancel_futures=True)

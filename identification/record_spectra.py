@@ -122,6 +122,11 @@ def _common_sampling(records: Sequence[xr.Dataset]) -> Sampling:
     rate, samples = float(first.attrs["sampling_rate"]), int(first.attrs["samples_per_period"])
     periods = int(first.attrs["periods"])
     mesh = [mesh_period(record) for record in records]
+    means = [float(record.attrs["torque_mean"]) for record in records if "torque_mean" in record.attrs]
+    if means and max(means) - min(means) > SAME * max(abs(mean) for mean in means):
+        raise SpectraError(
+            f"the records differ in torque_mean: {min(means):g} to {max(means):g} N m; they must be of one condition"
+        )
     if max(mesh) - min(mesh) > 1e-6 * mesh[0]:
         raise SpectraError(f"the records differ in mesh_period: {min(mesh):g} to {max(mesh):g} s")
     if first.sizes["time"] != samples * periods:
