@@ -7,7 +7,6 @@ how many and how much they scattered. That keeps a hundred realisations of four 
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import contextmanager
@@ -17,9 +16,11 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from gearbench.bench.attributes import rig_attributes
 from gearbench.bench.excitation import torque_realisation
 from gearbench.bench.lumped_run import Setup, SteadyState, steady_state, tables_for
 from gearbench.bench.schedule import ProgressReport, Schedule, schedule
+from gearbench.bench.workers import processors
 from gearbench.geometry import Pair, body, pair
 from gearbench.lumped import choose_substeps, lumped_model
 from gearbench.lumped.potential_energy import outside_foundation_fit
@@ -41,7 +42,7 @@ def simulate_lumped(case: Case, progress: ProgressReport | None = None) -> xr.Da
     setup = _setup(case, meshing, plan)
     collected = _Collected(case.experiment.realisations, plan.block_samples)
     total = case.experiment.realisations
-    with _workers(min(total, _processors())) as pool:
+    with _workers(min(total, processors())) as pool:
 
         def run(number: int) -> int:
             torque = torque_realisation(case.experiment, number)
@@ -54,11 +55,6 @@ def simulate_lumped(case: Case, progress: ProgressReport | None = None) -> xr.Da
             if progress is not None:
                 progress(done / total, f"realisation {done} of {total}")
     return _record(case, meshing, plan, setup, collected)
-
-
-def _processors() -> int:
-    """Processors that this process may run on."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @contextmanager
@@ -128,17 +124,11 @@ def _record(case: Case, meshing: Pair, plan: Schedule, setup: Setup, collected: 
 
 def _rig_attributes(rig: Rig, meshing: Pair) -> dict[str, Any]:
     density = rig.material.density
-    return {
-        "teeth_driver": rig.driver.teeth,
-        "teeth_driven": rig.driven.teeth,
-        "base_radius_driver": meshing.driver.base_radius,
-        "base_radius_driven": meshing.driven.base_radius,
-        "inertia_driver": body(meshing.driver, rig.driver, density, "rig.driver").inertia,
-        "inertia_driven": body(meshing.driven, rig.driven, density, "rig.driven").inertia,
-        "working_pressure_angle": meshing.working_pressure_angle,
-        "support_direction": rig.support.direction,
-        "driven_boundary": rig.load.boundary,
-    }
+    bodies = (
+        body(meshing.driver, rig.driver, density, "rig.driver"),
+        body(meshing.driven, rig.driven, density, "rig.driven"),
+    )
+    return rig_attributes(rig, meshing, bodies)
 
 
 def _channels(
