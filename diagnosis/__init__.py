@@ -1,0 +1,1 @@
+"""Which effect that the simulation leaves out causes its gap to the measurement."""
