@@ -20,7 +20,7 @@ import numpy as np
 from gearbench.fem.body import CondensedGear, condense, rounded
 from gearbench.fem.compiled import cache_folder
 from gearbench.fem.law import Curve, Law, elastic_pair, make_law
-from gearbench.rig import Gear, Material, Rig
+from gearbench.rig import Gear, Material, Rig, sound_gear
 from gearbench.rig.value import Value
 
 Arrays = Mapping[str, Any]  # of numpy arrays
@@ -118,6 +118,6 @@ def _fields(gear: CondensedGear) -> list[tuple[Field[Any], Any]]:
 
 
 def _gear_key(gear: Gear, material: Material, element_size: float | None, modes: int) -> str:
-    """Cache entry of a condensed gear; totals of mass and inertia do not enter the condensation."""
-    bare = rounded(gear).model_copy(update={"mass": None, "inertia": None, "bore_radius": 0.0})
+    """Cache entry of a condensed gear; totals of mass and inertia and tooth errors do not enter the condensation."""
+    bare = sound_gear(rounded(gear)).model_copy(update={"mass": None, "inertia": None, "bore_radius": 0.0})
     return key_for("gear", {"gear": bare, "material": material, "element_size": element_size, "modes": modes})

@@ -1,26 +1,38 @@
 """What is tested: gears, rig, experiment and case, as immutable SI values."""
 
 from gearbench.rig.case import Case, CaseError, dump_case, read_case
+from gearbench.rig.drive import Coupling, Drive, Ripple
 from gearbench.rig.experiment import Condition, Experiment, Identification, Multisine, Simulation
-from gearbench.rig.gear import Gear
-from gearbench.rig.rig import Damping, Drive, Load, Material, Rig, Support, Supports
+from gearbench.rig.gear import Crack, Gear
+from gearbench.rig.mesh import Friction, MeshCorrection
+from gearbench.rig.neutral import effects_in, sound_gear
+from gearbench.rig.rig import Damping, Load, Material, Rig, Support, Supports
+from gearbench.rig.sensors import Sensors
 
 __all__ = [
     "Case",
     "CaseError",
     "Condition",
+    "Coupling",
+    "Crack",
     "Damping",
     "Drive",
     "Experiment",
+    "Friction",
     "Gear",
     "Identification",
     "Load",
     "Material",
+    "MeshCorrection",
     "Multisine",
     "Rig",
+    "Ripple",
+    "Sensors",
     "Simulation",
     "Support",
     "Supports",
     "dump_case",
+    "effects_in",
     "read_case",
+    "sound_gear",
 ]

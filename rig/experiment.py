@@ -17,7 +17,12 @@ class Multisine(Value):
     amplitude: float | None = quantity(None, "nm", gt=0.0, doc="peak of the multisine torque (or give rms)")
     rms: float | None = quantity(None, "nm", gt=0.0, doc="rms of the multisine torque (or give amplitude)")
     band: tuple[float, float] = quantity(unit="hz", doc="lowest and highest excited frequency")
-    grid: Literal["full", "odd"] = quantity("full", doc="excited lines")
+    grid: Literal["full", "odd", "comb"] = quantity(
+        "full", doc="excited lines: all, the odd ones, or comb: +-residue modulo the hunting period's lines"
+    )
+    residue: int | None = quantity(
+        None, ge=1, le=10**9, doc="comb: lines +-residue modulo lcm(teeth); absent: the one that overlaps least"
+    )
     crest: float = quantity(1.7, ge=1.5, doc="crest factor reached by clipping")
 
     @model_validator(mode="after")
@@ -26,6 +31,8 @@ class Multisine(Value):
             raise ValueError("give exactly one of amplitude_nm and rms_nm")
         if not 0.0 <= self.band[0] < self.band[1]:
             raise ValueError(f"band_hz = {list(self.band)} must rise from a frequency of at least 0 Hz")
+        if self.residue is not None and self.grid != "comb":
+            raise ValueError(f'residue = {self.residue} belongs to grid = "comb", but grid = "{self.grid}"')
         return self
 
 
@@ -76,8 +83,8 @@ class Simulation(Value):
 
     model: Literal["lumped", "reduced"] = quantity("reduced", doc="lumped 3-DOF model or reduced finite elements")
     substeps: int = quantity(0, ge=0, le=1024, doc="integration steps per sample; 0: as many as the error bound needs")
-    mesh_stiffness: Literal["potential-energy", "rectangular"] = quantity(
-        "potential-energy", doc="lumped model: law of k(t)"
+    mesh_stiffness: Literal["potential-energy", "rectangular", "finite-element"] = quantity(
+        "potential-energy", doc="lumped model: law of k(t); finite-element: the non-linear model on FE tables"
     )
     stiffness_single: float | None = quantity(None, "n_per_m", gt=0.0, doc="rectangular k(t): one pair in contact")
     stiffness_double: float | None = quantity(None, "n_per_m", gt=0.0, doc="rectangular k(t): two pairs in contact")

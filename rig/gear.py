@@ -4,7 +4,19 @@ from __future__ import annotations
 
 from math import pi
 
+from pydantic import model_validator
+
+from gearbench.rig.checks import items_within
 from gearbench.rig.value import Value, quantity
+
+_LARGEST_ERROR = 1e-3  # m
+
+
+class Crack(Value):
+    """A cracked tooth: its bending stiffness is lower, the contact of its flank is that of a sound one."""
+
+    tooth: int = quantity(ge=0, doc="number of the cracked tooth, 0 .. teeth - 1")
+    stiffness_loss: float = quantity(ge=0.0, le=0.95, doc="relative loss of that tooth's bending stiffness")
 
 
 class Gear(Value):
@@ -29,3 +41,23 @@ class Gear(Value):
     hub_radius: float = quantity(unit="mm", gt=0.0, doc="radius of the rigid hub circle")
     mass: float | None = quantity(None, "kg", gt=0.0, doc="total mass; absent: from the geometry")
     inertia: float | None = quantity(None, "kg_m2", gt=0.0, doc="total moment of inertia; absent: from the geometry")
+    pitch_error: tuple[float, ...] = quantity(
+        (), "um", doc="excess of each tooth's working flank, in order of meshing; empty: none"
+    )
+    runout: float = quantity(0.0, "um", ge=0.0, le=_LARGEST_ERROR, doc="run-out F_r, twice the eccentricity")
+    runout_phase: float = quantity(0.0, "deg", doc="rotation of this gear at which run-out adds most material")
+    crack: Crack | None = quantity(None, doc="absent: all teeth are sound")
+
+    @model_validator(mode="after")
+    def _one_value_a_tooth(self) -> Gear:
+        given = len(self.pitch_error)
+        if given not in (0, self.teeth):
+            raise ValueError(
+                f"pitch_error_um has {given} values, must have none or {self.teeth}, one for each of the teeth"
+            )
+        items_within(self, "pitch_error", -_LARGEST_ERROR, _LARGEST_ERROR)
+        if self.crack and self.crack.tooth >= self.teeth:
+            raise ValueError(
+                f"crack.tooth = {self.crack.tooth} must be less than teeth = {self.teeth} (teeth count from 0)"
+            )
+        return self

@@ -5,7 +5,10 @@ from __future__ import annotations
 from math import pi
 from typing import ClassVar, Literal
 
+from gearbench.rig.drive import Drive
 from gearbench.rig.gear import Gear
+from gearbench.rig.mesh import Friction, MeshCorrection
+from gearbench.rig.sensors import Sensors
 from gearbench.rig.value import Value, quantity
 
 
@@ -19,10 +22,19 @@ class Material(Value):
 
 
 class Support(Value):
-    """Spring and damper between one gear's centre and the ground, in y or along the line of action."""
+    """Spring and damper between one gear's centre and the ground, in y or along the line of action.
+
+    Force: stiffness y (|y| / reference_deflection)^exponent + damping y'.
+    """
 
     stiffness: float = quantity(unit="n_per_m", gt=0.0, doc="support stiffness")
     damping: float = quantity(0.0, "n_s_per_m", ge=0.0, doc="support damping")
+    exponent: float = quantity(
+        0.0, gt=-0.9, le=3.0, doc="e of the force k y (|y| / reference_deflection)^e; 0: linear"
+    )
+    reference_deflection: float = quantity(
+        10e-6, "um", gt=0.0, le=1e-2, doc="deflection at which the secant stiffness is `stiffness`"
+    )
 
 
 class Supports(Value):
@@ -32,12 +44,6 @@ class Supports(Value):
     driver: Support = quantity(doc="support of the driver")
     driven: Support = quantity(doc="support of the driven gear")
     direction: Literal["tangential", "line-of-action"] = quantity("tangential", doc="axis of support motion")
-
-
-class Drive(Value):
-    """Boundary of the driver: the torque of the experiment."""
-
-    boundary: Literal["torque"] = quantity("torque", doc="what is imposed on the driver")
 
 
 class Load(Value):
@@ -80,3 +86,6 @@ class Rig(Value):
     drive: Drive = quantity(Drive(), doc="boundary of the driver")
     load: Load = quantity(Load(), doc="boundary of the driven gear")
     damping: Damping = quantity(Damping(), doc="damping of gears and mesh")
+    friction: Friction = quantity(Friction(), doc="friction between the flanks")
+    mesh: MeshCorrection = quantity(MeshCorrection(), doc="corrections of the mesh force and of the pairs' errors")
+    sensors: Sensors = quantity(Sensors(), doc="delays and noise of the channels")

@@ -61,7 +61,7 @@ def _field(info: FieldInfo, unit: str, full: bool) -> dict[str, Any]:
         text["unit"] = SYMBOLS[unit]
     schema: dict[str, Any] = text | _type(kind, info, unit)
     if info.default is not None and not info.is_required():
-        schema["default"] = info.default if isinstance(info.default, str | int) else _number(info.default, unit)
+        schema["default"] = _default(info.default, unit)
     return schema
 
 
@@ -71,9 +71,9 @@ def _type(kind: Any, info: FieldInfo, unit: str) -> dict[str, Any]:
     if kind is str:
         return {"type": "string", "minLength": 1}
     if get_origin(kind) is tuple:
-        length = len(get_args(kind))
-        items = _type(get_args(kind)[0], info, unit)
-        return {"type": "array", "items": items, "minItems": length, "maxItems": length}
+        parts = get_args(kind)
+        array = {"type": "array", "items": _type(parts[0], info, unit)}
+        return array if Ellipsis in parts else array | {"minItems": len(parts), "maxItems": len(parts)}
     plain: dict[str, Any] = {"type": "integer" if kind is int else "number"}
     for rule in info.metadata:
         for name, word in _LIMITS.items():
@@ -86,6 +86,12 @@ def _type(kind: Any, info: FieldInfo, unit: str) -> dict[str, Any]:
         "sd": {"type": "number", "minimum": 0, "description": "standard deviation"},
     }
     return {"oneOf": [plain, spread]}
+
+
+def _default(value: Any, unit: str) -> Any:
+    if isinstance(value, tuple):
+        return [_default(item, unit) for item in value]
+    return value if isinstance(value, str | int) else _number(value, unit)
 
 
 def _number(value: float, unit: str) -> float:

@@ -27,6 +27,11 @@ _FACTORS: dict[str, Decimal] = {
     "kg_m3": Decimal(1),
     "n_per_m": Decimal(1),
     "n_s_per_m": Decimal(1),
+    "nm_per_rad": Decimal(1),
+    "nm_s_per_rad": Decimal(1),
+    "m_per_s": Decimal(1),
+    "urad": Decimal("1e-6"),
+    "us": Decimal("1e-6"),
     "s": Decimal(1),
 }
 
@@ -48,6 +53,11 @@ SYMBOLS: dict[str, str] = {
     "kg_m3": "kg/m^3",
     "n_per_m": "N/m",
     "n_s_per_m": "N s/m",
+    "nm_per_rad": "N m/rad",
+    "nm_s_per_rad": "N m s/rad",
+    "m_per_s": "m/s",
+    "urad": "urad",
+    "us": "us",
     "s": "s",
 }
 
