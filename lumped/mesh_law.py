@@ -1,0 +1,160 @@
+"""The non-linear mesh: force over deflection and mesh phase, and how the tooth pairs share it, as tables.
+
+Phase is that of the driven gear's rotation [cycles], 0 when driver tooth 0 touches at the pitch point; pair n is driver
+tooth n mod z1 with driven tooth n mod z2 and passes the pitch point at phase n. The tables come from elsewhere (bench:
+finite elements, or a stiffness k(phase)); this module only reads them, and needs numpy alone.
+
+Between its nodes the force is deflection times a secant stiffness that is linear in phase and in the square root of the
+deflection: exact where the mesh is linear, and dense near zero deflection, where contact stiffens.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gearbench.lumped.errors import LumpedError
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+
+def approach_grid(largest: float, nodes: int) -> Array:
+    """Deflections (nodes,) [m] from 0 to `largest`, uniform in their square root."""
+    return largest * (np.arange(nodes) / (nodes - 1)) ** 2
+
+
+@dataclass(frozen=True)
+class MeshLaw:
+    """Force of the mesh of sound, error-free gears, and the state of each pair in it.
+
+    approach (n_d,) [m]: an `approach_grid`. force (n_p, n_d) [N] along the line of action, driver torque over base
+    radius, at phases k/n_p. offsets (n_o,): successive whole numbers; the last column of `share` is zero at phase 0.
+    share (n_p, n_o): part of the tangent stiffness that pair floor(phase) + offset carries at the reference load; adds
+    up to 1. rho1, rho2 (n_p, n_o): roll lengths [m] of those pairs' contacts. bending (n_p, n_o, 2): part that the
+    driver's and the driven tooth's flexibility, without their local contact, has in their pair's. backlash [m]: along
+    the line of action. base_pitch [m]. mirror: phase at which a pair's back flanks pass the pitch point.
+    """
+
+    approach: Array
+    force: Array
+    offsets: Integers
+    share: Array
+    rho1: Array
+    rho2: Array
+    bending: Array
+    backlash: float
+    base_pitch: float
+    mirror: float = 0.5
+
+    def __post_init__(self) -> None:
+        nodes = len(self.approach)
+        if nodes < 3 or not np.allclose(self.approach, approach_grid(self.approach[-1], nodes), rtol=1e-9, atol=0):
+            raise LumpedError("the deflections of a mesh law must be an approach_grid of at least 3 nodes")
+        if self.force.ndim != 2 or self.force.shape[1] != nodes:
+            raise LumpedError(f"the forces of a mesh law have shape {self.force.shape}, not (phases, {nodes})")
+        shape = (len(self.force), len(self.offsets))
+        for name in ("share", "rho1", "rho2"):
+            if getattr(self, name).shape != shape:
+                raise LumpedError(f"{name} of a mesh law has shape {getattr(self, name).shape}, not {shape}")
+        if self.bending.shape != (*shape, 2):
+            raise LumpedError(f"bending of a mesh law has shape {self.bending.shape}, not {(*shape, 2)}")
+
+    @property
+    def phases(self) -> int:
+        """Number of phases in a cycle."""
+        return len(self.force)
+
+    @cached_property
+    def secant(self) -> Array:
+        """Force over deflection [N/m] (phases + 1, n_d), the first phase repeated at the end; at zero deflection the
+        line through the next two nodes."""
+        table = np.empty((self.phases + 1, len(self.approach)))
+        table[:-1, 1:] = self.force[:, 1:] / self.approach[1:]
+        table[:-1, 0] = np.maximum(2 * table[:-1, 1] - table[:-1, 2], 0.0)
+        table[-1] = table[0]
+        return table
+
+    def evaluate(self, delta: ArrayLike, phase: ArrayLike) -> tuple[Array, Array]:
+        """Force [N] and tangent stiffness [N/m] at deflections [m] and phases [cycles] (shapes broadcast).
+
+        Nothing touches from delta = 0 down to -backlash; below, the back flanks push the other way. Beyond the last
+        node the secant goes on as between the last two.
+        """
+        delta, phase = np.asarray(delta, dtype=float), np.asarray(phase, dtype=float)
+        back = delta < -self.backlash
+        if np.any(back):
+            depth = np.where(back, -delta - self.backlash, np.maximum(delta, 0.0))
+            force, tangent = self._pressed(depth, np.where(back, self.mirror - phase, phase))
+            return np.where(back, -force, force), np.where(back | (delta > 0), tangent, 0.0)
+        force, tangent = self._pressed(np.maximum(delta, 0.0), phase)
+        return force, np.where(delta > 0, tangent, 0.0)
+
+    def _pressed(self, depth: Array, phase: Array) -> tuple[Array, Array]:
+        """Force and tangent at deflections >= 0."""
+        row, weight = place_phase(phase, self.phases)
+        last = len(self.approach) - 1
+        root = last * np.sqrt(depth / self.approach[-1])
+        node = np.minimum(root.astype(np.int64), last - 1)
+        table = self.secant.ravel()
+        at = row * (last + 1) + node
+        low = table[at] + weight * (table[at + last + 1] - table[at])
+        at = at + 1
+        rise = table[at] + weight * (table[at + last + 1] - table[at]) - low
+        stiffness = low + (root - node) * rise
+        return depth * stiffness, stiffness + 0.5 * root * rise
+
+    @cached_property
+    def _closed(self) -> tuple[Array, Array]:
+        """share and bending with the end of the cycle appended, where every pair has moved on by one offset."""
+        share, bending = np.zeros((self.phases + 1, len(self.offsets))), self.bending[[*range(self.phases), -1]]
+        share[:-1] = self.share
+        share[-1, 1:] = self.share[0, :-1]
+        bending[-1, 1:] = self.bending[0, :-1]
+        return share, bending
+
+    def pairs(self, phase: ArrayLike) -> tuple[Integers, Array]:
+        """Numbers (..., n_o) of the pairs near contact at `phase` (...), and their tangent shares (..., n_o)."""
+        phase = np.asarray(phase, dtype=float)
+        numbers = np.floor(phase).astype(np.int64)[..., None] + self.offsets
+        return numbers, self._between(self._closed[0], phase)
+
+    def bending_of(self, phase: ArrayLike) -> Array:
+        """Bending parts (..., n_o, 2) of the pairs that `pairs` lists."""
+        return self._between(self._closed[1], np.asarray(phase, dtype=float))
+
+    def _between(self, table: Array, phase: Array) -> Array:
+        row, weight = place_phase(phase, self.phases)
+        weight = weight.reshape(weight.shape + (1,) * (table.ndim - 1))
+        return np.asarray(table[row] + weight * (table[row + 1] - table[row]))
+
+    def friction(self, phase: ArrayLike, transition: float = 0.0) -> tuple[Array, Array, Array]:
+        """Levers of friction: sums over the pairs of share sgn rho1 [m], share sgn [-] and share sgn rho2 [m].
+
+        sgn is +1 after the pitch point, where the driver's flank slides faster, and -1 before. Friction of coefficient
+        mu at the normal force N is mu N (-m1, -s sin a_w, +m2, +s sin a_w) on (driver rotation, driver y, driven
+        rotation, driven y). `transition` [m] > 0 makes sgn a tanh of the distance from the pitch point over it.
+        """
+        phase = np.asarray(phase, dtype=float)
+        away = (phase - np.floor(phase))[..., None] - self.offsets
+        travel = away * self.base_pitch
+        sign = np.sign(travel) if transition <= 0.0 else np.tanh(travel / transition)
+        weight = self._between(self._closed[0], phase) * sign
+        # Both roll lengths are linear in the phase along the whole path of contact.
+        column = int(np.argmin(np.abs(self.offsets)))
+        centre1 = self.rho1[0, column] + self.offsets[column] * self.base_pitch
+        centre2 = self.rho2[0, column] - self.offsets[column] * self.base_pitch
+        total = weight.sum(axis=-1)
+        spread = (weight * travel).sum(axis=-1)
+        return centre1 * total + spread, total, centre2 * total - spread
+
+
+def place_phase(phase: ArrayLike, phases: int) -> tuple[Integers, Array]:
+    """Row of the table below each phase [cycles], and the fraction of the interval that lies behind it."""
+    position = np.asarray(phase, dtype=float)
+    position = (position - np.floor(position)) * phases
+    row = np.minimum(position.astype(np.int64), phases - 1)
+    return row, position - row
