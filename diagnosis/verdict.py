@@ -1,0 +1,288 @@
+"""The verdict of a diagnosis and its file, verdict.json (schema "gearbench-verdict/1").
+
+Values are frozen and complete: what is not known is null, never a made-up number. Other programs write such files
+too, so reading checks everything and says what is wrong in one sentence.
+"""
+
+from __future__ import annotations
+
+import difflib
+import json
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal, NoReturn, get_args
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from gearbench.diagnosis.errors import DiagnosisError
+from gearbench.records.storage import write_atomically
+
+SCHEMA: Literal["gearbench-verdict/1"] = "gearbench-verdict/1"
+
+Outcome = Literal["effect", "none", "unknown"]
+Place = Literal["mesh", "driver-support", "driven-support", "drive", "load", "sensor", "none"]
+Kind = Literal["channel", "band", "class", "phase", "tooth", "place", "condition"]
+PLACES: tuple[str, ...] = get_args(Place)
+KINDS: tuple[str, ...] = get_args(Kind)
+
+# Departure of a sum of probabilities from 1 that rounding in a file explains.
+ROUNDING = 1e-6
+# A verdict is a page of text; a file beyond this size [bytes] is something else.
+LARGEST_FILE = 2**24
+
+Name = Annotated[str, Field(min_length=1, max_length=200)]
+Probability = Annotated[float, Field(ge=0.0, le=1.0)]
+NotNegative = Annotated[float, Field(ge=0.0)]
+
+
+class _Value(BaseModel):
+    """Frozen, closed to unknown keys, finite numbers only, no text taken for a number."""
+
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", allow_inf_nan=False, strict=True, populate_by_name=True, hide_input_in_errors=True
+    )
+
+
+class Probabilities(_Value):
+    """How likely an effect of the library, none, or something unknown is at work; they add up to 1."""
+
+    effect: Probability
+    none: Probability
+    unknown: Probability
+
+    @model_validator(mode="after")
+    def _whole(self) -> Probabilities:
+        total = self.effect + self.none + self.unknown
+        if abs(total - 1.0) > ROUNDING:
+            raise ValueError(f"effect + none + unknown = {total:g} must be 1")
+        return self
+
+
+class Parameter(_Value):
+    """Estimate of one parameter of an effect: value and standard deviation in `unit`."""
+
+    value: float
+    std: NotNegative
+    unit: str
+
+
+class Effect(_Value):
+    """An effect found at work, how likely it is, and its parameters by name."""
+
+    name: Name
+    probability: Probability
+    parameters: dict[Name, Parameter] = {}
+
+
+class Candidate(_Value):
+    """One hypothesis: its effects (none: the nominal rig with its uncertainties), its log evidence relative to any
+    common constant, and its relative gap on the held-out record (null: not computed)."""
+
+    effects: tuple[Name, ...]
+    log_evidence: float
+    held_out: NotNegative | None = None
+
+
+class Share(_Value):
+    """A part of the gap: `share` of the whole of its kind, beside the share that needs no cause.
+
+    `floor_noise` is what measurement noise explains (null: one period, so unknown), `floor_nominal` what the
+    uncertainty of the nominal parameters explains (null: not computed), `floor` their sum (null unless both known).
+    Floors are parts of the same whole as the shares and may exceed them.
+    """
+
+    kind: Kind
+    name: Name
+    share: Annotated[float, Field(ge=0.0, le=1.0 + ROUNDING)]
+    floor: NotNegative | None
+    floor_noise: NotNegative | None = None
+    floor_nominal: NotNegative | None = None
+
+
+class Range(_Value):
+    """A value between its lowest and highest likely one; in the file the list [value, low, high]."""
+
+    value: NotNegative
+    low: NotNegative
+    high: NotNegative
+
+    @model_validator(mode="before")
+    @classmethod
+    def _from_list(cls, data: Any) -> Any:
+        if isinstance(data, (Range, dict)):
+            return data
+        if not isinstance(data, (list, tuple)) or len(data) != 3:
+            raise ValueError("must be a list of three numbers, [value, low, high]")
+        return dict(zip(("value", "low", "high"), data, strict=True))
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Range:
+        if not self.low <= self.value <= self.high:
+            raise ValueError(f"value {self.value:g} must lie between low {self.low:g} and high {self.high:g}")
+        return self
+
+
+class Gap(_Value):
+    """Rms of measured minus simulated in one channel and band of a record, from nominal rig to floor.
+
+    `with_effect` is null when no effect was added, `floor` when the noise is unknown (a single period). Band
+    [0, 0] is the mean value.
+    """
+
+    record: Name
+    channel: Name
+    band_hz: tuple[NotNegative, NotNegative]
+    unit: str
+    nominal: Range
+    recalibrated: Range
+    with_effect: Range | None
+    floor: Range | None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _band_from_list(cls, data: Any) -> Any:
+        if isinstance(data, Mapping) and isinstance(data.get("band_hz"), list):
+            return {**data, "band_hz": tuple(data["band_hz"])}
+        return data
+
+    @model_validator(mode="after")
+    def _rising(self) -> Gap:
+        if self.band_hz[0] > self.band_hz[1]:
+            raise ValueError(f"band_hz = [{self.band_hz[0]:g}, {self.band_hz[1]:g}] must rise")
+        return self
+
+
+class Verdict(_Value):
+    """What a diagnosis hands back; the fields are those of verdict.json."""
+
+    schema_: Literal["gearbench-verdict/1"] = Field(SCHEMA, alias="schema")
+    verdict: Outcome
+    probability: Probabilities
+    effects: tuple[Effect, ...] = ()
+    candidates: tuple[Candidate, ...] = ()
+    place: Place
+    where: tuple[Share, ...] = ()
+    gap: tuple[Gap, ...] = ()
+    held_out: Name | None = None
+    indistinguishable: tuple[tuple[Name, ...], ...] = ()
+    advice: tuple[str, ...] = ()
+
+    @model_validator(mode="after")
+    def _agrees_with_itself(self) -> Verdict:
+        if self.verdict == "effect" and not self.effects:
+            raise ValueError('effects is empty, but verdict "effect" names at least one')
+        if self.verdict != "effect" and self.effects:
+            raise ValueError(f'effects names {self.effects[0].name}, but verdict "{self.verdict}" names none')
+        names = [effect.name for effect in self.effects]
+        for name in names:
+            if names.count(name) > 1:
+                raise ValueError(f'effects names "{name}" {names.count(name)} times, must once')
+        return self
+
+
+def verdict_json(verdict: Verdict) -> str:
+    """The text of verdict.json: indented, keys in the order of the fields, ranges as lists."""
+    tree = verdict.model_dump(mode="json", by_alias=True)
+    for gap in tree["gap"]:
+        for name in ("nominal", "recalibrated", "with_effect", "floor"):
+            if gap[name] is not None:
+                gap[name] = list(gap[name].values())
+    return json.dumps(tree, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def write_verdict(verdict: Verdict, path: str | Path) -> None:
+    """Write verdict.json, replacing `path` in one step. Raises RecordError if its folder does not exist."""
+    text = verdict_json(verdict)
+    write_atomically(path, lambda temporary: _write(temporary, text))
+
+
+def _write(path: Path, text: str) -> None:
+    path.write_text(text, encoding="utf-8")
+
+
+def read_verdict(path: str | Path) -> Verdict:
+    """Read and check a verdict of any program. Raises DiagnosisError: one sentence with file, key and limit."""
+    source = Path(path)
+    if not source.is_file():
+        raise DiagnosisError(f"verdict {source} does not exist")
+    if source.stat().st_size > LARGEST_FILE:
+        raise DiagnosisError(f"verdict {source} has {source.stat().st_size} bytes, at most {LARGEST_FILE}")
+    try:
+        return parse_verdict(source.read_text(encoding="utf-8"))
+    except UnicodeDecodeError:
+        raise DiagnosisError(f"verdict {source} is not UTF-8 text") from None
+    except DiagnosisError as error:
+        raise DiagnosisError(f"verdict {source}: {error}") from None
+
+
+def parse_verdict(text: str) -> Verdict:
+    """The verdict in a JSON text. Raises DiagnosisError: one sentence with key and limit."""
+    try:
+        tree = json.loads(text, parse_constant=_not_finite, object_pairs_hook=_once)
+    except json.JSONDecodeError as error:
+        raise DiagnosisError(f"no JSON at line {error.lineno}, column {error.colno}: {error.msg}") from None
+    except DiagnosisError:
+        raise
+    except ValueError as error:
+        raise DiagnosisError(f"no usable JSON: {error}") from None
+    except RecursionError:
+        raise DiagnosisError("JSON nested too deeply for a verdict") from None
+    if not isinstance(tree, dict):
+        raise DiagnosisError("a verdict is a JSON object with keys in braces")
+    if tree.get("schema") != SCHEMA:
+        raise DiagnosisError(f'schema is {json.dumps(tree.get("schema"))}, but a verdict has "{SCHEMA}"')
+    try:
+        return Verdict.model_validate_json(json.dumps(tree))
+    except ValidationError as error:
+        raise DiagnosisError(_sentence(error)) from None
+
+
+def _not_finite(word: str) -> NoReturn:
+    raise DiagnosisError(f"holds {word}, but numbers must be finite (use null for what is unknown)")
+
+
+def _once(pairs: Iterable[tuple[str, Any]]) -> dict[str, Any]:
+    tree: dict[str, Any] = {}
+    for key, value in pairs:
+        if key in tree:
+            raise DiagnosisError(f'key "{key}" stands twice in the same object')
+        tree[key] = value
+    return tree
+
+
+def _sentence(error: ValidationError) -> str:
+    """One sentence from what pydantic found: the first defect, with its dotted key."""
+    first = error.errors()[0]
+    where = ".".join(str(part) for part in first["loc"] if part != "schema_")
+    kind, context = first["type"], first.get("ctx", {})
+    if kind == "missing":
+        return f"key {where} is missing"
+    if kind == "extra_forbidden":
+        return f"key {where} is unknown{_nearest(first['loc'])}"
+    if kind == "literal_error":
+        return f"{where} must be one of {context['expected']}"
+    if kind == "value_error":
+        words = str(first["msg"]).removeprefix("Value error, ")
+        return f"{where}: {words}" if where else words
+    words = str(first["msg"]).removeprefix("Input ")
+    return f"{where} {words[:1].lower()}{words[1:]}"
+
+
+# Which values the keys of a verdict hold, for the nearest key to a misspelt one.
+_BELOW: dict[str, type[_Value]] = {
+    "probability": Probabilities,
+    "effects": Effect,
+    "parameters": Parameter,
+    "candidates": Candidate,
+    "where": Share,
+    "gap": Gap,
+}
+
+
+def _nearest(location: tuple[int | str, ...]) -> str:
+    model: type[_Value] = Verdict
+    for part in location[:-1]:
+        model = _BELOW.get(str(part), model)
+    known = [field.alias or name for name, field in model.model_fields.items()]
+    near = difflib.get_close_matches(str(location[-1]), known, n=1)
+    return f"; did you mean {near[0]}?" if near else f"; keys are {', '.join(known)}"
