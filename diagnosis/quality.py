@@ -1,0 +1,103 @@
+"""What a channel says about itself: noise and drift from row to row, clipping."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+NOISE_IN_WORDS = "noise and what does not turn with the shafts cannot be told from the rest, which costs power"
+# A change counts as drift beyond this many standard deviations of what white noise does ...
+BEYOND_NOISE = 6.0
+# ... and this part of the channel's rms (its mean left out).
+LEVEL = 1e-3
+# Ratio of the scatter's rms in the noisiest half row to that in the quietest.
+GROWTH = 1.5
+# Equal samples in a row, at an end of the range, that make a run; and how many such samples make clipping.
+RUN, FEWEST = 3, 6
+# A coarsely quantised signal lingers at its extremes: there, the last level must hold that many times as many.
+CROWD = 5.0
+
+
+def noise_of(rows: Array) -> float:
+    """Rms of one sample's random part from the differences of successive rows (P, N), P >= 2; white or not."""
+    change = np.diff(rows, axis=0)
+    return float(np.sqrt((change - change.mean(axis=1, keepdims=True)).var() / 2))
+
+
+def drift_of(periods: Mapping[str, Array], base_radii: tuple[float, float], notes: list[str]) -> float:
+    """Largest change of level of any channel over its rows, relative to its rms; 0 where noise explains it.
+
+    Appends a sentence to `notes` for the channel that drifts most and for the one whose scatter grows most.
+    """
+    ratio = base_radii[0] / base_radii[1]
+    size = {name: float(rows.std()) for name, rows in periods.items()}
+    if {"angle_driver", "angle_driven"} <= set(size):
+        # A gear held at constant speed has no motion to measure its drift by: take the other one's.
+        size["angle_driven"] = max(size["angle_driven"], size["angle_driver"] * ratio)
+        size["angle_driver"] = max(size["angle_driver"], size["angle_driven"] / ratio)
+    drifts, growths = {}, {}
+    for name, rows in periods.items():
+        if size[name] > 0.0:
+            drifts[name] = _level_change(rows) / size[name]
+            growths[name] = _growth(rows, size[name])
+    worst = max(drifts, key=lambda name: drifts[name], default="")
+    found = drifts.get(worst, 0.0)
+    found = found if found > LEVEL else 0.0
+    if found:
+        notes.append(
+            f"{worst} drifts: over the record its level changes by {100 * found:.2g} % of its rms, more than noise"
+            " explains; slow changes are no effect of the gears"
+        )
+    noisiest = max(growths, key=lambda name: growths[name], default="")
+    if growths.get(noisiest, 1.0) > GROWTH:
+        notes.append(
+            f"the scatter of {noisiest} changes {growths[noisiest]:.2g}-fold within the record (limit {GROWTH:g}): its"
+            " noise is not steady, which costs power"
+        )
+    return found
+
+
+def clipped(values: Array) -> float:
+    """Fraction of the samples (n,) that stand clipped at either end of the range; 0 if none do."""
+    if np.ptp(values) == 0.0:
+        return 0.0
+    total = 0
+    for end in (values.max(), values.min()):
+        at_end = values == end
+        count = int(at_end.sum())
+        if count < FEWEST or _longest_run(at_end) < RUN:
+            continue
+        levels, counts = np.unique(values, return_counts=True)
+        if levels.size < values.size / 4:  # quantised: equal samples are the rule
+            beside = counts[1:4] if end == levels[0] else counts[-4:-1]
+            if count < CROWD * max(1.0, float(beside.mean())):
+                continue
+        total += count
+    return total / values.size
+
+
+def _level_change(rows: Array) -> float:
+    """Spread of the row means beyond what white noise explains; 0 within it."""
+    means = rows.mean(axis=1)
+    spread = float(np.ptp(means))
+    limit = BEYOND_NOISE * noise_of(rows) * np.sqrt(2.0 / rows.shape[1])
+    return spread if spread > limit else 0.0
+
+
+def _growth(rows: Array, size: float) -> float:
+    """Ratio of the largest to the smallest rms of row differences over half rows; 1 for noise that is too
+    small to matter."""
+    change = np.diff(rows, axis=0)
+    change = change - change.mean(axis=1, keepdims=True)
+    half = rows.shape[1] // 2
+    rms = np.sqrt((change[:, : 2 * half].reshape(-1, half) ** 2).mean(axis=1))
+    return float(rms.max() / max(rms.min(), LEVEL * size)) if rms.max() > LEVEL * size else 1.0
+
+
+def _longest_run(flags: NDArray[np.bool_]) -> int:
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], flags, [False])).astype(int)))
+    return int((edges[1::2] - edges[::2]).max()) if edges.size else 0
