@@ -246,7 +246,7 @@ def _phase(record: xr.Dataset, frequency: float, facts: Facts, notes: list[str])
             "the origin of the mesh phase is arbitrary (mesh_phase_origin): single teeth and contact zones cannot be"
             " told by their number"
         )
-    return start + steps, known
+    return np.asarray(start + steps, dtype=np.float64), known
 
 
 def _departures(

@@ -165,8 +165,8 @@ def _check_angles(record: xr.Dataset, source: str, facts: Facts) -> None:
         jump = float(np.abs(steps - np.median(steps)).max())
         if jump > pi:
             raise DiagnosisError(
-                f"{source}: angle_{gear} jumps by {jump:.4g} rad between two samples (limit pi): a record holds absolute,"
-                " unwrapped angles in rad"
+                f"{source}: angle_{gear} jumps by {jump:.4g} rad between two samples (limit pi): a record holds"
+                " absolute, unwrapped angles in rad"
             )
         if not _slope(record, gear) > 0.0:
             raise DiagnosisError(
@@ -193,7 +193,8 @@ def _mean_torque(record: xr.Dataset, source: str) -> float:
         )
     if not torque > 0.0:
         raise DiagnosisError(
-            f"{source}: the mean of torque_driver is {torque:.4g} N m and must be positive: it closes the working flanks"
+            f"{source}: the mean of torque_driver is {torque:.4g} N m and must be positive: it closes the working"
+            " flanks"
         )
     return torque
 
@@ -254,8 +255,8 @@ def _check_load_torque(record: xr.Dataset, source: str, torque: float, facts: Fa
     off = float(record["torque_driven"].values[0].mean()) / wanted
     if abs(off - 1) > LOAD_TORQUE:
         raise DiagnosisError(
-            f"{source}: the mean of torque_driven is {off * wanted:.4g} N m, where the mean of torque_driver and the teeth"
-            f" want {wanted:.4g} N m (limit {LOAD_TORQUE:.0%}); it is positive against the driven rotation"
+            f"{source}: the mean of torque_driven is {off * wanted:.4g} N m, where the mean of torque_driver and the"
+            f" teeth want {wanted:.4g} N m (limit {LOAD_TORQUE:.0%}); it is positive against the driven rotation"
             + _hint(off, _TORQUE_HINTS, "torque_driven")
         )
 

@@ -14,8 +14,8 @@ NOISE_IN_WORDS = "noise and what does not turn with the shafts cannot be told fr
 BEYOND_NOISE = 6.0
 # ... and this part of the channel's rms (its mean left out).
 LEVEL = 1e-3
-# Ratio of the scatter's rms in the noisiest half row to that in the quietest.
-GROWTH = 1.5
+# Ratio of the scatter's rms in the noisiest half row to that in the quietest, beyond what chance makes of it.
+GROWTH = 1.2
 # Equal samples in a row, at an end of the range, that make a run; and how many such samples make clipping.
 RUN, FEWEST = 3, 6
 # A coarsely quantised signal lingers at its extremes: there, the last level must hold that many times as many.
@@ -53,11 +53,13 @@ def drift_of(periods: Mapping[str, Array], base_radii: tuple[float, float], note
             " explains; slow changes are no effect of the gears"
         )
     noisiest = max(growths, key=lambda name: growths[name], default="")
-    if growths.get(noisiest, 1.0) > GROWTH:
-        notes.append(
-            f"the scatter of {noisiest} changes {growths[noisiest]:.2g}-fold within the record (limit {GROWTH:g}): its"
-            " noise is not steady, which costs power"
-        )
+    if noisiest:
+        limit = GROWTH + BEYOND_NOISE / np.sqrt(periods[noisiest].shape[1] / 2)
+        if growths[noisiest] > limit:
+            notes.append(
+                f"the scatter of {noisiest} changes {growths[noisiest]:.3g}-fold within the record (limit {limit:.3g}):"
+                " its noise is not steady, which costs power"
+            )
     return found
 
 
