@@ -1,0 +1,208 @@
+"""Derivatives of the force residuals to all unknowns, by the chain through the mesh and directly.
+
+Friction's modulation of a column is left out (mu is small and steps that do not help are refused), everything else is
+exact to first order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.diagnosis.basis import KNOTS
+from gearbench.diagnosis.condition import Condition
+from gearbench.diagnosis.machine import Machine
+from gearbench.diagnosis.parameters import Layout
+from gearbench.diagnosis.rows import (
+    LOSS_FACTOR,
+    Mesh,
+    assemble,
+    carried,
+    corrected,
+    coupling_compliance,
+    mesh,
+    modulation,
+    order_bin,
+    per_tooth,
+    support_force,
+)
+from gearbench.diagnosis.unknowns import DELAYED, ROWS, SHAPE_ORDERS
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+BACKLASH_STEP = 1e-7  # [m]
+
+
+def rows_and_columns(
+    machine: Machine, condition: Condition, where: Layout, p: Array
+) -> tuple[Complex, Complex, Complex]:
+    """Residuals (4, K) [N], shares of the mesh error (4, K), and derivatives (4, K, unknowns) to the unknowns."""
+    spectra = corrected(condition, where, p)
+    state = mesh(machine, condition, where, p, spectra)
+    residual, share = assemble(machine, condition, where, p, spectra, state)
+    out = np.zeros((len(ROWS), condition.bins, where.size), dtype=complex)
+    _mesh_columns(machine, condition, where, p, spectra, state, out)
+    # One error of the mesh force shows in every row, as strongly as the row weighs it.
+    out *= -share[..., None]
+    _support_columns(machine, condition, where, p, spectra, out)
+    forces = carried(machine, condition, where, p, state.force)
+    _drive_columns(machine, condition, where, p, spectra, forces[0], share[0], out)
+    _row_columns(machine, condition, where, spectra, state, forces, share, out)
+    return residual, share, out
+
+
+def _mesh_columns(
+    machine: Machine,
+    condition: Condition,
+    where: Layout,
+    p: Array,
+    spectra: Mapping[str, Complex],
+    state: Mesh,
+    out: Complex,
+) -> None:
+    """What moves the mesh force: derivatives of F_m, the same in all rows."""
+    n, k = condition.samples, condition.bins
+    listed: list[tuple[int, Array]] = []
+
+    def put(key: str, *values: Array, start: int = 0) -> None:
+        first = where[key].start + start
+        listed.extend((first + i, value) for i, value in enumerate(values))
+
+    turns = [2 * np.pi * (m + 1) * condition.phase for m in range(SHAPE_ORDERS)]
+    waves = [wave for angle in turns for wave in (np.cos(angle), np.sin(angle))]
+    first, second = condition.rotation
+    viscous = state.viscosity * state.rate * state.touching
+    put("scale", state.elastic + 0.5 * viscous)
+    put("mesh-ratio", viscous)
+    put("offset", state.tangent)
+    put("eccentricity", *(state.tangent * w for w in (np.cos(first), np.sin(first), np.cos(second), np.sin(second))))
+    put("shape", *(state.elastic * wave for wave in waves))
+    put("profile", *(state.tangent * wave for wave in waves))
+    level = np.maximum(np.abs(state.elastic), 1e-3 * condition.force_level) / condition.force_level
+    put("curvature", state.elastic * np.log(level))
+    put("backlash", _backlash(machine, condition, where, p, state))
+    bins = np.zeros((2 * len(KNOTS), n // 2 + 1), dtype=complex)
+    bins[: len(KNOTS)] = condition.hats_full * condition.force_full / condition.stiffness_level
+    bins[len(KNOTS) :] = 1j * bins[: len(KNOTS)]
+    put("compliance", *(state.tangent * (np.fft.irfft(bins, n, axis=-1) * n)))
+    g = machine.support_factor
+    for channel, sign in zip(DELAYED, (1.0, -1.0, g, -g), strict=True):
+        if channel in spectra:
+            rate = 1j * condition.omega * spectra[channel]
+            rate[0] = condition.pitch_speed if channel.startswith("angle") else 0.0
+            put(f"delay-{channel}", sign * state.tangent * (np.fft.irfft(rate, n) * n))
+    loss = 1.0 - per_tooth(condition, p[where["crack"]], condition.share[..., None] * condition.bending)
+    for key, weights, lever in (
+        ("pitch", np.stack([condition.share, condition.share], axis=-1), state.tangent),
+        ("crack", condition.share[..., None] * condition.bending, -state.elastic / loss),
+    ):
+        put(key, *_of_teeth(condition, weights * lever[:, None, None]))
+    index = [at for at, _ in listed]
+    values = np.fft.rfft(np.stack([value for _, value in listed]), axis=-1)[:, :k] / n
+    out[:, :, index] = values.T[None]
+
+
+def _of_teeth(condition: Condition, weights: Array) -> Array:
+    """Weights (N, n_o, 2) of the pairs sorted to their teeth: (z1 + z2, N)."""
+    z1, z2 = condition.teeth
+    total = np.zeros((z1 + z2, condition.samples))
+    at = np.arange(condition.samples)
+    for pair in range(weights.shape[1]):
+        total[condition.tooth[0][:, pair], at] += weights[:, pair, 0]
+        total[z1 + condition.tooth[1][:, pair], at] += weights[:, pair, 1]
+    return total
+
+
+def _backlash(machine: Machine, condition: Condition, where: Layout, p: Array, state: Mesh) -> Array:
+    present = max(machine.law.backlash + p[where["backlash"]][0], 0.0)
+    if not np.any(state.delta < -present):
+        return np.zeros(condition.samples)
+    wider = replace(machine.law, backlash=present + BACKLASH_STEP).evaluate(state.delta, condition.phase)[0]
+    now = replace(machine.law, backlash=present).evaluate(state.delta, condition.phase)[0]
+    return np.asarray(machine.scale * modulation(condition, where, p) * (wider - now) / BACKLASH_STEP)
+
+
+def _support_columns(
+    machine: Machine, condition: Condition, where: Layout, p: Array, spectra: Mapping[str, Complex], out: Complex
+) -> None:
+    n, k, g = condition.samples, condition.bins, machine.support_factor
+    s = 1j * condition.omega[:k]
+    for side, (row, channel, sign) in enumerate(((1, "y_driver", -1.0), (3, "y_driven", 1.0))):
+        if channel not in spectra:
+            continue
+        name = ("bearing-driver", "bearing-driven")[side]
+        y = spectra[channel]
+        stiffness = p[where["stiffness"]][side]
+        values = support_force(machine, side, np.fft.irfft(y, n) * n, stiffness, p[where[name]][0])
+        spring, more = np.fft.rfft(np.stack(values), axis=-1)[:, :k] / n
+        damping = machine.damping[side] * np.exp(p[where["damping"]][side])
+        out[row, :, where["stiffness"].start + side] += sign * spring / g
+        out[row, :, where[name].start] += sign * more / g
+        out[row, :, where["damping"].start + side] += sign * damping * s * y[:k] / g
+        out[row, :, where["mass"].start + side] += sign * machine.mass[side] * s**2 * y[:k] / g
+        mass = machine.mass[side] * (1 + p[where["mass"]][side])
+        moving = (mass * s**2 + damping * s) * y[:k] + spring
+        out[row, :, where[f"delay-{channel}"].start] += sign * s * moving / g
+
+
+def _drive_columns(
+    machine: Machine,
+    condition: Condition,
+    where: Layout,
+    p: Array,
+    spectra: Mapping[str, Complex],
+    force: Complex,
+    share: Complex,
+    out: Complex,
+) -> None:
+    """Inertias, coupling, ripple and the direct part of a late driver angle. `force` (K,) is rb1's in the drive row."""
+    k = condition.bins
+    rb1, rb2 = machine.base_radius
+    s = 1j * condition.omega[:k]
+    turning = s**2 * spectra["angle_driver"][:k] / rb1
+    relative = p[where["inertia"]]
+    inertia = machine.inertia[0] * (1 + relative[0])
+    rotor = machine.rotor * (1 + relative[2])
+    shaft = inertia * turning + rb1 * force
+    start = where["inertia"].start
+    out[0, :, start] += -share * machine.inertia[0] * turning / rb1
+    soft = coupling_compliance(machine, condition, where, p)
+    out[0, :, start + 2] += -machine.rotor * (turning + s**2 * soft * shaft) / rb1
+    out[0, :, where["coupling"].start] += -rotor * s**2 * (1 - 1j * LOSS_FACTOR * (s.imag > 0)) * shaft / rb1
+    out[0, :, where["delay-angle_driver"].start] += -(rotor + share * inertia) * s * turning / rb1
+    for i, name in enumerate(where.block("ripple").names):
+        label, order, part = name.rsplit(":", 2)
+        if label == condition.name:
+            at = order_bin(machine, int(order))
+            out[0, at, where["ripple"].start + i] += 0.5 * (1.0 if part == "cos" else -1j) / rb1
+    if "torque_driven" in spectra:
+        moving = machine.inertia[1] * s**2 * spectra["angle_driven"][:k] / rb2
+        out[2, :, start + 1] += moving / rb2
+        out[2, :, where["delay-angle_driven"].start] += (1 + relative[1]) * s * moving / rb2
+
+
+def _row_columns(
+    machine: Machine,
+    condition: Condition,
+    where: Layout,
+    spectra: Mapping[str, Complex],
+    state: Mesh,
+    forces: Complex,
+    share: Complex,
+    out: Complex,
+) -> None:
+    """Friction, and the smooth filters of single rows."""
+    k, n = condition.bins, condition.samples
+    rubbing = np.fft.rfft(state.force * condition.arms, axis=-1)[:, :k] / n
+    basis = condition.hats_full[:, :k].T
+    for row, name in enumerate(ROWS):
+        lever = (0, 1, 2, 1)[row]
+        out[row, :, where["friction"].start] += -share[row] * rubbing[lever]
+        weighted = basis * (share[row] * forces[lever])[:, None]
+        at = where[f"filter-{name}"].start
+        out[row, :, at : at + len(KNOTS)] += weighted
+        out[row, :, at + len(KNOTS) : at + 2 * len(KNOTS)] += 1j * weighted

@@ -1,0 +1,114 @@
+"""Refit of all unknowns to the force residuals under one hypothesis, and its Laplace evidence.
+
+The cost is the negative logarithm of the posterior: that of `blocks` plus the Gaussian prior. Gauss-Newton steps with
+the missing parts lambda re-estimated between them; a step that does not lower the cost is halved, then refused.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve
+
+from gearbench.diagnosis.blocks import Blocks, missing, whitened
+from gearbench.diagnosis.columns import rows_and_columns
+from gearbench.diagnosis.condition import Condition
+from gearbench.diagnosis.machine import Machine
+from gearbench.diagnosis.parameters import Layout
+from gearbench.diagnosis.rows import rows
+from gearbench.diagnosis.unknowns import ROWS
+
+Array = NDArray[np.float64]
+
+ROUNDS = 6  # of expectation-maximisation between two steps
+HALVINGS = 4
+ENOUGH = 0.3  # change of the cost that no longer matters
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Everything that the hypotheses share."""
+
+    machine: Machine
+    conditions: tuple[Condition, ...]
+    where: Layout
+    blocks: tuple[Blocks, ...]
+
+
+@dataclass(frozen=True)
+class Fit:
+    """The unknowns (P,) of one hypothesis, prior `sd` (P,), `precision` (P, P) of the posterior, `information` (P, P)
+    of the data alone, lambda of every condition, cost without the prior's normalisation, and log evidence."""
+
+    p: Array
+    sd: Array
+    precision: Array
+    information: Array
+    factors: tuple[Array, ...]
+    cost: float
+    log_evidence: float
+    steps: int
+
+    @property
+    def std(self) -> Array:
+        """Posterior standard deviations (P,)."""
+        return np.sqrt(np.diag(np.linalg.inv(self.precision)))
+
+
+def _score(problem: Problem, p: Array, sd: Array, factors: Sequence[Array], rounds: int) -> tuple[float, list[Array]]:
+    total, found = 0.5 * float(((p / sd) ** 2).sum()), []
+    for condition, blocks, start in zip(problem.conditions, problem.blocks, factors, strict=True):
+        residual, share = rows(problem.machine, condition, problem.where, p)
+        factor, cost = missing(blocks, residual, share, start, rounds)
+        total += cost
+        found.append(factor)
+    return total, found
+
+
+def _normal(problem: Problem, p: Array, factors: Sequence[Array]) -> tuple[Array, Array]:
+    size = problem.where.size
+    information, gradient = np.zeros((size, size)), np.zeros(size)
+    for condition, blocks, factor in zip(problem.conditions, problem.blocks, factors, strict=True):
+        residual, share, columns = rows_and_columns(problem.machine, condition, problem.where, p)
+        r, j = whitened(blocks, residual, share, columns, factor)
+        information += 2 * (j.T @ j)
+        gradient += 2 * (j.T @ r)
+    return information, gradient
+
+
+def refit(problem: Problem, sd: Array, start: Array, factors: Sequence[Array] | None = None, *, most: int = 12) -> Fit:
+    """The fit under prior standard deviations `sd` (P,), from `start` (P,) and, if known, lambda there."""
+    low, high = problem.where.bounds()
+    p = np.clip(start, low, high)
+    if factors is None:
+        factors = [np.ones((len(ROWS) + 1, len(b.count)))[[*b.rows, len(ROWS)]] for b in problem.blocks]
+    cost, lambdas = _score(problem, p, sd, factors, 4 * ROUNDS)
+    steps = 0
+    for _ in range(most):
+        steps += 1
+        information, gradient = _normal(problem, p, lambdas)
+        move = -_solve(information, sd, gradient + p / sd**2)
+        length, before = 1.0, cost
+        for _ in range(HALVINGS):
+            trial = np.clip(p + length * move, low, high)
+            value, found = _score(problem, trial, sd, lambdas, ROUNDS)
+            if value < cost:
+                p, cost, lambdas = trial, value, found
+                break
+            length *= 0.4
+        if before - cost < ENOUGH:
+            break
+    information, _ = _normal(problem, p, lambdas)
+    precision = information + np.diag(1 / sd**2)
+    scaled = precision * sd[:, None] * sd[None, :]
+    evidence = -cost - 0.5 * float(np.linalg.slogdet(scaled)[1])
+    return Fit(p, sd, precision, information, tuple(lambdas), cost, evidence, steps)
+
+
+def _solve(information: Array, sd: Array, right: Array) -> Array:
+    """(information + diag sd^-2)^-1 right, scaled by the prior against the units' different sizes."""
+    scaled = information * sd[:, None] * sd[None, :] + np.eye(len(sd))
+    return np.asarray(sd * cho_solve(cho_factor(scaled), sd * right))

@@ -1,0 +1,235 @@
+"""Force residuals: what is missing from each equation of motion of the measured rig, and how it depends on unknowns.
+
+In a periodic record accelerations follow in the frequency domain, so every equation of motion gives its own estimate of
+the one normal force in the mesh, without simulation. With s = j omega, F_m the force that the mesh law gives for the
+measured deflection, mu A the friction lever of each row, Q(y) the support's force:
+
+    drive           [T1 + ripple - J_r s^2 theta1 - (1 + J_r s^2 H)(J_1 s^2 theta1 + rb1 F_m (1 + mu A1))] / rb1
+    driver support  [-(m1 s^2 + c1 s) y1 - Q1(y1)] / g - F_m (1 + mu As)
+    load            [M2 + J_2 s^2 theta2] / rb2 - F_m (1 + mu A2)
+    driven support  [(m2 s^2 + c2 s) y2 + Q2(y2)] / g - F_m (1 + mu As)
+
+H is the coupling's compliance (0: rigid). Signs: physics, sections 1 and 4. A residual is zero for a rig that the
+unknowns describe, and noise besides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.diagnosis.basis import KNOTS
+from gearbench.diagnosis.condition import CHANNELS, Condition
+from gearbench.diagnosis.machine import Machine
+from gearbench.diagnosis.parameters import Layout
+from gearbench.diagnosis.unknowns import DELAYED, RIPPLE_ORDERS, ROWS, SHAPE_ORDERS
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+LOSS_FACTOR = 0.05  # of a coupling that the nominal rig takes for rigid
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """The mesh of one condition under given unknowns, over time (N,): deflection [m], force without damping [N], its
+    tangent [N/m], damping coefficient [N s/m], rate of the DTE [m/s], the whole force [N] and the touching flags."""
+
+    delta: Array
+    elastic: Array
+    tangent: Array
+    viscosity: Array
+    rate: Array
+    force: Array
+    touching: NDArray[np.bool_]
+
+
+def corrected(condition: Condition, where: Layout, p: Array) -> dict[str, Complex]:
+    """Spectra (N/2 + 1,) of the channels with the delays of the unknowns taken out."""
+    out = {}
+    for channel in CHANNELS:
+        spectrum = condition.spectra.get(channel)
+        if spectrum is None:
+            continue
+        if channel in DELAYED:
+            lag = p[where[f"delay-{channel}"]][0]
+            if lag:
+                spectrum = spectrum * np.exp(1j * condition.omega * lag)
+                spectrum[0] += _advance(condition, channel) * lag
+        out[channel] = spectrum
+    return out
+
+
+def _advance(condition: Condition, channel: str) -> float:
+    """Steady rate [m/s] of a channel that its departures leave out: rb times speed for angles."""
+    return condition.pitch_speed if channel.startswith("angle") else 0.0
+
+
+def excess(condition: Condition, where: Layout, p: Array) -> Array:
+    """Excess material (N,) [m] of the contact by offset, run-out, pitch errors and profile."""
+    a = np.full(condition.samples, p[where["offset"]][0])
+    cos1, sin1, cos2, sin2 = p[where["eccentricity"]]
+    first, second = condition.rotation
+    a += cos1 * np.cos(first) + sin1 * np.sin(first) + cos2 * np.cos(second) + sin2 * np.sin(second)
+    a += per_tooth(condition, p[where["pitch"]], condition.share)
+    profile = p[where["profile"]]
+    for n in range(SHAPE_ORDERS):
+        angle = 2 * np.pi * (n + 1) * condition.phase
+        a += profile[2 * n] * np.cos(angle) + profile[2 * n + 1] * np.sin(angle)
+    return a
+
+
+def per_tooth(condition: Condition, values: Array, weight: Array) -> Array:
+    """Sum (N,) over the pairs of the teeth's values (z1 + z2,) times weights (N, n_o), or (N, n_o, 2) per side."""
+    z1 = int(condition.teeth[0])
+    first, second = (weight[..., 0], weight[..., 1]) if weight.ndim == 3 else (weight, weight)
+    total = values[:z1][condition.tooth[0]] * first + values[z1:][condition.tooth[1]] * second
+    return np.asarray(total.sum(axis=-1))
+
+
+def modulation(condition: Condition, where: Layout, p: Array) -> Array:
+    """Factor (N,) of the mesh stiffness: scale, shape and loss of single teeth."""
+    shape = p[where["shape"]]
+    factor = np.ones(condition.samples)
+    for n in range(SHAPE_ORDERS):
+        angle = 2 * np.pi * (n + 1) * condition.phase
+        factor += shape[2 * n] * np.cos(angle) + shape[2 * n + 1] * np.sin(angle)
+    loss = per_tooth(condition, p[where["crack"]], condition.share[..., None] * condition.bending)
+    return np.asarray(np.exp(p[where["scale"]][0]) * factor * (1.0 - loss))
+
+
+def mesh(machine: Machine, condition: Condition, where: Layout, p: Array, spectra: Mapping[str, Complex]) -> Mesh:
+    """The mesh force that the measured motion makes under the unknowns."""
+    g = machine.support_factor
+    closing = spectra["angle_driver"] - spectra["angle_driven"]
+    if "y_driver" in spectra:
+        closing = closing + g * spectra["y_driver"]
+    if "y_driven" in spectra:
+        closing = closing - g * spectra["y_driven"]
+    filtered = closing + _yielding(machine, condition, where, p)
+    n = condition.samples
+    delta = np.fft.irfft(filtered, n) * n + excess(condition, where, p)
+    rate = np.fft.irfft(1j * condition.omega * closing, n) * n
+    law = replace(machine.law, backlash=max(machine.law.backlash + p[where["backlash"]][0], 0.0))
+    force, tangent = law.evaluate(delta, condition.phase)
+    factor = machine.scale * modulation(condition, where, p)
+    curve = p[where["curvature"]][0]
+    if curve:
+        level = np.maximum(np.abs(force), 1e-3 * condition.force_level) / condition.force_level
+        factor = factor * level**curve
+    elastic, tangent = factor * force, factor * tangent
+    touching = force != 0.0
+    ratio = machine.mesh_ratio * np.exp(p[where["mesh-ratio"]][0])
+    viscosity = 2 * ratio * np.sqrt(np.maximum(tangent, 0.0) * machine.mesh_mass)
+    return Mesh(delta, elastic, tangent, viscosity, rate, elastic + viscosity * rate * touching, touching)
+
+
+def _yielding(machine: Machine, condition: Condition, where: Layout, p: Array) -> Complex:
+    """Departure of the deflection's spectrum by compliance that moves no channel: radial supports, webs."""
+    values = p[where["compliance"]]
+    count = len(KNOTS)
+    gain = (values[:count] + 1j * values[count:]) @ condition.hats_full
+    return np.asarray(gain * condition.force_full / condition.stiffness_level)
+
+
+def coupling_compliance(machine: Machine, condition: Condition, where: Layout, p: Array) -> Complex:
+    """H (K,) [rad/(N m)] of the drive's coupling."""
+    s = 1j * condition.omega[: condition.bins]
+    more = p[where["coupling"]][0] * (1.0 - 1j * LOSS_FACTOR * np.sign(s.imag))
+    if machine.compliance == 0.0:
+        return np.asarray(more)
+    return np.asarray(machine.compliance / (1 + s * machine.coupling_damping * machine.compliance) + more)
+
+
+def support_force(machine: Machine, side: int, y: Array, log_stiffness: float, more: float) -> tuple[Array, Array]:
+    """Spring force (N,) [N] of a support, and its derivative to the exponent."""
+    reference = machine.reference[side]
+    size = np.maximum(np.abs(y), 1e-4 * reference) / reference
+    force = machine.stiffness[side] * np.exp(log_stiffness) * y * size ** (machine.exponent[side] + more)
+    return force, force * np.log(size)
+
+
+def rows(machine: Machine, condition: Condition, where: Layout, p: Array) -> tuple[Complex, Complex]:
+    """Force residuals (4, K) [N] of the unknowns, and the share (4, K) of an error of the mesh force in each.
+
+    Rows of channels that the record lacks are NaN.
+    """
+    spectra = corrected(condition, where, p)
+    state = mesh(machine, condition, where, p, spectra)
+    return assemble(machine, condition, where, p, spectra, state)
+
+
+def _transform(condition: Condition, values: Array) -> Complex:
+    return np.asarray(np.fft.rfft(values, axis=-1)[..., : condition.bins] / condition.samples)
+
+
+def carried(machine: Machine, condition: Condition, where: Layout, p: Array, force: Array) -> Complex:
+    """Spectra (3, K) of the mesh force with friction as driver rotation, supports and driven rotation feel it."""
+    mu = machine.friction + p[where["friction"]][0]
+    return _transform(condition, force * (1 + mu * condition.arms))
+
+
+def assemble(
+    machine: Machine, condition: Condition, where: Layout, p: Array, spectra: Mapping[str, Complex], state: Mesh
+) -> tuple[Complex, Complex]:
+    k, n = condition.bins, condition.samples
+    s = 1j * condition.omega[:k]
+    rb1, rb2 = machine.base_radius
+    inertia = machine.inertia * (1 + p[where["inertia"]][:2])
+    rotor = machine.rotor * (1 + p[where["inertia"]][2])
+    first, middle, last = carried(machine, condition, where, p, state.force)
+    theta1, theta2 = spectra["angle_driver"][:k] / rb1, spectra["angle_driven"][:k] / rb2
+    out = np.full((len(ROWS), k), np.nan, dtype=complex)
+    share = np.ones((len(ROWS), k), dtype=complex)
+    share[0] = 1 + rotor * s**2 * coupling_compliance(machine, condition, where, p)
+    torque = spectra["torque_driver"][:k] + ripple(machine, condition, where, p)
+    out[0] = (torque - (rotor + share[0] * inertia[0]) * s**2 * theta1) / rb1 - share[0] * first
+    if "torque_driven" in spectra:
+        out[2] = (spectra["torque_driven"][:k] + inertia[1] * s**2 * theta2) / rb2 - last
+    for side, (row, channel, sign) in enumerate(((1, "y_driver", -1.0), (3, "y_driven", 1.0))):
+        if channel not in spectra:
+            continue
+        out[row] = sign * support(machine, condition, where, p, side, spectra[channel]) - middle
+    filters = _filters(condition, where, p)
+    out += filters * np.stack([share[0] * first, middle, last, middle])
+    return out, share
+
+
+def support(machine: Machine, condition: Condition, where: Layout, p: Array, side: int, y: Complex) -> Complex:
+    """Force (K,) [N] along the line of action that moves one gear's centre as measured: y its spectrum (N/2 + 1,)."""
+    k, n = condition.bins, condition.samples
+    s = 1j * condition.omega[:k]
+    name = ("bearing-driver", "bearing-driven")[side]
+    spring, _ = support_force(
+        machine, side, np.fft.irfft(y, n) * n, p[where["stiffness"]][side], p[where[name]][0]
+    )
+    mass = machine.mass[side] * (1 + p[where["mass"]][side])
+    damping = machine.damping[side] * np.exp(p[where["damping"]][side])
+    moving = (mass * s**2 + damping * s) * y[:k] + _transform(condition, spring)
+    return np.asarray(moving / machine.support_factor)
+
+
+def ripple(machine: Machine, condition: Condition, where: Layout, p: Array) -> Complex:
+    """Spectrum (K,) of the torque ripple [N m]."""
+    out = np.zeros(condition.bins, dtype=complex)
+    values = p[where["ripple"]]
+    names = where.block("ripple").names
+    for i, name in enumerate(names):
+        label, order, part = name.rsplit(":", 2)
+        if label == condition.name:
+            out[order_bin(machine, int(order))] += 0.5 * values[i] * (1.0 if part == "cos" else -1j)
+    return out
+
+
+def order_bin(machine: Machine, order: int) -> int:
+    """Bin of an order of the driver's rotation in the spectrum of one hunting period."""
+    return order * machine.hunting // machine.teeth[0]
+
+
+def _filters(condition: Condition, where: Layout, p: Array) -> Complex:
+    count = len(KNOTS)
+    basis = condition.hats_full[:, : condition.bins]
+    return np.stack([(v[:count] + 1j * v[count:]) @ basis for v in (p[where[f"filter-{row}"]] for row in ROWS)])

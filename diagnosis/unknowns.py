@@ -1,0 +1,77 @@
+"""The layout of all unknowns for a rig and its conditions, with the priors of background and of effects.
+
+The widths of the effects are those of rigs worth diagnosing; the widths of the background are a tenth of them, what
+good rigs have of everything. Both are documented numbers, not fitted ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.diagnosis.basis import KNOTS
+from gearbench.diagnosis.condition import Condition
+from gearbench.diagnosis.machine import Machine
+from gearbench.diagnosis.parameters import NUISANCE, Layout, block, layout
+
+Array = NDArray[np.float64]
+
+SHAPE_ORDERS = 6  # mesh orders of the free part of stiffness shape and profile error
+RIPPLE_ORDERS = (6, 12, 18, 24)  # per driver revolution: what commutation and slots of usual motors leave
+ROWS = ("drive", "driver-support", "load", "driven-support")
+DELAYED = ("angle_driver", "angle_driven", "y_driver", "y_driven")
+
+
+def unknowns(machine: Machine, conditions: Sequence[Condition]) -> Layout:
+    """All unknowns of the force residuals of these conditions."""
+    z1, z2 = machine.teeth
+    complex_knots = [f"{part}@{knot:g}" for part in ("re", "im") for knot in KNOTS]
+    ripple = [
+        f"{condition.name}:{order}:{part}"
+        for condition in conditions
+        for order in RIPPLE_ORDERS
+        for part in ("cos", "sin")
+    ]
+    torque = float(np.mean([condition.torque_mean for condition in conditions]))
+    gear = 1.0 / (1.0 / max(machine.rotor, 1e-12) + 1.0 / machine.inertia[0])
+
+    def softness(frequency: float) -> float:
+        return 1.0 / (gear * (2 * np.pi * frequency) ** 2)
+
+    blocks = [
+        block("stiffness", NUISANCE, "1", ("driver", "driven"), 1.0),
+        block("damping", NUISANCE, "1", ("driver", "driven"), 1.0, low=-3.0, high=3.0),
+        block("mass", NUISANCE, "1", ("driver", "driven"), 1.0),
+        block("inertia", NUISANCE, "1", ("driver", "driven", "rotor"), 1.0),
+        block("scale", NUISANCE, "1", ("mesh",), machine.sd_scale, low=-0.7, high=0.7),
+        block("mesh-ratio", NUISANCE, "1", ("mesh",), machine.sd_mesh_ratio, low=-3.0, high=3.0),
+        block("offset", NUISANCE, "m", ("excess",), 5e-6),
+        block("curvature", NUISANCE, "1", ("mesh",), 0.05, low=-0.5, high=0.5),
+        block("shape", NUISANCE, "1", 2 * SHAPE_ORDERS, 0.04),
+        block("profile", NUISANCE, "m", 2 * SHAPE_ORDERS, 0.5e-6),
+        block("compliance", NUISANCE, "1", complex_knots, 0.08),
+        *(block(f"filter-{row}", f"free-{row}", "1", complex_knots, 0.03, 1.0) for row in ROWS),
+        block("friction", "friction", "1", ("coefficient",), 0.006, 0.08),
+        block("eccentricity", "eccentricity", "m", ("cos1", "sin1", "cos2", "sin2"), 0.5e-6, 6e-6),
+        block("pitch", "pitch-error", "m", z1 + z2, 0.35e-6, 3e-6),
+        block("crack", "tooth-contrast", "1", z1 + z2, 0.02, 0.4),
+        block("coupling", "coupling", "rad/(N m)", ("compliance",), softness(6e3), softness(1.3e3), low=0.0),
+        block("bearing-driver", "bearing-driver", "1", ("exponent",), 0.03, 0.35, low=-0.8, high=2.0),
+        block("bearing-driven", "bearing-driven", "1", ("exponent",), 0.03, 0.35, low=-0.8, high=2.0),
+        *(block(f"delay-{c}", f"delay-{c}", "s", ("delay",), 4e-6, 60e-6) for c in DELAYED),
+        block("ripple", "torque-ripple", "N m", ripple, 0.0006 * torque, 0.006 * torque),
+        block("backlash", "backlash", "m", ("more",), 8e-6, 80e-6),
+    ]
+    found = layout(blocks)
+    for key, deviations in (
+        ("stiffness", machine.sd_stiffness),
+        ("damping", machine.sd_damping),
+        ("mass", machine.sd_mass),
+        ("inertia", (*machine.sd_inertia, machine.sd_rotor)),
+    ):
+        entry = found.block(key)
+        entry.narrow[:] = deviations
+        entry.wide[:] = deviations
+    return found
