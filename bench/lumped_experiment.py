@@ -45,7 +45,7 @@ def simulate_lumped(case: Case, progress: ProgressReport | None = None) -> xr.Da
     with _workers(min(total, processors())) as pool:
 
         def run(number: int) -> int:
-            torque = torque_realisation(case.experiment, number)
+            torque = torque_realisation(case.experiment, number, case.rig)
             collected.put(number, steady_state(setup, plan, case.experiment, torque))
             return number
 

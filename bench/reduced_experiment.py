@@ -70,7 +70,7 @@ def simulate_reduced(case: Case, progress: ProgressReport | None = None) -> xr.D
                 done[number] = fraction
                 report(float(done.mean()), f"realisation {number + 1} of {total}")
 
-        torque = torque_realisation(case.experiment, number)
+        torque = torque_realisation(case.experiment, number, case.rig)
         return _run(machine, scheme, start, plan, case.experiment, torque, substeps, tell)
 
     runs = realisations(run, total, stop)

@@ -29,7 +29,7 @@ def main(realisations: int) -> None:
     meshing = pair(case.rig)
     model = lumped_model(case.rig, meshing, case.simulation)
     tables = tables_for(model, plan, SUBSTEPS)
-    torque = torque_realisation(case.experiment, 0)
+    torque = torque_realisation(case.experiment, 0, case.rig)
     force = torque.sample(2 * SUBSTEPS * plan.samples_per_period) / meshing.driver.base_radius
     state = model.equilibrium(float(force.mean()))
     integrate(tables, force, state, samples=1, substeps=SUBSTEPS)  # compiles

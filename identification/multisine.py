@@ -15,9 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 
-Grid = Literal["full", "odd"]
+Grid = Literal["full", "odd", "comb"]
 
 CLIPPING_ROUNDS = 400
+# Fresh random phases where clipping stalls, as it does with few lines.
+STARTS = 8
 # Points per period of the highest line: coarse and fine clipping, and where the peak is measured.
 CLIPPING_POINTS = (4, 8)
 PEAK_POINTS = 32
@@ -94,14 +96,17 @@ def random_phase_multisine(
     grid: Grid = "full",
     crest: float = 1.7,
     phases: str = "random",
+    modulus: int = 0,
+    residue: int = 0,
     rng: np.random.Generator,
 ) -> MultisineSignal:
     """A multisine of equal amplitudes on the lines of `grid` inside `band` [Hz], crest factor at most about `crest`.
 
     `samples` points a period at `sampling_rate` [Hz]; either `amplitude` (peak of the whole multisine) or
-    `rms` sets its size. Grid "full": every line of the band but 0; "odd": the odd ones. `phases` other than
-    "random" are refused. Raises MultisineError for an empty or unsampled band, sizes that are not positive,
-    or a crest factor that this number of lines cannot reach.
+    `rms` sets its size. Grid "full": every line of the band but 0; "odd": the odd ones; "comb": those that are
+    +-`residue` modulo `modulus` (see identification.comb). `phases` other than "random" are refused. Raises
+    MultisineError for an empty or unsampled band, sizes that are not positive, or a crest factor that this
+    number of lines cannot reach.
     """
     if phases != "random":
         raise MultisineError(
@@ -113,9 +118,8 @@ def random_phase_multisine(
     size = amplitude if amplitude is not None else rms
     if not size or not np.isfinite(size) or size < 0:
         raise MultisineError(f"the size of the multisine, {size!r}, must be positive")
-    lines = excited_lines(samples, sampling_rate, band, grid)
-    unit = _clip(lines, crest, rng)
-    signal = MultisineSignal(samples, sampling_rate, lines, unit)
+    lines = excited_lines(samples, sampling_rate, band, grid, modulus, residue)
+    signal = _lowest_crest(samples, sampling_rate, lines, crest, rng)
     peak = signal.peak
     if peak > CREST_SLACK * crest * signal.rms:
         raise MultisineError(
@@ -123,13 +127,35 @@ def random_phase_multisine(
             f" the best found is {peak / signal.rms:.3g}"
         )
     scale = size / (peak if amplitude is not None else signal.rms)
-    return MultisineSignal(samples, sampling_rate, lines, unit * scale)
+    return MultisineSignal(samples, sampling_rate, lines, signal.spectrum * scale)
 
 
-def excited_lines(samples: int, sampling_rate: float, band: tuple[float, float], grid: Grid) -> NDArray[np.int64]:
-    """Lines (multiples of sampling_rate / samples) inside `band` [Hz] that the grid excites; never line 0."""
-    if grid not in ("full", "odd"):
-        raise MultisineError(f"grid = {grid!r} is unknown; grids are 'full' and 'odd'")
+def _lowest_crest(
+    samples: int, sampling_rate: float, lines: NDArray[np.int64], crest: float, rng: np.random.Generator
+) -> MultisineSignal:
+    """Unit amplitudes with the first phases that reach the crest factor, else the best of all starts."""
+    best: MultisineSignal | None = None
+    for _ in range(STARTS):
+        signal = MultisineSignal(samples, sampling_rate, lines, _clip(lines, crest, rng))
+        if best is None or signal.crest < best.crest:
+            best = signal
+        if signal.crest <= CREST_SLACK * crest:
+            break
+    assert best is not None
+    return best
+
+
+def excited_lines(
+    samples: int, sampling_rate: float, band: tuple[float, float], grid: Grid, modulus: int = 0, residue: int = 0
+) -> NDArray[np.int64]:
+    """Lines (multiples of sampling_rate / samples) inside `band` [Hz] that the grid excites; never line 0.
+
+    `modulus` and `residue` belong to grid "comb". Raises MultisineError.
+    """
+    if grid not in ("full", "odd", "comb"):
+        raise MultisineError(f"grid = {grid!r} is unknown; grids are 'full', 'odd' and 'comb'")
+    if grid == "comb" and not 0 < 2 * residue < modulus:
+        raise MultisineError(f"residue = {residue} of a comb must lie between 1 and half of its modulus = {modulus}")
     low, high = band
     if not (0 <= low <= high < sampling_rate / 2):
         raise MultisineError(
@@ -138,7 +164,10 @@ def excited_lines(samples: int, sampling_rate: float, band: tuple[float, float],
     spacing = sampling_rate / samples
     first, last = int(np.ceil(low / spacing - 1e-9)), int(np.floor(high / spacing + 1e-9))
     lines = np.arange(max(first, 1), last + 1)
-    lines = lines[lines % 2 == 1] if grid == "odd" else lines
+    if grid == "odd":
+        lines = lines[lines % 2 == 1]
+    elif grid == "comb":
+        lines = lines[(lines % modulus == residue) | (lines % modulus == modulus - residue)]
     if not lines.size:
         raise MultisineError(f"band {low:g}-{high:g} Hz holds no line of grid {grid!r}; lines are {spacing:g} Hz apart")
     return lines
