@@ -20,6 +20,7 @@ from gearbench.lumped import mesh_stiffness
 from gearbench.lumped.mesh_law import MeshLaw, approach_grid
 from gearbench.lumped.potential_energy import hertz_compliance, tooth_compliance
 from gearbench.rig import Gear, Rig, Simulation
+from gearbench.rig.neutral import sound_gear
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -30,7 +31,6 @@ LOAD_STEP = 2**0.5  # tables are solved up to the next power of this [N m], so t
 REFERENCE = 0.3  # of the largest load: where the shares of the pairs are taken
 OFFSETS = 4  # pairs looked at on either side of the one at the pitch point
 VERSION = 1  # of the tables' meaning; part of their name on disk
-ERRORS = ("pitch_error", "runout", "runout_phase", "crack")  # of a gear that the sound pair's law does not know
 
 
 def mesh_law(rig: Rig, simulation: Simulation, load_max_nm: float) -> MeshLaw:
@@ -40,7 +40,7 @@ def mesh_law(rig: Rig, simulation: Simulation, load_max_nm: float) -> MeshLaw:
     included, from disk where it has been solved before; else linear in the deflection, with the stiffness k(phase)
     that the case asks for. Raises GeometryError, ContactError, LumpedError or BenchError.
     """
-    sound = _sound(rig)
+    sound = rig.model_copy(update={"driver": sound_gear(rig.driver), "driven": sound_gear(rig.driven)})
     if simulation.mesh_stiffness != "finite-element":
         return linear_law(sound, simulation)
     meshing = pair(sound)
@@ -69,16 +69,6 @@ def linear_law(rig: Rig, simulation: Simulation) -> MeshLaw:
     share = np.where(inside, 1.0 / (one + two + hertz), 0.0)
     share /= share.sum(axis=1, keepdims=True)
     return _assemble(rig, meshing, approach, k[:, None] * approach, share)
-
-
-def _sound(rig: Rig) -> Rig:
-    """The rig with gears free of errors and cracks."""
-    gears = {}
-    for name in ("driver", "driven"):
-        gear: Gear = getattr(rig, name)
-        fields = type(gear).model_fields
-        gears[name] = gear.model_copy(update={key: fields[key].default for key in ERRORS if key in fields})
-    return rig.model_copy(update=gears)
 
 
 def _bare(gear: Gear) -> Gear:

@@ -27,7 +27,7 @@ def approach_grid(largest: float, nodes: int) -> Array:
     return largest * (np.arange(nodes) / (nodes - 1)) ** 2
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class MeshLaw:
     """Force of the mesh of sound, error-free gears, and the state of each pair in it.
 
@@ -78,6 +78,13 @@ class MeshLaw:
         table[-1] = table[0]
         return table
 
+    @property
+    def pitch_roll(self) -> tuple[float, float]:
+        """Roll lengths [m] of driver and driven tooth at the pitch point; both are linear in the phase."""
+        column = int(np.argmin(np.abs(self.offsets)))
+        travel = self.offsets[column] * self.base_pitch
+        return float(self.rho1[0, column] + travel), float(self.rho2[0, column] - travel)
+
     def evaluate(self, delta: ArrayLike, phase: ArrayLike) -> tuple[Array, Array]:
         """Force [N] and tangent stiffness [N/m] at deflections [m] and phases [cycles] (shapes broadcast).
 
@@ -108,7 +115,7 @@ class MeshLaw:
         return depth * stiffness, stiffness + 0.5 * root * rise
 
     @cached_property
-    def _closed(self) -> tuple[Array, Array]:
+    def closed(self) -> tuple[Array, Array]:
         """share and bending with the end of the cycle appended, where every pair has moved on by one offset."""
         share, bending = np.zeros((self.phases + 1, len(self.offsets))), self.bending[[*range(self.phases), -1]]
         share[:-1] = self.share
@@ -120,11 +127,11 @@ class MeshLaw:
         """Numbers (..., n_o) of the pairs near contact at `phase` (...), and their tangent shares (..., n_o)."""
         phase = np.asarray(phase, dtype=float)
         numbers = np.floor(phase).astype(np.int64)[..., None] + self.offsets
-        return numbers, self._between(self._closed[0], phase)
+        return numbers, self._between(self.closed[0], phase)
 
     def bending_of(self, phase: ArrayLike) -> Array:
         """Bending parts (..., n_o, 2) of the pairs that `pairs` lists."""
-        return self._between(self._closed[1], np.asarray(phase, dtype=float))
+        return self._between(self.closed[1], np.asarray(phase, dtype=float))
 
     def _between(self, table: Array, phase: Array) -> Array:
         row, weight = place_phase(phase, self.phases)
@@ -142,11 +149,8 @@ class MeshLaw:
         away = (phase - np.floor(phase))[..., None] - self.offsets
         travel = away * self.base_pitch
         sign = np.sign(travel) if transition <= 0.0 else np.tanh(travel / transition)
-        weight = self._between(self._closed[0], phase) * sign
-        # Both roll lengths are linear in the phase along the whole path of contact.
-        column = int(np.argmin(np.abs(self.offsets)))
-        centre1 = self.rho1[0, column] + self.offsets[column] * self.base_pitch
-        centre2 = self.rho2[0, column] - self.offsets[column] * self.base_pitch
+        weight = self._between(self.closed[0], phase) * sign
+        centre1, centre2 = self.pitch_roll
         total = weight.sum(axis=-1)
         spread = (weight * travel).sum(axis=-1)
         return centre1 * total + spread, total, centre2 * total - spread
