@@ -47,6 +47,7 @@ DERIVED = ("mesh_phase", "dte", "force")
 class Measurement:
     """One record, realisation 0, cut into rows.
 
+    `record` says all that replaying it needs: attributes that it lacked are filled in from the case.
     `periods`: channel -> (P, N) in SI, one row per hunting period; the angles are their departures [rad]
     from steady rotation, `angle - 2 pi phase / teeth`, everything else as recorded; a channel that the
     record lacks is absent. `phase` (N,): mesh phase [cycles] of the samples of the first row at steady
@@ -116,6 +117,7 @@ def measurement(
     samples, rows, cycles = _row(record, frequency, source, facts, notes)
     frequency = cycles * float(record.attrs["sampling_rate"]) / samples
     phase, known = _phase(record, frequency, facts, notes)
+    record = _completed(record, frequency, float(phase[0]), facts)
     whole = {str(key): record[key].values[0, : rows * samples] for key in record.data_vars if key not in DERIVED}
     whole, zero = _departures(whole, phase, source, facts, notes)
     whole = _usable(whole, record, source, notes)
@@ -247,6 +249,22 @@ def _phase(record: xr.Dataset, frequency: float, facts: Facts, notes: list[str])
             " told by their number"
         )
     return np.asarray(start + steps, dtype=np.float64), known
+
+
+def _completed(record: xr.Dataset, frequency: float, start: float, facts: Facts) -> xr.Dataset:
+    """The record with those attributes filled in that the case or the angles tell."""
+    known = {
+        "teeth_driver": facts.teeth[0],
+        "teeth_driven": facts.teeth[1],
+        "base_radius_driver": facts.base_radii[0],
+        "base_radius_driven": facts.base_radii[1],
+        "working_pressure_angle": facts.working_angle,
+        "support_direction": facts.direction,
+        "driven_boundary": facts.boundary,
+        "mesh_period": 1.0 / frequency,
+        "mesh_phase": start,
+    }
+    return record.assign_attrs({key: value for key, value in known.items() if key not in record.attrs})
 
 
 def _departures(

@@ -82,6 +82,13 @@ def test_an_excitation_of_two_hunting_periods_gives_one_row_of_both() -> None:
 def test_without_a_declared_mesh_period_the_angles_tell_it() -> None:
     made = taken(mesh_period=None)
     assert made.mesh_frequency == pytest.approx(MESH, rel=1e-12) and made.rows == 2
+    assert made.record.attrs["mesh_period"] == pytest.approx(1 / MESH, rel=1e-12)
+
+
+def test_what_the_record_does_not_say_of_its_rig_the_case_says() -> None:
+    said = taken(teeth_driver=None, working_pressure_angle=None, support_direction=None).record.attrs
+    assert (said["teeth_driver"], said["support_direction"]) == (20, "tangential")
+    assert np.degrees(said["working_pressure_angle"]) == pytest.approx(20.0, abs=1e-9)
 
 
 def test_condition_by_name_attribute_or_nearness() -> None:
