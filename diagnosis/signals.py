@@ -120,7 +120,7 @@ def noise_of_mean(rows: Array) -> Array:
 
 def frequencies(measurement: Measurement) -> Array:
     """Frequencies (N // 2 + 1,) [Hz] of the lines of a row."""
-    return np.fft.rfftfreq(measurement.phase.size, 1 / measurement.sampling_rate)
+    return np.fft.rfftfreq(measurement.phase.size, 1 / measurement.sampling_rate).astype(np.float64)
 
 
 def excited(measurement: Measurement) -> Integers:
