@@ -13,14 +13,21 @@ from hypothesis import strategies as st
 from gearbench.rig import (
     Case,
     Condition,
+    Coupling,
+    Crack,
     Damping,
+    Drive,
     Experiment,
+    Friction,
     Gear,
     Identification,
     Load,
     Material,
+    MeshCorrection,
     Multisine,
     Rig,
+    Ripple,
+    Sensors,
     Simulation,
     Support,
     Supports,
@@ -38,9 +45,21 @@ def maybe(strategy: st.SearchStrategy[Any]) -> st.SearchStrategy[Any]:
     return st.none() | strategy
 
 
+CRACKS = st.builds(Crack, tooth=st.integers(0, 4), stiffness_loss=number(0, 0.95))
+ERRORS = st.integers(5, 12).flatmap(
+    lambda teeth: st.fixed_dictionaries(
+        {"teeth": st.just(teeth), "pitch_error": st.lists(number(-1e-3, 1e-3), min_size=teeth, max_size=teeth)}
+    )
+)
+
+
+def gear_of(shape: dict[str, Any], **fields: Any) -> Gear:
+    return Gear(**{**fields, **shape})
+
+
 GEARS = st.builds(
-    Gear,
-    teeth=st.integers(5, 1000),
+    gear_of,
+    shape=st.fixed_dictionaries({"teeth": st.integers(5, 1000)}) | ERRORS,
     module=number(1e-4, 0.1),
     pressure_angle=number(radians(11), radians(34)),
     profile_shift=number(-1.5, 2),
@@ -52,12 +71,55 @@ GEARS = st.builds(
     hub_radius=number(1e-3, 1),
     mass=maybe(number(1e-6, 1e3)),
     inertia=maybe(number(1e-9, 1e3)),
+    runout=number(0, 1e-3),
+    runout_phase=number(-7, 7),
+    crack=maybe(CRACKS),
 )
-SUPPORTS = st.builds(Support, stiffness=number(1, 1e12), damping=number(0, 1e9))
+SUPPORTS = st.builds(
+    Support,
+    stiffness=number(1, 1e12),
+    damping=number(0, 1e9),
+    exponent=number(-0.89, 3),
+    reference_deflection=number(1e-9, 1e-2),
+)
+COUPLINGS = st.builds(Coupling, inertia=number(1e-9, 1e3)) | st.builds(
+    Coupling, inertia=number(1e-9, 1e3), stiffness=number(1, 1e9), damping=number(0, 1e3)
+)
+
+
+def ripple_of(terms: dict[int, tuple[float, float]]) -> Ripple:
+    amplitude, phase = ([term[i] for term in terms.values()] for i in (0, 1))
+    return Ripple(orders=tuple(terms), amplitude=tuple(amplitude), phase=tuple(phase))
+
+
+RIPPLES = st.builds(
+    ripple_of, st.dictionaries(st.integers(1, 10_000), st.tuples(number(0, 1e3), number(-7, 7)), max_size=4)
+)
+SERIES = st.lists(st.tuples(number(-0.1, 0.1), number(-0.1, 0.1)), max_size=5)
+
+
+def mesh_of(scale: float, stiffness: list[tuple[float, float]], error: list[tuple[float, float]]) -> MeshCorrection:
+    return MeshCorrection(
+        stiffness_scale=scale,
+        stiffness_cos=tuple(c for c, _ in stiffness),
+        stiffness_sin=tuple(s for _, s in stiffness),
+        error_mean=1e-6 * scale,
+        error_cos=tuple(1e-3 * c for c, _ in error),
+        error_sin=tuple(1e-3 * s for _, s in error),
+    )
+
+
 MULTISINES = st.one_of(
     st.builds(Multisine, amplitude=number(1e-6, 1e3), band=st.just((1.0, 1234.5))),
     st.builds(
         Multisine, rms=number(1e-6, 1e3), band=st.tuples(number(0, 10), number(11, 4000)), grid=st.just("odd")
+    ),
+    st.builds(
+        Multisine,
+        rms=number(1e-6, 1e3),
+        band=st.just((1.0, 1234.5)),
+        grid=st.just("comb"),
+        residue=maybe(st.integers(1, 10**9)),
     ),
 )
 
@@ -99,6 +161,10 @@ CASES = st.builds(
         ),
         load=st.builds(Load, boundary=st.sampled_from(["speed", "torque"])),
         damping=st.builds(Damping, material_ratio=number(0, 0.49)),
+        drive=st.builds(Drive, coupling=maybe(COUPLINGS), ripple=maybe(RIPPLES)),
+        friction=st.builds(Friction, coefficient=number(0, 1), transition_speed=number(1e-6, 10)),
+        mesh=st.builds(mesh_of, number(0.01, 10), SERIES, SERIES),
+        sensors=st.builds(Sensors, delay_y_driven=number(-0.1, 0.1), noise_angle=number(0, 1)),
     ),
     experiment=experiments(maybe(MULTISINES)),
     simulation=st.builds(Simulation, element_size=maybe(number(1e-6, 1e-2)), modes=st.integers(0, 60)),
