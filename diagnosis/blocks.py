@@ -39,22 +39,22 @@ class Blocks:
     rows: NDArray[np.int64]
 
 
-def kinds_of(condition: Condition, hunting: int) -> NDArray[np.int64]:
-    """Kind of every bin (K,), read off the torque and the bin's number modulo the hunting teeth."""
+def kinds_of(condition: Condition) -> NDArray[np.int64]:
+    """Kind of every bin (K,), read off the torque and the bin's number modulo the cycles of a row."""
     number = np.arange(condition.bins)
     torque = np.abs(condition.spectra["torque_driver"][: condition.bins])
     kind = np.full(condition.bins, KINDS.index("other"))
     for side, name in ((1, "driven-shaft"), (0, "driver-shaft")):
-        kind[number % (hunting // condition.teeth[side]) == 0] = KINDS.index(name)
+        kind[number % (condition.cycles // condition.teeth[side]) == 0] = KINDS.index(name)
     kind[torque > EXCITED * torque[1:].max()] = KINDS.index("excited")
-    kind[number % hunting == 0] = KINDS.index("operating")
+    kind[number % condition.cycles == 0] = KINDS.index("operating")
     return kind
 
 
 def cut(machine: Machine, condition: Condition, level: Array, relative: Array) -> Blocks:
     """Blocks of a condition. `level` (rows, K) [N] is each row's own estimate of the mesh force (NaN: no such row),
     `relative` (rows + 1, K) the floors as shares of the block's force."""
-    kind = kinds_of(condition, machine.hunting)
+    kind = kinds_of(condition)
     present = np.flatnonzero(np.isfinite(level).all(axis=1))
     of_bin = np.full(condition.bins, -1)
     kinds, counts, centres = [], [], []

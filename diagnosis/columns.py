@@ -26,7 +26,7 @@ from gearbench.diagnosis.rows import (
     mesh,
     modulation,
     order_bin,
-    per_tooth,
+    softened,
     support_force,
 )
 from gearbench.diagnosis.unknowns import DELAYED, ROWS, SHAPE_ORDERS
@@ -93,14 +93,19 @@ def _mesh_columns(
     for channel, sign in zip(DELAYED, (1.0, -1.0, g, -g), strict=True):
         if channel in spectra:
             rate = 1j * condition.omega * spectra[channel]
+            faster = np.fft.irfft(1j * condition.omega * rate, n) * n
             rate[0] = condition.pitch_speed if channel.startswith("angle") else 0.0
-            put(f"delay-{channel}", sign * state.tangent * (np.fft.irfft(rate, n) * n))
-    loss = 1.0 - per_tooth(condition, p[where["crack"]], condition.share[..., None] * condition.bending)
+            damping = state.viscosity * state.touching * faster
+            put(f"delay-{channel}", sign * (state.tangent * (np.fft.irfft(rate, n) * n) + damping))
+    soft = softened(condition, p[where["crack"]])
+    left = (condition.share * soft).sum(axis=-1)
+    weaker = (condition.share * soft**2)[..., None] * condition.bending
     for key, weights, lever in (
         ("pitch", np.stack([condition.share, condition.share], axis=-1), state.tangent),
-        ("crack", condition.share[..., None] * condition.bending, -state.elastic / loss),
+        ("crack", weaker, -state.elastic / left),
     ):
-        put(key, *_of_teeth(condition, weights * lever[:, None, None]))
+        own = 1.0 if key == "pitch" else (1.0 - p[where["crack"], None]) ** -2
+        put(key, *(own * _of_teeth(condition, weights * lever[:, None, None])))
     index = [at for at, _ in listed]
     values = np.fft.rfft(np.stack([value for _, value in listed]), axis=-1)[:, :k] / n
     out[:, :, index] = values.T[None]
@@ -177,7 +182,7 @@ def _drive_columns(
     for i, name in enumerate(where.block("ripple").names):
         label, order, part = name.rsplit(":", 2)
         if label == condition.name:
-            at = order_bin(machine, int(order))
+            at = order_bin(condition, int(order))
             out[0, at, where["ripple"].start + i] += 0.5 * (1.0 if part == "cos" else -1j) / rb1
     if "torque_driven" in spectra:
         moving = machine.inertia[1] * s**2 * spectra["angle_driven"][:k] / rb2

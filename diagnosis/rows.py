@@ -97,8 +97,16 @@ def modulation(condition: Condition, where: Layout, p: Array) -> Array:
     for n in range(SHAPE_ORDERS):
         angle = 2 * np.pi * (n + 1) * condition.phase
         factor += shape[2 * n] * np.cos(angle) + shape[2 * n + 1] * np.sin(angle)
-    loss = per_tooth(condition, p[where["crack"]], condition.share[..., None] * condition.bending)
-    return np.asarray(np.exp(p[where["scale"]][0]) * factor * (1.0 - loss))
+    left = (condition.share * softened(condition, p[where["crack"]])).sum(axis=-1)
+    return np.asarray(np.exp(p[where["scale"]][0]) * factor * left)
+
+
+def softened(condition: Condition, loss: Array) -> Array:
+    """Factor (N, n_o) of each pair's stiffness when teeth (z1 + z2,) lose these parts of their bending stiffness."""
+    z1 = condition.teeth[0]
+    more = loss / (1.0 - loss)
+    first, second = more[:z1][condition.tooth[0]], more[z1:][condition.tooth[1]]
+    return np.asarray(1.0 / (1.0 + condition.bending[..., 0] * first + condition.bending[..., 1] * second))
 
 
 def mesh(machine: Machine, condition: Condition, where: Layout, p: Array, spectra: Mapping[str, Complex]) -> Mesh:
@@ -220,13 +228,13 @@ def ripple(machine: Machine, condition: Condition, where: Layout, p: Array) -> C
     for i, name in enumerate(names):
         label, order, part = name.rsplit(":", 2)
         if label == condition.name:
-            out[order_bin(machine, int(order))] += 0.5 * values[i] * (1.0 if part == "cos" else -1j)
+            out[order_bin(condition, int(order))] += 0.5 * values[i] * (1.0 if part == "cos" else -1j)
     return out
 
 
-def order_bin(machine: Machine, order: int) -> int:
-    """Bin of an order of the driver's rotation in the spectrum of one hunting period."""
-    return order * machine.hunting // machine.teeth[0]
+def order_bin(condition: Condition, order: int) -> int:
+    """Bin of an order of the driver's rotation."""
+    return order * condition.cycles // condition.teeth[0]
 
 
 def _filters(condition: Condition, where: Layout, p: Array) -> Complex:

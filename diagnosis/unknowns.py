@@ -56,7 +56,7 @@ def unknowns(machine: Machine, conditions: Sequence[Condition]) -> Layout:
         block("friction", "friction", "1", ("coefficient",), 0.006, 0.08),
         block("eccentricity", "eccentricity", "m", ("cos1", "sin1", "cos2", "sin2"), 0.5e-6, 6e-6),
         block("pitch", "pitch-error", "m", z1 + z2, 0.35e-6, 3e-6),
-        block("crack", "tooth-contrast", "1", z1 + z2, 0.02, 0.4),
+        block("crack", "tooth-contrast", "1", z1 + z2, 0.02, 0.35, low=-2.0, high=0.9),
         block("coupling", "coupling", "rad/(N m)", ("compliance",), softness(6e3), softness(1.3e3), low=0.0),
         block("bearing-driver", "bearing-driver", "1", ("exponent",), 0.03, 0.35, low=-0.8, high=2.0),
         block("bearing-driven", "bearing-driven", "1", ("exponent",), 0.03, 0.35, low=-0.8, high=2.0),

@@ -1,0 +1,91 @@
+"""What may be at work: single effects of the library, and free forms at each place that name no effect."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.diagnosis.fit import Fit
+from gearbench.diagnosis.parameters import Layout
+from gearbench.diagnosis.unknowns import DELAYED, ROWS
+
+Array = NDArray[np.float64]
+
+LIBRARY = (
+    "backlash",
+    "friction",
+    "eccentricity",
+    "pitch-error",
+    "tooth-crack",
+    "coupling",
+    "bearing-nonlinearity",
+    "sensor-delay",
+    "torque-ripple",
+)
+PLACES = ("mesh", "drive", "driver-support", "driven-support", "load", "sensor", "none")
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """An effect (`effect` empty: a free form) at a place; `groups` and single `entries` of the unknowns get wide
+    priors, `name` tells it from others of the same effect, and `choices` is out of how many like it it was picked."""
+
+    name: str
+    effect: str
+    place: str
+    groups: tuple[str, ...] = ()
+    entries: tuple[int, ...] = ()
+    choices: int = 1
+
+    def prior(self, where: Layout) -> Array:
+        """Prior standard deviations (P,) under this hypothesis."""
+        return where.prior(self.groups, self.entries)
+
+
+def library(where: Layout, without: tuple[str, ...] = ()) -> tuple[Hypothesis, ...]:
+    """Every single effect of the library in every place where it may be."""
+    found = [
+        Hypothesis(name, name, "mesh", (name,))
+        for name in ("backlash", "friction", "eccentricity", "pitch-error")
+    ]
+    teeth = range(*where["crack"].indices(where.size))
+    found += [
+        Hypothesis(f"tooth-crack {number}", "tooth-crack", "mesh", (), (entry,), len(teeth))
+        for number, entry in enumerate(teeth)
+    ]
+    found.append(Hypothesis("coupling", "coupling", "drive", ("coupling",)))
+    found.append(Hypothesis("torque-ripple", "torque-ripple", "drive", ("torque-ripple",)))
+    found += [
+        Hypothesis(f"bearing-nonlinearity {side}", "bearing-nonlinearity", f"{side}-support", (f"bearing-{side}",), (), 2)
+        for side in ("driver", "driven")
+    ]
+    found += [
+        Hypothesis(f"sensor-delay {channel}", "sensor-delay", "sensor", (f"delay-{channel}",), (), len(DELAYED))
+        for channel in DELAYED
+    ]
+    return tuple(h for h in found if h.effect not in without)
+
+
+def free_forms() -> tuple[Hypothesis, ...]:
+    """Competitors that name a place but no effect."""
+    found = [Hypothesis("free mesh", "", "mesh", ("tooth-contrast",))]
+    found += [Hypothesis(f"free {row}", "", row, (f"free-{row}",)) for row in ROWS]
+    return tuple(found)
+
+
+def predicted_evidence(fit: Fit, sd: Array) -> float:
+    """Log evidence under other priors `sd` (P,), by the quadratic that the fit found for the data alone."""
+    pull = fit.precision @ fit.p
+    scaled = fit.information * sd[:, None] * sd[None, :] + np.eye(len(sd))
+    factor = np.linalg.cholesky(scaled)
+    half = np.linalg.solve(factor, sd * pull)
+    return 0.5 * float(half @ half) - float(np.log(np.diag(factor)).sum())
+
+
+def predicted_gains(fit: Fit, where: Layout, hypotheses: tuple[Hypothesis, ...]) -> Array:
+    """Log evidence (hypotheses,) over that of the background alone, as the fit's quadratic predicts it."""
+    base = predicted_evidence(fit, where.prior())
+    out = [predicted_evidence(fit, h.prior(where)) - base - np.log(h.choices) for h in hypotheses]
+    return np.array(out)

@@ -1,0 +1,119 @@
+"""Force residuals: their derivatives against differences, and their covariance against dense linear algebra."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from shared.synthetic import measurement
+
+from gearbench.diagnosis.blocks import Blocks, cost_of, missing, whitened
+from gearbench.diagnosis.columns import rows_and_columns
+from gearbench.diagnosis.condition import Condition, prepare
+from gearbench.diagnosis.fit import Fit
+from gearbench.diagnosis.hypotheses import predicted_evidence
+from gearbench.diagnosis.machine import Machine, machine
+from gearbench.diagnosis.parameters import Layout
+from gearbench.diagnosis.rows import rows
+from gearbench.diagnosis.unknowns import unknowns
+from gearbench.rig import read_case
+
+CASE = Path(__file__).resolve().parents[2] / "cases" / "gap_demo.toml"
+
+
+@pytest.fixture(scope="module")
+def prepared() -> tuple[Machine, Condition, Layout]:
+    made = machine(read_case(CASE), 220.0, 100.0)
+    condition = prepare(measurement(), made, 3000.0)
+    return made, condition, unknowns(made, [condition])
+
+
+def test_columns_are_derivatives_of_the_residuals(prepared: tuple[Machine, Condition, Layout]) -> None:
+    made, condition, where = prepared
+    sd = where.prior()
+    p = 0.3 * sd * np.random.default_rng(2).standard_normal(where.size)
+    p[where["coupling"]] = abs(p[where["coupling"]])
+    # Friction's modulation of other columns is left out on purpose: compare without friction.
+    p[where["friction"]] = 0.0
+    for key in ("filter-drive", "filter-load", "filter-driver-support", "filter-driven-support"):
+        p[where[key]] = 0.0
+    _, _, columns = rows_and_columns(made, condition, where, p)
+    for entry, name in enumerate(where.names()):
+        step = np.zeros(where.size)
+        step[entry] = 1e-4 * sd[entry]
+        difference = rows(made, condition, where, p + step)[0] - rows(made, condition, where, p - step)[0]
+        difference /= 2 * step[entry]
+        if name == "backlash.more":  # these flanks never separate
+            assert not difference.any() and not columns[:, :, entry].any()
+            continue
+        error = np.linalg.norm(difference - columns[:, :, entry]) / np.linalg.norm(difference)
+        # The shape columns neglect their second order.
+        assert error < 0.05, name
+        if name.split(".")[0] in EXACT:
+            assert error < 2e-3, name
+
+
+# Of the others, damping's dependence on the tangent stiffness is left out of the derivatives.
+EXACT = ("friction", "coupling", "bearing-driver", "bearing-driven", "stiffness", "mass", "inertia", "ripple", "filter-drive")
+
+
+def test_one_blocks_covariance_is_the_dense_one() -> None:
+    rng = np.random.default_rng(3)
+    bins, unknown = 5, 3
+    r = rng.standard_normal((4, bins)) + 1j * rng.standard_normal((4, bins))
+    g = 1 + 0.3 * (rng.standard_normal((4, bins)) + 1j * rng.standard_normal((4, bins)))
+    j = rng.standard_normal((4, bins, unknown)) + 1j * rng.standard_normal((4, bins, unknown))
+    floor = rng.uniform(0.5, 2.0, (5, bins))
+    factor = rng.uniform(1.0, 3.0, (5, 1))
+    blocks = Blocks(np.zeros(bins, int), np.zeros(1, int), np.array([5.0]), np.ones(1), floor, np.arange(4))
+    flat, tall = whitened(blocks, r, g, j, factor)
+    square, gram, cost = 0.0, np.zeros((unknown, unknown)), 0.0
+    for k in range(bins):
+        d = floor[:, k] * factor[:, 0]
+        covariance = np.diag(d[:4]) + d[4] * np.outer(g[:, k], g[:, k].conj())
+        inverse = np.linalg.inv(covariance)
+        square += float((r[:, k].conj() @ inverse @ r[:, k]).real)
+        gram += (j[:, k].conj().T @ inverse @ j[:, k]).real
+        cost += float(np.linalg.slogdet(covariance)[1])
+    assert flat @ flat == pytest.approx(square, rel=1e-12)
+    assert tall.T @ tall == pytest.approx(gram, rel=1e-12)
+    # log|V| = sum log d + log(1/dm + sum |g|^2/d), with the mesh's own log d counted in the sum.
+    wanted = cost + square + 1.5 * float(np.log(factor).sum())
+    assert cost_of(blocks, r, g, floor, factor) == pytest.approx(wanted, rel=1e-12)
+
+
+def test_missing_part_is_found_in_the_row_that_has_it() -> None:
+    rng = np.random.default_rng(4)
+    bins = 800
+    numbers = np.repeat(np.arange(bins // 8), 8)
+
+    def noise(size: float) -> np.ndarray:
+        return size * (rng.standard_normal(bins) + 1j * rng.standard_normal(bins)) / np.sqrt(2)
+
+    g = np.ones((4, bins), dtype=complex)
+    mesh = noise(1.0)
+    r = np.stack([noise(1.0), noise(5.0), noise(1.0), noise(1.0)]) - mesh
+    blocks = Blocks(numbers, np.zeros(100, int), np.full(100, 8.0), np.ones(100), np.ones((5, bins)), np.arange(4))
+    factor, cost = missing(blocks, r, g, np.ones((5, 100)), 100)
+    level = np.median(factor, axis=1)
+    assert level[1] == pytest.approx(25.0, rel=0.25)
+    assert max(level[[0, 2, 3, 4]]) < 1.7
+    assert cost < cost_of(blocks, r, g, np.ones((5, bins)), np.ones((5, 100)))
+
+
+def test_predicted_evidence_is_that_of_a_linear_model() -> None:
+    rng = np.random.default_rng(5)
+    columns, data = rng.standard_normal((40, 4)), rng.standard_normal(40) * 3
+    narrow, wide = np.full(4, 0.2), np.array([0.2, 3.0, 0.2, 1.0])
+
+    def exact(sd: np.ndarray) -> float:
+        covariance = np.eye(40) + columns @ np.diag(sd**2) @ columns.T
+        return -0.5 * float(data @ np.linalg.solve(covariance, data)) - 0.5 * float(np.linalg.slogdet(covariance)[1])
+
+    information = columns.T @ columns
+    precision = information + np.diag(1 / narrow**2)
+    p = np.linalg.solve(precision, columns.T @ data)
+    fit = Fit(p, narrow, precision, information, (), 0.0, 0.0, 1)
+    got = predicted_evidence(fit, wide) - predicted_evidence(fit, narrow)
+    assert got == pytest.approx(exact(wide) - exact(narrow), rel=1e-10)
