@@ -26,6 +26,7 @@ from gearbench.lumped import choose_substeps, lumped_model
 from gearbench.lumped.potential_energy import outside_foundation_fit
 from gearbench.records import make_record, provenance
 from gearbench.rig import Case, Rig, dump_case
+from gearbench.rig.neutral import effects_in
 
 Array = NDArray[np.float64]
 
@@ -33,10 +34,16 @@ Array = NDArray[np.float64]
 def simulate_lumped(case: Case, progress: ProgressReport | None = None) -> xr.Dataset:
     """Record of the case's experiment on the lumped model.
 
-    Runs the realisations on all processors that this process may use; the result does not depend on their
-    number. Raises BenchError, LumpedError or GeometryError (each one sentence) for what cannot be
+    A rig with effects beyond the linear model, or a mesh law from finite elements, runs on the non-linear one (see
+    `nonlinear_experiment`). Runs the realisations on all processors that this process may use; the result does not
+    depend on their number. Raises BenchError, LumpedError or GeometryError (each one sentence) for what cannot be
     simulated.
     """
+    if case.simulation.mesh_stiffness == "finite-element" or effects_in(case.rig):
+        # Imported on use: it brings in the mesher.
+        from gearbench.bench.nonlinear_experiment import simulate_nonlinear
+
+        return simulate_nonlinear(case, progress)
     meshing = pair(case.rig)
     plan = schedule(case.experiment, case.rig)
     setup = _setup(case, meshing, plan)

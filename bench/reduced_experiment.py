@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from gearbench.bench.attributes import rig_attributes
+from gearbench.bench.attributes import lost_contact, refuse_effects, rig_attributes
 from gearbench.bench.errors import BenchError
 from gearbench.bench.excitation import Torque, torque_realisation
 from gearbench.bench.reduced_rig import ElasticRig, choose_substeps, elastic_rig, machine_for
@@ -50,6 +50,7 @@ def simulate_reduced(case: Case, progress: ProgressReport | None = None) -> xr.D
     Raises GeometryError, BenchError or ContactError (each one sentence) for what cannot be simulated.
     """
     report = progress or (lambda fraction, note: None)
+    refuse_effects(case.rig, "reduced finite-element model")
     plan = schedule(case.experiment, case.rig)
     elastic = elastic_rig(case.rig, case.simulation, lambda note: report(0.0, note))
     machine = machine_for(elastic, plan.mesh_frequency)
@@ -163,16 +164,6 @@ def _dte(case: Case, meshing: Pair, samples: Array) -> Array:
     return np.asarray(turned + along * (samples[..., 2] - samples[..., 3]))
 
 
-def _lost_contact(lost: int, total: int) -> str | None:
-    """Warning where the teeth separate: the response then is not that of a linear system."""
-    if not lost:
-        return None
-    return (
-        f"the teeth are out of contact in {lost} of {total} samples, so the rig is not linear and its identified"
-        " response depends on the excitation"
-    )
-
-
 def _check_reach(elastic: ElasticRig, dte: Array) -> None:
     """Refuse a record in which the flanks overlapped further than tip edges are followed."""
     most = EDGE_SEPARATION * elastic.pair.driver.module
@@ -239,7 +230,7 @@ def _record(case: Case, elastic: ElasticRig, plan: Schedule, runs: list[Run], su
         "settling_residual": max(run.residual for run in runs),
         "settling_periods": round((start * plan.sampling_rate / plan.block_samples + 1) * plan.block_periods),
         "contact_lost_samples": lost,
-        "warnings": _lost_contact(lost, samples.shape[0] * samples.shape[1]),
+        "warnings": lost_contact(lost, samples.shape[0] * samples.shape[1]),
         "model": "reduced",
         "substeps": substeps,
         "provenance": provenance(dump_case(case), case.experiment.seed, settings),

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from gearbench.lumped.nonlinear import NonLinear, sliding_factor
 
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 # Columns of the table.
 POSITION, EXCESS, EXCESS_RATE, GAIN, PULL1, PULL_Y, PULL2, RIPPLE, BACK = range(9)
@@ -119,7 +120,7 @@ def _wave(series: Array, phase: float) -> float:
 
 @njit(nogil=True, cache=True)
 def _fill(
-    out: Array, first_phase: float, step: float, offsets: Array, share: Array, bending: Array,
+    out: Array, first_phase: float, step: float, offsets: Integers, share: Array, bending: Array,
     excess1: Array, excess2: Array, growth1: Array, growth2: Array, base: Array, series: Array, errors: Array,
     runout: Array, levers: Array, waves: Array,
 ) -> None:  # fmt: skip

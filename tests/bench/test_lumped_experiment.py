@@ -67,7 +67,7 @@ def steady_response(case: Case, realisation: int) -> np.ndarray:
     cycles = round(plan.mesh_frequency_for(62) * samples / plan.sampling_rate)
     number = np.arange(samples)
     kept, place = np.unique(number * cycles % samples, return_inverse=True)
-    torque = torque_realisation(plan, realisation)
+    torque = torque_realisation(plan, realisation, case.rig)
     assert torque.signal is not None
     lines = np.array([0, *torque.signal.lines])
     force = np.array([torque.mean, *torque.signal.spectrum]) / pair(case.rig).driver.base_radius
