@@ -26,6 +26,7 @@ _STYLE: dict[Any, Any] = {
     "axes.spines.right": False,
     "legend.frameon": False,
     "svg.hashsalt": "gearbench",
+    "svg.fonttype": "none",
 }
 
 

@@ -9,7 +9,7 @@ without making a verdict wrong is said in `Measurement.warnings`.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import lcm, pi
 from pathlib import Path
 
@@ -54,7 +54,7 @@ class Measurement:
     speed (each row adds `mesh_cycles`). `phase_known`: its origin is the geometry's; `zero_known`: the
     angles' zero is unloaded contact, so that the mean of the transmission error means something.
     `noise`: channel -> rms of one sample's departure from row to row (empty with one row); `drift`: the
-    largest change of a channel's level between rows beyond white noise, relative to its rms.
+    largest change of a channel's level between rows beyond white noise, relative to its rms. `path`: its file.
     """
 
     name: str
@@ -70,6 +70,7 @@ class Measurement:
     zero_known: bool = True
     noise: dict[str, float] = field(default_factory=dict)
     drift: float = 0.0
+    path: Path | None = None
 
     @property
     def rows(self) -> int:
@@ -95,7 +96,7 @@ def intake(paths: Sequence[Path], nominal: Case) -> tuple[Measurement, ...]:
     facts = facts_of(nominal)
     names = _names(resolved)
     made = [
-        measurement(read_record(path), name, nominal, source=str(path), facts=facts)
+        replace(measurement(read_record(path), name, nominal, source=str(path), facts=facts), path=Path(path))
         for path, name in zip(paths, names, strict=True)
     ]
     _refuse_copies(made, paths)

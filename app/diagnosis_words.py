@@ -1,0 +1,158 @@
+"""The words of a diagnosis: names of effects, places and channels, the verdict as a sentence, numbers with units."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import floor, isfinite, log10
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from gearbench.diagnosis.verdict import Gap, Range, Verdict
+
+EFFECTS = {
+    "backlash": "backlash",
+    "friction": "friction between the flanks",
+    "eccentricity": "run-out of a gear",
+    "pitch-error": "pitch errors",
+    "tooth-crack": "a cracked tooth",
+    "coupling": "an elastic coupling",
+    "bearing-nonlinearity": "a support that stiffens with its deflection",
+    "contact-nonlinearity": "a mesh that stiffens with its load",
+    "sensor-delay": "a delay of one sensor",
+    "torque-ripple": "ripple of the driving torque",
+    "profile-error": "an error of the tooth profile",
+    "encoder-runout": "run-out of an encoder",
+    "temperature-drift": "drift with temperature",
+    "support-stiffness": "another stiffness of a support",
+    "mesh-damping": "another damping of the mesh",
+}
+PLACES = {
+    "mesh": "in the mesh",
+    "driver-support": "at the driver's support",
+    "driven-support": "at the driven gear's support",
+    "drive": "at the drive",
+    "load": "at the load",
+    "sensor": "in a sensor",
+    "none": "at no place",
+}
+CHANNELS = {
+    "dte": "transmission error",
+    "angle_driver": "angle of the driver",
+    "angle_driven": "angle of the driven gear",
+    "y_driver": "displacement of the driver",
+    "y_driven": "displacement of the driven gear",
+    "torque_driver": "torque on the driver",
+    "torque_driven": "torque on the driven gear",
+}
+STAGES = ("nominal", "recalibrated", "with_effect", "floor")
+STAGE_WORDS = {
+    "nominal": "nominal rig",
+    "recalibrated": "recalibrated",
+    "with_effect": "with the effect",
+    "floor": "noise floor",
+}
+# How a unit is shown: (factor, unit).
+SHOWN_UNITS = {"m": (1e6, "um"), "rad": (1e6, "urad")}
+
+
+def effects_in_words(names: Sequence[str]) -> str:
+    """`friction between the flanks and a cracked tooth`; the nominal rig alone where there is no effect."""
+    words = [EFFECTS.get(name, name.replace("-", " ")) for name in names]
+    if not words:
+        return "the nominal rig"
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
+
+
+def headline(verdict: Verdict) -> str:
+    """The verdict in one sentence without numbers."""
+    place = PLACES[verdict.place]
+    if verdict.verdict == "effect":
+        words = effects_in_words([effect.name for effect in verdict.effects])
+        return f"{words[:1].upper()}{words[1:]} {'explains' if len(verdict.effects) == 1 else 'explain'} the gap."
+    if verdict.verdict == "none":
+        return "No further effect is needed: the nominal rig explains the records within its uncertainties."
+    where = f" It arises {place}." if verdict.place != "none" else ""
+    return f"No effect of the library explains the gap.{where}"
+
+
+def confidence(verdict: Verdict) -> str:
+    """How sure, where, and how far the gap shrinks, in a sentence or two."""
+    sure = getattr(verdict.probability, verdict.verdict)
+    words = {"effect": "an effect of the library", "none": "no effect", "unknown": "something else"}
+    parts = [f"Probability of {words[verdict.verdict]}: {percent(sure)}."]
+    if verdict.verdict == "effect" and verdict.place != "none":
+        parts.append(f"It acts {PLACES[verdict.place]}.")
+    shrunk = shrinkage(verdict)
+    return " ".join([*parts, shrunk] if shrunk else parts)
+
+
+def shrinkage(verdict: Verdict) -> str:
+    """How far the gap of the first channel shrinks over the whole band; empty where no gap is given."""
+    gap = next(iter(whole_band(verdict.gap)), None)
+    if gap is None:
+        return ""
+    best = gap.with_effect or gap.recalibrated
+    scale, unit = SHOWN_UNITS.get(gap.unit, (1.0, gap.unit))
+    record = f"the held-out record {gap.record}" if verdict.held_out else f"record {gap.record} (not held out)"
+    by = "recalibrated" if gap.with_effect is None else "with the effect"
+    floor = f" (noise floor {number(scale * gap.floor.value)} {unit})" if gap.floor else ""
+    return (
+        f"On {record} the rms gap of the {CHANNELS.get(gap.channel, gap.channel)} goes from"
+        f" {number(scale * gap.nominal.value)} to {number(scale * best.value)} {unit} {by}{floor}."
+    )
+
+
+def whole_band(gaps: Sequence[Gap]) -> list[Gap]:
+    """One gap a channel: the widest band that is not the mean."""
+    best: dict[str, Gap] = {}
+    for gap in gaps:
+        width = gap.band_hz[1] - gap.band_hz[0]
+        held = best.get(gap.channel)
+        if width > 0 and (held is None or width > held.band_hz[1] - held.band_hz[0]):
+            best[gap.channel] = gap
+    return list(best.values())
+
+
+def band_in_words(band: tuple[float, float]) -> str:
+    """`20-3000 Hz`, or `mean` for the band [0, 0]."""
+    return "mean" if band[1] == 0 else f"{number(band[0], 4)}-{number(band[1], 4)} Hz"
+
+
+def number(value: float, digits: int = 3) -> str:
+    """A number with that many significant digits, without exponent between 1e-3 and 1e6."""
+    if not isfinite(value):
+        return str(value)
+    if value == 0:
+        return "0"
+    power = floor(log10(abs(value)))
+    if power < -3 or power >= 6:
+        return f"{value:.{digits - 1}e}".replace("e-0", "e-").replace("e+0", "e")
+    rounded = round(value, digits - 1 - power)
+    return f"{rounded:.{max(0, digits - 1 - power)}f}"
+
+
+def with_std(value: float, std: float) -> str:
+    """`0.0584 ± 0.0012`: both to the second significant digit of the standard deviation."""
+    if not (isfinite(std) and std > 0):
+        return number(value)
+    digits = 1 - floor(log10(std))
+    if max(abs(value), std) >= 1e6 or max(abs(value), std) < 1e-3:
+        return f"{number(value)} ± {number(std, 2)}"
+    return f"{round(value, digits):.{max(0, digits)}f} ± {round(std, digits):.{max(0, digits)}f}"
+
+
+def interval(value: Range | None, unit: str) -> str:
+    """`1.23 (1.10-1.40)` in the unit that is shown; a dash where there is none."""
+    if value is None:
+        return "–"
+    scale = SHOWN_UNITS.get(unit, (1.0, unit))[0]
+    return f"{number(scale * value.value)} ({number(scale * value.low)}–{number(scale * value.high)})"
+
+
+def percent(value: float) -> str:
+    """A probability or share: `97 %`, `0.4 %`, never 100 % for less than all."""
+    if 0.995 <= value < 1.0:
+        return "> 99 %"
+    if 0.0 < value < 0.001:
+        return "< 0.1 %"
+    return f"{100 * value:.1f} %" if value < 0.1 and value else f"{100 * value:.0f} %"
