@@ -110,7 +110,7 @@ def ranked_residues(modulus: int, teeth_driver: int, teeth_driven: int) -> Ints:
     Order: least summed strength of the overlaps with shaft sidebands (1-3, around each class); of equals the
     one with the widest gap between the classes, then the smallest. At most 2000 candidates are looked at,
     around modulus/7, where the classes are evenly spread. CombError where no residue keeps the classes apart
-    (modulus below 7) or where the modulus is no multiple of both numbers of teeth.
+    (modulus below 6) or where the modulus is no multiple of both numbers of teeth.
     """
     kinds = _kinds(modulus, teeth_driver, teeth_driven)
     first = max(1, round(modulus / 7) - MOST_CANDIDATES // 2)
@@ -119,7 +119,7 @@ def ranked_residues(modulus: int, teeth_driver: int, teeth_driven: int) -> Ints:
     gap = np.diff(classes, axis=1).min(axis=1, initial=modulus)
     candidates, gap = candidates[gap > 0], gap[gap > 0]
     if not candidates.size:
-        raise CombError(f"a comb modulo {modulus} has no residue that keeps 0, r, 2r and 3r apart; 7 is the least")
+        raise CombError(f"a comb modulo {modulus} has no residue that keeps 0, r, 2r and 3r apart; 6 is the least")
     entries = [(kind, offset) for kind in kinds for offset in kind.offsets]
     lines = np.stack([fold(kind.multiple * candidates + offset, modulus) for kind, offset in entries])
     cost = np.zeros(candidates.size)
