@@ -202,11 +202,11 @@ def contact_zones(meshing: Pair, phase: Array) -> tuple[tuple[str, ...], Integer
     entry = (after_start >= -OUTWARD) & (after_start <= INWARD)
     leave = (after_end >= -INWARD) & (after_end <= OUTWARD)
     nearer = np.abs(after_start) <= np.abs(after_end)
-    counts = sorted({int(count) for count in np.unique(touching)} | {int(meshing.contact_ratio)})
-    names = (*(PAIRS_IN_WORDS.get(count, f"{count} pairs") for count in counts), "entry", "exit")
-    labels = np.searchsorted(counts, touching).astype(np.int64)
-    labels[leave & ~(entry & nearer)] = len(counts) + 1
-    labels[entry & (nearer | ~leave)] = len(counts)
+    fewest = int(meshing.contact_ratio)
+    names = (*(PAIRS_IN_WORDS.get(count, f"{count} pairs") for count in (fewest, fewest + 1)), "entry", "exit")
+    labels = np.where(touching > fewest, 1, 0)
+    labels[entry & (nearer | ~leave)] = 2
+    labels[leave & ~(entry & nearer)] = 3
     return names, labels
 
 
