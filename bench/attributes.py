@@ -1,13 +1,11 @@
-"""What a record says about its rig, and what a model cannot say about one."""
+"""What a record says about its rig."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from gearbench.bench.errors import BenchError
 from gearbench.geometry import Body, Pair
 from gearbench.rig import Rig
-from gearbench.rig.neutral import effects_in
 
 
 def rig_attributes(rig: Rig, meshing: Pair, bodies: tuple[Body, Body]) -> dict[str, Any]:
@@ -33,13 +31,3 @@ def lost_contact(lost: int, total: int) -> str | None:
         f"the teeth are out of contact in {lost} of {total} samples, so the rig is not linear and its identified"
         " response depends on the excitation"
     )
-
-
-def refuse_effects(rig: Rig, model: str) -> None:
-    """Raise BenchError for the first effect of a rig that a model without effects cannot represent."""
-    found = effects_in(rig)
-    if found:
-        raise BenchError(
-            f"the {model} does not represent {found[0]}: leave it at its neutral value, or set simulation.model ="
-            ' "lumped", which has it'
-        )

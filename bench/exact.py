@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gearbench.bench.effects import is_nonlinear
 from gearbench.bench.schedule import schedule
 from gearbench.geometry import pair
 from gearbench.identification.monodromy import exact_itf
@@ -29,10 +30,17 @@ def lumped_periodic_system(case: Case) -> PeriodicSystem:
     """The case's lumped model at its operating speed, as a periodic system from F [N] to DTE [m].
 
     Phase 0 is mesh phase 0. Smooth switches of k(t) give a trigonometric system, sharp ones a piecewise
-    constant one.
+    constant one. The non-linear model is linearised about its static deflection under the mean torque, all teeth
+    sound and free of errors.
     """
     meshing = pair(case.rig)
     plan = schedule(case.experiment, case.rig)
+    if is_nonlinear(case):
+        # Imported on use: it brings in the mesher.
+        from gearbench.bench.nonlinear_static import linearised_matrices
+
+        a, b, c = linearised_matrices(case, meshing, FEWEST_PHASES)
+        return PeriodicSystem(plan.mesh_period, a, b, c)
     return periodic_system(lumped_model(case.rig, meshing, case.simulation), plan.mesh_period)
 
 

@@ -17,6 +17,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from gearbench.bench.attributes import rig_attributes
+from gearbench.bench.effects import is_nonlinear
 from gearbench.bench.excitation import torque_realisation
 from gearbench.bench.lumped_run import Setup, SteadyState, steady_state, tables_for
 from gearbench.bench.schedule import ProgressReport, Schedule, schedule
@@ -26,7 +27,6 @@ from gearbench.lumped import choose_substeps, lumped_model
 from gearbench.lumped.potential_energy import outside_foundation_fit
 from gearbench.records import make_record, provenance
 from gearbench.rig import Case, Rig, dump_case
-from gearbench.rig.neutral import effects_in
 
 Array = NDArray[np.float64]
 
@@ -39,7 +39,7 @@ def simulate_lumped(case: Case, progress: ProgressReport | None = None) -> xr.Da
     depend on their number. Raises BenchError, LumpedError or GeometryError (each one sentence) for what cannot be
     simulated.
     """
-    if case.simulation.mesh_stiffness == "finite-element" or effects_in(case.rig):
+    if is_nonlinear(case):
         # Imported on use: it brings in the mesher.
         from gearbench.bench.nonlinear_experiment import simulate_nonlinear
 

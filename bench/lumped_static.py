@@ -6,6 +6,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from gearbench.bench.effects import is_nonlinear
 from gearbench.bench.schedule import ProgressReport
 from gearbench.bench.static import Loads, static_dataset
 from gearbench.geometry import pair
@@ -18,7 +19,13 @@ Array = NDArray[np.float64]
 def static_lumped(
     case: Case, loads: Loads, phase: Array, progress: ProgressReport | None = None
 ) -> xr.Dataset:
-    """Static response by the law k(phase); it depends on no load, so secant and tangent agree."""
+    """Static response by the law k(phase), which depends on no load, so that secant and tangent agree; or by the
+    non-linear one."""
+    if is_nonlinear(case):
+        # Imported on use: it brings in the mesher.
+        from gearbench.bench.nonlinear_static import static_nonlinear
+
+        return static_nonlinear(case, loads, phase)
     meshing = pair(case.rig)
     model = lumped_model(case.rig, meshing, case.simulation)
     unit, values = loads

@@ -12,7 +12,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from gearbench.bench.attributes import lost_contact, refuse_effects, rig_attributes
+from gearbench.bench.attributes import lost_contact, rig_attributes
+from gearbench.bench.effects import refuse_effects
 from gearbench.bench.errors import BenchError
 from gearbench.bench.excitation import Torque, torque_realisation
 from gearbench.bench.reduced_rig import ElasticRig, choose_substeps, elastic_rig, machine_for

@@ -6,6 +6,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from gearbench.bench.effects import refuse_effects
 from gearbench.bench.errors import BenchError
 from gearbench.bench.reduced_rig import ElasticRig, elastic_rig
 from gearbench.bench.schedule import ProgressReport
@@ -39,6 +40,7 @@ def static_reduced(
     Raises GeometryError, and ContactError where contact leaves the modelled flanks.
     """
     report = progress or (lambda fraction, note: None)
+    refuse_effects(case.rig, "static finite-element solution", ("rig.driver", "rig.driven", "rig.mesh"))
     elastic = elastic_rig(case.rig, case.simulation, lambda note: report(0.0, note))
     unit, values = loads
     _check_range(elastic, unit, values)
