@@ -1,0 +1,81 @@
+"""The answers of a challenge: what was withheld from each case. They alone hold the seed.
+
+File: `{"ID": {"kind": "effect" | "none" | "foreign", "effects": [names], "place": name, "parameters": {effect: {name:
+{"value", "unit"}}}, "severity": {effect: number}, "family", "seed", "number"}}`.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from gearbench.challenge.errors import ChallengeError
+from gearbench.records.storage import write_atomically
+
+KINDS = ("effect", "none", "foreign")
+PLACES = ("mesh", "driver-support", "driven-support", "drive", "load", "sensor", "none")
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What is true of one case. `number` is its place in the plan, from which with `seed` its draws follow."""
+
+    kind: str
+    effects: tuple[str, ...] = ()
+    place: str = "none"
+    parameters: Mapping[str, Mapping[str, Mapping[str, Any]]] = field(default_factory=dict)
+    severity: Mapping[str, float] = field(default_factory=dict)
+    family: str = ""
+    seed: int = 0
+    number: int = 0
+
+
+def write_answers(answers: Mapping[str, Answer], path: Path) -> None:
+    """Write the answers in one step. Raises RecordError when the folder is missing."""
+    text = json.dumps({name: asdict(answer) for name, answer in answers.items()}, indent=1, allow_nan=False) + "\n"
+    write_atomically(path, lambda temporary: temporary.write_text(text, encoding="utf-8") and None)
+
+
+def read_answers(path: Path) -> dict[str, Answer]:
+    """Answers by case. Raises ChallengeError: one sentence with file and key."""
+    if not path.is_file():
+        raise ChallengeError(f"answers {path} do not exist")
+    try:
+        tree = json.loads(path.read_text(encoding="utf-8"))
+    except (ValueError, RecursionError) as error:
+        raise ChallengeError(f"answers {path} are truncated or no JSON ({error})") from None
+    if not isinstance(tree, dict) or not tree:
+        raise ChallengeError(f"answers {path} must be a JSON object with a key for each case")
+    return {name: _answer(entry, f"answers {path}: {name}") for name, entry in tree.items()}
+
+
+def _answer(entry: Any, where: str) -> Answer:
+    if not isinstance(entry, dict):
+        raise ChallengeError(f"{where} must be an object")
+    for key in ("kind", "effects", "place", "parameters"):
+        if key not in entry:
+            raise ChallengeError(f"{where} lacks the key {key}")
+    effects = entry["effects"]
+    if entry["kind"] not in KINDS:
+        raise ChallengeError(f"{where}: kind = {entry['kind']!r} must be one of {', '.join(KINDS)}")
+    if not isinstance(effects, list) or not all(isinstance(name, str) for name in effects):
+        raise ChallengeError(f"{where}: effects must be a list of names")
+    if bool(effects) == (entry["kind"] == "none"):
+        raise ChallengeError(f"{where}: effects = {effects} do not go with kind = {entry['kind']}")
+    if entry["place"] not in PLACES:
+        raise ChallengeError(f"{where}: place = {entry['place']!r} must be one of {', '.join(PLACES)}")
+    if not isinstance(entry["parameters"], dict) or not isinstance(entry.get("severity", {}), dict):
+        raise ChallengeError(f"{where}: parameters and severity must be objects")
+    return Answer(
+        kind=entry["kind"],
+        effects=tuple(effects),
+        place=entry["place"],
+        parameters=entry["parameters"],
+        severity=entry.get("severity", {}),
+        family=str(entry.get("family", "")),
+        seed=int(entry.get("seed", 0)),
+        number=int(entry.get("number", 0)),
+    )
