@@ -6,21 +6,27 @@ from pathlib import Path
 
 import typer
 
+from gearbench.comb_report import comb_data, comb_lines, comb_reports
 from gearbench.options import CaseArgument, JsonOption, SetOption, load_case, print_json
-from gearbench.simulate_command import experiments
+from gearbench.simulate_command import experiments, plan
 
 
 def check(case: CaseArgument, settings: SetOption = None, as_json: JsonOption = False) -> None:
-    """Print the data sheet of a case: diameters, contact ratio, backlash, masses; or say what is wrong."""
+    """Print the data sheet of a case: diameters, contact ratio, backlash, masses; or say what is wrong.
+
+    For a comb multisine also its residue and which kinds of response then share lines.
+    """
     loaded = load_case(case, settings)
-    from gearbench.bench.schedule import schedule
     from gearbench.geometry import data_sheet
 
     rows = data_sheet(loaded.rig)
-    for experiment, _ in experiments(loaded, Path("record.nc")):
-        schedule(experiment.experiment, experiment.rig)
+    plan(loaded)
+    names = [condition.name for condition in loaded.conditions] or [""]
+    under = [experiment for experiment, _ in experiments(loaded, Path("record.nc"))]
+    combs = comb_reports(list(zip(names, under, strict=True)))
     if as_json:
-        print_json({"case": loaded.name, "data": {row.name: {"value": row.value, "unit": row.unit} for row in rows}})
+        data = {row.name: {"value": row.value, "unit": row.unit} for row in rows}
+        print_json({"case": loaded.name, "data": data, "combs": [comb_data(comb) for comb in combs]})
         return
     typer.echo(f"{loaded.name}\n")
     shared = [row for row in rows if not row.name.startswith(("driver ", "driven "))]
@@ -33,6 +39,8 @@ def check(case: CaseArgument, settings: SetOption = None, as_json: JsonOption = 
         if name != row.name:
             both = f"{_figure(row.value):>12} {_figure(driven[name]):>12}"
             typer.echo(f"  {name:<40} {both}  {row.unit}".rstrip())
+    for comb in combs:
+        typer.echo("\n  " + "\n  ".join(comb_lines(comb)))
 
 
 def _figure(value: float) -> str:

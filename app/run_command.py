@@ -12,7 +12,7 @@ from gearbench.failure import InputError
 from gearbench.options import CaseArgument, JsonOption, SetOption, load_case, print_json
 from gearbench.output import claimed, fingerprint
 from gearbench.progress import Progress
-from gearbench.simulate_command import experiments
+from gearbench.simulate_command import experiments, plan
 from gearbench.summary_text import headline
 
 
@@ -27,7 +27,6 @@ def run(
 ) -> None:
     """Run a case: geometry, mesh, simulation, identification, pictures, summary. Resumes in its own folder."""
     loaded = load_case(case, settings)
-    from gearbench.bench.schedule import schedule
     from gearbench.geometry import pair
     from gearbench.pipeline import Job, run_experiment
     from gearbench.records.provenance import source_digest
@@ -35,8 +34,8 @@ def run(
 
     # What cannot be run is refused before a folder is made.
     pair(loaded.rig)
+    plan(loaded)
     for experiment, _ in experiments(loaded, Path("record.nc")):
-        schedule(experiment.experiment, experiment.rig)
         if experiment.experiment.multisine is None:
             raise InputError(
                 "experiment.multisine is missing: without excitation run has nothing to identify; `simulate` and"

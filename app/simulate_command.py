@@ -24,9 +24,14 @@ def simulate(
     settings: SetOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Carry out the experiment of a case on a model and write the record."""
+    """Carry out the experiment of a case on a model and write the record.
+
+    A case with [[condition]] tables has one record for each: `--out DIR/record.nc` writes
+    DIR/record-NAME.nc, NAME being the name of the condition.
+    """
     loaded = load_case(case, settings)
     check_out(out, [case])
+    plan(loaded)
     from gearbench.bench import simulate as carry_out
     from gearbench.records import write_record
 
@@ -53,6 +58,16 @@ def experiments(case: Case, out: Path) -> list[tuple[Case, Path]]:
         return [(case, out)]
     names = [(condition, out.with_name(f"{out.stem}-{condition.name}{out.suffix}")) for condition in case.conditions]
     return [(case.under(condition), path) for condition, path in names]
+
+
+def plan(case: Case) -> None:
+    """Raise BenchError if one of the case's experiments cannot be timed: before any of them is run."""
+    from gearbench.bench.excitation import comb_for
+    from gearbench.bench.schedule import schedule
+
+    for experiment, _ in experiments(case, Path("record.nc")):
+        schedule(experiment.experiment, experiment.rig)
+        comb_for(experiment.experiment, experiment.rig)
 
 
 def record_summary(record: Any, path: Path) -> dict[str, Any]:

@@ -110,7 +110,14 @@ def brute_force(modulus: int, teeth: tuple[int, int], residue: int) -> dict[froz
 
 @pytest.mark.parametrize(
     ("modulus", "teeth", "residue"),
-    [(60, (20, 30), 13), (60, (20, 30), 9), (60, (20, 30), 20), (120, (20, 30), 17), (40, (20, 40), 7), (50, (25, 10), 9)],
+    [
+        (60, (20, 30), 13),
+        (60, (20, 30), 9),
+        (60, (20, 30), 20),
+        (120, (20, 30), 17),
+        (40, (20, 40), 7),
+        (50, (25, 10), 9),
+    ],
 )
 def test_overlaps_are_those_of_adding_lines(modulus: int, teeth: tuple[int, int], residue: int) -> None:
     truth = brute_force(modulus, teeth, residue)
@@ -142,7 +149,9 @@ def test_overlaps_read_as_an_engineer_says_it() -> None:
     assert (worst.first, worst.second, worst.strength) == ("even distortion", "linear response", 0.3)
 
 
-@pytest.mark.parametrize(("teeth", "times"), [((20, 30), 1), ((20, 30), 2), ((16, 48), 1), ((25, 40), 1), ((62, 62), 1)])
+@pytest.mark.parametrize(
+    ("teeth", "times"), [((20, 30), 1), ((20, 30), 2), ((16, 48), 1), ((25, 40), 1), ((62, 62), 1)]
+)
 def test_chosen_residues_keep_the_classes_apart_and_overlap_least(teeth: tuple[int, int], times: int) -> None:
     modulus = times * hunting_teeth(*teeth)
     ranked = ranked_residues(modulus, *teeth).tolist()

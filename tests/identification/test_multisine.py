@@ -82,3 +82,22 @@ def test_bands_that_cannot_be(band: tuple[float, float], words: str) -> None:
 def test_too_few_points_to_sample() -> None:
     with pytest.raises(MultisineError, match=r"1800 points.*line 900"):
         make().sample(1800)
+
+
+def test_a_comb_excites_the_lines_of_its_residue_only() -> None:
+    signal = make("comb", modulus=50, residue=7, crest=2.0, amplitude=3.0)
+    spectrum = np.abs(np.fft.rfft(signal.sample(4096))) / 2048
+    wanted = [line for line in range(10, 901) if line % 50 in (7, 43)]
+    assert signal.lines.tolist() == wanted
+    assert np.ptp(spectrum[wanted]) < 1e-12 and np.delete(spectrum, wanted).max() < 1e-12
+    for residue, modulus in ((0, 50), (25, 50), (7, 0), (-7, 50)):
+        with pytest.raises(MultisineError, match=f"residue = {residue} .*modulus = {modulus}"):
+            make("comb", modulus=modulus, residue=residue)
+
+
+def test_clipping_that_stalls_starts_again() -> None:
+    # With this seed the first phases of these 119 lines stall at a crest factor of 2.04.
+    comb = {"grid": "comb", "modulus": 60, "residue": 13, "crest": 2.0, "amplitude": 1.0}
+    draw = np.random.default_rng(130)
+    signal = random_phase_multisine(12288, 10240.0, (20.0, 3000.0), rng=draw, **comb)
+    assert signal.crest < 2.04
