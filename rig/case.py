@@ -110,6 +110,10 @@ def _merge(model: type[Value], base: Mapping[str, Any], changes: Mapping[str, An
         if any(key in changes for key in keys):
             for key in keys:
                 kept.pop(key, None)
+    for name, others in model.forgets.items():
+        if key_of(model, name) in changes:
+            for other in others:
+                kept.pop(key_of(model, other), None)
     for key, value in changes.items():
         below = _table_of(model, key)
         inner = kept.get(key)

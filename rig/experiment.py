@@ -14,6 +14,7 @@ class Multisine(Value):
     """Random-phase multisine torque on the driver. `amplitude` is the peak of the whole multisine."""
 
     groups: ClassVar[tuple[tuple[str, ...], ...]] = (("amplitude", "rms"),)
+    forgets: ClassVar[dict[str, tuple[str, ...]]] = {"grid": ("residue",)}
     amplitude: float | None = quantity(None, "nm", gt=0.0, doc="peak of the multisine torque (or give rms)")
     rms: float | None = quantity(None, "nm", gt=0.0, doc="rms of the multisine torque (or give amplitude)")
     band: tuple[float, float] = quantity(unit="hz", doc="lowest and highest excited frequency")

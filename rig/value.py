@@ -66,11 +66,13 @@ class Value(BaseModel):
     """Base of every declarative value: frozen, closed to unknown fields, finite numbers only, in SI.
 
     `groups` names sets of fields of which a case gives at most one; setting one clears the others.
+    `forgets` maps a field to those that go back to their defaults when a variation sets it.
     `common` is the type whose keys may stand directly in the table, for all its sub-tables of that type.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, hide_input_in_errors=True)
     groups: ClassVar[tuple[tuple[str, ...], ...]] = ()
+    forgets: ClassVar[dict[str, tuple[str, ...]]] = {}
     common: ClassVar[type[Value] | None] = None
 
 

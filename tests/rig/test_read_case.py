@@ -164,6 +164,22 @@ def test_conditions_inherit_the_experiment(write) -> None:
     )
 
 
+def test_a_condition_that_names_its_grid_chooses_its_residue_anew(write) -> None:
+    comb = CASE + 'grid = "comb"\nresidue = 5\n'
+    text = comb + "".join(
+        f'[[condition]]\nname = "{name}"\nmultisine = {{ {keys} }}\n'
+        for name, keys in (
+            ("same", "amplitude_nm = 1"),
+            ("chosen", 'grid = "comb"'),
+            ("full", 'grid = "full"'),
+            ("other", "residue = 7"),
+        )
+    )
+    found = [condition.experiment.multisine for condition in read_case(write(text)).conditions]
+    combs = [(multisine.grid, multisine.residue) for multisine in found if multisine]
+    assert combs == [("comb", 5), ("comb", None), ("full", None), ("comb", 7)]
+
+
 @pytest.mark.parametrize(
     ("setting", "words"),
     [

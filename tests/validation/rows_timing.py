@@ -92,7 +92,8 @@ def lumped_steps() -> float:
     meshing = pair(case.rig)
     model = lumped_model(case.rig, meshing, case.simulation)
     tables = tables_for(model, plan, 4)
-    force = torque_realisation(case.experiment, 0).sample(8 * plan.samples_per_period) / meshing.driver.base_radius
+    torque = torque_realisation(case.experiment, 0, case.rig).sample(8 * plan.samples_per_period)
+    force = torque / meshing.driver.base_radius
     start = model.equilibrium(float(force.mean()))
     integrate(tables, force, start, samples=1, substeps=4)
     blocks = 10 * case.experiment.periods
