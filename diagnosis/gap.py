@@ -63,8 +63,12 @@ def gaps(
     """Gaps per channel (DTE first) and band on the held-out record, the nominal rig's beside those of better ones.
 
     `simulate(case, record)` gives one steady row (default: the replay on the non-linear lumped model). For each
-    channel: the whole band first, then its parts, then the mean (band [0, 0]) where it is known.
+    channel: the whole band first, then its parts, then the mean (band [0, 0]) where it is known. Empty for a record
+    whose mesh phase is arbitrary: a replay cannot be held against it. Raises what `simulate` raises, and
+    DiagnosisError for a replay of another length.
     """
+    if not held_out.phase_known:
+        return ()
     if simulate is None:
         # Its time loop is compiled on import, which not every user of this module wants.
         from gearbench.bench.replay import replay
