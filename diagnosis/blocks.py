@@ -23,14 +23,17 @@ Complex = NDArray[np.complex128]
 KINDS = ("operating", "excited", "driver-shaft", "driven-shaft", "other")
 BLOCK = 8  # bins
 SHRINK = 1.5  # exponent of the prior on lambda
+AUDIBLE = 3.0  # times the noise
 EXCITED = 0.05  # of the largest torque line
 
 
 @dataclass(frozen=True)
 class Blocks:
-    """Blocks of one condition: `of_bin` (K,) block numbers (-1: unused), `kind` (blocks,) index into KINDS, `count`
-    (blocks,) bins, `frequency` (blocks,) centre [Hz]; `floor` (rows + 1, K) variances [N^2], the mesh last."""
+    """Blocks of one condition: `used` (B,) bins in which anything but noise is heard, `of_bin` (B,) their blocks;
+    `kind` (blocks,) index into KINDS, `count` (blocks,) bins, `frequency` (blocks,) centre [Hz]; `floor` (rows + 1, B)
+    variances [N^2], the mesh last; `rows` those that the record has channels for."""
 
+    used: NDArray[np.int64]
     of_bin: NDArray[np.int64]
     kind: NDArray[np.int64]
     count: Array
@@ -51,14 +54,15 @@ def kinds_of(condition: Condition) -> NDArray[np.int64]:
     return kind
 
 
-def cut(machine: Machine, condition: Condition, level: Array, relative: Array) -> Blocks:
+def cut(machine: Machine, condition: Condition, level: Array, relative: Array, separates: bool) -> Blocks:
     """Blocks of a condition. `level` (rows, K) [N] is each row's own estimate of the mesh force (NaN: no such row),
-    `relative` (rows + 1, K) the floors as shares of the block's force."""
+    `relative` (rows + 1, K) the floors as shares of the block's force. Where flanks separate, impacts reach beyond the
+    sampled band and only excited and operating bins are used."""
     kind = kinds_of(condition)
     present = np.flatnonzero(np.isfinite(level).all(axis=1))
     of_bin = np.full(condition.bins, -1)
     kinds, counts, centres = [], [], []
-    for label in range(len(KINDS)):
+    for label in range(2 if separates else len(KINDS)):
         bins = np.flatnonzero(kind == label)
         for start in range(0, len(bins), BLOCK):
             chosen = bins[start : start + BLOCK]
@@ -67,12 +71,27 @@ def cut(machine: Machine, condition: Condition, level: Array, relative: Array) -
             counts.append(len(chosen))
             centres.append(condition.frequency[chosen].mean())
     number = len(kinds)
+    inside = of_bin >= 0
     power = np.zeros((len(present), number))
     for i, row in enumerate(present):
-        power[i] = np.bincount(of_bin, np.abs(level[row]) ** 2, number) / np.array(counts)
-    size = np.median(power, axis=0)[of_bin]
-    floor = relative**2 * size + _noise(machine, condition)
-    return Blocks(of_bin, np.array(kinds), np.array(counts, dtype=float), np.array(centres), floor, present)
+        power[i] = np.bincount(of_bin[inside], np.abs(level[row, inside]) ** 2, number) / np.array(counts)
+    size = np.median(power, axis=0)
+    noise = _noise(machine, condition)
+    loudest = np.bincount(of_bin[inside], noise[[*present, len(ROWS)]].max(axis=0)[inside], number) / np.array(counts)
+    # In bins of noise alone the mesh force is stiffness times noise: they would pull every stiffness to zero.
+    heard = size > AUDIBLE**2 * loudest
+    renumber = np.where(heard, np.cumsum(heard) - 1, -1)
+    used = np.flatnonzero(inside)[heard[of_bin[inside]]]
+    floor = relative**2 * size[of_bin] + noise
+    return Blocks(
+        used=used,
+        of_bin=renumber[of_bin[used]],
+        kind=np.array(kinds)[heard],
+        count=np.array(counts, dtype=float)[heard],
+        frequency=np.array(centres)[heard],
+        floor=floor[:, used],
+        rows=present,
+    )
 
 
 def _noise(machine: Machine, condition: Condition) -> Array:
@@ -96,7 +115,7 @@ def missing(blocks: Blocks, residual: Complex, share: Complex, start: Array, rou
     """Lambda (rows + 1, blocks) >= 1 by expectation-maximisation from `start`, and the cost
     sum n log|V| + r^H V^-1 r + SHRINK log lambda."""
     use = blocks.rows
-    r, g = residual[use], share[use]
+    r, g = residual[np.ix_(use, blocks.used)], share[np.ix_(use, blocks.used)]
     floor = blocks.floor[[*use, len(ROWS)]]
     number = len(blocks.count)
     factor = start.copy()
@@ -125,11 +144,13 @@ def cost_of(blocks: Blocks, r: Complex, g: Complex, floor: Array, factor: Array)
 
 
 def whitened(blocks: Blocks, residual: Complex, share: Complex, columns: Complex, factor: Array) -> tuple[Array, Array]:
-    """Residuals (2 rows K,) and columns (2 rows K, unknowns), real, whose squares add up to r^H V^-1 r."""
+    """Residuals (2 rows B,) and columns (2 rows B, unknowns), real, whose squares add up to r^H V^-1 r; `columns`
+    (4, B, unknowns) are those of the used bins."""
     use = blocks.rows
     d = blocks.floor[[*use, len(ROWS)]] * factor[:, blocks.of_bin]
-    g = share[use] / np.sqrt(d[:-1])
-    r = residual[use] / np.sqrt(d[:-1])
+    here = np.ix_(use, blocks.used)
+    g = share[here] / np.sqrt(d[:-1])
+    r = residual[here] / np.sqrt(d[:-1])
     j = columns[use] / np.sqrt(d[:-1])[..., None]
     # (1 + dm g g^H)^(-1/2) = 1 - t g g^H with one scalar a bin.
     norm = (np.abs(g) ** 2).sum(axis=0)

@@ -7,7 +7,7 @@ exact to first order.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,21 +38,34 @@ BACKLASH_STEP = 1e-7  # [m]
 
 
 def rows_and_columns(
-    machine: Machine, condition: Condition, where: Layout, p: Array
+    machine: Machine, condition: Condition, where: Layout, p: Array, used: NDArray[np.int64]
 ) -> tuple[Complex, Complex, Complex]:
-    """Residuals (4, K) [N], shares of the mesh error (4, K), and derivatives (4, K, unknowns) to the unknowns."""
+    """Residuals (4, K) [N], shares of the mesh error (4, K), and derivatives (4, B, unknowns) of the residuals in the
+    B `used` bins to the unknowns."""
     spectra = corrected(condition, where, p)
     state = mesh(machine, condition, where, p, spectra)
     residual, share = assemble(machine, condition, where, p, spectra, state)
-    out = np.zeros((len(ROWS), condition.bins, where.size), dtype=complex)
-    _mesh_columns(machine, condition, where, p, spectra, state, out)
+    out = np.zeros((len(ROWS), len(used), where.size), dtype=complex)
+    index, moved = _mesh_columns(machine, condition, where, p, spectra, state, used)
     # One error of the mesh force shows in every row, as strongly as the row weighs it.
-    out *= -share[..., None]
-    _support_columns(machine, condition, where, p, spectra, out)
+    out[:, :, index] = -share[:, used, None] * moved.T
+    put = _Put(out, used)
+    _support_columns(machine, condition, where, p, spectra, put)
     forces = carried(machine, condition, where, p, state.force)
-    _drive_columns(machine, condition, where, p, spectra, forces[0], share[0], out)
-    _row_columns(machine, condition, where, spectra, state, forces, share, out)
+    _drive_columns(machine, condition, where, p, spectra, forces[0], share[0], put)
+    _row_columns(condition, where, state, forces, share, put)
     return residual, share, out
+
+
+@dataclass(frozen=True)
+class _Put:
+    """Adds a spectrum (K,) to one column of one row, at the used bins."""
+
+    out: Complex
+    used: NDArray[np.int64]
+
+    def __call__(self, row: int, entry: int, spectrum: Complex) -> None:
+        self.out[row, :, entry] += spectrum[self.used]
 
 
 def _mesh_columns(
@@ -62,10 +75,10 @@ def _mesh_columns(
     p: Array,
     spectra: Mapping[str, Complex],
     state: Mesh,
-    out: Complex,
-) -> None:
-    """What moves the mesh force: derivatives of F_m, the same in all rows."""
-    n, k = condition.samples, condition.bins
+    used: NDArray[np.int64],
+) -> tuple[list[int], Complex]:
+    """What moves the mesh force: entries (n,) and spectra (n, B) of the derivatives of F_m, the same in all rows."""
+    n = condition.samples
     listed: list[tuple[int, Array]] = []
 
     def put(key: str, *values: Array, start: int = 0) -> None:
@@ -107,8 +120,8 @@ def _mesh_columns(
         own = 1.0 if key == "pitch" else (1.0 - p[where["crack"], None]) ** -2
         put(key, *(own * _of_teeth(condition, weights * lever[:, None, None])))
     index = [at for at, _ in listed]
-    values = np.fft.rfft(np.stack([value for _, value in listed]), axis=-1)[:, :k] / n
-    out[:, :, index] = values.T[None]
+    values = np.fft.rfft(np.stack([value for _, value in listed]), axis=-1)[:, used] / n
+    return index, np.asarray(values)
 
 
 def _of_teeth(condition: Condition, weights: Array) -> Array:
@@ -132,7 +145,7 @@ def _backlash(machine: Machine, condition: Condition, where: Layout, p: Array, s
 
 
 def _support_columns(
-    machine: Machine, condition: Condition, where: Layout, p: Array, spectra: Mapping[str, Complex], out: Complex
+    machine: Machine, condition: Condition, where: Layout, p: Array, spectra: Mapping[str, Complex], put: _Put
 ) -> None:
     n, k, g = condition.samples, condition.bins, machine.support_factor
     s = 1j * condition.omega[:k]
@@ -145,13 +158,13 @@ def _support_columns(
         values = support_force(machine, side, np.fft.irfft(y, n) * n, stiffness, p[where[name]][0])
         spring, more = np.fft.rfft(np.stack(values), axis=-1)[:, :k] / n
         damping = machine.damping[side] * np.exp(p[where["damping"]][side])
-        out[row, :, where["stiffness"].start + side] += sign * spring / g
-        out[row, :, where[name].start] += sign * more / g
-        out[row, :, where["damping"].start + side] += sign * damping * s * y[:k] / g
-        out[row, :, where["mass"].start + side] += sign * machine.mass[side] * s**2 * y[:k] / g
+        put(row, where["stiffness"].start + side, sign * spring / g)
+        put(row, where[name].start, sign * more / g)
+        put(row, where["damping"].start + side, sign * damping * s * y[:k] / g)
+        put(row, where["mass"].start + side, sign * machine.mass[side] * s**2 * y[:k] / g)
         mass = machine.mass[side] * (1 + p[where["mass"]][side])
         moving = (mass * s**2 + damping * s) * y[:k] + spring
-        out[row, :, where[f"delay-{channel}"].start] += sign * s * moving / g
+        put(row, where[f"delay-{channel}"].start, sign * s * moving / g)
 
 
 def _drive_columns(
@@ -162,7 +175,7 @@ def _drive_columns(
     spectra: Mapping[str, Complex],
     force: Complex,
     share: Complex,
-    out: Complex,
+    put: _Put,
 ) -> None:
     """Inertias, coupling, ripple and the direct part of a late driver angle. `force` (K,) is rb1's in the drive row."""
     k = condition.bins
@@ -174,40 +187,35 @@ def _drive_columns(
     rotor = machine.rotor * (1 + relative[2])
     shaft = inertia * turning + rb1 * force
     start = where["inertia"].start
-    out[0, :, start] += -share * machine.inertia[0] * turning / rb1
+    put(0, start, -share * machine.inertia[0] * turning / rb1)
     soft = coupling_compliance(machine, condition, where, p)
-    out[0, :, start + 2] += -machine.rotor * (turning + s**2 * soft * shaft) / rb1
-    out[0, :, where["coupling"].start] += -rotor * s**2 * (1 - 1j * LOSS_FACTOR * (s.imag > 0)) * shaft / rb1
-    out[0, :, where["delay-angle_driver"].start] += -(rotor + share * inertia) * s * turning / rb1
+    put(0, start + 2, -machine.rotor * (turning + s**2 * soft * shaft) / rb1)
+    put(0, where["coupling"].start, -rotor * s**2 * (1 - 1j * LOSS_FACTOR * (s.imag > 0)) * shaft / rb1)
+    put(0, where["delay-angle_driver"].start, -(rotor + share * inertia) * s * turning / rb1)
     for i, name in enumerate(where.block("ripple").names):
         label, order, part = name.rsplit(":", 2)
         if label == condition.name:
             at = order_bin(condition, int(order))
-            out[0, at, where["ripple"].start + i] += 0.5 * (1.0 if part == "cos" else -1j) / rb1
+            line = np.zeros(k, dtype=complex)
+            line[at] = 0.5 * (1.0 if part == "cos" else -1j) / rb1
+            put(0, where["ripple"].start + i, line)
     if "torque_driven" in spectra:
         moving = machine.inertia[1] * s**2 * spectra["angle_driven"][:k] / rb2
-        out[2, :, start + 1] += moving / rb2
-        out[2, :, where["delay-angle_driven"].start] += (1 + relative[1]) * s * moving / rb2
+        put(2, start + 1, moving / rb2)
+        put(2, where["delay-angle_driven"].start, (1 + relative[1]) * s * moving / rb2)
 
 
 def _row_columns(
-    machine: Machine,
-    condition: Condition,
-    where: Layout,
-    spectra: Mapping[str, Complex],
-    state: Mesh,
-    forces: Complex,
-    share: Complex,
-    out: Complex,
+    condition: Condition, where: Layout, state: Mesh, forces: Complex, share: Complex, put: _Put
 ) -> None:
     """Friction, and the smooth filters of single rows."""
     k, n = condition.bins, condition.samples
     rubbing = np.fft.rfft(state.force * condition.arms, axis=-1)[:, :k] / n
-    basis = condition.hats_full[:, :k].T
     for row, name in enumerate(ROWS):
         lever = (0, 1, 2, 1)[row]
-        out[row, :, where["friction"].start] += -share[row] * rubbing[lever]
-        weighted = basis * (share[row] * forces[lever])[:, None]
+        put(row, where["friction"].start, -share[row] * rubbing[lever])
+        weighted = condition.hats_full[:, :k] * (share[row] * forces[lever])
         at = where[f"filter-{name}"].start
-        out[row, :, at : at + len(KNOTS)] += weighted
-        out[row, :, at + len(KNOTS) : at + 2 * len(KNOTS)] += 1j * weighted
+        for knot, spectrum in enumerate(weighted):
+            put(row, at + knot, spectrum)
+            put(row, at + len(KNOTS) + knot, 1j * spectrum)

@@ -72,7 +72,7 @@ def _normal(problem: Problem, p: Array, factors: Sequence[Array]) -> tuple[Array
     size = problem.where.size
     information, gradient = np.zeros((size, size)), np.zeros(size)
     for condition, blocks, factor in zip(problem.conditions, problem.blocks, factors, strict=True):
-        residual, share, columns = rows_and_columns(problem.machine, condition, problem.where, p)
+        residual, share, columns = rows_and_columns(problem.machine, condition, problem.where, p, blocks.used)
         r, j = whitened(blocks, residual, share, columns, factor)
         information += 2 * (j.T @ j)
         gradient += 2 * (j.T @ r)

@@ -38,7 +38,7 @@ def test_columns_are_derivatives_of_the_residuals(prepared: tuple[Machine, Condi
     p[where["friction"]] = 0.0
     for key in ("filter-drive", "filter-load", "filter-driver-support", "filter-driven-support"):
         p[where[key]] = 0.0
-    _, _, columns = rows_and_columns(made, condition, where, p)
+    _, _, columns = rows_and_columns(made, condition, where, p, np.arange(condition.bins))
     for entry, name in enumerate(where.names()):
         step = np.zeros(where.size)
         step[entry] = 1e-4 * sd[entry]
@@ -66,7 +66,7 @@ def test_one_blocks_covariance_is_the_dense_one() -> None:
     j = rng.standard_normal((4, bins, unknown)) + 1j * rng.standard_normal((4, bins, unknown))
     floor = rng.uniform(0.5, 2.0, (5, bins))
     factor = rng.uniform(1.0, 3.0, (5, 1))
-    blocks = Blocks(np.zeros(bins, int), np.zeros(1, int), np.array([5.0]), np.ones(1), floor, np.arange(4))
+    blocks = Blocks(np.arange(bins), np.zeros(bins, int), np.zeros(1, int), np.array([5.0]), np.ones(1), floor, np.arange(4))
     flat, tall = whitened(blocks, r, g, j, factor)
     square, gram, cost = 0.0, np.zeros((unknown, unknown)), 0.0
     for k in range(bins):
@@ -94,7 +94,7 @@ def test_missing_part_is_found_in_the_row_that_has_it() -> None:
     g = np.ones((4, bins), dtype=complex)
     mesh = noise(1.0)
     r = np.stack([noise(1.0), noise(5.0), noise(1.0), noise(1.0)]) - mesh
-    blocks = Blocks(numbers, np.zeros(100, int), np.full(100, 8.0), np.ones(100), np.ones((5, bins)), np.arange(4))
+    blocks = Blocks(np.arange(bins), numbers, np.zeros(100, int), np.full(100, 8.0), np.ones(100), np.ones((5, bins)), np.arange(4))
     factor, cost = missing(blocks, r, g, np.ones((5, 100)), 100)
     level = np.median(factor, axis=1)
     assert level[1] == pytest.approx(25.0, rel=0.25)
