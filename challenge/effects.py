@@ -180,7 +180,7 @@ def _filter(levels: Levels, severity: float, rng: np.random.Generator) -> Drawn:
 
 def _quadratic(levels: Levels, severity: float, rng: np.random.Generator) -> Drawn:
     size = float(np.exp(rng.uniform(np.log(0.6), np.log(2.5))))
-    parameters = {"over_linear_at_10_mm_per_s": _value(size, "1")}
+    parameters = {"over_linear_at_30_mm_per_s": _value(size, "1")}
     return _foreign(levels, Foreign(damping_quadratic=size), "mesh", parameters)
 
 

@@ -37,7 +37,7 @@ class Foreign:
     filter_frequency: float = 0.0  # [Hz]; 0: none
     filter_order: int = 1
     filter_acting: bool = False  # the torque that acts is filtered, not the recorded one
-    damping_quadratic: float = 0.0  # over the linear damping, at a rate of 10 mm/s
+    damping_quadratic: float = 0.0  # over the linear damping, at a rate of 30 mm/s
 
 
 @dataclass(frozen=True)

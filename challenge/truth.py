@@ -19,7 +19,7 @@ from gearbench.rig import Case, Condition, Experiment, effects_in
 Array = NDArray[np.float64]
 
 REFERENCE = 10e-6  # [m] deflection at which the pairs' stiffness is given
-RATE = 0.01  # [m/s] at which quadratic damping is compared with the linear one
+RATE = 0.03  # [m/s] at which quadratic damping is compared with the linear one: about its rms
 SLIP_TIME = 50e-6  # [s] in which the slipping coupling lets go of what exceeds its limit
 # Effects that a nominal rig may have: what the truth rig has as well.
 ALLOWED = ("rig.drive.coupling", "rig.mesh.stiffness_scale", "rig.sensors.noise_")
