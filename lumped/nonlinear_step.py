@@ -6,7 +6,7 @@ loop allocates nothing and releases the interpreter lock.
 
 from __future__ import annotations
 
-from math import sqrt
+from math import copysign, sqrt
 
 import numpy as np
 from numba import njit
@@ -84,7 +84,7 @@ def _spring(y: float, stiffness: float, exponent: float, reference: float) -> fl
     """Force [N] of a support."""
     if exponent == 0.0:
         return stiffness * y
-    return stiffness * y * (abs(y) / reference) ** exponent
+    return stiffness * reference * copysign((abs(y) / reference) ** (1.0 + exponent), y)
 
 
 @njit(nogil=True, cache=True, fastmath=FASTMATH, error_model="numpy")

@@ -1,0 +1,237 @@
+"""Every effect of the non-linear model, one at a time, against its closed form."""
+
+from __future__ import annotations
+
+from math import cos, pi, sin, tan
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from shared.effect_rig import GEARS, make_model, make_rig, run
+from shared.hat_mesh import ALPHA, BACKLASH, BASE_PITCH, BENDING, PITCH_ROLL, RADII, hat, hat_law, stiffness
+
+from gearbench.lumped.mesh_tables import EXCESS, GAIN, PULL1, PULL2, PULL_Y, Motion, tables
+from gearbench.lumped.nonlinear import NonLinear
+from gearbench.rig import Coupling, Crack, Drive, Friction, Load, MeshCorrection, Rig, Ripple, Support, Supports
+
+Array = NDArray[np.float64]
+
+FORCE = 3500.0  # T1 / rb1 [N]
+HUNTING = 60
+
+
+def steady_dte(rig: Rig, *, frequency: float = 4.0, swing: float = 0.0) -> tuple[Array, Array]:
+    """Mesh phase and DTE over one hunting period at constant torque, turning so slowly that the rig follows."""
+    model = make_model(rig, hat_law(swing=swing, bend=0.0))
+    state = model.equilibrium(FORCE, *first_entry(model), 0.0)
+    steps = 60 * 20000
+    time, out = run(model, lambda t: np.full(t.shape, FORCE), state, mesh_frequency=frequency, cycles=60.0, steps=steps)
+    dte = out[:, 0] - out[:, 3] + cos(ALPHA) * (out[:, 1] - out[:, 2])
+    return time[::100] * frequency, dte[::100]
+
+
+def first_entry(model: NonLinear) -> tuple[float, float]:
+    row = tables(model, Motion(1.0, 2, 1.0))[0]
+    return float(row[EXCESS]), float(row[GAIN])
+
+
+def order(dte: Array, number: int) -> complex:
+    """Complex amplitude of a line of the hunting period."""
+    return complex(2 * np.fft.rfft(dte)[number] / dte.size)
+
+
+def test_run_out_is_a_transmission_error_of_half_its_size_at_the_shaft_order() -> None:
+    _, dte = steady_dte(make_rig(driver={"runout": 12e-6, "runout_phase": 0.7}, driven={"runout": 8e-6}))
+    # Most material at rotation 0.7 of the driver: the driver then falls back most.
+    assert order(dte, HUNTING // 20) == pytest.approx(-6e-6 * np.exp(-0.7j), rel=2e-3)
+    assert order(dte, HUNTING // 30) == pytest.approx(-4e-6, rel=2e-3)
+    assert abs(order(dte, 5)) < 1e-9
+
+
+def test_pitch_error_of_a_tooth_moves_the_gears_while_that_tooth_meshes() -> None:
+    errors = [0.0] * 20
+    errors[7] = 5e-6
+    phase, dte = steady_dte(make_rig(driver={"pitch_error": tuple(errors)}))
+    expected = FORCE / 3e8 - 5e-6 * sum(hat(phase - n) for n in (7, 27, 47))
+    assert np.abs(dte - expected).max() < 0.05 * 5e-6  # the hat's kinks ring a little
+
+
+def test_errors_common_to_all_pairs_follow_the_mesh_orders() -> None:
+    mesh = MeshCorrection(error_mean=3e-6, error_cos=(1e-6, 0.0), error_sin=(0.0, 0.5e-6))
+    _, dte = steady_dte(make_rig(mesh=mesh))
+    assert dte.mean() == pytest.approx(FORCE / 3e8 - 3e-6, rel=1e-4)
+    assert order(dte, 60) == pytest.approx(-1e-6, rel=2e-2)
+    assert order(dte, 120) == pytest.approx(0.5e-6j, rel=2e-2)
+
+
+def test_a_cracked_tooth_softens_the_mesh_while_it_carries_and_never_else() -> None:
+    model = make_model(make_rig(driven={"crack": Crack(tooth=3, stiffness_loss=0.5)}))
+    phase = np.arange(60 * 32) / 32
+    gain = tables(model, Motion(60.0, phase.size, 1.0))[:-1, GAIN]
+    share = hat(phase - 3) + hat(phase - 33)
+    # Its pair: compliance 1/k grows by its bending part when that doubles.
+    left = 1 / (1 + BENDING[1])
+    np.testing.assert_allclose(gain, 1 - share * (1 - left), rtol=1e-12)
+    assert gain[share == 0].min() == 1.0
+    both = make_rig(driver={"crack": Crack(tooth=3, stiffness_loss=0.5)})
+    gain = tables(make_model(both), Motion(60.0, phase.size, 1.0))[:-1, GAIN]
+    softest = np.flatnonzero(gain < gain.min() + 1e-12) / 32
+    np.testing.assert_array_equal(softest, [3.0, 23.0, 43.0])
+    assert gain.min() == pytest.approx(1 / (1 + BENDING[0]), rel=1e-12)
+
+
+def test_corrections_scale_and_shape_the_stiffness() -> None:
+    mesh = MeshCorrection(stiffness_scale=0.8, stiffness_cos=(0.1, 0.0), stiffness_sin=(0.0, -0.05))
+    gain = tables(make_model(make_rig(mesh=mesh)), Motion(2.0, 64, 1.0))[:-1, GAIN]
+    phase = np.arange(64) / 32
+    expected = 0.8 * (1 + 0.1 * np.cos(2 * pi * phase) - 0.05 * np.sin(4 * pi * phase))
+    np.testing.assert_allclose(gain, expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("boundary", ["speed", "torque"])
+def test_friction_takes_what_its_sliding_dissipates(boundary: str) -> None:
+    mu, v0, frequency = 0.08, 20e-3, 50.0
+    rig = make_rig(friction=Friction(coefficient=mu, transition_speed=v0), load=Load(boundary=boundary))
+    model = make_model(rig, hat_law(swing=0.0, bend=0.0))
+    state = model.equilibrium(FORCE, 0.0, 1.0, 0.0)
+    _, out = run(model, lambda t: np.full(t.shape, FORCE), state, mesh_frequency=frequency, cycles=60.0, steps=60000)
+    last = out[-30000:]
+    speeds = 2 * pi * frequency / 20, 2 * pi * frequency / 30
+    power = speeds[0] * FORCE * RADII[0] - speeds[1] * RADII[1] * last[:, 6].mean()
+    # Normal force times mu times sliding speed of both pairs, over one cycle; the gears hardly vibrate.
+    phase = (np.arange(4000) + 0.5) / 4000
+    loss = np.zeros_like(phase)
+    for pair in (0, 1):
+        speed = (phase - pair) * BASE_PITCH * sum(speeds)
+        loss += hat(phase - pair) * mu * speed * np.tanh(speed / v0)
+    normal = last[:, 5].reshape(-1, 1000).mean(axis=0)
+    force = np.interp(phase, np.arange(1000) / 1000, normal, period=1.0)
+    assert power == pytest.approx(float((force * loss).mean()), rel=1e-3)
+    assert power > 0
+
+
+def test_friction_makes_the_normal_force_jump_at_the_pitch_point() -> None:
+    # With moments about the driver: T1 = N (rb1 + mu s rho1), s = -1 before and +1 after the pitch point.
+    mu = 0.06
+    _, still = steady_dte(make_rig())
+    phase, dte = steady_dte(make_rig(friction=Friction(coefficient=mu, transition_speed=1e-6)))
+    # Just before a pair reaches the pitch point only its share counts, as the other pair has hardly any.
+    before, after = (dte[np.argmin(np.abs(phase - at))] for at in (30.0 - 0.02, 30.0 + 0.02))
+    lever = PITCH_ROLL[0] / RADII[0]
+
+    def share_of_sliding(away: float) -> float:
+        # One pair at `away`, the other one nearly a cycle off on the other side.
+        first = float(hat(away)) * np.sign(away) * (PITCH_ROLL[0] + away * BASE_PITCH)
+        other = away - np.sign(away)
+        return float((first + hat(other) * np.sign(other) * (PITCH_ROLL[0] + other * BASE_PITCH)) / RADII[0])
+
+    for found, away in ((before, -0.02), (after, 0.02)):
+        assert found == pytest.approx(FORCE / 3e8 / (1 + mu * share_of_sliding(away)), rel=2e-3)
+    assert before - after == pytest.approx(2 * mu * lever * FORCE / 3e8, rel=0.1)
+    assert np.ptp(still) < 1e-3 * (before - after)
+    assert lever == pytest.approx(tan(ALPHA), rel=1e-3)
+
+
+def test_friction_pushes_the_centres_along_the_flank() -> None:
+    rig = make_rig(friction=Friction(coefficient=0.1, transition_speed=1e-6))
+    row = tables(make_model(rig), Motion(1.0, 8, 1.0))[2]  # a quarter of a cycle behind the pitch point
+    near, far = 0.75, 0.25
+    assert row[PULL_Y] == pytest.approx(0.1 * sin(ALPHA) * (near - far))
+    behind, before = PITCH_ROLL[1] - 0.25 * BASE_PITCH, PITCH_ROLL[1] + 0.75 * BASE_PITCH
+    assert row[PULL2] == pytest.approx(0.1 * (near * behind - far * before) / RADII[1])
+    along = rig.model_copy(update={"support": rig.support.model_copy(update={"direction": "line-of-action"})})
+    row = tables(make_model(along), Motion(1.0, 8, 1.0))[2]
+    assert row[PULL_Y] == 0.0
+    assert row[PULL1] != 0.0
+
+
+@pytest.mark.parametrize("boundary", ["speed", "torque"])
+def test_a_coupling_swings_at_the_frequency_of_both_inertias(boundary: str) -> None:
+    spring, rotor = 8e3, 2e-3
+    drive = Drive(coupling=Coupling(inertia=rotor, stiffness=spring))
+    model = make_model(make_rig(drive=drive, load=Load(boundary=boundary)))
+    loose = model.linearised(0.0, FORCE)  # gears apart: driver and rotor are alone
+    found = np.abs(np.linalg.eigvals(loose).imag)
+    expected = np.sqrt(spring * (1 / GEARS[0] + 1 / rotor))
+    assert np.abs(found - expected).min() < 1e-9 * expected
+    # Ever stiffer it becomes the rigid one.
+    rigid = make_model(make_rig(drive=Drive(coupling=Coupling(inertia=rotor)), load=Load(boundary=boundary)))
+    stiff = make_model(
+        make_rig(drive=Drive(coupling=Coupling(inertia=rotor, stiffness=1e10)), load=Load(boundary=boundary))
+    )
+    one, other = (np.sort(np.abs(np.linalg.eigvals(m.linearised(3e8, FORCE)))) for m in (rigid, stiff))
+    moving = one[one > 1.0]
+    np.testing.assert_allclose(other[other > 1.0][: moving.size], moving, rtol=1e-4)
+
+
+def test_ripple_has_its_orders_and_is_no_part_of_the_reaction_to_the_commanded_torque() -> None:
+    ripple = Ripple(orders=(6,), amplitude=(2.0,), phase=(0.8,))
+    _, dte = steady_dte(make_rig(drive=Drive(ripple=ripple)))
+    assert order(dte, 18) == pytest.approx(2.0 / RADII[0] / 3e8 * np.exp(0.8j), rel=2e-3)
+    assert abs(order(dte, 7)) < 1e-3 * abs(order(dte, 18))
+
+
+def test_gears_that_come_apart_fly_freely_until_the_back_flanks_touch() -> None:
+    model = make_model(make_rig())
+    # Driver thrown back from first contact against the torque: a parabola, no force while it lasts.
+    state = np.zeros(10)
+    state[5] = -0.02
+    push = 100.0
+    time, out = run(model, lambda t: np.full(t.shape, push), state, mesh_frequency=50.0, cycles=0.5, steps=20000)
+    rise = push / model.masses[0]
+    flight = time < 2 * 0.02 / rise
+    np.testing.assert_allclose(out[flight, 0], (-0.02 * time + 0.5 * rise * time**2)[flight], atol=1e-15)
+    assert not out[flight, 5].any()
+    assert out[flight, 0].min() == pytest.approx(-(0.02**2) / (2 * rise), rel=1e-3)
+    # Faster, it reaches the other side of the backlash.
+    state[5] = -0.2
+    _, out = run(model, lambda t: np.full(t.shape, push), state, mesh_frequency=50.0, cycles=0.05, steps=20000)
+    hit = int(np.argmax(out[:, 5] < 0))
+    dte = out[:, 0] + cos(ALPHA) * (out[:, 1] - out[:, 2])
+    assert hit > 0
+    assert dte[hit] == pytest.approx(-BACKLASH, rel=1e-3)
+    assert not out[:hit, 5].any()
+
+
+@pytest.mark.parametrize("exponent", [-0.4, 0.0, 0.6])
+def test_a_support_deflects_by_its_power_law(exponent: float) -> None:
+    support = Support(stiffness=1e8, damping=3e3, exponent=exponent, reference_deflection=5e-6)
+    rig = make_rig(support=Supports(driver=support, driven=support))
+    model = make_model(rig, hat_law(swing=0.0))
+    state = 0.0 * model.equilibrium(FORCE, 0.0, 1.0, 0.0)
+    _, out = run(model, lambda t: np.full(t.shape, FORCE), state, mesh_frequency=10.0, cycles=8.0, steps=80000)
+    expected = 5e-6 * (FORCE * cos(ALPHA) / (1e8 * 5e-6)) ** (1 / (1 + exponent))
+    assert out[-1, 2] == pytest.approx(expected, rel=1e-4)
+    assert out[-1, 1] == pytest.approx(-expected, rel=1e-4)
+    assert model.support_deflection(FORCE) == pytest.approx((-expected, expected), rel=1e-12)
+
+
+def test_run_out_opens_and_closes_the_back_flanks_too() -> None:
+    model = make_model(make_rig(driver={"runout": 20e-6}))
+    state = np.zeros(10)
+
+    # Driver pressed backwards onto the back flanks while run-out has most material, at rotation 0.
+    def force(t: Array) -> Array:
+        return np.full(t.shape, -50.0)
+
+    state[0] = -BACKLASH + 10e-6
+    _, out = run(model, force, state, mesh_frequency=1e-3, cycles=1e-4, steps=20000)
+    dte = out[-1, 0] + cos(ALPHA) * (out[-1, 1] - out[-1, 2])
+    assert dte == pytest.approx(-BACKLASH + 10e-6 - 50.0 / float(stiffness(0.5)), rel=2e-2)
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"driver": {"pitch_error": (0.0,) * 20, "runout": 0.0, "runout_phase": 2.0}},
+        {"driven": {"crack": Crack(tooth=4, stiffness_loss=0.0)}},
+        {"drive": Drive(ripple=Ripple(orders=(3,), amplitude=(0.0,), phase=(1.0,)))},
+        {"friction": Friction(coefficient=0.0, transition_speed=1.0)},
+        {"mesh": MeshCorrection(stiffness_cos=(0.0,), stiffness_sin=(0.0,), error_cos=(0.0,), error_sin=(0.0,))},
+    ],
+)
+def test_a_neutral_effect_leaves_every_table_as_it_was(values: dict[str, Any]) -> None:
+    motion = Motion(60.0, 7680, 1e-5, 0.3)
+    plain, neutral = (tables(make_model(rig), motion) for rig in (make_rig(), make_rig(**values)))
+    assert plain.tobytes() == neutral.tobytes()

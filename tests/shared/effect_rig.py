@@ -1,0 +1,55 @@
+"""A small rig whose inertias and radii are written down, for the non-linear lumped model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import cos
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from shared.hat_mesh import ALPHA, RADII, hat_law
+
+from gearbench.lumped import equivalent_mass
+from gearbench.lumped.mesh_law import MeshLaw
+from gearbench.lumped.mesh_tables import Motion, tables
+from gearbench.lumped.nonlinear import NonLinear
+from gearbench.lumped.nonlinear_step import integrate
+from gearbench.rig import Damping, Gear, Rig, Support, Supports
+
+Array = NDArray[np.float64]
+
+GEARS = (2.3e-4, 1.2e-3)  # inertias [kg m^2]
+MASSES = (2.0, 3.0)
+ZETA = 0.05
+
+
+def make_rig(driver: dict[str, Any] | None = None, driven: dict[str, Any] | None = None, **fields: Any) -> Rig:
+    gear = {"module": 3e-3, "face_width": 0.023, "hub_radius": 0.016}
+    supports = Supports(driver=Support(stiffness=1e8, damping=3e3), driven=Support(stiffness=1.4e8, damping=2e3))
+    values: dict[str, Any] = {"support": supports, "damping": Damping(mesh_ratio=ZETA), **fields}
+    one, two = Gear(teeth=20, **gear, **(driver or {})), Gear(teeth=30, **gear, **(driven or {}))
+    return Rig(driver=one, driven=two, **values)
+
+
+def make_model(rig: Rig, law: MeshLaw | None = None) -> NonLinear:
+    """The model with inertias of its own, written down here: rotor, boundaries and direction as the rig says."""
+    coupling = rig.drive.coupling
+    rotor = coupling.inertia if coupling else 0.0
+    elastic = coupling is not None and coupling.stiffness is not None
+    first = GEARS[0] + (0.0 if elastic else rotor)
+    masses = (first / RADII[0] ** 2, GEARS[1] / RADII[1] ** 2, rotor / RADII[0] ** 2 if elastic else 0.0, *MASSES)
+    mesh_mass = equivalent_mass(RADII, (GEARS[0] + rotor, GEARS[1]), rig.load.boundary)
+    factor = cos(ALPHA) if rig.support.direction == "tangential" else 1.0
+    return NonLinear(rig, law or hat_law(), RADII, ALPHA, factor, masses, mesh_mass)
+
+
+def run(
+    model: NonLinear, force: Callable[[Array], Array], state: Array, *, mesh_frequency: float, cycles: float, steps: int
+) -> tuple[Array, Array]:
+    """Time [s] and outputs (steps, 7) of a run from mesh phase 0 under a force over time."""
+    step = cycles / mesh_frequency / steps
+    table = tables(model, Motion(cycles=cycles, entries=2 * steps, step=step))
+    excitation = force(np.arange(2 * steps) * step / 2)
+    _, out = integrate(model, table, excitation, state, step=step, substeps=1)
+    return np.arange(steps) * step, out
