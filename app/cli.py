@@ -14,6 +14,7 @@ from gearbench import __version__
 from gearbench.cases_command import cases
 from gearbench.check_command import check
 from gearbench.compare_command import compare
+from gearbench.diagnose_command import diagnose
 from gearbench.failure import INTERRUPTED, guarded, show_warning
 from gearbench.identify_command import identify
 from gearbench.mesh_command import mesh
@@ -33,7 +34,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
-for command in (run, simulate, static, identify, compare, check, mesh, cases, schema, validate):
+for command in (run, simulate, static, identify, compare, diagnose, check, mesh, cases, schema, validate):
     app.command()(command)
 
 # Options that take several numbers in a row.

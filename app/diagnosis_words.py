@@ -44,6 +44,15 @@ CHANNELS = {
     "torque_driver": "torque on the driver",
     "torque_driven": "torque on the driven gear",
 }
+SHORT_CHANNELS = {
+    "dte": "TE",
+    "angle_driver": "angle, driver",
+    "angle_driven": "angle, driven",
+    "y_driver": "y, driver",
+    "y_driven": "y, driven",
+    "torque_driver": "torque, driver",
+    "torque_driven": "torque, driven",
+}
 STAGES = ("nominal", "recalibrated", "with_effect", "floor")
 STAGE_WORDS = {
     "nominal": "nominal rig",
@@ -93,12 +102,13 @@ def shrinkage(verdict: Verdict) -> str:
         return ""
     best = gap.with_effect or gap.recalibrated
     scale, unit = SHOWN_UNITS.get(gap.unit, (1.0, gap.unit))
-    record = f"the held-out record {gap.record}" if verdict.held_out else f"record {gap.record} (not held out)"
+    named = "" if gap.record == "held-out" else f" {gap.record}"
+    record = f"the held-out record{named}" if verdict.held_out else f"record {gap.record} (not held out)"
     by = "recalibrated" if gap.with_effect is None else "with the effect"
-    floor = f" (noise floor {number(scale * gap.floor.value)} {unit})" if gap.floor else ""
+    floor = f" (noise floor {length(scale * gap.floor.value)} {unit})" if gap.floor else ""
     return (
         f"On {record} the rms gap of the {CHANNELS.get(gap.channel, gap.channel)} goes from"
-        f" {number(scale * gap.nominal.value)} to {number(scale * best.value)} {unit} {by}{floor}."
+        f" {length(scale * gap.nominal.value)} to {length(scale * best.value)} {unit} {by}{floor}."
     )
 
 
@@ -115,7 +125,7 @@ def whole_band(gaps: Sequence[Gap]) -> list[Gap]:
 
 def band_in_words(band: tuple[float, float]) -> str:
     """`20-3000 Hz`, or `mean` for the band [0, 0]."""
-    return "mean" if band[1] == 0 else f"{number(band[0], 4)}-{number(band[1], 4)} Hz"
+    return "mean" if band[1] == 0 else f"{band[0]:g}–{band[1]:g} Hz"
 
 
 def number(value: float, digits: int = 3) -> str:
@@ -146,7 +156,14 @@ def interval(value: Range | None, unit: str) -> str:
     if value is None:
         return "–"
     scale = SHOWN_UNITS.get(unit, (1.0, unit))[0]
-    return f"{number(scale * value.value)} ({number(scale * value.low)}–{number(scale * value.high)})"
+    return f"{length(scale * value.value)} ({length(scale * value.low, 2)}–{length(scale * value.high, 2)})"
+
+
+def length(value: float, digits: int = 3) -> str:
+    """A number with that many significant digits but at most four decimals: a tenth of a nanometre in um."""
+    if not isfinite(value) or abs(value) >= 1e-4 * 10 ** (digits - 1):
+        return number(value, digits)
+    return f"{value:.4f}" if round(value, 4) else "0"
 
 
 def percent(value: float) -> str:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gearbench.diagnosis_words import CHANNELS
+from gearbench.diagnosis_words import SHORT_CHANNELS
 from gearbench.plotting import BLUE, GREY, ORANGE, figure, save
 
 if TYPE_CHECKING:
@@ -119,4 +119,4 @@ def _legend(drawing: Any, shares: Sequence[Share]) -> None:
 
 
 def _short(share: Share) -> str:
-    return CHANNELS.get(share.name, share.name) if share.kind == "channel" else share.name
+    return SHORT_CHANNELS.get(share.name, share.name) if share.kind == "channel" else share.name

@@ -41,7 +41,7 @@ class Traces:
 def draw_gap(path: Path, gaps: Sequence[Gap], record: str) -> None:
     """Rms gap of each channel over the whole band, relative to that of the nominal rig, with its interval."""
     shown = [gap for gap in whole_band(gaps) if gap.nominal.value > 0]
-    with figure(1, 1, (8.5, 1.5 + 0.75 * len(shown))) as (drawing, axes):
+    with figure(1, 1, (8.5, 1.3 + 0.5 * len(shown))) as (drawing, axes):
         seen: set[str] = set()
         for row, gap in enumerate(reversed(shown)):
             for number, stage in enumerate(STAGES):
@@ -54,7 +54,7 @@ def draw_gap(path: Path, gaps: Sequence[Gap], record: str) -> None:
                     y,
                     xerr=[[(found.value - found.low) / scale], [(found.high - found.value) / scale]],
                     fmt=MARKS[stage],
-                    markersize=9 if stage == "floor" else 6,
+                    markersize=9 if stage == "floor" else 5,
                     color=COLOURS[stage],
                     capsize=2.5,
                     label=None if stage in seen else STAGE_WORDS[stage],
@@ -108,9 +108,11 @@ def draw_traces(path: Path, traces: Traces) -> None:
 
 
 def _spectra(axes: Any, traces: Traces, micro: float, unit: str) -> None:
-    for stage, values in traces.simulated.items():
+    for number, (stage, values) in enumerate(traces.simulated.items()):
         centre, rms = octave_bands(_line_rms(traces.measured - values), traces.rate / traces.measured.size)
-        axes.plot(centre, micro * rms, marker=".", color=COLOURS[stage], label=STAGE_WORDS[stage])
+        # Curves that lie on one another all stay visible.
+        width = (3.4, 2.0, 1.2)[number]
+        axes.plot(centre, micro * rms, color=COLOURS[stage], linewidth=width, label=STAGE_WORDS[stage])
     if traces.noise is not None:
         centre, rms = octave_bands(traces.noise, traces.rate / traces.measured.size)
         axes.plot(centre, micro * rms, color=GREY, linestyle=":", label=STAGE_WORDS["floor"])
@@ -123,11 +125,15 @@ def _spectra(axes: Any, traces: Traces, micro: float, unit: str) -> None:
 
 
 def octave_bands(lines: Array, spacing: float) -> tuple[Array, Array]:
-    """Centres (B,) [Hz] and rms (B,) of line rms values (lines,) over bands of 1/6 octave; empty bands are left out."""
+    """Centres (B,) [Hz] and rms (B,) of line rms values (lines,) over bands of 1/6 octave.
+
+    Bands without a line, and the last one, which the Nyquist frequency cuts, are left out.
+    """
     frequency = np.arange(lines.size) * spacing
     band = np.round(PER_OCTAVE * np.log2(np.maximum(frequency, spacing) / spacing)).astype(int)
     energy = np.bincount(band[1:], weights=lines[1:] ** 2)
     held = np.bincount(band[1:]) > 0
+    held[-1] = False
     centres = spacing * 2.0 ** (np.arange(energy.size) / PER_OCTAVE)
     return centres[held], np.sqrt(energy[held])
 

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gearbench.diagnosis_words import (
-    CHANNELS,
     PLACES,
+    SHORT_CHANNELS,
     SHOWN_UNITS,
     band_in_words,
     confidence,
@@ -18,13 +18,14 @@ from gearbench.diagnosis_words import (
     interval,
     number,
     percent,
+    whole_band,
     with_std,
 )
 from gearbench.plotting import BLUE, GREEN, ORANGE
-from gearbench.report_html import bar, items, page, picture, table, text
+from gearbench.report_html import bar, folded, items, page, picture, table, text
 
 if TYPE_CHECKING:
-    from gearbench.diagnosis.verdict import Verdict
+    from gearbench.diagnosis.verdict import Gap, Verdict
 
 # Hypotheses of the table; the others are counted.
 CANDIDATES = 10
@@ -103,13 +104,6 @@ def _how_far(report: Report) -> list[str]:
     gaps = report.verdict.gap
     if not gaps:
         return []
-    rows = []
-    for before, gap in zip((None, *gaps), gaps, strict=False):
-        unit = SHOWN_UNITS.get(gap.unit, (1.0, gap.unit))[1]
-        name = CHANNELS.get(gap.channel, gap.channel)
-        again = before is not None and before.channel == gap.channel
-        stages = (gap.nominal, gap.recalibrated, gap.with_effect, gap.floor)
-        rows.append(("" if again else name, band_in_words(gap.band_hz), unit, *(interval(s, gap.unit) for s in stages)))
     record = gaps[0].record
     where = (
         f"Rms of measured minus simulated on record {record}, which was held out of the search"
@@ -117,13 +111,27 @@ def _how_far(report: Report) -> list[str]:
         else f"Rms of measured minus simulated on record {record}. No record was held out, so this gap is that of the"
         " fit itself and flatters it"
     )
-    head = ("channel", "band", "unit", "nominal rig", "recalibrated", "with the effect", "noise floor")
+    main = [gap for gap in gaps if gap in whole_band(gaps) or gap.channel == gaps[0].channel]
+    rest = len(gaps) - len(main)
     return [
         text("How far the gap shrinks", "h2"),
         text(f"{where}; in brackets where nine of ten repetitions would fall."),
         *_pictures(report, ("gap", "traces")),
-        table(head, rows, numbers=(3, 4, 5, 6)),
+        _gap_table(main),
+        folded("All channels and bands", _gap_table(gaps)) if rest else "",
     ]
+
+
+def _gap_table(gaps: Sequence[Gap]) -> str:
+    rows = []
+    for before, gap in zip((None, *gaps), gaps, strict=False):
+        unit = SHOWN_UNITS.get(gap.unit, (1.0, gap.unit))[1]
+        again = before is not None and before.channel == gap.channel
+        name = "" if again else f"{SHORT_CHANNELS.get(gap.channel, gap.channel)} [{unit}]"
+        stages = (gap.nominal, gap.recalibrated, gap.with_effect, gap.floor)
+        rows.append((name, band_in_words(gap.band_hz), *(interval(stage, gap.unit) for stage in stages)))
+    head = ("channel", "band", "nominal rig", "recalibrated", "with the effect", "noise floor")
+    return table(head, rows, numbers=(2, 3, 4, 5))
 
 
 def _candidates(verdict: Verdict) -> list[str]:
@@ -132,20 +140,21 @@ def _candidates(verdict: Verdict) -> list[str]:
     ranked = sorted(verdict.candidates, key=lambda one: -one.log_evidence)
     best = ranked[0].log_evidence
     chosen = {effect.name for effect in verdict.effects}
+    judged = any(one.held_out is not None for one in ranked)
     rows, bold = [], None
     for place, one in enumerate(ranked[:CANDIDATES]):
         if set(one.effects) == chosen and (chosen or verdict.verdict == "none") and bold is None:
             bold = place
-        held_out = "–" if one.held_out is None else number(one.held_out)
-        rows.append((effects_in_words(one.effects), number(one.log_evidence - best), held_out))
+        held_out = () if not judged else ("–" if one.held_out is None else number(one.held_out),)
+        rows.append((effects_in_words(one.effects), number(one.log_evidence - best), *held_out))
     more = len(ranked) - len(rows)
     return [
         text("Which causes were weighed", "h2"),
         text(
             "Log evidence below that of the best: how much less likely the records are under this cause, its parameters"
-            " averaged over (e-fold units). In bold: the verdict."
+            " averaged over (natural logarithm; -3 is one in twenty). In bold: the verdict."
         ),
-        table(("cause", "log evidence", "gap on held-out"), rows, numbers=(1, 2), best=bold),
+        table(("cause", "log evidence", *(("gap on held-out",) if judged else ())), rows, numbers=(1, 2), best=bold),
         text(f"{more} less likely ones are left out.", style="small") if more else "",
     ]
 

@@ -25,6 +25,7 @@ tr.best td { font-weight: 600; } td.code { font-family: "DejaVu Sans Mono", Cons
 .bar div { min-width: 2px; } .legend span { margin-right: 1.4rem; white-space: nowrap; }
 .legend i { display: inline-block; width: .8em; height: .8em; margin-right: .4em; border-radius: 2px; }
 figure { margin: .8rem 0; } figure svg { width: 100%; height: auto; } figcaption { font-size: .85rem; color: #555c64; }
+summary { cursor: pointer; font-size: .85rem; color: #0b5c9e; } .wide { overflow-x: auto; }
 ul { margin: .3rem 0; padding-left: 1.2rem; }
 @media print { body { max-width: none; font-size: 11px; } h2, figure, table { break-inside: avoid; } }
 """
@@ -69,7 +70,13 @@ def table(
         + "</tr>"
         for number, row in enumerate(rows)
     ]
-    return f"<table>\n<thead><tr>{top}</tr></thead>\n<tbody>\n" + "\n".join(lines) + "\n</tbody>\n</table>"
+    held = "\n".join(lines)
+    return f'<div class="wide"><table>\n<thead><tr>{top}</tr></thead>\n<tbody>\n{held}\n</tbody>\n</table></div>'
+
+
+def folded(summary: str, body: str) -> str:
+    """Something that opens on a click."""
+    return f"<details><summary>{escape(summary)}</summary>\n{body}\n</details>"
 
 
 def bar(parts: Sequence[tuple[str, float, str, str]]) -> str:
