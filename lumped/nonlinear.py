@@ -143,10 +143,14 @@ class NonLinear:
     def support_deflection(self, force: float) -> tuple[float, float]:
         """y1, y2 [m] at rest under the mesh force [N]."""
         out = []
-        for support, push in ((self.rig.support.driver, -1.0), (self.rig.support.driven, 1.0)):
-            reference = support.reference_deflection
-            size = self.factor * abs(force) / (support.stiffness * reference)
-            out.append(float(push * np.sign(force) * reference * size ** (1 / (1 + support.exponent))))
+        across = self.factor * force
+        for support, push in ((self.rig.support.driver, -across), (self.rig.support.driven, across)):
+            deflection = push / support.stiffness
+            if support.exponent:  # a linear support does not depend on its reference, not even in rounding
+                reference = support.reference_deflection
+                size = abs(deflection) / reference
+                deflection = float(np.sign(push)) * reference * size ** (1 / (1 + support.exponent))
+            out.append(deflection)
         return out[0], out[1]
 
     def equilibrium(self, force: float, excess: float, gain: float, phase: float) -> Array:
