@@ -47,7 +47,8 @@ DERIVED = ("mesh_phase", "dte", "force")
 class Measurement:
     """One record, realisation 0, cut into rows.
 
-    `record` says all that replaying it needs: attributes that it lacked are filled in from the case.
+    `record` says all that replaying it needs: its periods are the rows, and attributes that it lacked are filled in
+    from the case.
     `periods`: channel -> (P, N) in SI, one row per hunting period; the angles are their departures [rad]
     from steady rotation, `angle - 2 pi phase / teeth`, everything else as recorded; a channel that the
     record lacks is absent. `phase` (N,): mesh phase [cycles] of the samples of the first row at steady
@@ -118,7 +119,7 @@ def measurement(
     samples, rows, cycles = _row(record, frequency, source, facts, notes)
     frequency = cycles * float(record.attrs["sampling_rate"]) / samples
     phase, known = _phase(record, frequency, facts, notes)
-    record = _completed(record, frequency, float(phase[0]), facts)
+    record = _completed(record, (samples, rows), frequency, float(phase[0]), facts)
     whole = {str(key): record[key].values[0, : rows * samples] for key in record.data_vars if key not in DERIVED}
     whole, zero = _departures(whole, phase, source, facts, notes)
     whole = _usable(whole, record, source, notes)
@@ -252,8 +253,10 @@ def _phase(record: xr.Dataset, frequency: float, facts: Facts, notes: list[str])
     return np.asarray(start + steps, dtype=np.float64), known
 
 
-def _completed(record: xr.Dataset, frequency: float, start: float, facts: Facts) -> xr.Dataset:
-    """The record with those attributes filled in that the case or the angles tell."""
+def _completed(
+    record: xr.Dataset, row: tuple[int, int], frequency: float, start: float, facts: Facts
+) -> xr.Dataset:
+    """The record with rows for periods, and those attributes filled in that the case or the angles tell."""
     known = {
         "teeth_driver": facts.teeth[0],
         "teeth_driven": facts.teeth[1],
@@ -265,7 +268,10 @@ def _completed(record: xr.Dataset, frequency: float, start: float, facts: Facts)
         "mesh_period": 1.0 / frequency,
         "mesh_phase": start,
     }
-    return record.assign_attrs({key: value for key, value in known.items() if key not in record.attrs})
+    filled = {key: value for key, value in known.items() if key not in record.attrs}
+    samples, rows = row
+    whole = record.isel(time=slice(0, samples * rows))
+    return whole.assign_attrs(filled | {"samples_per_period": samples, "periods": rows})
 
 
 def _departures(

@@ -70,6 +70,7 @@ def test_an_excitation_of_half_a_hunting_period_gives_rows_of_two() -> None:
     assert (made.rows, made.mesh_cycles, made.phase.size) == (2, 60, SAMPLES)
     odd = channels(samples=SAMPLES // 2, periods=3)
     made = taken(odd, samples_per_period=SAMPLES // 2, periods=3)
+    assert made.record.sizes["time"] == made.record.attrs["samples_per_period"] == SAMPLES
     assert made.rows == 1 and made.zero_known and any("fill no row" in one for one in made.warnings)
 
 
