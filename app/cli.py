@@ -12,6 +12,7 @@ import typer
 
 from gearbench import __version__
 from gearbench.cases_command import cases
+from gearbench.challenge_command import challenge
 from gearbench.check_command import check
 from gearbench.compare_command import compare
 from gearbench.diagnose_command import diagnose
@@ -36,6 +37,7 @@ app = typer.Typer(
 
 for command in (run, simulate, static, identify, compare, diagnose, check, mesh, cases, schema, validate):
     app.command()(command)
+app.add_typer(challenge)
 
 # Options that take several numbers in a row.
 _LISTS = ("--torque-nm", "--dte-um")

@@ -28,6 +28,7 @@ USER_ERRORS = (
     ("gearbench.identification.frf", "FrfError"),
     ("gearbench.identification.transmission_error", "TransmissionError"),
     ("gearbench.bench.errors", "BenchError"),
+    ("gearbench.challenge.errors", "ChallengeError"),
     ("gearbench.diagnosis.errors", "DiagnosisError"),
     ("gearbench.failure", "InputError"),
 )

@@ -36,7 +36,11 @@ class Answer:
 def write_answers(answers: Mapping[str, Answer], path: Path) -> None:
     """Write the answers in one step. Raises RecordError when the folder is missing."""
     text = json.dumps({name: asdict(answer) for name, answer in answers.items()}, indent=1, allow_nan=False) + "\n"
-    write_atomically(path, lambda temporary: temporary.write_text(text, encoding="utf-8") and None)
+
+    def write(temporary: Path) -> None:
+        temporary.write_text(text, encoding="utf-8")
+
+    write_atomically(path, write)
 
 
 def read_answers(path: Path) -> dict[str, Answer]:

@@ -129,7 +129,8 @@ def run_condition(bench: Bench, rig: Structure, levels: Levels, condition: Condi
     stride = substeps // OVERSAMPLED
     count = OVERSAMPLED * (experiment.periods * plan.samples_per_period + 2 * MARGIN)
     _, seen = integrate(plant, torque, state, step=step, first=begin, outputs=count, stride=stride)
-    return Run((begin + stride * np.arange(count)) * step, seen, np.ascontiguousarray(command))
+    time = np.asarray((begin + stride * np.arange(count)) * step, dtype=np.float64)
+    return Run(time, seen, np.ascontiguousarray(command))
 
 
 def measure(

@@ -44,8 +44,8 @@ from gearbench.challenge.packing import (
     PAIR_EXPONENT,
     PAIR_REFERENCE,
     RIPPLE,
-    RIPPLES,
     RIPPLE_ORDER,
+    RIPPLES,
     ROLL_PITCH,
     SENSOR_ON_HOUSING,
     SHAFT,
@@ -150,7 +150,7 @@ def _working(
     across = (s[DEGREES + 5] - s[DEGREES + 7]) * c[SINE] - (s[DEGREES + 4] - s[DEGREES + 6]) * c[COSINE]
     sweep = c[BASE_DRIVER] / c[BASE_PITCH] * speed1
     normal, rubbing, moment1, moment2 = 0.0, 0.0, 0.0, 0.0
-    for number in range(int(floor(turn - last)) + 1, int(floor(turn - c[TABLE_FIRST])) + 1):
+    for number in range(floor(turn - last) + 1, floor(turn - c[TABLE_FIRST]) + 1):
         v = turn - number
         force = _pair_force(c, mesh, number, v, sweep, dte, rate, scale)
         if force > 0.0:
@@ -171,7 +171,7 @@ def _back(c: Array, mesh: Mesh, turn: float, speed1: float, dte: float, rate: fl
     last = c[TABLE_FIRST] + c[TABLE_PITCH] * (mesh[0].shape[0] - 1)
     sweep = -c[BASE_DRIVER] / c[BASE_PITCH] * speed1
     force = 0.0
-    for number in range(int(floor(turn - 0.5 + c[TABLE_FIRST])), int(floor(turn - 0.5 + last)) + 1):
+    for number in range(floor(turn - 0.5 + c[TABLE_FIRST]), floor(turn - 0.5 + last) + 1):
         clean = dte - mesh[1][number % mesh[1].shape[0], 0] - mesh[2][number % mesh[2].shape[0], 0]
         force += _pair_force(c, mesh, number, number + 0.5 - turn, sweep, clean, rate, scale)
     return force

@@ -36,15 +36,45 @@ class Family:
 
 
 FAMILIES: dict[str, Family] = {
-    "development": Family("parabola", (0.2, 0.35), (0.03, 0.08), (0.0, 0.25), (0.0, 0.2e-6), 0, "rocking", (0.0,), (3, 8)),
-    "calibration": Family("cosine", (0.15, 0.35), (0.05, 0.12), (0.2, 0.6), (0.5e-6, 3e-6), 1, "shaking", (0.0,), (4, 10)),
-    "test": Family("energy", (0.0, 0.0), (0.03, 0.12), (0.4, 1.0), (0.2e-6, 2e-6), 1, "oblique", (0.0, 1.0), (3, 10)),
+    "development": Family(
+        shape="parabola",
+        bow=(0.2, 0.35),
+        exponent=(0.03, 0.08),
+        damping_load=(0.0, 0.25),
+        damping_onset=(0.0, 0.2e-6),
+        friction_shape=0,
+        housing="rocking",
+        sensors_on_housing=(0.0,),
+        side_ratio=(3.0, 8.0),
+    ),
+    "calibration": Family(
+        shape="cosine",
+        bow=(0.15, 0.35),
+        exponent=(0.05, 0.12),
+        damping_load=(0.2, 0.6),
+        damping_onset=(0.5e-6, 3e-6),
+        friction_shape=1,
+        housing="shaking",
+        sensors_on_housing=(0.0,),
+        side_ratio=(4.0, 10.0),
+    ),
+    "test": Family(
+        shape="energy",
+        bow=(0.0, 0.0),
+        exponent=(0.03, 0.12),
+        damping_load=(0.4, 1.0),
+        damping_onset=(0.2e-6, 2e-6),
+        friction_shape=1,
+        housing="oblique",
+        sensors_on_housing=(0.0, 1.0),
+        side_ratio=(3.0, 10.0),
+    ),
 }
 
 
 @dataclass(frozen=True)
 class Structure:
-    """One truth rig without effects. Pairs are driver, driven; arrays of four x_driver, y_driver, x_driven, y_driven."""
+    """One truth rig without effects. Pairs are driver, driven; fours are x_driver, y_driver, x_driven, y_driven."""
 
     family: str
     shape: Shape

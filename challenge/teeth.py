@@ -1,9 +1,9 @@
 """Stiffness of the truth rig's tooth pairs over the path of contact, and its scale.
 
 The shape of the law is not that of the finite-element tables: a beam on a foundation (potential energy), a parabola
-between the ends as in ISO 6336's picture of a single pair, or a raised cosine. Its scale is: the mean tangent stiffness over
-a mesh cycle is set to a given one. Beyond the ends of the path of contact the corner of a tip works on; there the
-gap between the flanks grows with the square of the distance.
+between the ends as in ISO 6336's picture of a single pair, or a raised cosine. Its scale is: the mean tangent
+stiffness over a mesh cycle is set to a given one. Beyond the ends of the path of contact the corner of a tip works on;
+there the gap between the flanks grows with the square of the distance.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class PairLaw:
     @property
     def place(self) -> Array:
         """Positions of the nodes."""
-        return self.first + self.pitch * np.arange(NODES)
+        return np.asarray(self.first + self.pitch * np.arange(NODES), dtype=np.float64)
 
 
 def path_ends(meshing: Pair) -> tuple[float, float]:

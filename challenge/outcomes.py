@@ -1,0 +1,79 @@
+"""One case judged: what the verdict is worth beside the answer.
+
+* An effect (or two) was at work. `right`: the verdict names exactly these. `class`: it names another, but reports a
+  class of indistinguishable effects that holds both the named and the true one. `part`: it names one of two.
+  `wrong`: it names anything else. `missed`: it says none. `refused`: it says unknown.
+* None was. `right`: it says none. `named`: it names an effect (a false alarm). `flagged`: it says unknown.
+* A foreign one was, or one that was taken out of the library. `refused`: it says unknown. `blamed`: it names an
+  effect. `missed`: it says none.
+* `failed`: there is no verdict, because the diagnosis of the case failed.
+
+The place is right when the verdict's equals the answer's, whatever the verdict. Of two effects either place counts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from gearbench.challenge.answers import Answer
+
+VERDICTS = ("effect", "none", "unknown")
+# Which probability a perfect program gives 1, by the kind of the case.
+TRUE_VERDICT = {"effect": "effect", "none": "none", "foreign": "unknown"}
+
+Verdict = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A case, its answer, its verdict (None: failed) and what that is worth."""
+
+    name: str
+    answer: Answer
+    verdict: Verdict | None
+    result: str
+    place_right: bool
+
+
+def without(answer: Answer, effect: str | None) -> Answer:
+    """The answer when `effect` is not in the library: a case that it made counts as foreign."""
+    if effect is not None and answer.kind == "effect" and effect in answer.effects:
+        return replace(answer, kind="foreign")
+    return answer
+
+
+def named_effects(verdict: Verdict) -> tuple[str, ...]:
+    """Names of the effects that a verdict gives."""
+    return tuple(effect["name"] for effect in verdict.get("effects", ()))
+
+
+def judge(name: str, answer: Answer, verdict: Verdict | None) -> Outcome:
+    """The outcome of one case."""
+    if verdict is None:
+        return Outcome(name, answer, None, "failed", False)
+    return Outcome(name, answer, verdict, _result(answer, verdict), verdict["place"] == answer.place)
+
+
+def _result(answer: Answer, verdict: Verdict) -> str:
+    said = verdict["verdict"]
+    if answer.kind == "none":
+        return {"none": "right", "effect": "named", "unknown": "flagged"}[said]
+    if said != "effect":
+        return {"none": "missed", "unknown": "refused"}[said]
+    if answer.kind == "foreign":
+        return "blamed"
+    named, true = set(named_effects(verdict)), set(answer.effects)
+    if named == true:
+        return "right"
+    if _in_one_class(true, named, verdict.get("indistinguishable", ())):
+        return "class"
+    return "part" if named < true else "wrong"
+
+
+def _in_one_class(true: set[str], named: set[str], classes: Sequence[Sequence[str]]) -> bool:
+    """Whether one class holds the one true and the one named effect."""
+    if len(true) != 1 or len(named) != 1:
+        return False
+    return any(true | named <= set(members) for members in classes)
