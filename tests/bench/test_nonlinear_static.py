@@ -57,8 +57,7 @@ def make_case(boundary: str, drive: Drive, **experiment: Any) -> Case:
     return Case(name="test", rig=rig, experiment=Experiment(**run), simulation=simulation)
 
 
-@pytest.mark.parametrize("boundary", ["speed", "torque"])
-@pytest.mark.parametrize("stiffness", [None, 2e4])
+@pytest.mark.parametrize(("boundary", "stiffness"), [("speed", None), ("speed", 2e4), ("torque", 2e4)])
 def test_linearised_response_is_what_a_small_multisine_excites(boundary: str, stiffness: float | None) -> None:
     drive = Drive(coupling=Coupling(inertia=2e-3, stiffness=stiffness))
     # Supports stiffen with load: only a small excitation sees the tangent at the mean torque.
