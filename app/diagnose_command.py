@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 PICTURES = {
     "where": "Shares of the gap between the records and the nominal rig.",
     "gap": "Rms gap from the nominal rig to the noise floor, channel by channel.",
-    "traces": "Above: the record and its simulations. Below: what remains between them.",
+    "traces": "What remains between the record and its simulations: in time, and by frequency.",
 }
 
 

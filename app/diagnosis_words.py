@@ -138,6 +138,7 @@ def number(value: float, digits: int = 3) -> str:
     if power < -3 or power >= 6:
         return f"{value:.{digits - 1}e}".replace("e-0", "e-").replace("e+0", "e")
     rounded = round(value, digits - 1 - power)
+    power = floor(log10(abs(rounded)))  # 9.996 has become 10.0
     return f"{rounded:.{max(0, digits - 1 - power)}f}"
 
 
@@ -145,9 +146,10 @@ def with_std(value: float, std: float) -> str:
     """`0.0584 ± 0.0012`: both to the second significant digit of the standard deviation."""
     if not (isfinite(std) and std > 0):
         return number(value)
+    power = floor(log10(max(abs(value), std)))
+    if power < -3 or power >= 6:
+        return f"({with_std(value / 10.0**power, std / 10.0**power)})e{power}"
     digits = 1 - floor(log10(std))
-    if max(abs(value), std) >= 1e6 or max(abs(value), std) < 1e-3:
-        return f"{number(value)} ± {number(std, 2)}"
     return f"{round(value, digits):.{max(0, digits)}f} ± {round(std, digits):.{max(0, digits)}f}"
 
 

@@ -89,9 +89,9 @@ def _teeth(axes: Any, shares: list[Share]) -> None:
 
 def _edge(values: Sequence[float], shares: Sequence[Share]) -> float:
     """End of the axis [%]: all bars, and floors that do not dwarf them."""
-    edge = 1.12 * max(values, default=0.0)
+    edge = 1.12 * max(values, default=0.0) or 1.0
     floors = [value for share in shares for value in (share.floor_noise, share.floor_nominal) if value is not None]
-    return max(min(105 * max(floors, default=0.0), FLOOR_REACH * edge), edge) or 1.0
+    return max([edge, *(105 * floor for floor in floors if 105 * floor <= FLOOR_REACH * edge)])
 
 
 def _marks(axes: Any, at: float, share: Share, edge: float, *, upright: bool) -> None:

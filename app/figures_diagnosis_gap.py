@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.diagnosis_words import CHANNELS, STAGE_WORDS, STAGES, whole_band
+from gearbench.diagnosis_words import number as number_of
 from gearbench.plotting import BLUE, GREEN, GREY, ORANGE, figure, save
 
 if TYPE_CHECKING:
@@ -20,6 +21,8 @@ Array = NDArray[np.float64]
 
 COLOURS = {"nominal": ORANGE, "recalibrated": BLUE, "with_effect": GREEN, "floor": GREY}
 MARKS = {"nominal": "s", "recalibrated": "o", "with_effect": "D", "floor": "|"}
+# Curves that lie on one another all stay visible.
+WIDTHS = (3.0, 1.8, 1.1)
 # Bands of an octave in the spectrum of the gap.
 PER_OCTAVE = 6
 
@@ -83,24 +86,21 @@ def _plain_ticks(axes: Any) -> None:
 
 
 def draw_traces(path: Path, traces: Traces) -> None:
-    """Measured and simulated over six mesh periods, and the spectrum of their difference."""
+    """Measured minus simulated over six mesh periods, and its spectrum."""
     micro = 1e6 if traces.unit == "m" else 1.0
     unit = "um" if traces.unit == "m" else traces.unit
     name = CHANNELS.get(traces.channel, traces.channel)
     with figure(2, 1, (9.0, 6.6)) as (drawing, (above, below)):
         count = min(traces.measured.size, round(6 * traces.rate / traces.mesh))
         cycles = np.arange(count) * traces.mesh / traces.rate
-        above.plot(cycles, micro * _moving(traces.measured)[:count], color="#222222", linewidth=1.6, label="measured")
-        for stage, values in traces.simulated.items():
-            if stage != "recalibrated":
-                above.plot(
-                    cycles, micro * _moving(values)[:count], color=COLOURS[stage], linewidth=1.1,
-                    linestyle="--" if stage == "nominal" else "-", label=STAGE_WORDS[stage],
-                )
+        for number, (stage, values) in enumerate(traces.simulated.items()):
+            rest = _moving(traces.measured - values)[:count]
+            above.plot(cycles, micro * rest, color=COLOURS[stage], linewidth=WIDTHS[number], label=STAGE_WORDS[stage])
         above.set_xlim(0, cycles[-1])
         above.set_xlabel("mesh periods from the start of the record")
-        above.set_ylabel(f"{name} [{unit}]")
-        above.set_title(f"{name[:1].upper()}{name[1:]} without its mean")
+        above.set_ylabel(f"difference [{unit}]")
+        size = number_of(micro * float(traces.measured.std()))
+        above.set_title(f"Measured minus simulated, without its mean: {name} (its own rms is {size} {unit})")
         above.margins(y=0.2)
         above.legend(loc="upper right", ncols=3)
         _spectra(below, traces, micro, unit)
@@ -110,9 +110,7 @@ def draw_traces(path: Path, traces: Traces) -> None:
 def _spectra(axes: Any, traces: Traces, micro: float, unit: str) -> None:
     for number, (stage, values) in enumerate(traces.simulated.items()):
         centre, rms = octave_bands(_line_rms(traces.measured - values), traces.rate / traces.measured.size)
-        # Curves that lie on one another all stay visible.
-        width = (3.4, 2.0, 1.2)[number]
-        axes.plot(centre, micro * rms, color=COLOURS[stage], linewidth=width, label=STAGE_WORDS[stage])
+        axes.plot(centre, micro * rms, color=COLOURS[stage], linewidth=WIDTHS[number], label=STAGE_WORDS[stage])
     if traces.noise is not None:
         centre, rms = octave_bands(traces.noise, traces.rate / traces.measured.size)
         axes.plot(centre, micro * rms, color=GREY, linestyle=":", label=STAGE_WORDS["floor"])
@@ -120,7 +118,7 @@ def _spectra(axes: Any, traces: Traces, micro: float, unit: str) -> None:
     axes.set_yscale("log")
     axes.set_xlabel("frequency [Hz]")
     axes.set_ylabel(f"rms per 1/{PER_OCTAVE} octave [{unit}]")
-    axes.set_title("Measured minus simulated")
+    axes.set_title("Spectrum of the difference")
     axes.legend(loc="best", ncols=4)
 
 

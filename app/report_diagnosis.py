@@ -167,8 +167,8 @@ def _where(report: Report) -> list[str]:
     return [
         text("Where the gap is", "h2"),
         text(
-            f"{words}Below, the gap of the nominal rig is divided in several ways; each adds up to 100 %. A share below"
-            " its floors needs no cause."
+            f"{words}Below, the gap of the nominal rig is divided in several ways; each adds up to 100 %. Where a floor"
+            " exceeds its bar the size of the gap needs no cause, and only its pattern tells one."
         ),
         *_pictures(report, ("where",)),
     ]
