@@ -12,7 +12,11 @@ from gearbench.rig import Gear
 RIM_MODULES = 0.05
 # Smallest rounding of a tip edge that is told from a sharp corner [m].
 SMALLEST_EDGE = 1e-6
-# A form circle this little (in modules of roll length) inside the base circle is rounding, not undercut.
+# Thinnest tooth between its fillets, in modules: below it undercut has cut the tooth off.
+NECK_MODULES = 0.1
+# Smallest root radius, in modules.
+ROOT_MODULES = 0.1
+# A rack tip this little (in modules) too wide for the rack tooth is rounding.
 ROUNDING = 1e-12
 
 
@@ -33,15 +37,39 @@ def check_rack(gear: Gear, name: str, offset: float) -> None:
         )
 
 
-def check_undercut(gear: Gear, name: str, rho_form: float) -> None:
-    """Refuse a tooth whose fillet cuts into the involute: form point behind the base, `rho_form` < 0."""
-    if rho_form < -ROUNDING * gear.module:
-        limit = gear.profile_shift - rho_form * sin(gear.pressure_angle) / gear.module
+def check_root(gear: Gear, name: str, root: float) -> None:
+    """Refuse a rack that reaches the gear's centre, `root` being the root radius [m]."""
+    lacking = ROOT_MODULES - root / gear.module
+    if lacking > ROUNDING:
+        limit = gear.dedendum - lacking
         raise GeometryError(
-            f"{name}.profile_shift = {gear.profile_shift:g} undercuts the teeth: at least"
-            f" {at_least(limit, 4)} with teeth = {gear.teeth}, dedendum = {gear.dedendum:g},"
-            f" rack_tip_radius = {gear.rack_tip_radius:g}, thinning_um = {gear.thinning * 1e6:g}"
+            f"{name}.dedendum = {gear.dedendum:g} leaves no root circle: at most {at_most(limit, 4)} with"
+            f" teeth = {gear.teeth}, profile_shift = {gear.profile_shift:g}, thinning_um = {gear.thinning * 1e6:g}"
         )
+
+
+def check_neck(gear: Gear, name: str, has_neck: Callable[[Gear], bool]) -> None:
+    """Refuse teeth that their fillets cut off or nearly: `has_neck` tells whether enough is left between them."""
+    if has_neck(gear):
+        return
+
+    def fits(shift: float) -> bool:
+        return has_neck(gear.model_copy(update={"profile_shift": shift}))
+
+    shifts = [gear.profile_shift + 0.1 * k for k in range(1, 36)]
+    high = next((shift for shift in shifts if fits(shift)), None)
+    what = (
+        f"{name}.profile_shift = {gear.profile_shift:g} cuts the teeth off at their roots (less than"
+        f" {NECK_MODULES:g} modules are left between the fillets)"
+    )
+    others = (
+        f"with teeth = {gear.teeth}, dedendum = {gear.dedendum:g}, rack_tip_radius = {gear.rack_tip_radius:g},"
+        f" thinning_um = {gear.thinning * 1e6:g}"
+    )
+    if high is None:
+        raise GeometryError(f"{what}: no profile_shift helps {others}")
+    limit = at_least(_largest(high, gear.profile_shift, fits), 4)
+    raise GeometryError(f"{what}: at least {limit} {others}")
 
 
 def land_half_angle(tip: float, edge: float, base: float, psi_b: float) -> float:

@@ -7,7 +7,7 @@ after half a turn, so each gear touches with its counter-clockwise flank. Formul
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import acos, atan, pi, sin, sqrt, tan
+from math import acos, atan, inf, pi, sin, sqrt, tan
 
 from gearbench.geometry.error import GeometryError, at_least, at_most
 from gearbench.geometry.interference import TOLERANCE, fillet_clearance, largest_tip
@@ -58,14 +58,17 @@ class Pair:
 
     @property
     def active_driver(self) -> tuple[float, float]:
-        """Roll lengths of the driver where contact on the line of action starts and ends."""
-        return self.line_of_action - self.driven.rho_end, self.driver.rho_end
+        """Roll lengths of the driver where contact on the line of action starts and ends: at the mate's tip edges or,
+        where undercut has cut the flank away that they would touch, at the form circles."""
+        start, stop = self.line_of_action - self.driven.rho_end, self.driver.rho_end
+        return max(start, self.driver.rho_form), min(stop, self.line_of_action - self.driven.rho_form)
 
     @property
     def active_driven(self) -> tuple[float, float]:
         """Roll lengths of the driven gear where its active profile begins (end of contact) and ends
         (start)."""
-        return self.line_of_action - self.driver.rho_end, self.driven.rho_end
+        start, stop = self.active_driver
+        return self.line_of_action - stop, self.line_of_action - start
 
     @property
     def contact_ratio(self) -> float:
@@ -76,8 +79,26 @@ class Pair:
     @property
     def contact_ratio_sharp(self) -> float:
         """Transverse contact ratio that sharp tip edges (radius 0) would give."""
-        path = sum(sqrt(gear.tip_radius**2 - gear.base_radius**2) for gear in (self.driver, self.driven))
-        return (path - self.line_of_action) / self.base_pitch
+        reach = [
+            min(sqrt(gear.tip_radius**2 - gear.base_radius**2), self.line_of_action - mate.rho_form)
+            for gear, mate in ((self.driver, self.driven), (self.driven, self.driver))
+        ]
+        return (sum(reach) - self.line_of_action) / self.base_pitch
+
+    @property
+    def specific_sliding(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Specific sliding (sliding velocity over the gear's own rolling velocity) of driver and driven gear, each at
+        the start and at the end of its active profile; -inf where the active profile starts on the base circle."""
+        sliding = []
+        for gear, mate, ends in (
+            (self.driver, self.driven, self.active_driver),
+            (self.driven, self.driver, self.active_driven),
+        ):
+            ratio = gear.teeth / mate.teeth
+            rolled = [((self.line_of_action - rho) * ratio, rho) for rho in ends]
+            start, stop = (1 - other / own if own > 0.0 else -inf for other, own in rolled)
+            sliding.append((start, stop))
+        return sliding[0], sliding[1]
 
     @property
     def backlash(self) -> float:
@@ -91,6 +112,11 @@ class Pair:
     def backlash_normal(self) -> float:
         """Backlash along the line of action."""
         return self.backlash * self.driver.base_radius / self.pitch_radii[0]
+
+    @property
+    def backlash_angles(self) -> tuple[float, float]:
+        """Angle [rad] through which driver and driven gear turn in their backlash while the mate stands."""
+        return self.backlash / self.pitch_radii[0], self.backlash / self.pitch_radii[1]
 
     @property
     def clearances(self) -> tuple[float, float]:
@@ -161,9 +187,9 @@ def _zero_backlash_distance(rig: Rig, base_sum: float) -> float:
 
 def pair(rig: Rig) -> Pair:
     """The pair of a rig. Raises GeometryError (see `profile` for one gear's own refusals) when mates have
-    different racks, the centre distance is impossible, backlash or tip clearance is negative, a tip reaches
-    below its mate's form circle, or the contact ratio is below 1. The common face width is the smaller of the
-    two.
+    different racks, the centre distance is impossible, backlash or tip clearance is negative, a tip meets the fillet
+    of its mate or cuts into it (undercut gives way: there contact begins at the form circle), or the contact ratio is
+    below 1. The common face width is the smaller of the two.
     """
     _common_rack(rig)
     driver, driven = profile(rig.driver, "rig.driver"), profile(rig.driven, "rig.driven")
@@ -198,14 +224,14 @@ def _check(meshing: Pair, rig: Rig) -> None:
         )
     names = ("rig.driver", "rig.driven")
     gears = (meshing.driver, meshing.driven)
-    starts = (meshing.active_driver[0], meshing.active_driven[0])
+    starts = (meshing.line_of_action - meshing.driven.rho_end, meshing.line_of_action - meshing.driver.rho_end)
     for i, mate in ((0, 1), (1, 0)):
         tip = f"{names[i]}.tip_diameter_mm = {2e3 * gears[i].tip_radius:.6g}"
         if meshing.clearances[i] < -ROUNDING:
             limit = at_most(2e3 * (gears[i].tip_radius + meshing.clearances[i]), 4)
             raise GeometryError(f"{tip} reaches into the root of {names[mate]}: at most {limit} with {key}")
         form = f"{names[mate]} ({2e3 * gears[mate].form_radius:.6g} mm)"
-        if starts[mate] < gears[mate].rho_form - ROUNDING:
+        if starts[mate] < gears[mate].rho_form - ROUNDING and not gears[mate].undercut:
             limit = at_most(2e3 * _tip_reaching(gears[i], meshing.line_of_action - gears[mate].rho_form), 4)
             raise GeometryError(
                 f"{tip} interferes: the tip reaches below the form circle of {form};"

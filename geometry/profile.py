@@ -3,18 +3,19 @@
 Gear frame: origin at the gear's centre, tooth 0 centred on +x; the working flank is the counter-clockwise
 one. Lengths in m, angles in rad. Points and normals are arrays (..., 2); normals are unit vectors out of the
 material. Notation and formulas: ISO 21771:2007 (involute, generating profile shift); F. L. Litvin and A.
-Fuentes, Gear Geometry and Applied Theory (2004), chapters 5 and 10 (envelope of the rack's rounded tip).
+Fuentes, Gear Geometry and Applied Theory (2004), chapters 5 and 10 (envelope of the rack's rounded tip, undercut).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import atan2, cos, pi, sin, sqrt, tan
+from math import atan2, cos, pi, sqrt, tan
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gearbench.geometry.limits import check_body, check_rack, check_tip, check_undercut
+from gearbench.geometry.fillet import Trochoid, form_point, neck, radial, tangential
+from gearbench.geometry.limits import NECK_MODULES, check_body, check_neck, check_rack, check_root, check_tip
 from gearbench.rig import Gear
 
 Array = NDArray[np.float64]
@@ -25,26 +26,14 @@ def involute(angle: float) -> float:
     return tan(angle) - angle
 
 
-def radial(angle: ArrayLike) -> Array:
-    """Unit vectors (..., 2) at the polar `angle`."""
-    angle = np.asarray(angle, dtype=float)
-    return np.stack((np.cos(angle), np.sin(angle)), axis=-1)
-
-
-def tangential(angle: ArrayLike) -> Array:
-    """Unit vectors (..., 2) perpendicular to those at the polar `angle`, counter-clockwise."""
-    angle = np.asarray(angle, dtype=float)
-    return np.stack((-np.sin(angle), np.cos(angle)), axis=-1)
-
-
 @dataclass(frozen=True)
 class Profile:
     """The boundary of one tooth; build it with `profile(gear)`.
 
     Along the working flank, `rho` is the roll length on the base tangent and `s` the arc length from the
     involute's (virtual) origin on the base circle, which goes on along the tip-edge arc. Along the fillet,
-    `beta` is the angle between the rack tip's normal and the centre line: 0 on the root circle,
-    pi/2 - pressure_angle on the involute.
+    `beta` is the angle between the rack tip's normal and the centre line: 0 on the root circle, `beta_form` on the
+    involute (pi/2 - pressure_angle, less on undercut teeth).
     """
 
     teeth: int
@@ -58,9 +47,8 @@ class Profile:
     psi_b: float  # polar angle of the working involute's origin on the base circle
     rho_form: float  # roll length where the fillet ends and the involute begins
     rho_end: float  # roll length where the involute ends and the tip-edge arc begins
-    rack_depth: float  # depth of the rack tip's arc centre below the rolling line; may be negative
-    rack_offset: float  # distance of that centre from the axis of the rack tooth
-    rack_radius: float  # radius of the rack tip
+    beta_form: float  # parameter of the fillet where the involute begins
+    trochoid: Trochoid  # that the fillet is part of
 
     # --- radii, angles and lengths --------------------------------------------------------------------------
 
@@ -78,6 +66,11 @@ class Profile:
     def form_radius(self) -> float:
         """Radius where the fillet meets the involute."""
         return sqrt(self.base_radius**2 + self.rho_form**2)
+
+    @property
+    def undercut(self) -> bool:
+        """Whether the fillet cuts into the involute: both then meet in an outward corner, else tangentially."""
+        return self.beta_form < self.trochoid.beta_last
 
     @property
     def end_radius(self) -> float:
@@ -103,7 +96,7 @@ class Profile:
     @property
     def root_half_angle(self) -> float:
         """Half of the angle of the root land, the part of the root circle between two fillets."""
-        return self.rack_offset / self.reference_radius
+        return self.trochoid.offset / self.reference_radius
 
     @property
     def s_form(self) -> float:
@@ -160,55 +153,25 @@ class Profile:
 
     # --- fillet on the counter-clockwise side of tooth 0 ----------------------------------------------------
 
-    @property
-    def beta_form(self) -> float:
-        """Fillet parameter where the involute begins."""
-        return pi / 2 - self.pressure_angle
-
-    def _rolling(self, beta: Array) -> Array:
-        """Polar angle of the pitch point (gear frame) while the rack tip touches at `beta`."""
-        return pi / self.teeth + (self.rack_depth * np.tan(beta) - self.rack_offset) / self.reference_radius
-
     def fillet(self, beta: ArrayLike) -> Array:
-        """Points of the fillet at `beta` in [0, beta_form].
-
-        The common normal of rack and gear passes through the pitch point (law of gearing), which fixes how
-        far the rack has rolled when its tip touches with the normal `beta`.
-        """
-        beta = np.asarray(beta, dtype=float)
-        angle = self._rolling(beta)
-        depth = self.rack_depth + self.rack_radius * np.cos(beta)
-        across = (depth * np.tan(beta))[..., None]
-        return (self.reference_radius - depth)[..., None] * radial(angle) - across * tangential(angle)
+        """Points of the fillet at `beta` in [0, beta_form]."""
+        return self.trochoid.points(beta)
 
     def fillet_normals(self, beta: ArrayLike) -> Array:
         """Normals of the fillet at `beta`, out of the material (into the tooth space)."""
-        beta = np.asarray(beta, dtype=float)
-        return radial(self._rolling(beta) + beta)
+        return self.trochoid.normals(beta)
 
     def fillet_length(self, beta: ArrayLike) -> Array:
-        """Arc length of the fillet from the root circle to `beta`.
-
-        The tip's centre turns about the pitch point at a distance depth/cos(beta) while the tip's normal
-        turns by d beta + d angle: ds/d beta = depth^2/(r cos^3 beta) + radius (1 + depth/(r cos^2 beta)),
-        here integrated.
-        """
-        beta = np.asarray(beta, dtype=float)
-        t, c = np.tan(beta), 1 / np.cos(beta)
-        h, r = self.rack_depth, self.reference_radius
-        return 0.5 * h * h / r * (t * c + np.arcsinh(t)) + self.rack_radius * (beta + h / r * t)
+        """Arc length of the fillet from the root circle to `beta`."""
+        return self.trochoid.length(beta)
 
     def fillet_speed(self, beta: ArrayLike) -> Array:
         """Derivative of `fillet_length`."""
-        c = 1 / np.cos(np.asarray(beta, dtype=float))
-        h, r = self.rack_depth, self.reference_radius
-        return h * h / r * c**3 + self.rack_radius * (1 + h / r * c**2)
+        return self.trochoid.speed(beta)
 
     def fillet_radius(self, beta: ArrayLike) -> Array:
         """Magnitude of the radius of curvature of the fillet."""
-        c = 1 / np.cos(np.asarray(beta, dtype=float))
-        turning = np.abs(1 + self.rack_depth / self.reference_radius * c**2)
-        return self.fillet_speed(beta) / np.maximum(turning, 1e-12)
+        return self.trochoid.curvature_radius(beta)
 
     def fillet_beta(self, length: ArrayLike) -> Array:
         """Inverse of `fillet_length`, by Newton's method from a table."""
@@ -223,44 +186,68 @@ class Profile:
         return beta
 
 
+def generated(gear: Gear) -> tuple[Trochoid, float, float]:
+    """What the rack makes of a gear: its fillet (before the involute ends it), the polar angle of the working
+    involute's origin, and how far the rack tip radius fits into the rack tooth [m] (negative: it does not).
+
+    The rack is fed down to the generating profile shift x_E = x - thinning/(2 m tan alpha) (ISO 21771), so thinning
+    lowers the root with the flank.
+    """
+    m, alpha = gear.module, gear.pressure_angle
+    shift = gear.profile_shift - gear.thinning / (2 * m * tan(alpha))
+    radius = gear.rack_tip_radius * m
+    offset = m * pi / 4 - (gear.dedendum * m - radius) * tan(alpha) - radius / cos(alpha)
+    fillet = Trochoid(
+        teeth=gear.teeth,
+        reference_radius=m * gear.teeth / 2,
+        pressure_angle=alpha,
+        depth=(gear.dedendum - shift) * m - radius,
+        offset=max(offset, 0.0),
+        radius=radius,
+    )
+    return fillet, (pi / 2 + 2 * shift * tan(alpha)) / gear.teeth + involute(alpha), offset
+
+
+def _has_neck(gear: Gear) -> bool:
+    """Whether enough is left between the fillets of a tooth."""
+    fillet, psi_b, _ = generated(gear)
+    return neck(fillet, form_point(fillet, psi_b)[0]) >= NECK_MODULES * gear.module
+
+
 def profile(gear: Gear, name: str = "gear") -> Profile:
     """The profile of a gear. `name` is the gear's key in the case, used in the sentence of a `GeometryError`.
 
-    The gear is cut by its rack down to the generating profile shift x_E = x - thinning/(2 m tan alpha) (ISO
-    21771), so thinning lowers the root with the flank. Raises GeometryError on undercut, a rack tip radius or
-    a tip edge that does not fit, a pointed tip, and a hub or bore that does not fit.
+    Undercut teeth lose the involute's beginning to the fillet. Raises GeometryError if the fillets cut a tooth off,
+    for a rack tip radius or a tip edge that does not fit, a pointed tip or one inside the form circle, and a hub or
+    bore that does not fit.
     """
-    m, alpha = gear.module, gear.pressure_angle
-    reference = m * gear.teeth / 2
-    base = reference * cos(alpha)
-    shift = gear.profile_shift - gear.thinning / (2 * m * tan(alpha))
-    rack_radius = gear.rack_tip_radius * m
-    depth = (gear.dedendum - shift) * m - rack_radius
-    offset = m * pi / 4 - (gear.dedendum * m - rack_radius) * tan(alpha) - rack_radius / cos(alpha)
-    rho_form = reference * sin(alpha) - depth / sin(alpha) - rack_radius
-    psi_b = (pi / 2 + 2 * shift * tan(alpha)) / gear.teeth + involute(alpha)
+    m = gear.module
+    fillet, psi_b, room = generated(gear)
+    reference = fillet.reference_radius
+    base = reference * cos(gear.pressure_angle)
     tip = reference + (gear.addendum + gear.profile_shift) * m
     if gear.tip_diameter is not None:
         tip = gear.tip_diameter / 2
-    check_rack(gear, name, offset)
-    check_undercut(gear, name, rho_form)
+    root = reference - fillet.depth - fillet.radius
+    check_rack(gear, name, room)
+    check_root(gear, name, root)
+    check_neck(gear, name, _has_neck)
+    beta_form, rho_form = form_point(fillet, psi_b)
     check_tip(gear, name, tip=tip, base=base, psi_b=psi_b, rho_form=rho_form)
-    root = reference - depth - rack_radius
     check_body(gear, name, root)
     edge = gear.tip_edge_radius
     return Profile(
         teeth=gear.teeth,
         module=m,
-        pressure_angle=alpha,
+        pressure_angle=gear.pressure_angle,
         reference_radius=reference,
         base_radius=base,
         tip_radius=tip,
         root_radius=root,
         edge_radius=edge,
         psi_b=psi_b,
-        rho_form=max(rho_form, 0.0),
+        rho_form=rho_form,
         rho_end=edge + sqrt((tip - edge) ** 2 - base**2),
-        rack_depth=depth,
-        rack_offset=max(offset, 0.0),
-        rack_radius=rack_radius,
+        beta_form=beta_form,
+        trochoid=fillet,
     )

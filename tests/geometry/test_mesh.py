@@ -35,6 +35,8 @@ CASES: dict[str, dict[str, Any]] = {
     "thin rim": {"teeth": 62, "hub_radius": 0.0592},
     "sharp tip and rack": {"teeth": 40, "tip_edge_radius": 0.0, "rack_tip_radius": 0.0},
     "z10": {"teeth": 10, "profile_shift": 0.55, "hub_radius": 0.0005},
+    "z8 undercut": {"teeth": 8, "hub_radius": 0.003},
+    "z12 deeply undercut": {"teeth": 12, "profile_shift": -0.4, "rack_tip_radius": 0.0, "hub_radius": 0.006},
     "positive": {"teeth": 62, "profile_shift": 1.6},
     "negative": {"teeth": 62, "profile_shift": -1.3, "thinning": 50e-6},
     "nearly pointed": {"teeth": 20, "profile_shift": 0.5, "tip_diameter": 47.03e-3, "tip_edge_radius": 20e-6},

@@ -19,17 +19,17 @@ MakeGear = Callable[..., Gear]
 MakeRig = Callable[..., Rig]
 
 ALONE = {
-    "undercut": (
-        {"profile_shift": -0.9},
-        r"profile_shift = -0\.9 undercuts .*at least (\S+) with",
+    "cut off": (
+        {"teeth": 9, "profile_shift": -1.2, "dedendum": 1.4, "rack_tip_radius": 0.0, "addendum": 1.5},
+        r"profile_shift = -1\.2 cuts the teeth off .*: at least (\S+) with",
         "profile_shift",
         1,
     ),
-    "undercut by thinning": (
-        {"teeth": 18, "thinning": 500e-6},
-        r"profile_shift = 0 undercuts .*at least (\S+) with .*thinning_um = 500",
-        "profile_shift",
-        1,
+    "nothing left of the involute": (
+        {"teeth": 30, "profile_shift": -1.5, "tip_diameter": 56.2e-3, "tip_edge_radius": 0.0},
+        r"tip_diameter_mm = 56\.2 leaves no involute: .* form diameter of (\S+) mm",
+        "tip_diameter",
+        1e-3,
     ),
     "pointed": (
         {"profile_shift": 0.6, "tip_diameter": 50e-3, "tip_edge_radius": 0.0},
@@ -168,6 +168,11 @@ def test_pair_refusals_name_a_limit_that_is_allowed(gear: MakeGear, rig: MakeRig
     else:
         common = {"centre_distance": limit}
     pair(rig(gear(**driver), gear(**driven), **common))
+
+
+def test_a_rack_that_reaches_the_centre(gear: MakeGear) -> None:
+    with pytest.raises(GeometryError, match=r"dedendum = 1\.5 leaves no root circle: at most 1\.4000 with teeth = 5"):
+        profile(gear(teeth=5, profile_shift=-1.0, dedendum=1.5, hub_radius=1e-4, rack_tip_radius=0.1))
 
 
 def test_impossible_centre_distance(gear: MakeGear, rig: MakeRig) -> None:

@@ -20,6 +20,11 @@ GEARS = {
     "sharp rack": {"teeth": 30, "rack_tip_radius": 0.0},
     "sharp tip": {"teeth": 40, "tip_edge_radius": 0.0},
     "steep": {"teeth": 25, "pressure_angle": radians(25), "rack_tip_radius": 0.25},
+    "z8 undercut": {"teeth": 8},
+    "z10 undercut": {"teeth": 10, "thinning": 60e-6},
+    "z12 undercut by a sharp rack": {"teeth": 12, "rack_tip_radius": 0.0},
+    "z20 undercut by shift": {"teeth": 20, "profile_shift": -0.7},
+    "z17 slightly undercut": {"teeth": 17, "profile_shift": -0.001},
 }
 
 

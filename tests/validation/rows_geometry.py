@@ -73,7 +73,7 @@ def kinematics() -> float:
 CHECKS = [
     Check(
         "geometry-rack",
-        "involute and trochoid against the rolling rack, 9 gears",
+        f"involute and trochoid against the rolling rack, {len(GEARS)} gears, 5 undercut",
         1e-9,
         "m",
         profile_against_rack,
