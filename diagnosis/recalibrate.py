@@ -7,8 +7,9 @@ Minimised over the parameters z (in standard deviations of their priors):
 
 A block is one record, channel, band, and either the rotation's lines or the others. Its variance is not known and
 has been maximised out of the likelihood, so a block that the model cannot explain loses its weight by itself: that
-is what makes the fit robust. s_b^2 is the noise of the rows' mean plus a thousandth of the measured level squared,
-below which no model is right. Neighbouring lines err alike: a block counts as n_b <= 8 independent ones.
+is what makes the fit robust. s_b^2 is the noise of the rows' mean plus the square of a hundredth of the measured
+level, below which no model is right (and where flanks separate now and then, J is too rough to descend). Neighbouring
+lines err alike: a block counts as n_b <= 8 independent ones.
 
 As log is concave, least squares with weights 2 n_b / (s_b^2 + C_b) bounds J from above: a full Gauss-Newton step
 lowers J where the replay is linear. Elsewhere it is halved until it does, or not taken. The Jacobian comes from finite
@@ -45,7 +46,7 @@ FITTED = ("dte", "y_driver", "y_driven", "torque_driven")
 # Independent lines that a block counts as, at most.
 INDEPENDENT = 8
 # Part of the measured level below which no model is right.
-LEVEL = 1e-3
+LEVEL = 1e-2
 # Part of a channel's level that rounding leaves on its silent lines.
 ROUNDING = 1e-6
 # Finite-difference step, largest step and smallest gain worth another iteration [sd; sd; units of J].
@@ -81,7 +82,7 @@ def recalibrate(
     measurements: Sequence[Measurement],
     simulate: Simulate,
     *,
-    iterations: int = 5,
+    iterations: int = 8,
 ) -> Recalibration:
     """The case with its parameters moved to where J is least near the start; never with a higher J.
 
