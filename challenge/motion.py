@@ -216,9 +216,7 @@ def _drive(c: Array, time: float, torque: float, s: Array, rate: Array) -> float
 
 
 @njit(nogil=True, cache=True, fastmath=FASTMATH)
-def _derivative(
-    c: Array, mesh: Mesh, time: float, torque: float, s: Array, rate: Array, seen: Array
-) -> None:
+def _derivative(c: Array, mesh: Mesh, time: float, torque: float, s: Array, rate: Array, seen: Array) -> None:
     d = DEGREES
     progress = max(time, 0.0) / c[DRIFT + 3]
     angle1, angle2 = c[SPEED_DRIVER] * time + s[1], c[SPEED_DRIVEN] * time + s[2]
@@ -282,9 +280,7 @@ def _derivative(
 
 
 @njit(nogil=True, cache=True, fastmath=FASTMATH)
-def _run(
-    c: Array, mesh: Mesh, torque: Array, s: Array, h: float, first: int, stride: int, out: Array
-) -> None:
+def _run(c: Array, mesh: Mesh, torque: Array, s: Array, h: float, first: int, stride: int, out: Array) -> None:
     """Advance the state `s` in place and fill `out`."""
     k1, k2, k3, k4 = np.empty(STATES), np.empty(STATES), np.empty(STATES), np.empty(STATES)
     trial = np.empty(STATES)

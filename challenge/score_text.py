@@ -67,8 +67,7 @@ def _by_effect(score: Table) -> str:
         place = rows["place_right"]["count"]
         right = rate_text(rows[good]) + ("" if good == "right" else " refused")
         lines.append(
-            f"{name or 'none':24}{right:28}{bad:>6}{rows['missed']['count']:>8}"
-            f"{rows['refused']['count']:>9}{place:>7}"
+            f"{name or 'none':24}{right:28}{bad:>6}{rows['missed']['count']:>8}{rows['refused']['count']:>9}{place:>7}"
         )
     return "\n".join(lines) if len(lines) > 1 else ""
 
