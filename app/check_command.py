@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from math import isnan
 from pathlib import Path
+from typing import Annotated
 
 import typer
 
@@ -11,15 +13,23 @@ from gearbench.options import CaseArgument, JsonOption, SetOption, load_case, pr
 from gearbench.simulate_command import experiments, plan
 
 
-def check(case: CaseArgument, settings: SetOption = None, as_json: JsonOption = False) -> None:
-    """Print the data sheet of a case: diameters, contact ratio, backlash, masses; or say what is wrong.
+def check(
+    case: CaseArgument,
+    diameter: Annotated[
+        list[float] | None,
+        typer.Option("--diameter-mm", help="give the tooth thickness at this diameter too (may be repeated)"),
+    ] = None,
+    settings: SetOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Print the data sheet of a case: diameters, contact ratio, sliding, backlash, gauges, masses; or what is wrong.
 
     For a comb multisine also its residue and which kinds of response then share lines.
     """
     loaded = load_case(case, settings)
     from gearbench.geometry import data_sheet
 
-    rows = data_sheet(loaded.rig)
+    rows = data_sheet(loaded.rig, [1e-3 * number for number in diameter or []])
     plan(loaded)
     names = [condition.name for condition in loaded.conditions] or [""]
     under = [experiment for experiment, _ in experiments(loaded, Path("record.nc"))]
@@ -31,17 +41,17 @@ def check(case: CaseArgument, settings: SetOption = None, as_json: JsonOption = 
     typer.echo(f"{loaded.name}\n")
     shared = [row for row in rows if not row.name.startswith(("driver ", "driven "))]
     for row in shared:
-        typer.echo(f"  {row.name:<40} {_figure(row.value):>12}  {row.unit}".rstrip())
-    typer.echo(f"\n  {'':<40} {'driver':>12} {'driven':>12}")
+        typer.echo(f"  {row.name:<46} {_figure(row.value):>12}  {row.unit}".rstrip())
+    typer.echo(f"\n  {'':<46} {'driver':>12} {'driven':>12}")
     driven = {row.name.removeprefix("driven "): row.value for row in rows if row.name.startswith("driven ")}
     for row in rows:
         name = row.name.removeprefix("driver ")
         if name != row.name:
             both = f"{_figure(row.value):>12} {_figure(driven[name]):>12}"
-            typer.echo(f"  {name:<40} {both}  {row.unit}".rstrip())
+            typer.echo(f"  {name:<46} {both}  {row.unit}".rstrip())
     for comb in combs:
         typer.echo("\n  " + "\n  ".join(comb_lines(comb)))
 
 
 def _figure(value: float) -> str:
-    return f"{value:.6g}"
+    return "-" if isnan(value) else f"{value:.6g}"

@@ -32,39 +32,22 @@ def tip_path(gear: Profile, mate: Profile, distance: float, working_pressure_ang
     return distance * radial(own) - radius * radial(own + ahead - ratio * turned)
 
 
-def _faced(gear: Profile) -> tuple[Array, Array]:
-    """Points (n, 2) and normals (n, 2) that the tip arc is held against: the fillet and, where undercut ends it in a
-    corner, the involute beyond; the corner then stands at SAMPLES - 1 and at SAMPLES, with either normal."""
-    beta = np.linspace(0.0, gear.beta_form, SAMPLES)
-    points, normals = gear.fillet(beta), gear.fillet_normals(beta)
-    if not gear.undercut:
-        return points, normals
-    rho = np.linspace(gear.rho_form, gear.rho_end, SAMPLES)
-    return np.concatenate((points, gear.involute(rho))), np.concatenate((normals, gear.involute_normals(rho)))
-
-
 def fillet_clearance(gear: Profile, mate: Profile, distance: float, working_pressure_angle: float) -> float:
-    """Smallest gap [m] between the mate's tip-edge arc and the fillet of `gear` (with undercut, its corner and flank
-    too); negative: it cuts in.
+    """Smallest gap [m] between the mate's tip-edge arc and the fillet of `gear`; negative: it cuts in.
 
-    Signed along the normals, so that an error of the nearest sample counts only in second order.
+    Signed along the fillet's normals, so that an error of the nearest sample counts only in second order. A tip that
+    cuts off the outward corner of an undercut flank enters the fillet too.
     """
     path = tip_path(gear, mate, distance, working_pressure_angle)
-    points, normals = _faced(gear)
+    beta = np.linspace(0.0, gear.beta_form, SAMPLES)
+    points, normals = gear.fillet(beta), gear.fillet_normals(beta)
     nearest = np.argmin(cdist(path, points), axis=1)
     # Beyond the ends the arc faces the involute or the root circle, which have their own checks.
-    inside = (nearest > 0) & (nearest < len(points) - 1)
+    inside = (nearest > 0) & (nearest < SAMPLES - 1)
     if not inside.any():
         return float("inf")
     path, nearest = path[inside], nearest[inside]
-    away = path - points[nearest]
-    gap = np.einsum("ij,ij->i", away, normals[nearest])
-    if gear.undercut:
-        # An outward corner: before it lies what either normal points to.
-        corner = (nearest == SAMPLES - 1) | (nearest == SAMPLES)
-        ahead = np.max(away[corner] @ normals[SAMPLES - 1 : SAMPLES + 1].T, axis=1, initial=-np.inf)
-        gap[corner] = np.copysign(np.linalg.norm(away[corner], axis=1), ahead)
-    return float(np.min(gap)) - mate.edge_radius
+    return float(np.min(np.einsum("ij,ij->i", path - points[nearest], normals[nearest]))) - mate.edge_radius
 
 
 def with_tip(gear: Profile, radius: float) -> Profile:
