@@ -41,7 +41,8 @@ def compare(
         return
     for row in whole:
         name = f"{row.quantity}, {row.phase_or_band}"
-        typer.echo(f"{name:<48} {row.a:>10.5g} {row.b:>10.5g} {row.unit:<5} {row.percent:>+8.1f} %")
+        change = f"{row.percent:>+8.1f} %" if row.of_difference is None else f"{row.difference:>8.3g} {row.unit} apart"
+        typer.echo(f"{name:<48} {row.a:>10.5g} {row.b:>10.5g} {row.unit:<5} {change}")
     for note in notes:
         typer.echo(f"note: {note}")
     typer.echo(f"{out}: compare.csv, {', '.join(pictures)}")

@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from gearbench.bench.compare_records import differences
 from gearbench.bench.errors import BenchError
 from gearbench.bench.measures import mesh_orders, mode_range, synchronous_mean
 from gearbench.records import SCHEMA as RECORD_SCHEMA
@@ -27,22 +28,26 @@ _SCHEMAS = {"gearbench-record/1": "record", "gearbench-static/1": "static", "gea
 
 
 class Row(NamedTuple):
-    """One line of compare.csv; `difference` is b - a, `percent` relates it to a."""
+    """One line of compare.csv; `difference` is b - a, `percent` relates it to a.
+
+    For the rms of a signal, `of_difference` is the rms of the difference of both signals and takes its place.
+    """
 
     quantity: str
     phase_or_band: str
     unit: str
     a: float
     b: float
+    of_difference: float | None = None
 
     @property
     def difference(self) -> float:
-        """b - a."""
-        return self.b - self.a
+        """b - a, or the rms of the difference."""
+        return self.b - self.a if self.of_difference is None else self.of_difference
 
     @property
     def percent(self) -> float:
-        """100 (b - a) / |a|; NaN where a is 0."""
+        """100 difference / |a|; NaN where a is 0."""
         return 100 * self.difference / abs(self.a) if self.a else float("nan")
 
 
@@ -161,7 +166,9 @@ def _dte_rows(one: Results, two: Results) -> list[Row]:
     first, second = _dte(one, PHASES), _dte(two, PHASES)
     if first is None or second is None:
         return []
-    return _phase_rows("DTE, mean over mesh periods", "um", 1e6 * first, 1e6 * second)
+    assert one.record is not None and two.record is not None
+    rows = [Row(*found) for found in differences(one.record, two.record)]
+    return rows + _phase_rows("DTE, mean over mesh periods", "um", 1e6 * first, 1e6 * second)
 
 
 def _mode_rows(one: Results, two: Results) -> list[Row]:

@@ -8,6 +8,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
+from gearbench.identification.transmission_error import dte
+
 Array = NDArray[np.float64]
 
 
@@ -28,9 +30,10 @@ def synchronous_mean(record: xr.Dataset, channel: str = "dte", points: int = 256
     """Mean of a channel over mesh periods and realisations: phases (points,) [cycles], values (points,).
 
     A sample counts in the phase interval that it falls into; an interval without one is interpolated. Phase
-    comes from the `mesh_phase` of the record, or from its `mesh_period` and time (origin arbitrary then).
+    comes from the `mesh_phase` of the record, or from its `mesh_period` and time (origin arbitrary then). A DTE
+    that the record does not hold is computed from its angles and displacements.
     """
-    signal = record[channel].values
+    signal = (dte(record) if channel == "dte" else record[channel]).values
     if "mesh_phase" in record:
         phase = record["mesh_phase"].values % 1.0
     else:

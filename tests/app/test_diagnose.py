@@ -13,9 +13,11 @@ from shared.fake_diagnosis import at_rest, friction_found, nothing_found, unknow
 from shared.measured import channels, nominal, written
 
 import gearbench.diagnosis_job as job
+from gearbench.bench.compare_records import differences
 from gearbench.cli import run_command_line
 from gearbench.diagnosis.verdict import read_verdict
 from gearbench.diagnosis_job import take_in
+from gearbench.records import read_record
 from gearbench.report_html import bar, items, page, table, text
 from gearbench.rig import Case, read_case
 
@@ -121,6 +123,19 @@ def test_all_products_and_what_they_hold(
     assert updated.rig.friction.coefficient == 0.0581 and recalibrated.rig.friction.coefficient == 0.0
     assert updated.rig.support.driver.stiffness == recalibrated.rig.support.driver.stiffness == 0.98e8
     assert updated.conditions == nominal().conditions
+
+
+def test_compare_reproduces_the_gap_of_the_verdict(records: list[Path], tmp_path: Path, asked: dict) -> None:
+    out = tmp_path / "out"
+    assert run(records, out) == 0
+    measured = read_record(records[2])
+    rig = read_case(out / "updated.toml")
+    told = {(gap.channel, gap.band_hz[1]): gap for gap in read_verdict(out / "verdict.json").gap}
+    for case, stage in ((nominal(), "nominal"), (rig, "with_effect")):
+        rows = {row.quantity: row for row in differences(measured, at_rest(case, measured)) if row.band == "0-150 Hz"}
+        for quantity, channel in (("DTE, rms", "dte"), ("y of the driver, rms", "y_driver")):
+            gap = getattr(told[channel, 150.0], stage)
+            assert rows[quantity].difference == pytest.approx(1e6 * gap.value, rel=1e-6)
 
 
 def test_the_report_is_one_page_that_opens_offline(records: list[Path], tmp_path: Path, asked: dict) -> None:

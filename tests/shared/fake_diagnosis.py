@@ -100,6 +100,7 @@ def at_rest(case: Case, record: xr.Dataset) -> xr.Dataset:
         "angle_driven": 2 * pi * cycles / 30,
         "y_driver": -y1,
         "y_driven": y2,
+        "mesh_phase": cycles,
     }
     about = {**record.attrs, "samples_per_period": samples, "periods": 1}
     return make_record({name: value[None] for name, value in channels.items()}, about)
