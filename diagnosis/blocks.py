@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from gearbench.diagnosis.condition import Condition
 from gearbench.diagnosis.machine import Machine
+from gearbench.diagnosis.rows import Residuals
 from gearbench.diagnosis.unknowns import ROWS
 
 Array = NDArray[np.float64]
@@ -23,6 +24,7 @@ Complex = NDArray[np.complex128]
 KINDS = ("operating", "excited", "driver-shaft", "driven-shaft", "other")
 BLOCK = 8  # bins
 SHRINK = 1.5  # exponent of the prior on lambda
+ALIASED = 2e-5  # of the mean mesh force: what folds back from beyond the sampled band
 AUDIBLE = 3.0  # times the noise
 EXCITED = 0.05  # of the largest torque line
 
@@ -55,11 +57,11 @@ def kinds_of(condition: Condition) -> NDArray[np.int64]:
 
 
 def cut(machine: Machine, condition: Condition, level: Array, relative: Array, separates: bool) -> Blocks:
-    """Blocks of a condition. `level` (rows, K) [N] is each row's own estimate of the mesh force (NaN: no such row),
-    `relative` (rows + 1, K) the floors as shares of the block's force. Where flanks separate, impacts reach beyond the
+    """Blocks of a condition. `level` (rows + 1, K) [N] is the mesh force as each row (NaN: no such row) and the nominal
+    mesh law have it, `relative` (rows + 1, K) the floors as shares of the block's force. Where flanks separate, impacts reach beyond the
     sampled band and only excited and operating bins are used."""
     kind = kinds_of(condition)
-    present = np.flatnonzero(np.isfinite(level).all(axis=1))
+    present = np.flatnonzero(np.isfinite(level[:-1]).all(axis=1))
     of_bin = np.full(condition.bins, -1)
     kinds, counts, centres = [], [], []
     for label in range(2 if separates else len(KINDS)):
@@ -72,22 +74,25 @@ def cut(machine: Machine, condition: Condition, level: Array, relative: Array, s
             centres.append(condition.frequency[chosen].mean())
     number = len(kinds)
     inside = of_bin >= 0
-    power = np.zeros((len(present), number))
-    for i, row in enumerate(present):
-        power[i] = np.bincount(of_bin[inside], np.abs(level[row, inside]) ** 2, number) / np.array(counts)
-    size = np.median(power, axis=0)
-    noise = _noise(machine, condition)
-    loudest = np.bincount(of_bin[inside], noise[[*present, len(ROWS)]].max(axis=0)[inside], number) / np.array(counts)
-    # In bins of noise alone the mesh force is stiffness times noise: they would pull every stiffness to zero.
-    heard = size > AUDIBLE**2 * loudest
+    counted = np.array(counts, dtype=float)
+
+    def mean(values: Array) -> Array:
+        return np.bincount(of_bin[inside], values[inside], number) / counted
+
+    noise = _noise(machine, condition) + (ALIASED * condition.force_level) ** 2
+    size = np.median([mean(np.abs(level[row]) ** 2) for row in present], axis=0)
+    moved = mean(np.abs(level[-1]) ** 2)
+    # In bins of noise alone there is nothing to explain.
+    heard = (size > AUDIBLE**2 * mean(noise[present].max(axis=0))) | (moved > AUDIBLE**2 * mean(noise[-1]))
     renumber = np.where(heard, np.cumsum(heard) - 1, -1)
     used = np.flatnonzero(inside)[heard[of_bin[inside]]]
     floor = relative**2 * size[of_bin] + noise
+    floor[-1] += relative[-1] ** 2 * np.maximum(moved - size, 0.0)[of_bin]
     return Blocks(
         used=used,
         of_bin=renumber[of_bin[used]],
         kind=np.array(kinds)[heard],
-        count=np.array(counts, dtype=float)[heard],
+        count=counted[heard],
         frequency=np.array(centres)[heard],
         floor=floor[:, used],
         rows=present,
@@ -111,46 +116,71 @@ def _noise(machine: Machine, condition: Condition) -> Array:
     return np.stack([out[0], out[1], last, out[2], meshing])
 
 
-def missing(blocks: Blocks, residual: Complex, share: Complex, start: Array, rounds: int) -> tuple[Array, float]:
-    """Lambda (rows + 1, blocks) >= 1 by expectation-maximisation from `start`, and the cost
-    sum n log|V| + r^H V^-1 r + SHRINK log lambda."""
-    use = blocks.rows
-    r, g = residual[np.ix_(use, blocks.used)], share[np.ix_(use, blocks.used)]
-    floor = blocks.floor[[*use, len(ROWS)]]
-    number = len(blocks.count)
-    factor = start.copy()
-    for _ in range(rounds):
-        d = floor * factor[:, blocks.of_bin]
-        weight = np.abs(g) ** 2 / d[:-1]
-        precision = 1.0 / d[-1] + weight.sum(axis=0)
-        mean = -(np.conj(g) * r / d[:-1]).sum(axis=0) / precision
-        second = np.empty_like(d)
-        second[-1] = np.abs(mean) ** 2 + 1.0 / precision
-        second[:-1] = np.abs(r + g * mean) ** 2 + np.abs(g) ** 2 / precision
-        total = np.stack([np.bincount(blocks.of_bin, row, number) for row in second / floor])
-        factor = np.maximum(total / (blocks.count + SHRINK), 1.0)
-    return factor, cost_of(blocks, r, g, floor, factor)
+@dataclass(frozen=True)
+class Split:
+    """How given residuals divide under given lambda: `variance` (rows + 1, B) of the rows' and the mesh's own errors,
+    `weight` (rows, B) conj(g)/d, `precision` (B,) of the mesh's error, `mean` (B,) its expectation, `force` (B,) the
+    best estimate of the force in the mesh, `level` (B,) its mean square over the block."""
+
+    variance: Array
+    weight: Complex
+    precision: Array
+    mean: Complex
+    force: Complex
+    level: Array
 
 
-def cost_of(blocks: Blocks, r: Complex, g: Complex, floor: Array, factor: Array) -> float:
-    """The cost of residuals under given lambda."""
-    d = floor * factor[:, blocks.of_bin]
-    weight = np.abs(g) ** 2 / d[:-1]
-    precision = 1.0 / d[-1] + weight.sum(axis=0)
-    through = np.abs((np.conj(g) * r / d[:-1]).sum(axis=0)) ** 2 / precision
-    square = (np.abs(r) ** 2 / d[:-1]).sum(axis=0) - through
-    logdet = np.log(d).sum(axis=0) + np.log(precision)
-    return float((square + logdet).sum() + SHRINK * np.log(factor).sum())
-
-
-def whitened(blocks: Blocks, residual: Complex, share: Complex, columns: Complex, factor: Array) -> tuple[Array, Array]:
-    """Residuals (2 rows B,) and columns (2 rows B, unknowns), real, whose squares add up to r^H V^-1 r; `columns`
-    (4, B, unknowns) are those of the used bins."""
+def split(blocks: Blocks, found: Residuals, factor: Array) -> Split:
+    """The split of residuals (in the used bins) under lambda (rows + 1, blocks)."""
     use = blocks.rows
     d = blocks.floor[[*use, len(ROWS)]] * factor[:, blocks.of_bin]
-    here = np.ix_(use, blocks.used)
-    g = share[here] / np.sqrt(d[:-1])
-    r = residual[here] / np.sqrt(d[:-1])
+    r, g = found.left[use], found.share[use]
+    weight = np.conj(g) / d[:-1]
+    precision = 1.0 / d[-1] + (weight * g).real.sum(axis=0)
+    mean = -(weight * r).sum(axis=0) / precision
+    force = found.force - mean
+    number = len(blocks.count)
+    level = np.bincount(blocks.of_bin, np.abs(force) ** 2, number) / blocks.count
+    return Split(d, weight, precision, mean, force, level[blocks.of_bin])
+
+
+def missing(blocks: Blocks, found: Residuals, start: Array, rounds: int) -> tuple[Array, float]:
+    """Lambda (rows + 1, blocks) >= 1 by expectation-maximisation from `start`, and the cost there.
+
+    The cost is the sum over bins of log|V| + r^H V^-1 r and of the logarithm of the force's own mean square in the
+    block (its prior: Gaussian, of unknown size), plus SHRINK log lambda over the blocks.
+    """
+    use, number = blocks.rows, len(blocks.count)
+    r, g = found.left[use], found.share[use]
+    floor = blocks.floor[[*use, len(ROWS)]]
+    factor = start
+    for _ in range(rounds):
+        parts = split(blocks, found, factor)
+        second = np.empty_like(floor)
+        second[-1] = np.abs(parts.mean) ** 2 + 1.0 / parts.precision
+        second[:-1] = np.abs(r + g * parts.mean) ** 2 + np.abs(g) ** 2 / parts.precision
+        total = np.stack([np.bincount(blocks.of_bin, row, number) for row in second / floor])
+        factor = np.maximum(total / (blocks.count + SHRINK), 1.0)
+    return factor, cost_of(blocks, found, factor)
+
+
+def cost_of(blocks: Blocks, found: Residuals, factor: Array) -> float:
+    """The cost of residuals (in the used bins) under given lambda."""
+    r = found.left[blocks.rows]
+    parts = split(blocks, found, factor)
+    through = np.abs(parts.mean) ** 2 * parts.precision
+    square = (np.abs(r) ** 2 / parts.variance[:-1]).sum(axis=0) - through
+    logdet = np.log(parts.variance).sum(axis=0) + np.log(parts.precision)
+    return float((square + logdet + np.log(parts.level)).sum() + SHRINK * np.log(factor).sum())
+
+
+def whitened(blocks: Blocks, found: Residuals, columns: Complex, factor: Array) -> tuple[Array, Array]:
+    """Residuals (2 rows B,) and columns (2 rows B, unknowns), real, whose squares add up to r^H V^-1 r; all in the
+    used bins."""
+    use = blocks.rows
+    d = blocks.floor[[*use, len(ROWS)]] * factor[:, blocks.of_bin]
+    g = found.share[use] / np.sqrt(d[:-1])
+    r = found.left[use] / np.sqrt(d[:-1])
     j = columns[use] / np.sqrt(d[:-1])[..., None]
     # (1 + dm g g^H)^(-1/2) = 1 - t g g^H with one scalar a bin.
     norm = (np.abs(g) ** 2).sum(axis=0)
@@ -159,3 +189,16 @@ def whitened(blocks: Blocks, residual: Complex, share: Complex, columns: Complex
     j = j - g[..., None] * (t[:, None] * np.einsum("rk,rkp->kp", np.conj(g), j))
     flat, tall = r.ravel(), j.reshape(-1, j.shape[-1])
     return np.concatenate([flat.real, flat.imag]), np.concatenate([tall.real, tall.imag])
+
+
+def of_level(
+    blocks: Blocks, found: Residuals, columns: Complex, pressing: Complex, factor: Array
+) -> tuple[Array, Array]:
+    """Gradient (unknowns,) and curvature (unknowns, unknowns), without its negative part, of the cost's part that the
+    force's own size makes."""
+    parts = split(blocks, found, factor)
+    change = pressing + np.einsum("rk,rkp->kp", parts.weight, columns[blocks.rows]) / parts.precision[:, None]
+    gradient = 2 * ((np.conj(parts.force) / parts.level) @ change).real
+    scaled = change / np.sqrt(parts.level)[:, None]
+    tall = np.concatenate([scaled.real, scaled.imag])
+    return np.asarray(gradient), np.asarray(2 * tall.T @ tall)

@@ -19,6 +19,7 @@ from gearbench.diagnosis.parameters import Layout
 from gearbench.diagnosis.rows import (
     LOSS_FACTOR,
     Mesh,
+    Residuals,
     assemble,
     carried,
     corrected,
@@ -39,14 +40,17 @@ BACKLASH_STEP = 1e-7  # [m]
 
 def rows_and_columns(
     machine: Machine, condition: Condition, where: Layout, p: Array, used: NDArray[np.int64]
-) -> tuple[Complex, Complex, Complex]:
-    """Residuals (4, K) [N], shares of the mesh error (4, K), and derivatives (4, B, unknowns) of the residuals in the
-    B `used` bins to the unknowns."""
+) -> tuple[Residuals, Complex, Complex]:
+    """Residuals in the B `used` bins, their derivatives (4, B, unknowns) to the unknowns, and those (B, unknowns) of
+    the mesh force."""
     spectra = corrected(condition, where, p)
     state = mesh(machine, condition, where, p, spectra)
-    residual, share = assemble(machine, condition, where, p, spectra, state)
+    residuals = assemble(machine, condition, where, p, spectra, state)
     out = np.zeros((len(ROWS), len(used), where.size), dtype=complex)
     index, moved = _mesh_columns(machine, condition, where, p, spectra, state, used)
+    share = residuals.share
+    pressing = np.zeros((len(used), where.size), dtype=complex)
+    pressing[:, index] = moved.T
     # One error of the mesh force shows in every row, as strongly as the row weighs it.
     out[:, :, index] = -share[:, used, None] * moved.T
     put = _Put(out, used)
@@ -54,7 +58,7 @@ def rows_and_columns(
     forces = carried(machine, condition, where, p, state.force)
     _drive_columns(machine, condition, where, p, spectra, forces[0], share[0], put)
     _row_columns(condition, where, state, forces, share, put)
-    return residual, share, out
+    return residuals.at(used), out, pressing
 
 
 @dataclass(frozen=True)
@@ -219,3 +223,19 @@ def _row_columns(
         for knot, spectrum in enumerate(weighted):
             put(row, at + knot, spectrum)
             put(row, at + len(KNOTS) + knot, 1j * spectrum)
+
+
+def stiffening(condition: Condition, where: Layout, p: Array) -> tuple[float, Array]:
+    """Mean over the row of the logarithm of the mesh stiffness's factor, and its gradient (unknowns,)."""
+    gradient = np.zeros(where.size)
+    gradient[where["scale"]] = 1.0
+    loss = p[where["crack"]]
+    soft = softened(condition, loss)
+    left = (condition.share * soft).sum(axis=-1)
+    weaker = (condition.share * soft**2 / left[:, None])[..., None] * condition.bending
+    z1, z2 = condition.teeth
+    for side, (start, count) in enumerate(((0, z1), (z1, z2))):
+        total = np.bincount(condition.tooth[side].ravel(), weaker[..., side].ravel(), count) / condition.samples
+        at = slice(where["crack"].start + start, where["crack"].start + start + count)
+        gradient[at] = -total / (1.0 - loss[start : start + count]) ** 2
+    return float(np.log(np.maximum(modulation(condition, where, p), 1e-3)).mean()), gradient

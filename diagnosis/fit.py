@@ -1,6 +1,8 @@
 """Refit of all unknowns to the force residuals under one hypothesis, and its Laplace evidence.
 
-The cost is the negative logarithm of the posterior: that of `blocks` plus the Gaussian prior. Gauss-Newton steps with
+The cost is the negative logarithm of the posterior: that of `blocks`, plus the Gaussian prior, less the logarithm of
+how much the unknowns stretch the measured motion into forces (without it, zero stiffness would explain every error of
+motion). Gauss-Newton steps with
 the missing parts lambda re-estimated between them; a step that does not lower the cost is halved, then refused.
 """
 
@@ -13,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
-from gearbench.diagnosis.blocks import Blocks, missing, whitened
-from gearbench.diagnosis.columns import rows_and_columns
+from gearbench.diagnosis.blocks import Blocks, missing, of_level, whitened
+from gearbench.diagnosis.columns import rows_and_columns, stiffening
 from gearbench.diagnosis.condition import Condition
 from gearbench.diagnosis.machine import Machine
 from gearbench.diagnosis.parameters import Layout
@@ -23,9 +25,9 @@ from gearbench.diagnosis.unknowns import ROWS
 
 Array = NDArray[np.float64]
 
-ROUNDS = 6  # of expectation-maximisation between two steps
+ROUNDS = 12  # of expectation-maximisation between two steps
 HALVINGS = 4
-ENOUGH = 0.3  # change of the cost that no longer matters
+ENOUGH = 1.0  # change of the cost that no longer matters
 
 
 @dataclass(frozen=True)
@@ -41,12 +43,13 @@ class Problem:
 @dataclass(frozen=True)
 class Fit:
     """The unknowns (P,) of one hypothesis, prior `sd` (P,), `precision` (P, P) of the posterior, `information` (P, P)
-    of the data alone, lambda of every condition, cost without the prior's normalisation, and log evidence."""
+    of the data alone and their `pull` (P,): the data's cost is p' information p / 2 - pull p to second order; lambda of every condition, cost without the prior's normalisation, and log evidence."""
 
     p: Array
     sd: Array
     precision: Array
     information: Array
+    pull: Array
     factors: tuple[Array, ...]
     cost: float
     log_evidence: float
@@ -59,10 +62,10 @@ class Fit:
 
 
 def _score(problem: Problem, p: Array, sd: Array, factors: Sequence[Array], rounds: int) -> tuple[float, list[Array]]:
-    total, found = 0.5 * float(((p / sd) ** 2).sum()), []
+    total, found = 0.5 * float(((p / sd) ** 2).sum()) - stretch(problem, p)[0], []
     for condition, blocks, start in zip(problem.conditions, problem.blocks, factors, strict=True):
-        residual, share = rows(problem.machine, condition, problem.where, p)
-        factor, cost = missing(blocks, residual, share, start, rounds)
+        found_here = rows(problem.machine, condition, problem.where, p).at(blocks.used)
+        factor, cost = missing(blocks, found_here, start, rounds)
         total += cost
         found.append(factor)
     return total, found
@@ -72,11 +75,35 @@ def _normal(problem: Problem, p: Array, factors: Sequence[Array]) -> tuple[Array
     size = problem.where.size
     information, gradient = np.zeros((size, size)), np.zeros(size)
     for condition, blocks, factor in zip(problem.conditions, problem.blocks, factors, strict=True):
-        residual, share, columns = rows_and_columns(problem.machine, condition, problem.where, p, blocks.used)
-        r, j = whitened(blocks, residual, share, columns, factor)
-        information += 2 * (j.T @ j)
-        gradient += 2 * (j.T @ r)
-    return information, gradient
+        found, columns, pressing = rows_and_columns(problem.machine, condition, problem.where, p, blocks.used)
+        r, j = whitened(blocks, found, columns, factor)
+        slope, curve = of_level(blocks, found, columns, pressing, factor)
+        information += 2 * (j.T @ j) + curve
+        gradient += 2 * (j.T @ r) + slope
+    return information, gradient - stretch(problem, p)[1]
+
+
+def stretch(problem: Problem, p: Array) -> tuple[float, Array]:
+    """Log of the volume by which the unknowns stretch measured motion into the residuals, and its gradient (P,): mesh
+    stiffness for the deflection, dynamic stiffness for the supports."""
+    where, machine = problem.where, problem.machine
+    total, gradient = 0.0, np.zeros(where.size)
+    for condition, blocks in zip(problem.conditions, problem.blocks, strict=True):
+        level, slope = stiffening(condition, where, p)
+        total += 2 * blocks.used.size * level
+        gradient += 2 * blocks.used.size * slope
+        omega = condition.omega[blocks.used]
+        for side, row in enumerate((1, 3)):
+            if row not in blocks.rows:
+                continue
+            spring = machine.stiffness[side] * np.exp(p[where["stiffness"]][side])
+            damper = 1j * omega * machine.damping[side] * np.exp(p[where["damping"]][side])
+            inertia = -(omega**2) * machine.mass[side]
+            whole = spring + damper + inertia * (1 + p[where["mass"]][side])
+            total += 2 * float(np.log(np.abs(whole)).sum())
+            for key, part in (("stiffness", spring), ("damping", damper), ("mass", inertia)):
+                gradient[where[key].start + side] += 2 * float((part / whole).real.sum())
+    return total, gradient
 
 
 def refit(problem: Problem, sd: Array, start: Array, factors: Sequence[Array] | None = None, *, most: int = 12) -> Fit:
@@ -101,11 +128,11 @@ def refit(problem: Problem, sd: Array, start: Array, factors: Sequence[Array] | 
             length *= 0.4
         if before - cost < ENOUGH:
             break
-    information, _ = _normal(problem, p, lambdas)
+    information, gradient = _normal(problem, p, lambdas)
     precision = information + np.diag(1 / sd**2)
     scaled = precision * sd[:, None] * sd[None, :]
     evidence = -cost - 0.5 * float(np.linalg.slogdet(scaled)[1])
-    return Fit(p, sd, precision, information, tuple(lambdas), cost, evidence, steps)
+    return Fit(p, sd, precision, information, information @ p - gradient, tuple(lambdas), cost, evidence, steps)
 
 
 def _solve(information: Array, sd: Array, right: Array) -> Array:

@@ -77,10 +77,9 @@ def free_forms() -> tuple[Hypothesis, ...]:
 
 def predicted_evidence(fit: Fit, sd: Array) -> float:
     """Log evidence under other priors `sd` (P,), by the quadratic that the fit found for the data alone."""
-    pull = fit.precision @ fit.p
     scaled = fit.information * sd[:, None] * sd[None, :] + np.eye(len(sd))
     factor = np.linalg.cholesky(scaled)
-    half = np.linalg.solve(factor, sd * pull)
+    half = np.linalg.solve(factor, sd * fit.pull)
     return 0.5 * float(half @ half) - float(np.log(np.diag(factor)).sum())
 
 

@@ -160,11 +160,22 @@ def support_force(machine: Machine, side: int, y: Array, log_stiffness: float, m
     return force, force * np.log(size)
 
 
-def rows(machine: Machine, condition: Condition, where: Layout, p: Array) -> tuple[Complex, Complex]:
-    """Force residuals (4, K) [N] of the unknowns, and the share (4, K) of an error of the mesh force in each.
+@dataclass(frozen=True)
+class Residuals:
+    """Force residuals `left` (4, K) [N], `share` (4, K) of an error of the mesh force in each, and the spectrum
+    `force` (K,) [N] of the mesh force itself. Rows of channels that the record lacks are NaN."""
 
-    Rows of channels that the record lacks are NaN.
-    """
+    left: Complex
+    share: Complex
+    force: Complex
+
+    def at(self, used: NDArray[np.int64]) -> Residuals:
+        """The same at some bins."""
+        return Residuals(self.left[:, used], self.share[:, used], self.force[used])
+
+
+def rows(machine: Machine, condition: Condition, where: Layout, p: Array) -> Residuals:
+    """Force residuals under the unknowns."""
     spectra = corrected(condition, where, p)
     state = mesh(machine, condition, where, p, spectra)
     return assemble(machine, condition, where, p, spectra, state)
@@ -182,7 +193,8 @@ def carried(machine: Machine, condition: Condition, where: Layout, p: Array, for
 
 def assemble(
     machine: Machine, condition: Condition, where: Layout, p: Array, spectra: Mapping[str, Complex], state: Mesh
-) -> tuple[Complex, Complex]:
+) -> Residuals:
+    """Residuals of given channel spectra (`corrected`) and mesh."""
     k, n = condition.bins, condition.samples
     s = 1j * condition.omega[:k]
     rb1, rb2 = machine.base_radius
@@ -203,7 +215,7 @@ def assemble(
         out[row] = sign * support(machine, condition, where, p, side, spectra[channel]) - middle
     filters = _filters(condition, where, p)
     out += filters * np.stack([share[0] * first, middle, last, middle])
-    return out, share
+    return Residuals(out, share, _transform(condition, state.force))
 
 
 def support(machine: Machine, condition: Condition, where: Layout, p: Array, side: int, y: Complex) -> Complex:

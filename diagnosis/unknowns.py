@@ -51,7 +51,7 @@ def unknowns(machine: Machine, conditions: Sequence[Condition]) -> Layout:
         block("curvature", NUISANCE, "1", ("mesh",), 0.05, low=-0.5, high=0.5),
         block("shape", NUISANCE, "1", 2 * SHAPE_ORDERS, 0.04),
         block("profile", NUISANCE, "m", 2 * SHAPE_ORDERS, 0.5e-6),
-        block("compliance", NUISANCE, "1", complex_knots, 0.08),
+        block("compliance", NUISANCE, "1", complex_knots, 0.25),
         *(block(f"filter-{row}", f"free-{row}", "1", complex_knots, 0.03, 1.0) for row in ROWS),
         block("friction", "friction", "1", ("coefficient",), 0.006, 0.08),
         block("eccentricity", "eccentricity", "m", ("cos1", "sin1", "cos2", "sin2"), 0.5e-6, 6e-6),

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from shared.synthetic import measurement
 
-from gearbench.diagnosis.blocks import Blocks, cost_of, missing, whitened
+from gearbench.diagnosis.blocks import Blocks, cost_of, missing, split, whitened
 from gearbench.diagnosis.columns import rows_and_columns
 from gearbench.diagnosis.condition import Condition, prepare
 from gearbench.diagnosis.fit import Fit
 from gearbench.diagnosis.hypotheses import predicted_evidence
 from gearbench.diagnosis.machine import Machine, machine
 from gearbench.diagnosis.parameters import Layout
-from gearbench.diagnosis.rows import rows
+from gearbench.diagnosis.rows import Residuals, rows
 from gearbench.diagnosis.unknowns import unknowns
 from gearbench.rig import read_case
 
@@ -38,11 +38,11 @@ def test_columns_are_derivatives_of_the_residuals(prepared: tuple[Machine, Condi
     p[where["friction"]] = 0.0
     for key in ("filter-drive", "filter-load", "filter-driver-support", "filter-driven-support"):
         p[where[key]] = 0.0
-    _, _, columns = rows_and_columns(made, condition, where, p, np.arange(condition.bins))
+    _, columns, _ = rows_and_columns(made, condition, where, p, np.arange(condition.bins))
     for entry, name in enumerate(where.names()):
         step = np.zeros(where.size)
         step[entry] = 1e-4 * sd[entry]
-        difference = rows(made, condition, where, p + step)[0] - rows(made, condition, where, p - step)[0]
+        difference = rows(made, condition, where, p + step).left - rows(made, condition, where, p - step).left
         difference /= 2 * step[entry]
         if name == "backlash.more":  # these flanks never separate
             assert not difference.any() and not columns[:, :, entry].any()
@@ -67,7 +67,10 @@ def test_one_blocks_covariance_is_the_dense_one() -> None:
     floor = rng.uniform(0.5, 2.0, (5, bins))
     factor = rng.uniform(1.0, 3.0, (5, 1))
     blocks = Blocks(np.arange(bins), np.zeros(bins, int), np.zeros(1, int), np.array([5.0]), np.ones(1), floor, np.arange(4))
-    flat, tall = whitened(blocks, r, g, j, factor)
+    force = 3 * rng.standard_normal(bins) + 1j
+    found = Residuals(r, g, force)
+    flat, tall = whitened(blocks, found, j, factor)
+    level = np.mean(np.abs(split(blocks, found, factor).force) ** 2)
     square, gram, cost = 0.0, np.zeros((unknown, unknown)), 0.0
     for k in range(bins):
         d = floor[:, k] * factor[:, 0]
@@ -79,8 +82,8 @@ def test_one_blocks_covariance_is_the_dense_one() -> None:
     assert flat @ flat == pytest.approx(square, rel=1e-12)
     assert tall.T @ tall == pytest.approx(gram, rel=1e-12)
     # log|V| = sum log d + log(1/dm + sum |g|^2/d), with the mesh's own log d counted in the sum.
-    wanted = cost + square + 1.5 * float(np.log(factor).sum())
-    assert cost_of(blocks, r, g, floor, factor) == pytest.approx(wanted, rel=1e-12)
+    wanted = cost + square + 1.5 * float(np.log(factor).sum()) + bins * float(np.log(level))
+    assert cost_of(blocks, found, factor) == pytest.approx(wanted, rel=1e-12)
 
 
 def test_missing_part_is_found_in_the_row_that_has_it() -> None:
@@ -95,11 +98,12 @@ def test_missing_part_is_found_in_the_row_that_has_it() -> None:
     mesh = noise(1.0)
     r = np.stack([noise(1.0), noise(5.0), noise(1.0), noise(1.0)]) - mesh
     blocks = Blocks(np.arange(bins), numbers, np.zeros(100, int), np.full(100, 8.0), np.ones(100), np.ones((5, bins)), np.arange(4))
-    factor, cost = missing(blocks, r, g, np.ones((5, 100)), 100)
+    found = Residuals(r, g, 10 * g[0])
+    factor, cost = missing(blocks, found, np.ones((5, 100)), 100)
     level = np.median(factor, axis=1)
     assert level[1] == pytest.approx(25.0, rel=0.25)
     assert max(level[[0, 2, 3, 4]]) < 1.7
-    assert cost < cost_of(blocks, r, g, np.ones((5, bins)), np.ones((5, 100)))
+    assert cost < cost_of(blocks, found, np.ones((5, 100)))
 
 
 def test_predicted_evidence_is_that_of_a_linear_model() -> None:
@@ -114,6 +118,6 @@ def test_predicted_evidence_is_that_of_a_linear_model() -> None:
     information = columns.T @ columns
     precision = information + np.diag(1 / narrow**2)
     p = np.linalg.solve(precision, columns.T @ data)
-    fit = Fit(p, narrow, precision, information, (), 0.0, 0.0, 1)
+    fit = Fit(p, narrow, precision, information, columns.T @ data, (), 0.0, 0.0, 1)
     got = predicted_evidence(fit, wide) - predicted_evidence(fit, narrow)
     assert got == pytest.approx(exact(wide) - exact(narrow), rel=1e-10)
