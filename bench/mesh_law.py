@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
+from functools import lru_cache
 from math import ceil, log, pi
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -30,7 +33,6 @@ NODES = 49
 LOAD_STEP = 2**0.5  # tables are solved up to the next power of this [N m], so that similar loads share them
 REFERENCE = 0.3  # of the largest load: where the shares of the pairs are taken
 OFFSETS = 4  # pairs looked at on either side of the one at the pitch point
-VERSION = 1  # of the tables' meaning; part of their name on disk
 
 
 def mesh_law(rig: Rig, simulation: Simulation, load_max_nm: float) -> MeshLaw:
@@ -52,7 +54,7 @@ def mesh_law(rig: Rig, simulation: Simulation, load_max_nm: float) -> MeshLaw:
         "centre": meshing.centre_distance,
         "element_size": simulation.element_size,
         "load": load,
-        "grid": f"{VERSION} {PHASES} {NODES} {OFFSETS} {REFERENCE}",
+        "source": _source(),
     }
     arrays = cached(key_for("mesh-law", values), lambda: _solve(elastic_rig(sound, simulation), load))
     return _assemble(sound, meshing, arrays["approach"], arrays["force"], arrays["share"])
@@ -88,6 +90,12 @@ def _table_load(rig: Rig, meshing: Pair, load_max: float) -> float:
             " for this pair"
         )
     return float(min(LOAD_STEP ** ceil(log(load_max) / log(LOAD_STEP) - 1e-9), most))
+
+
+@lru_cache(maxsize=1)
+def _source() -> str:
+    """Hash of this file: tables that another state of it has solved are not taken from disk."""
+    return hashlib.sha256(Path(__file__).read_bytes()).hexdigest()
 
 
 @compiled

@@ -8,6 +8,7 @@ from math import ceil, gcd, lcm, log
 import numpy as np
 from numpy.typing import NDArray
 
+from gearbench.bench.effects import refuse_unknown
 from gearbench.bench.errors import BenchError
 from gearbench.bench.excitation import Torque
 from gearbench.bench.mesh_law import mesh_law
@@ -151,6 +152,7 @@ def make_setup(
 
     Raises LumpedError, BenchError, GeometryError or ContactError.
     """
+    refuse_unknown(rig)
     law = law or mesh_law(rig, simulation, largest_load(experiment))
     model = nonlinear_model(rig, meshing, law)
     band = experiment.multisine.band[1] if experiment.multisine is not None else 0.0

@@ -6,6 +6,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from gearbench.bench.effects import refuse_unknown
 from gearbench.bench.mesh_law import mesh_law
 from gearbench.bench.static import Loads, static_dataset
 from gearbench.geometry import Pair, pair
@@ -36,6 +37,7 @@ def deflection(law: MeshLaw, force: Array, phase: Array) -> Array:
 
 def static_nonlinear(case: Case, loads: Loads, phase: Array) -> xr.Dataset:
     """Static response with errors and cracks as the first pairs have them, from mesh phase 0; no friction."""
+    refuse_unknown(case.rig)
     meshing = pair(case.rig)
     radius = meshing.driver.base_radius
     unit, values = loads

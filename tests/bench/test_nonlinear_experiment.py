@@ -291,3 +291,22 @@ def test_finite_elements_refuse_what_they_do_not_represent(effect: str) -> None:
     if {"driver", "driven", "mesh"} & set(EFFECTS[effect][0]):
         with pytest.raises(BenchError, match="static finite-element solution does not represent"):
             static(case, "reduced")
+
+
+def test_an_effect_that_no_lumped_model_knows_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = ("rig.friction.coefficient", "rig.driver.new_um")
+    monkeypatch.setattr("gearbench.bench.effects.effects_in", lambda rig: found)
+    with pytest.raises(BenchError, match=r"the lumped model does not represent rig\.driver\.new_um: leave"):
+        simulate(make_case())
+    with pytest.raises(BenchError, match=r"the lumped model does not represent rig\.driver\.new_um: leave"):
+        static(make_case())
+
+
+def test_tables_made_in_pieces_give_the_same_record(monkeypatch: pytest.MonkeyPatch) -> None:
+    case = make_case(driver={"runout": 5e-6, "crack": Crack(tooth=3, stiffness_loss=0.4)})
+    whole = simulate(case)
+    monkeypatch.setattr("gearbench.bench.nonlinear_run.MOST_ENTRIES", 5000)
+    pieces = simulate(case)
+    for name in ("dte", "y_driver", "torque_driven"):
+        scale = np.ptp(whole[name].values)
+        np.testing.assert_allclose(pieces[name].values, whole[name].values, atol=1e-6 * scale, err_msg=name)

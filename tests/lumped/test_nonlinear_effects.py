@@ -8,12 +8,26 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from shared.effect_rig import GEARS, make_model, make_rig, run
+from shared.effect_rig import GEARS, MASSES, make_model, make_rig, run
 from shared.hat_mesh import ALPHA, BACKLASH, BASE_PITCH, BENDING, PITCH_ROLL, RADII, hat, hat_law, stiffness
 
+from gearbench.geometry import pair
 from gearbench.lumped.mesh_tables import EXCESS, GAIN, PULL1, PULL2, PULL_Y, Motion, tables
-from gearbench.lumped.nonlinear import NonLinear
-from gearbench.rig import Coupling, Crack, Drive, Friction, Load, MeshCorrection, Rig, Ripple, Support, Supports
+from gearbench.lumped.nonlinear import NonLinear, nonlinear_model
+from gearbench.lumped.nonlinear_step import integrate
+from gearbench.rig import (
+    Coupling,
+    Crack,
+    Damping,
+    Drive,
+    Friction,
+    Load,
+    MeshCorrection,
+    Rig,
+    Ripple,
+    Support,
+    Supports,
+)
 
 Array = NDArray[np.float64]
 
@@ -102,9 +116,9 @@ def test_friction_takes_what_its_sliding_dissipates(boundary: str) -> None:
     # Normal force times mu times sliding speed of both pairs, over one cycle; the gears hardly vibrate.
     phase = (np.arange(4000) + 0.5) / 4000
     loss = np.zeros_like(phase)
-    for pair in (0, 1):
-        speed = (phase - pair) * BASE_PITCH * sum(speeds)
-        loss += hat(phase - pair) * mu * speed * np.tanh(speed / v0)
+    for number in (0, 1):
+        speed = (phase - number) * BASE_PITCH * sum(speeds)
+        loss += hat(phase - number) * mu * speed * np.tanh(speed / v0)
     normal = last[:, 5].reshape(-1, 1000).mean(axis=0)
     force = np.interp(phase, np.arange(1000) / 1000, normal, period=1.0)
     assert power == pytest.approx(float((force * loss).mean()), rel=1e-3)
@@ -205,6 +219,11 @@ def test_a_support_deflects_by_its_power_law(exponent: float) -> None:
     assert out[-1, 2] == pytest.approx(expected, rel=1e-4)
     assert out[-1, 1] == pytest.approx(-expected, rel=1e-4)
     assert model.support_deflection(FORCE) == pytest.approx((-expected, expected), rel=1e-12)
+    # Small vibrations see the slope of the force, whose stiffness per deflection grows with its exponent.
+    slope = (1 + exponent) * FORCE * cos(ALPHA) / expected
+    found = np.linalg.eigvals(model.linearised(0.0, FORCE))
+    wanted = np.roots([MASSES[1], 3e3, slope])
+    assert np.abs(found[:, None] - wanted).min(axis=0) == pytest.approx([0.0, 0.0], abs=1e-6 * np.abs(wanted[0]))
 
 
 def test_run_out_opens_and_closes_the_back_flanks_too() -> None:
@@ -235,3 +254,46 @@ def test_a_neutral_effect_leaves_every_table_as_it_was(values: dict[str, Any]) -
     motion = Motion(60.0, 7680, 1e-5, 0.3)
     plain, neutral = (tables(make_model(rig), motion) for rig in (make_rig(), make_rig(**values)))
     assert plain.tobytes() == neutral.tobytes()
+
+
+def test_damping_never_holds_the_flanks_together() -> None:
+    rig = make_rig().model_copy(update={"damping": Damping(mesh_ratio=0.4)})
+    model = make_model(rig, hat_law(swing=0.0, bend=0.0))
+    state = np.zeros(10)
+    state[0], state[5] = 0.2e-6, -0.05  # barely touching and leaving fast: the damper alone would pull
+    time, out = run(model, lambda t: np.zeros(t.shape), state, mesh_frequency=50.0, cycles=0.01, steps=20000)
+    dte = out[:, 0] + cos(ALPHA) * (out[:, 1] - out[:, 2])
+    assert dte[-1] < -5e-6
+    assert out[:, 5].min() == 0.0
+    np.testing.assert_allclose(out[:, 0], 0.2e-6 - 0.05 * time, atol=1e-15)
+
+
+@pytest.mark.parametrize("cycle", [0.1, 0.45, 0.8])
+def test_back_flanks_carry_with_the_stiffness_of_their_own_phase(cycle: float) -> None:
+    law = hat_law(mirror=0.3, bend=0.0)
+    model = make_model(make_rig(), law)
+    push = 2000.0
+    # Turning imperceptibly, pressed backwards: the mesh rests at the phase of the last sample.
+    motion = Motion(cycles=1e-6, entries=80000, step=5e-6, first_phase=cycle)
+    _, out = integrate(
+        model, tables(model, motion), np.full(2, -push), np.r_[-BACKLASH, np.zeros(9)], step=5e-6, substeps=1
+    )
+    dte = out[-1, 0] + cos(ALPHA) * (out[-1, 1] - out[-1, 2])
+    assert out[-1, 5] == pytest.approx(-push, rel=1e-6)
+    assert dte == pytest.approx(-BACKLASH - push / float(stiffness(0.3 - cycle)), rel=1e-6)
+
+
+@pytest.mark.parametrize("boundary", ["speed", "torque"])
+def test_the_rotor_counts_in_the_mass_of_the_mesh_and_turns_with_the_gear_or_alone(boundary: str) -> None:
+    masses = {"driver": {"inertia": 3e-4, "mass": 2.0}, "driven": {"inertia": 2e-3, "mass": 3.0}}
+    meshing = pair(make_rig(**masses))
+    r1, r2 = meshing.driver.base_radius, meshing.driven.base_radius
+    for spring, own, rotor in ((None, 2.3e-3, 0.0), (1e4, 3e-4, 2e-3)):
+        drive = Drive(coupling=Coupling(inertia=2e-3, stiffness=spring))
+        model = nonlinear_model(make_rig(**masses, drive=drive, load=Load(boundary=boundary)), meshing, hat_law())
+        assert model.masses == pytest.approx((own / r1**2, 2e-3 / r2**2, rotor / r1**2, 2.0, 3.0), rel=1e-12)
+        reduced = 2.3e-3 / r1**2
+        if boundary == "torque":
+            reduced = 1 / (1 / reduced + r2**2 / 2e-3)
+        assert model.mesh_mass == pytest.approx(reduced, rel=1e-12)
+        assert model.constants().rigid == (0.0 if spring else 1.0)
