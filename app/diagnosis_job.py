@@ -79,8 +79,12 @@ def diagnose(
     find: Callable[..., Any] | None = None,
     simulate: Simulate | None = None,
     report: Report = lambda step: None,
+    shares: bool = True,
 ) -> Diagnosis:
-    """The whole diagnosis. `find` and `simulate` stand in for the search and the replay (tests)."""
+    """The whole diagnosis; without `shares` the budget is left out, which takes most of the time after the search.
+
+    `find` and `simulate` stand in for the search and the replay (tests).
+    """
     search, simulate = find or default_search(), simulate or default_replay()
     report("cause")
     finding = search(taken.measurements, taken.nominal, held_out=taken.held_out, without=taken.without)
@@ -88,9 +92,11 @@ def diagnose(
     from gearbench.diagnosis.gap import gaps
 
     shrunk = gaps(taken.nominal, finding.recalibrated, finding.with_effect, taken.judged, simulate=simulate)
-    report("where the gap is")
-    shares = (*finding.where, *_budget(taken, simulate))
-    return Diagnosis(taken, _verdict(taken, finding, shares, shrunk), finding.recalibrated, finding.with_effect)
+    where = list(finding.where)
+    if shares:
+        report("where the gap is")
+        where += _budget(taken, simulate)
+    return Diagnosis(taken, _verdict(taken, finding, where, shrunk), finding.recalibrated, finding.with_effect)
 
 
 def default_search() -> Callable[..., Any]:
