@@ -17,7 +17,6 @@ def missing(what: str) -> Callable[[], float]:
 
 
 CHECKS = [
-    Check("iso-6336", "ISO/TR 6336-30 example 1: c', c_gamma", 1e-4, "", missing("the ISO 6336 stiffness")),
     Check(
         "full-transient", "reduced against full transient, to 3 kHz", 0.01, "", missing("the full transient")
     ),
