@@ -21,7 +21,7 @@ DELAY = 50e-6
 RIPPLE = 0.006  # of the mean torque, at each order
 BACKLASH = 80e-6  # transverse, at the reference circles
 BACKGROUND = (0.05, 0.12)  # of severity 1
-RIGID_COUPLING = (6500.0, 9000.0)  # [Hz] background of the coupling's resonance
+RIGID_COUPLING = (7500.0, 11000.0)  # [Hz] background of the coupling's resonance
 
 
 @dataclass(frozen=True)

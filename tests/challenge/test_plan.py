@@ -97,9 +97,9 @@ def test_severest_coupling_is_the_softest() -> None:
 @pytest.mark.parametrize("name", [*EFFECTS, *FOREIGN])
 def test_places_are_those_of_the_contract(name: str) -> None:
     places = {
-        **dict.fromkeys(("friction", "eccentricity", "pitch-error", "tooth-crack", "backlash"), {"mesh"}),
-        **dict.fromkeys(("coupling", "torque-ripple", "slipping-coupling"), {"drive"}),
-        **dict.fromkeys(("non-synchronous-torque", "torque-filter"), {"drive"}),
+        **{key: {"mesh"} for key in ("friction", "eccentricity", "pitch-error", "tooth-crack", "backlash")},
+        **{key: {"drive"} for key in ("coupling", "torque-ripple", "slipping-coupling")},
+        **{key: {"drive"} for key in ("non-synchronous-torque", "torque-filter")},
         "bearing-nonlinearity": {"driver-support", "driven-support"},
         "sensor-delay": {"sensor"},
         "temperature-drift": {"mesh", "driver-support", "driven-support"},

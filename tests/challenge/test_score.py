@@ -276,7 +276,7 @@ def test_cases_are_diagnosed_and_failures_told(folder: Path, workers: int) -> No
 def test_some_verdicts_need_resume(folder: Path) -> None:
     cases, answers = folder / "cases", folder / "answers.json"
     (cases / "c2" / "verdict.json").write_text(json.dumps(verdict("none")), encoding="utf-8")
-    with pytest.raises(ChallengeError, match="1 of 3 cases in .* add --resume"):
+    with pytest.raises(ChallengeError, match=r"1 of 3 cases in .* add --resume"):
         score_folder(cases, answers, read, says_friction, workers=0)
     outcomes, _ = score_folder(cases, answers, read, says_friction, resume=True, workers=0)
     assert [o.result for o in outcomes] == ["right", "right", "failed"]
@@ -290,7 +290,7 @@ def test_without_an_effect_its_cases_alone_are_judged_apart(folder: Path) -> Non
         ("c3", "foreign", "failed"),
     ]
     assert not (cases / "c1" / "verdict.json").exists()
-    with pytest.raises(ChallengeError, match="no case of .* has that effect"):
+    with pytest.raises(ChallengeError, match=r"no case of .* has that effect"):
         score_folder(cases, answers, read, says_friction, withheld="backlash", workers=0)
 
 
