@@ -8,7 +8,8 @@
   effect. `missed`: it says none.
 * `failed`: there is no verdict, because the diagnosis of the case failed.
 
-The place is right when the verdict's equals the answer's, whatever the verdict. Of two effects either place counts.
+The place is right when the verdict's equals the answer's, whatever the verdict; the answer of two effects gives the
+place of the first.
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from truth_plants import STIFFNESS, short_case
+from shared.truth_plants import STIFFNESS, short_case
 
 from gearbench.challenge import make as making
 from gearbench.challenge.answers import Answer, read_answers

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from truth_plants import drawn_levels, drawn_plant, short_bench
+from shared.truth_plants import drawn_levels, drawn_plant, short_bench
 
 from gearbench.challenge.levels import Foreign
 from gearbench.challenge.measure import (

@@ -6,7 +6,7 @@ from collections import Counter
 
 import numpy as np
 import pytest
-from truth_plants import drawn_levels, short_case
+from shared.truth_plants import drawn_levels, short_case
 
 from gearbench.challenge.effects import EFFECTS, FOREIGN, SEVERITY
 from gearbench.challenge.errors import ChallengeError

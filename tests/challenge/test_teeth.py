@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from truth_plants import short_bench
+from shared.truth_plants import short_bench
 
 from gearbench.challenge.errors import ChallengeError
 from gearbench.challenge.teeth import (

@@ -12,7 +12,7 @@ from gearbench.challenge.structure import draw_structure
 from gearbench.challenge.truth import Bench, build_plant, conditions_of, make_bench
 from gearbench.rig import Case, read_case
 
-CASES = Path(__file__).resolve().parents[1] / "cases"
+CASES = Path(__file__).resolve().parents[2] / "cases"
 STIFFNESS = 4.2e8  # N/m, about the mean of the nominal mesh
 
 
