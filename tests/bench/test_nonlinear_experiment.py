@@ -9,6 +9,7 @@ import pytest
 import xarray as xr
 
 from gearbench.bench import BenchError, simulate
+from gearbench.bench.mesh_law import mesh_law
 from gearbench.bench.nonlinear_run import cycles_to_repeat
 from gearbench.bench.static import static
 from gearbench.rig import (
@@ -310,3 +311,16 @@ def test_tables_made_in_pieces_give_the_same_record(monkeypatch: pytest.MonkeyPa
     for name in ("dte", "y_driver", "torque_driven"):
         scale = np.ptp(whole[name].values)
         np.testing.assert_allclose(pieces[name].values, whole[name].values, atol=1e-6 * scale, err_msg=name)
+
+
+def test_friction_is_paid_for_in_the_reaction() -> None:
+    mu = 0.06
+    case = make_case(friction=Friction(coefficient=mu, transition_speed=1e-4), experiment={"multisine": None})
+    record = simulate(case)
+    r1, r2 = record.attrs["base_radius_driver"], record.attrs["base_radius_driven"]
+    lost = 1 - record["torque_driven"].values.mean() * r1 / r2 / 100.0
+    law = mesh_law(case.rig, case.simulation, 300.0)
+    phase = np.arange(2000) / 2000
+    numbers, share = law.pairs(phase)
+    slid = (share * np.abs(phase[:, None] - numbers)).sum(axis=1).mean() * law.base_pitch
+    assert lost == pytest.approx(mu * slid * (1 / r1 + 1 / r2), rel=0.05)
