@@ -61,7 +61,7 @@ STAGE_WORDS = {
     "floor": "noise floor",
 }
 # How a unit is shown: (factor, unit).
-SHOWN_UNITS = {"m": (1e6, "um"), "rad": (1e6, "urad")}
+SHOWN_UNITS = {"m": (1e6, "um"), "rad": (1e6, "urad"), "1": (1.0, "")}
 
 
 def effects_in_words(names: Sequence[str]) -> str:

@@ -21,6 +21,7 @@ USER_ERRORS = (
     ("gearbench.geometry.mesh", "MeshingUnavailable"),
     ("gearbench.lumped.errors", "LumpedError"),
     ("gearbench.fem.static", "ContactError"),
+    ("gearbench.identification.comb", "CombError"),
     ("gearbench.identification.multisine", "MultisineError"),
     ("gearbench.identification.periodic", "PeriodicSystemError"),
     ("gearbench.identification.spectra", "SpectraError"),

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import json
 import re
+import shutil
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -68,9 +71,8 @@ def records(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     ]
 
 
-@pytest.fixture
-def asked(monkeypatch: pytest.MonkeyPatch) -> dict:
-    """The search and the replay stood in for; what the search was asked, and what it is to find."""
+def stand_in(monkeypatch: pytest.MonkeyPatch) -> dict:
+    """Stand in for the search and the replay; what the search was asked, and what it is to find."""
     said: dict = {"find": friction_found, "calls": 0}
 
     def search(measurements: tuple, case: Case, *, held_out: object, without: tuple) -> object:
@@ -81,6 +83,23 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> dict:
     monkeypatch.setattr(job, "default_search", lambda: search)
     monkeypatch.setattr(job, "default_replay", lambda: at_rest)
     return said
+
+
+@pytest.fixture
+def asked(monkeypatch: pytest.MonkeyPatch) -> dict:
+    return stand_in(monkeypatch)
+
+
+@pytest.fixture(scope="module")
+def done(records: list[Path], tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict, str, str]:
+    """The folder of one diagnosis that names friction, what the search was asked, what was printed and said."""
+    out = tmp_path_factory.mktemp("done") / "out"
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        said = stand_in(monkeypatch)
+        stdout, stderr = io.StringIO(), io.StringIO()
+        with contextlib.redirect_stdout(stdout), contextlib.redirect_stderr(stderr):
+            assert run(records, out) == 0
+    return out, said, stdout.getvalue(), stderr.getvalue()
 
 
 def run(records: list[Path], out: Path, *more: str) -> int:
@@ -96,14 +115,10 @@ def page_of(out: Path) -> tuple[str, Page]:
     return whole, held
 
 
-def test_all_products_and_what_they_hold(
-    records: list[Path], tmp_path: Path, asked: dict, capsys: pytest.CaptureFixture[str]
-) -> None:
-    out = tmp_path / "out"
-    assert run(records, out) == 0
-    captured = capsys.readouterr()
-    assert captured.out.splitlines()[0] == "Friction between the flanks explains the gap."
-    assert "97 %" in captured.out and "held-out record" in captured.out and "cause: done" in captured.err
+def test_all_products_and_what_they_hold(done: tuple[Path, dict, str, str]) -> None:
+    out, asked, printed, said = done
+    assert printed.splitlines()[0] == "Friction between the flanks explains the gap."
+    assert "97 %" in printed and "held-out record" in printed and "cause: done" in said
     assert {path.name for path in out.iterdir()} == PRODUCTS | {"run.json"}
     assert (asked["names"], asked["held_out"].name, asked["without"]) == (["base", "light"], "held-out", ())
     verdict = read_verdict(out / "verdict.json")
@@ -125,9 +140,8 @@ def test_all_products_and_what_they_hold(
     assert updated.conditions == nominal().conditions
 
 
-def test_compare_reproduces_the_gap_of_the_verdict(records: list[Path], tmp_path: Path, asked: dict) -> None:
-    out = tmp_path / "out"
-    assert run(records, out) == 0
+def test_compare_reproduces_the_gap_of_the_verdict(records: list[Path], done: tuple[Path, dict, str, str]) -> None:
+    out = done[0]
     measured = read_record(records[2])
     rig = read_case(out / "updated.toml")
     told = {(gap.channel, gap.band_hz[1]): gap for gap in read_verdict(out / "verdict.json").gap}
@@ -138,9 +152,8 @@ def test_compare_reproduces_the_gap_of_the_verdict(records: list[Path], tmp_path
             assert rows[quantity].difference == pytest.approx(1e6 * gap.value, rel=1e-6)
 
 
-def test_the_report_is_one_page_that_opens_offline(records: list[Path], tmp_path: Path, asked: dict) -> None:
-    assert run(records, tmp_path / "out") == 0
-    whole, held = page_of(tmp_path / "out")
+def test_the_report_is_one_page_that_opens_offline(done: tuple[Path, dict, str, str]) -> None:
+    whole, held = page_of(done[0])
     assert len(whole.encode()) < 2_000_000
     assert all(reference.startswith("#") for reference in held.references)
     assert not {"script", "img", "link", "iframe", "object"} & set(held.tags)
@@ -191,31 +204,31 @@ def test_the_place_and_the_probability_are_told_without_an_effect(
 
 
 def test_a_second_run_resumes_and_another_one_is_refused(
-    records: list[Path], tmp_path: Path, asked: dict, capsys: pytest.CaptureFixture[str]
+    records: list[Path], done: tuple[Path, dict, str, str], tmp_path: Path, asked: dict,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     out = tmp_path / "out"
-    assert run(records, out) == 0
+    shutil.copytree(done[0], out)
     before = {path.name: path.stat().st_mtime_ns for path in out.iterdir()}
-    assert run(records, out) == 0 and asked["calls"] == 1
+    assert run(records, out) == 0 and asked["calls"] == 0
     assert {path.name: path.stat().st_mtime_ns for path in out.iterdir()} == before
-    report = (out / "report.html").read_text()
     (out / "report.html").unlink()
-    assert run(records, out) == 0 and asked["calls"] == 1
-    assert (out / "report.html").read_text() == report
+    assert run(records, out) == 0 and asked["calls"] == 0
+    assert (out / "report.html").read_text() == (done[0] / "report.html").read_text()
     capsys.readouterr()
-    assert run(records, out, "--without", "friction") == 2 and asked["calls"] == 1
+    assert run(records, out, "--without", "friction") == 2 and asked["calls"] == 0
     assert "other options" in capsys.readouterr().err
     assert run(records, out, "--without", "friction", "--force") == 0
-    assert asked["without"] == ("friction",)
+    assert (asked["without"], asked["calls"]) == (("friction",), 1)
     assert "friction" in page_of(out)[0].split("left out of the library")[1][:60]
 
 
 def test_json_is_the_verdict(
-    records: list[Path], tmp_path: Path, asked: dict, capsys: pytest.CaptureFixture[str]
+    records: list[Path], done: tuple[Path, dict, str, str], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert run(records, tmp_path / "out", "--json") == 0
+    assert run(records, done[0], "--json") == 0
     printed = json.loads(capsys.readouterr().out)
-    assert printed == json.loads((tmp_path / "out" / "verdict.json").read_text())
+    assert printed == json.loads((done[0] / "verdict.json").read_text())
     assert printed["schema"] == "gearbench-verdict/1"
 
 
