@@ -1,12 +1,14 @@
-"""One spur gear: macro-geometry, body and mass."""
+"""One spur gear: macro-geometry, body and mass, micro-geometry and errors."""
 
 from __future__ import annotations
 
 from math import pi
+from typing import Literal
 
 from pydantic import model_validator
 
 from gearbench.rig.checks import items_within
+from gearbench.rig.flank_checks import check_flank
 from gearbench.rig.value import Value, quantity
 
 _LARGEST_ERROR = 1e-3  # m
@@ -41,20 +43,52 @@ class Gear(Value):
     hub_radius: float = quantity(unit="mm", gt=0.0, doc="radius of the rigid hub circle")
     mass: float | None = quantity(None, "kg", gt=0.0, doc="total mass; absent: from the geometry")
     inertia: float | None = quantity(None, "kg_m2", gt=0.0, doc="total moment of inertia; absent: from the geometry")
+    tip_relief: float = quantity(0.0, "um", ge=0.0, le=_LARGEST_ERROR, doc="material taken off both flanks at the tip")
+    tip_relief_start_diameter: float | None = quantity(
+        None, "mm", gt=0.0, doc="diameter at which tip relief starts; needed with it"
+    )
+    tip_relief_shape: Literal["linear", "parabolic"] = quantity("linear", doc="growth of tip relief over roll angle")
+    root_relief: float = quantity(
+        0.0, "um", ge=0.0, le=_LARGEST_ERROR, doc="material taken off both flanks at the form circle"
+    )
+    root_relief_start_diameter: float | None = quantity(
+        None, "mm", gt=0.0, doc="diameter at which root relief starts; needed with it"
+    )
+    root_relief_shape: Literal["linear", "parabolic"] = quantity("linear", doc="growth of root relief over roll angle")
+    profile_slope: float = quantity(
+        0.0,
+        "um",
+        ge=-_LARGEST_ERROR,
+        le=_LARGEST_ERROR,
+        doc="slope deviation f_Halpha: excess of the working flank at the tip less that at the form circle",
+    )
+    profile_slope_tooth: tuple[float, ...] = quantity(
+        (), "um", doc="what each tooth adds to profile_slope; empty: nothing"
+    )
+    profile_form: tuple[float, ...] = quantity((), "um", doc="measured excess of the working flank; empty: none")
+    profile_form_diameter: tuple[float, ...] = quantity((), "mm", doc="diameters of profile_form (or give roll)")
+    profile_form_roll: tuple[float, ...] = quantity((), "deg", doc="roll angles of profile_form (or give diameter)")
+    profile_form_tooth: tuple[float, ...] = quantity(
+        (), doc="factor on profile_form for each tooth; empty: all teeth alike"
+    )
+    wear: float = quantity(0.0, "um", ge=0.0, le=_LARGEST_ERROR, doc="wear depth of the whole working flank")
+    wear_depth: tuple[float, ...] = quantity((), "um", doc="wear depth over wear_roll, added to wear; empty: none")
+    wear_roll: tuple[float, ...] = quantity((), "deg", doc="roll angles of wear_depth")
+    wear_tooth: tuple[float, ...] = quantity((), doc="factor on all wear for each tooth; empty: all teeth alike")
     pitch_error: tuple[float, ...] = quantity(
         (), "um", doc="excess of each tooth's working flank, in order of meshing; empty: none"
     )
     runout: float = quantity(0.0, "um", ge=0.0, le=_LARGEST_ERROR, doc="run-out F_r, twice the eccentricity")
     runout_phase: float = quantity(0.0, "deg", doc="rotation of this gear at which run-out adds most material")
+    iso_grade: int | None = quantity(
+        None, ge=1, le=11, doc="draw pitch, run-out and profile errors that just satisfy this grade of ISO 1328-1:2013"
+    )
+    iso_seed: int = quantity(0, ge=0, le=2**31, doc="seed of the errors that iso_grade draws")
     crack: Crack | None = quantity(None, doc="absent: all teeth are sound")
 
     @model_validator(mode="after")
-    def _one_value_a_tooth(self) -> Gear:
-        given = len(self.pitch_error)
-        if given not in (0, self.teeth):
-            raise ValueError(
-                f"pitch_error_um has {given} values, must have none or {self.teeth}, one for each of the teeth"
-            )
+    def _errors(self) -> Gear:
+        check_flank(self)
         items_within(self, "pitch_error", -_LARGEST_ERROR, _LARGEST_ERROR)
         if self.crack and self.crack.tooth >= self.teeth:
             raise ValueError(

@@ -9,6 +9,44 @@ from gearbench.rig.value import Value, fields_of, key_of
 
 # Fields that only shape an effect whose size another field gives: alone they change nothing.
 _SHAPES = {"transition_speed"}
+_GEAR_SHAPES = {
+    "tip_relief_start_diameter",
+    "tip_relief_shape",
+    "root_relief_start_diameter",
+    "root_relief_shape",
+    "profile_form_diameter",
+    "profile_form_roll",
+    "profile_form_tooth",
+    "wear_roll",
+    "wear_tooth",
+    "runout_phase",
+    "iso_seed",
+}
+
+# Fields of a gear that move its flanks, in the order of the gear's fields.
+FLANK_FIELDS = (
+    "tip_relief",
+    "tip_relief_start_diameter",
+    "tip_relief_shape",
+    "root_relief",
+    "root_relief_start_diameter",
+    "root_relief_shape",
+    "profile_slope",
+    "profile_slope_tooth",
+    "profile_form",
+    "profile_form_diameter",
+    "profile_form_roll",
+    "profile_form_tooth",
+    "wear",
+    "wear_depth",
+    "wear_roll",
+    "wear_tooth",
+    "pitch_error",
+    "runout",
+    "runout_phase",
+    "iso_grade",
+    "iso_seed",
+)
 
 
 def effects_in(rig: Rig) -> tuple[str, ...]:
@@ -16,7 +54,8 @@ def effects_in(rig: Rig) -> tuple[str, ...]:
 
     An effect is what an ideal rig lacks: tooth errors and cracks, non-linear supports, what stands behind a
     coupling, ripple, friction, corrections of the mesh, delays and noise of the sensors. A field with its
-    neutral value is none, and neither is an error of zero, a crack without loss or a ripple of amplitude 0.
+    neutral value is none, and neither is an error of zero, a shape without an amount, a crack without loss or a
+    ripple of amplitude 0.
     Backlash (thinning, centre distance) belongs to the geometry and is not listed.
     """
     found: list[str] = []
@@ -33,16 +72,15 @@ def effects_in(rig: Rig) -> tuple[str, ...]:
 
 def sound_gear(gear: Gear) -> Gear:
     """The gear without errors and cracks: what is meshed and condensed."""
-    names = ("pitch_error", "runout", "runout_phase", "crack")
-    return gear.model_copy(update={name: Gear.model_fields[name].default for name in names})
+    return gear.model_copy(update={name: Gear.model_fields[name].default for name in (*FLANK_FIELDS, "crack")})
 
 
 def _gear_effects(gear: Gear) -> list[str]:
     found = []
-    if any(gear.pitch_error):
-        found.append(key_of(Gear, "pitch_error"))
-    if gear.runout:
-        found.append(key_of(Gear, "runout"))
+    for name in FLANK_FIELDS:
+        held = getattr(gear, name)
+        if name not in _GEAR_SHAPES and (any(held) if isinstance(held, tuple) else held):
+            found.append(key_of(Gear, name))
     if gear.crack and gear.crack.stiffness_loss:
         found.append("crack")
     return found

@@ -114,6 +114,8 @@ class Reader:
         place = f"{_dot(where)}{key}"
         if key.startswith(("helix", "beta", "helical")):
             return f"{place}: helical gears are not supported: spur gears only"
+        if any(word in key for word in ("crown", "lead", "face_form", "end_relief")):
+            return f"{place}: what varies across the face width is not supported: the gears are plane models"
         stems = {unit_key: unit_key for unit_key in known}
         for owner in (model, model.common):
             stems |= {name: key_of(owner, name) for name in owner.model_fields} if owner else {}
