@@ -1,0 +1,104 @@
+"""Mesh stiffness by every method, like with like: a static solution beside the analytic ones.
+
+Finite elements from hub to hub contain the torsion of both gear bodies, which no analytic method does; so they are
+shown with it and without it. All values are secant stiffnesses, force along the line of action over transmission
+error.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from gearbench.geometry import Pair, pair
+from gearbench.lumped import potential_energy_stiffness
+from gearbench.lumped.body_torsion import without_body_torsion
+from gearbench.lumped.iso6336 import SI, iso_stiffness
+from gearbench.lumped.potential_energy import outside_foundation_fit, pair_stiffness
+from gearbench.lumped.weber_banaschek import mesh_deflection
+from gearbench.lumped.weber_banaschek import pair_stiffness as weber_banaschek_pair
+from gearbench.rig import Case, Rig
+from gearbench.rig.neutral import effects_in
+
+Array = NDArray[np.float64]
+
+ALONE = 1 - 1e-9  # share of the load that a tooth pair carries alone
+
+
+@dataclass(frozen=True)
+class StiffnessRow:
+    """One method: stiffness [N/m] of one pair at the pitch point and over the mesh cycle.
+
+    `single` is None where two pairs carry at the pitch point; `least`, `most` and `curve` (n,) are None for ISO
+    6336, which knows the mean only. `torsion`: whether the torsion of the gear bodies is in it.
+    """
+
+    model: str
+    torsion: bool
+    single: float | None
+    mean: float
+    least: float | None = None
+    most: float | None = None
+    curve: Array | None = None
+
+
+@dataclass(frozen=True)
+class StiffnessTable:
+    """Rows under one load: driver torque [N m], mesh phase (n,) [cycles] of the curves, common face width [m],
+    sentences on what the rows leave out."""
+
+    torque: float
+    phase: Array
+    face_width: float
+    rows: tuple[StiffnessRow, ...]
+    notes: tuple[str, ...]
+
+
+def stiffness_table(case: Case, result: xr.Dataset, load: int = 0) -> StiffnessTable:
+    """Table of a static `result` of the case, for its load number `load`.
+
+    Analytic methods are evaluated at the same mesh phases, under the cycle's mean force. Raises GeometryError and
+    LumpedError.
+    """
+    rig, meshing = case.rig, pair(case.rig)
+    phase = np.asarray(result["phase"].values, dtype=float)
+    torque = float(result["torque"].values[load].mean())
+    force = torque / meshing.driver.base_radius
+    rows = (*_solved(rig, meshing, result, load), *_analytic(rig, meshing, phase, force))
+    notes = [*outside_foundation_fit(rig, meshing), *iso_stiffness(rig, meshing, force).notes]
+    if any(key.startswith(("rig.driver.", "rig.driven.", "rig.mesh.")) for key in effects_in(rig)):
+        notes.append("errors, micro-geometry and corrections of the gears are in no analytic method")
+    return StiffnessTable(torque, phase, meshing.face_width, rows, tuple(notes))
+
+
+def _row(model: str, torsion: bool, curve: Array, single: float | None) -> StiffnessRow:
+    return StiffnessRow(model, torsion, single, float(curve.mean()), float(curve.min()), float(curve.max()), curve)
+
+
+def _solved(rig: Rig, meshing: Pair, result: xr.Dataset, load: int) -> list[StiffnessRow]:
+    """Rows of the static solution."""
+    curve = np.asarray(result["stiffness_secant"].values[load], dtype=float)
+    if result.attrs["model"] != "reduced":
+        return [_row("lumped model", False, curve, None)]
+    alone = float(result["load_share"].values[load, 0].max()) >= ALONE
+    rigid = without_body_torsion(curve, rig, meshing)
+    return [
+        _row("finite elements, hub to hub", True, curve, float(curve[0]) if alone else None),
+        _row("finite elements, bodies rigid in torsion", False, rigid, float(rigid[0]) if alone else None),
+    ]
+
+
+def _analytic(rig: Rig, meshing: Pair, phase: Array, force: float) -> list[StiffnessRow]:
+    pitch = meshing.rho_pitch[0]
+    energy = potential_energy_stiffness(rig, meshing).at(phase)
+    weber = force / mesh_deflection(rig, meshing, phase, force)
+    iso = iso_stiffness(rig, meshing, force)
+    width = meshing.face_width
+    return [
+        _row("potential energy", False, energy, float(pair_stiffness(rig, meshing, pitch)[0])),
+        _row("Weber-Banaschek", False, weber, float(weber_banaschek_pair(rig, meshing, pitch, force)[0])),
+        StiffnessRow("ISO 6336-1 (c', c_gamma)", False, iso.single * SI * width, iso.mesh * SI * width),
+    ]
