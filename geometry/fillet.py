@@ -123,16 +123,18 @@ def form_point(fillet: Trochoid, psi_b: float) -> tuple[float, float]:
 
     def beyond(beta: ArrayLike) -> Array:
         """Angle by which the trochoid stands out of the involute."""
-        x, y = np.moveaxis(fillet.points(beta), -1, 0)
-        roll = np.sqrt(np.maximum((np.hypot(x, y) / base) ** 2 - 1, 0.0))
-        return np.asarray(np.arctan2(y, x) - psi_b + roll - np.arctan(roll))
+        points = fillet.points(beta)
+        along, across = points @ radial(psi_b), points @ tangential(psi_b)
+        roll = np.sqrt(np.maximum((np.hypot(along, across) / base) ** 2 - 1, 0.0))
+        return np.asarray(np.arctan2(across, along) + roll - np.arctan(roll))
 
     # To leading order, with t the roll length over that of the point of tangency, both curves part by
     # 2 t^3 - 3 t^2 + 1 times a constant, which vanishes at t = -1/2.
     beta = over(hypot(base, 0.5 * tangent))
     if -tangent > SLIGHT * base:
         grid = np.linspace(over(base), last, SAMPLES)
-        outermost = int(np.flatnonzero(beyond(grid) < 0.0)[-1])
+        within = beyond(grid) < 0.0
+        outermost = np.flatnonzero(within[:-1] & ~within[1:])[-1]
         beta = float(brentq(beyond, grid[outermost], grid[outermost + 1], xtol=1e-15, rtol=1e-15))
     if beta >= last:  # an undercut below rounding
         return last, 0.0

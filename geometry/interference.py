@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import atan2, sqrt, tan
+from math import acos, atan2, sqrt
 
 import numpy as np
 from scipy.spatial.distance import cdist
@@ -16,20 +16,23 @@ TOLERANCE = 1e-7
 
 
 def tip_path(gear: Profile, mate: Profile, distance: float, working_pressure_angle: float) -> Array:
-    """Path (n, 2) of the centre of the mate's tip-edge arc in the frame of `gear`, from below the mate's
-    contact with the working flank of tooth 0 to as far beyond the line of centres."""
+    """Path (n, 2) of the centre of the mate's tip-edge arc in the frame of `gear`, while the arc may reach inside the
+    form circle; empty if it never does.
+
+    The centre's distance from the gear's axis depends on the angle between it and the line of centres alone.
+    """
     ratio = gear.teeth / mate.teeth
     at_pitch = involute(working_pressure_angle)
     centre = mate.edge_centre
     radius, ahead = float(np.hypot(*centre)), atan2(centre[1], centre[0]) + at_pitch - mate.psi_b
-    # The gear's rotation when the arc begins to touch at the end of the mate's involute, and on the line of
-    # centres.
-    roll_pitch = gear.base_radius * tan(working_pressure_angle)
-    roll_start = roll_pitch + mate.base_radius * tan(working_pressure_angle) - mate.rho_end
-    begin, middle = (roll_start - roll_pitch) / gear.base_radius, ahead / ratio
-    turned = np.linspace(begin, 2 * middle - begin, SAMPLES)
+    reach = gear.form_radius + mate.edge_radius
+    cosine = (distance**2 + radius**2 - reach**2) / (2 * distance * radius)
+    if cosine >= 1.0:
+        return np.empty((0, 2))
+    swept = acos(max(cosine, -1.0)) * np.linspace(-1.0, 1.0, SAMPLES)
+    turned = (ahead - swept) / ratio  # the gear's rotation
     own = -(at_pitch - gear.psi_b + turned)  # from the world to the gear's frame
-    return distance * radial(own) - radius * radial(own + ahead - ratio * turned)
+    return distance * radial(own) - radius * radial(own + swept)
 
 
 def fillet_clearance(gear: Profile, mate: Profile, distance: float, working_pressure_angle: float) -> float:
@@ -39,6 +42,8 @@ def fillet_clearance(gear: Profile, mate: Profile, distance: float, working_pres
     cuts off the outward corner of an undercut flank enters the fillet too.
     """
     path = tip_path(gear, mate, distance, working_pressure_angle)
+    if not len(path):
+        return float("inf")
     beta = np.linspace(0.0, gear.beta_form, SAMPLES)
     points, normals = gear.fillet(beta), gear.fillet_normals(beta)
     nearest = np.argmin(cdist(path, points), axis=1)

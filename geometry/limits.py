@@ -14,8 +14,9 @@ RIM_MODULES = 0.05
 SMALLEST_EDGE = 1e-6
 # Thinnest tooth between its fillets, in modules: below it undercut has cut the tooth off.
 NECK_MODULES = 0.1
-# Smallest root radius, in modules.
+# Smallest root radius and smallest hub radius that can be meshed, in modules.
 ROOT_MODULES = 0.1
+HUB_MODULES = 1e-3
 # A rack tip this little (in modules) too wide for the rack tooth is rounding.
 ROUNDING = 1e-12
 
@@ -34,6 +35,22 @@ def check_rack(gear: Gear, name: str, offset: float) -> None:
             f"{name}.rack_tip_radius = {gear.rack_tip_radius:g} does not fit the rack tooth: at most"
             f" {at_most(room * cos(alpha) / (1 - sin(alpha)), 4)} with dedendum = {gear.dedendum:g} and"
             f" pressure_angle_deg = {alpha * 180 / pi:g}"
+        )
+
+
+def check_thinning(gear: Gear, name: str, psi_b: float) -> None:
+    """Refuse a thinning that leaves nothing of the tooth even on the base circle (`psi_b` <= 0)."""
+    if psi_b <= 0.0:
+        reference = gear.module * gear.teeth / 2
+        if gear.thinning > 0.0 and psi_b + gear.thinning / (2 * reference) > 0.0:
+            limit = at_most(1e6 * (gear.thinning + 2 * reference * psi_b), 2)
+            raise GeometryError(
+                f"{name}.thinning_um = {gear.thinning * 1e6:g} leaves nothing of the teeth: it must stay below {limit}"
+            )
+        limit = at_least(gear.profile_shift - psi_b * gear.teeth / (2 * tan(gear.pressure_angle)), 4)
+        raise GeometryError(
+            f"{name}.profile_shift = {gear.profile_shift:g} leaves nothing of the teeth: it must exceed {limit} with"
+            f" teeth = {gear.teeth}, thinning_um = {gear.thinning * 1e6:g}"
         )
 
 
@@ -128,6 +145,11 @@ def check_body(gear: Gear, name: str, root: float) -> None:
             f"{name}.hub_radius_mm = {gear.hub_radius * 1e3:g} is too large: at most"
             f" {at_most(limit * 1e3, 4)}, that is the root radius of {root * 1e3:.6g} mm less {RIM_MODULES:g}"
             " modules"
+        )
+    if gear.hub_radius < HUB_MODULES * gear.module:
+        raise GeometryError(
+            f"{name}.hub_radius_mm = {gear.hub_radius * 1e3:g} is too small to be meshed: at least"
+            f" {HUB_MODULES * gear.module * 1e3:g} ({HUB_MODULES:g} modules)"
         )
     if gear.bore_radius > gear.hub_radius:
         raise GeometryError(

@@ -15,7 +15,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gearbench.geometry.fillet import Trochoid, form_point, neck, radial, tangential
-from gearbench.geometry.limits import NECK_MODULES, check_body, check_neck, check_rack, check_root, check_tip
+from gearbench.geometry.limits import (
+    NECK_MODULES,
+    check_body,
+    check_neck,
+    check_rack,
+    check_root,
+    check_thinning,
+    check_tip,
+)
 from gearbench.rig import Gear
 
 Array = NDArray[np.float64]
@@ -230,6 +238,7 @@ def profile(gear: Gear, name: str = "gear") -> Profile:
         tip = gear.tip_diameter / 2
     root = reference - fillet.depth - fillet.radius
     check_rack(gear, name, room)
+    check_thinning(gear, name, psi_b)
     check_root(gear, name, root)
     check_neck(gear, name, _has_neck)
     beta_form, rho_form = form_point(fillet, psi_b)

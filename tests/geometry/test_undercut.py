@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 from shared.rack import build, rack_half_angle
+from shared.rolling import outline, overlap
 
-from gearbench.geometry import GeometryError, Pair, Profile, pair, profile
+from gearbench.geometry import GeometryError, Profile, pair, profile
 from gearbench.geometry.interference import with_tip
 from gearbench.rig import Gear, Rig
 
@@ -87,37 +88,7 @@ def test_a_pair_without_enough_involute_is_refused(gear: MakeGear, rig: MakeRig)
         pair(rig(gear(teeth=8), gear(teeth=30)))
 
 
-def outline(tooth: Profile) -> np.ndarray:
-    """Half of a tooth, from the middle of the root land to the tip."""
-    root = pi / tooth.teeth - tooth.root_half_angle * np.linspace(0, 1, 40)
-    return np.concatenate(
-        (
-            tooth.root_radius * np.column_stack((np.cos(root), np.sin(root))),
-            tooth.fillet(np.linspace(0, tooth.beta_form, 1500)),
-            tooth.points(np.linspace(tooth.s_form, tooth.s_tip, 1500)),
-        )
-    )
-
-
-def overlap(meshing: Pair, tip: np.ndarray, base: np.ndarray) -> float:
-    """How deep (m, along the circle) the wheel's tooth 0 enters the pinion's tooth 0, over all rotations."""
-    one, deepest = meshing.driver, 0.0
-    for turn in np.linspace(-0.6, 0.4, 601):
-        back = turn * one.teeth / meshing.driven.teeth
-        world = rotated(tip, pi + meshing.driven_angle - back) + np.array([meshing.centre_distance, 0.0])
-        own = rotated(world, -(meshing.driver_angle + turn))
-        radius, angle = np.hypot(*own.T), np.arctan2(own[:, 1], own[:, 0])
-        rising = np.hypot(*base.T)
-        # The outline's radius never falls along it, so it is a function of the radius.
-        left = np.interp(radius, rising, np.arctan2(base[:, 1], base[:, 0]))
-        near = (radius > one.root_radius) & (radius < one.end_radius) & (np.abs(angle) < 2 * pi / one.teeth)
-        if near.any():
-            deepest = max(deepest, float(np.max(radius[near] * (left[near] - np.abs(angle[near])))))
-    return deepest
-
-
-def rotated(points: np.ndarray, angle: float) -> np.ndarray:
-    return points @ np.array([[cos(angle), sin(angle)], [-sin(angle), cos(angle)]])
+TURNS = np.linspace(-0.6, 0.4, 601)
 
 
 @pytest.mark.parametrize("first, second", [((10, 0.0), (30, 0.0)), ((12, -0.2), (40, 0.0))])
@@ -126,7 +97,7 @@ def test_undercut_gives_way_to_the_wheel(
 ) -> None:
     found = pair(rig(*(gear(teeth=z, profile_shift=x) for z, x in (first, second))))
     assert found.driver.undercut
-    assert overlap(found, outline(found.driven)[40:], outline(found.driver)) < 1e-6
+    assert overlap(found, outline(found.driven)[40:], outline(found.driver), TURNS) < 1e-6
 
 
 @pytest.mark.parametrize("teeth", [10, 14])
@@ -138,11 +109,26 @@ def test_a_tip_longer_than_the_rack_cuts_into_the_undercut_flank(gear: MakeGear,
     found = re.search(r"at most (\S+) with", str(error.value))
     assert found and 128 < float(found.group(1)) < 128.4
     allowed = pair(rig(pinion, gear(**wheel, tip_diameter=float(found.group(1)) * 1e-3)))
-    assert overlap(allowed, outline(allowed.driven)[40:], outline(allowed.driver)) < 1e-6
+    assert overlap(allowed, outline(allowed.driven)[40:], outline(allowed.driver), TURNS) < 1e-6
     long = with_tip(allowed.driven, 64.225e-3)
-    assert overlap(allowed, outline(long)[40:], outline(allowed.driver)) == pytest.approx(21e-6, rel=0.5)
+    assert overlap(allowed, outline(long)[40:], outline(allowed.driver), TURNS) == pytest.approx(21e-6, rel=0.5)
 
 
 def test_profile_of_a_severed_tooth_is_refused(gear: MakeGear) -> None:
     with pytest.raises(GeometryError, match="cuts the teeth off"):
         profile(gear(teeth=6, profile_shift=-1.0, dedendum=1.2, hub_radius=1e-4))
+
+
+def test_a_trochoid_that_winds_behind_the_gear_is_refused_too() -> None:
+    # Polar angles beyond 180 degrees: z 5 at 10.3 degrees, x = -0.5.
+    with pytest.raises(GeometryError, match=r"profile_shift = -0\.5 .* at least"):
+        build(
+            teeth=5,
+            module=0.2e-3,
+            pressure_angle=0.1796875,
+            profile_shift=-0.5,
+            dedendum=1.5,
+            rack_tip_radius=0.0,
+            tip_edge_radius=0.0,
+            hub_radius=0.2e-3,
+        )
