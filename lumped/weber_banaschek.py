@@ -32,6 +32,8 @@ Array = NDArray[np.float64]
 
 NODES = 40
 MOST_STEPS = 60
+# Contact points that are evaluated one by one; more of them are interpolated from a table.
+MOST_POINTS, TABLE = 4096, 2049
 
 
 @dataclass(frozen=True)
@@ -146,6 +148,11 @@ def pair_deflection(rig: Rig, meshing: Pair, rho_driver: ArrayLike, force: Array
 
 
 def _linear(rig: Rig, meshing: Pair, rho: Array) -> tuple[Array, list[Array]]:
+    """Compliance (n,) [m/N] of both teeth and foundations, and both depths [m]; many points are interpolated."""
+    if rho.size > MOST_POINTS:
+        table = np.linspace(float(rho.min()), float(rho.max()), TABLE)
+        linear, depths = _linear(rig, meshing, table)
+        return np.interp(rho, table, linear), [np.interp(rho, table, depth) for depth in depths]
     width, mate = meshing.face_width, meshing.line_of_action - rho
     one = tooth_deflection(meshing.driver, rig.material, width, rho)
     two = tooth_deflection(meshing.driven, rig.material, width, mate)

@@ -154,6 +154,13 @@ def test_mesh_shares_the_force_at_equal_deflection() -> None:
         assert carried == pytest.approx(force, rel=1e-6)
 
 
+def test_many_phases_are_interpolated() -> None:
+    meshing = pair(RIG)
+    phase = np.linspace(0.0, 1.0, 3001)
+    few = mesh_deflection(RIG, meshing, phase[::100], 3e3)
+    np.testing.assert_allclose(mesh_deflection(RIG, meshing, phase, 3e3)[::100], few, rtol=1e-6)
+
+
 def test_bad_forces_are_refused() -> None:
     meshing = pair(RIG)
     with pytest.raises(LumpedError, match="at least 0 N"):
