@@ -1,0 +1,38 @@
+"""What other methods say beside a static solution: mesh stiffness of each, ISO root stress."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from gearbench.root_stress_text import root_stress_data, root_stress_lines
+from gearbench.stiffness_text import stiffness_data, stiffness_lines
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from gearbench.bench.stiffness_table import StiffnessTable
+    from gearbench.rig import Case
+
+
+def stiffness_tables(case: Case, result: xr.Dataset) -> list[StiffnessTable]:
+    """A table for each load of a static `result` under which all mesh phases carry, in the order of the loads."""
+    from gearbench.bench.stiffness_table import stiffness_table
+
+    carrying = (result["stiffness_secant"].values > 0).all(axis=1)
+    return [stiffness_table(case, result, load) for load in carrying.nonzero()[0]]
+
+
+def methods_data(case: Case, tables: list[StiffnessTable]) -> dict[str, Any]:
+    """Stiffness and root stress for JSON, an entry for each load that carries."""
+    return {
+        "stiffness": [stiffness_data(table) for table in tables],
+        "iso_root_stress": [root_stress_data(case.rig, table.torque) for table in tables],
+    }
+
+
+def methods_lines(case: Case, tables: list[StiffnessTable]) -> list[str]:
+    """The same as text, for the largest torque only."""
+    if not tables:
+        return []
+    table = max(tables, key=lambda one: one.torque)
+    return [*stiffness_lines(table), *root_stress_lines(root_stress_data(case.rig, table.torque))]
