@@ -45,7 +45,10 @@ def static(
             progress=progress,
         )
         write_atomically(out, lambda path: result.to_netcdf(path, engine="h5netcdf"))
-    summary = static_summary(result, out)
+    from gearbench.static_methods import methods_data, methods_lines, stiffness_tables
+
+    tables = stiffness_tables(loaded, result)
+    summary = static_summary(result, out) | methods_data(loaded, tables)
     if as_json:
         print_json(summary)
         return
@@ -55,6 +58,8 @@ def static(
             f" {row['te_peak_to_peak_um']:.4g} um peak to peak; tangent stiffness"
             f" {row['stiffness_least_n_per_um']:.4g} .. {row['stiffness_most_n_per_um']:.4g} N/um"
         )
+    for line in methods_lines(loaded, tables):
+        typer.echo(line)
     typer.echo(str(out))
 
 
