@@ -14,7 +14,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from gearbench.geometry import Pair, pair
-from gearbench.lumped import potential_energy_stiffness
+from gearbench.lumped import LumpedError, potential_energy_stiffness
 from gearbench.lumped.body_torsion import without_body_torsion
 from gearbench.lumped.iso6336 import SI, iso_stiffness
 from gearbench.lumped.potential_energy import outside_foundation_fit, pair_stiffness
@@ -60,15 +60,16 @@ class StiffnessTable:
 def stiffness_table(case: Case, result: xr.Dataset, load: int = 0) -> StiffnessTable:
     """Table of a static `result` of the case, for its load number `load`.
 
-    Analytic methods are evaluated at the same mesh phases, under the cycle's mean force. Raises GeometryError and
-    LumpedError.
+    Analytic methods are evaluated at the same mesh phases, under the cycle's mean force. Raises GeometryError, and
+    LumpedError without force.
     """
     rig, meshing = case.rig, pair(case.rig)
     phase = np.asarray(result["phase"].values, dtype=float)
     torque = float(result["torque"].values[load].mean())
     force = torque / meshing.driver.base_radius
-    rows = (*_solved(rig, meshing, result, load), *_analytic(rig, meshing, phase, force))
-    notes = [*outside_foundation_fit(rig, meshing), *iso_stiffness(rig, meshing, force).notes]
+    solved, lacks = _solved(rig, meshing, result, load)
+    rows = (*solved, *_analytic(rig, meshing, phase, force))
+    notes = [*lacks, *outside_foundation_fit(rig, meshing), *iso_stiffness(rig, meshing, force).notes]
     if any(key.startswith(("rig.driver.", "rig.driven.", "rig.mesh.")) for key in effects_in(rig)):
         notes.append("errors, micro-geometry and corrections of the gears are in no analytic method")
     return StiffnessTable(torque, phase, meshing.face_width, rows, tuple(notes))
@@ -78,17 +79,19 @@ def _row(model: str, torsion: bool, curve: Array, single: float | None) -> Stiff
     return StiffnessRow(model, torsion, single, float(curve.mean()), float(curve.min()), float(curve.max()), curve)
 
 
-def _solved(rig: Rig, meshing: Pair, result: xr.Dataset, load: int) -> list[StiffnessRow]:
-    """Rows of the static solution."""
+def _solved(rig: Rig, meshing: Pair, result: xr.Dataset, load: int) -> tuple[list[StiffnessRow], list[str]]:
+    """Rows of the static solution, and what cannot be said of it."""
     curve = np.asarray(result["stiffness_secant"].values[load], dtype=float)
     if result.attrs["model"] != "reduced":
-        return [_row("lumped model", False, curve, None)]
+        return [_row("lumped model", False, curve, None)], []
     alone = float(result["load_share"].values[load, 0].max()) >= ALONE
-    rigid = without_body_torsion(curve, rig, meshing)
-    return [
-        _row("finite elements, hub to hub", True, curve, float(curve[0]) if alone else None),
-        _row("finite elements, bodies rigid in torsion", False, rigid, float(rigid[0]) if alone else None),
-    ]
+    whole = _row("finite elements, hub to hub", True, curve, float(curve[0]) if alone else None)
+    try:
+        rigid = without_body_torsion(curve, rig, meshing)
+    except LumpedError as reason:
+        return [whole], [str(reason)]
+    name = "finite elements, bodies rigid in torsion"
+    return [whole, _row(name, False, rigid, float(rigid[0]) if alone else None)], []
 
 
 def _analytic(rig: Rig, meshing: Pair, phase: Array, force: float) -> list[StiffnessRow]:

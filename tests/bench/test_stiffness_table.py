@@ -72,3 +72,11 @@ def test_notes_say_what_the_methods_leave_out(case: Case) -> None:
     assert any("below 100 N/mm" in note for note in light.notes)
     heavy = stiffness_table(case, static(case, "lumped", torque=[500.0], positions=4))
     assert heavy.notes == ()
+
+
+def test_a_stiffness_above_that_of_the_bodies_is_only_noted(case: Case) -> None:
+    result = static(case, "reduced", torque=[100.0], positions=4)
+    result["stiffness_secant"] = 100 * result["stiffness_secant"]
+    table = stiffness_table(case, result)
+    assert [row.model for row in table.rows][:2] == ["finite elements, hub to hub", "potential energy"]
+    assert "must be below that of the gear bodies' torsion" in table.notes[0]
