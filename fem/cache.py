@@ -94,23 +94,23 @@ def stored_law(
     parts = [_gear_key(g, rig.material, element_size, modes) for g in (rig.driver, rig.driven)]
     key = key_for("law", {"driver": parts[0], "driven": parts[1], "centre": meshing.centre_distance})
     made: list[Law] = []
+    real = (rig.driver, rig.driven)
 
     def make() -> Arrays:
-        made.append(make_law(meshing, *gears, rig.material))
+        made.append(make_law(meshing, *gears, rig.material, gears=real))
         curves = made[0].curves.driver, made[0].curves.driven
         return {f"{name}{i}": np.asarray(v) for i, c in enumerate(curves) for name, v in c._asdict().items()}
 
     arrays = cached(key, make)
     if made:
         return made[0]
-    names = ("xi", "value", "slope", "log_low", "log_step")
 
     def curve(number: int) -> Curve:
-        values: list[Any] = [arrays[f"{name}{number}"] for name in names]
+        values: list[Any] = [arrays[f"{name}{number}"] for name in Curve._fields]
         plain: list[Any] = [float(v) if v.ndim == 0 else v for v in values]
         return Curve(*plain)
 
-    return make_law(meshing, *gears, rig.material, curves=(curve(0), curve(1)))
+    return make_law(meshing, *gears, rig.material, curves=(curve(0), curve(1)), gears=real)
 
 
 def _fields(gear: CondensedGear) -> list[tuple[Field[Any], Any]]:

@@ -11,12 +11,15 @@ from numpy.typing import NDArray
 from gearbench.fem.body import CondensedGear, rounded
 from gearbench.fem.compiled import compiled
 from gearbench.fem.curve import EDGE_SEPARATION, LOAD_RANGE, Curve, Curves, edge_reach, lone_approach, tabulate
+from gearbench.fem.deviation import Flanks, deviate, flanks_of, ideal_flanks
 from gearbench.fem.elasticity import plane_moduli
 from gearbench.fem.kernel import Kernel, cross_flexibility, grid_position, make_kernel
 from gearbench.fem.kinematics import Contact, Tooth, pair_contact, teeth_of
 from gearbench.fem.small import eliminate
+from gearbench.geometry.iso1328 import drawn_gear
+from gearbench.geometry.micro import check_micro
 from gearbench.geometry.pair import Pair, pair
-from gearbench.rig import Material, Rig
+from gearbench.rig import Gear, Material, Rig, sound_gear
 
 __all__ = ["EDGE_SEPARATION", "LOAD_RANGE", "PAIRS", "Curve", "Law", "elastic_pair", "make_law"]
 
@@ -28,8 +31,9 @@ NEAR = 0.25  # of the base pitch: how far beyond the path of contact tooth pairs
 
 
 class Law(NamedTuple):
-    """Contact law: both teeth, both kernels, centre distance [m], 2/(pi E* b) [m/N], the load-approach curves and how
-    far, in roll length, the tip edges of driver and driven gear reach [m]."""
+    """Contact law: both teeth, both kernels, centre distance [m], 2/(pi E* b) [m/N], the load-approach curves, how
+    far, in roll length, the tip edges of driver and driven gear reach [m], what their flanks have too much, and how
+    much that moves a gap at most [m] (0: ideal flanks)."""
 
     driver: Tooth
     driven: Tooth
@@ -40,6 +44,9 @@ class Law(NamedTuple):
     curves: Curves
     reach1: float
     reach2: float
+    flanks1: Flanks
+    flanks2: Flanks
+    play: float
 
 
 def elastic_pair(rig: Rig) -> Pair:
@@ -53,8 +60,12 @@ def make_law(
     driven: CondensedGear,
     material: Material,
     curves: tuple[Curve, Curve] | None = None,
+    gears: tuple[Gear, Gear] | None = None,
 ) -> Law:
-    """The contact law of an `elastic_pair` of condensed gears; the lines are solved here unless `curves` are given."""
+    """The contact law of an `elastic_pair` of condensed gears; the lines are solved here unless `curves` are given.
+
+    `gears` bring their micro-geometry and errors; without them the flanks are ideal.
+    """
     t1, t2 = teeth_of(meshing)
     moduli = plane_moduli(material)
     half_plane = 4.0 / (pi * moduli.modulus * min(driver.face_width, driven.face_width))
@@ -64,7 +75,23 @@ def make_law(
     reach1, reach2 = (edge_reach(t1, t2, a, approach_max), edge_reach(t2, t1, a, approach_max))
     if curves is None:
         curves = (tabulate(t1, t2, k1, k2, half_plane, a, reach1), tabulate(t2, t1, k2, k1, half_plane, a, reach2))
-    return Law(t1, t2, k1, k2, a, half_plane, Curves(*curves, t1.rho_end, t2.rho_end), reach1, reach2)
+    f1, f2 = _deviations(meshing, gears, reach1, reach2)
+    every = Curves(*curves, t1.rho_end, t2.rho_end)
+    return Law(t1, t2, k1, k2, a, half_plane, every, reach1, reach2, f1, f2, f1.largest + f2.largest)
+
+
+def _deviations(meshing: Pair, gears: tuple[Gear, Gear] | None, reach1: float, reach2: float) -> tuple[Flanks, Flanks]:
+    """What the flanks of driver and driven gear have too much. Raises GeometryError."""
+    if gears is None or all(gear == sound_gear(gear) for gear in gears):
+        return ideal_flanks(meshing.driver.teeth), ideal_flanks(meshing.driven.teeth)
+    line = meshing.line_of_action
+    found = []
+    sides = (("rig.driver", meshing.driver, reach1), ("rig.driven", meshing.driven, reach2))
+    for gear, (name, shape, reach) in zip(gears, sides, strict=True):
+        real = drawn_gear(gear, name)
+        check_micro(shape, real, name)
+        found.append(flanks_of(shape, real, line, reach))
+    return found[0], found[1]
 
 
 @compiled
@@ -83,6 +110,13 @@ def near_teeth(t1: Tooth, t2: Tooth, reach1: float, reach2: float, side: int, th
 
 
 @compiled
+def modelled(law: Law, k: Contact) -> bool:
+    """Whether a contact lies on involutes, or on a tip edge as far as it is followed."""
+    beyond = (k.slave == 1 and k.xi1 > law.reach1) or (k.slave == 2 and k.xi2 > law.reach2)
+    return not beyond and k.s1 >= law.driver.s_form and k.s2 >= law.driven.s_form
+
+
+@compiled
 def find_pairs(law: Law, theta1: float, theta2: float, dx: float, dy: float, margin: float):
     """Tooth pairs on the modelled flanks whose gap is below `margin`: sides and driver teeth (PAIRS,), contacts
     (PAIRS, fields of Contact) and their number."""
@@ -95,8 +129,11 @@ def find_pairs(law: Law, theta1: float, theta2: float, dx: float, dy: float, mar
         first, last = near_teeth(t1, t2, law.reach1, law.reach2, side, theta1, dx, dy)
         for j in range(first, last + 1):
             k = pair_contact(t1, t2, side, j, theta1, theta2, dx, dy)
-            beyond = (k.slave == 1 and k.xi1 > law.reach1) or (k.slave == 2 and k.xi2 > law.reach2)
-            if k.gap < margin and not beyond and k.s1 >= t1.s_form and k.s2 >= t2.s_form and n < PAIRS:
+            if not (k.gap < margin + law.play and n < PAIRS and modelled(law, k)):
+                continue
+            if law.play > 0.0:
+                k = deviate(t1, t2, law.flanks1, law.flanks2, side, j, theta1, theta2, dx, dy, k)
+            if k.gap < margin:
                 sides[n] = side
                 teeth[n] = j
                 found[n, 0], found[n, 1], found[n, 2], found[n, 3] = (k.gap, k.slave, k.xi1, k.xi2)
@@ -104,6 +141,22 @@ def find_pairs(law: Law, theta1: float, theta2: float, dx: float, dy: float, mar
                 found[n, 8], found[n, 9] = k.nx, k.ny
                 n += 1
     return sides, teeth, found, n
+
+
+@compiled
+def off_flanks(law: Law, theta1: float, theta2: float, dx: float, dy: float) -> bool:
+    """Whether a tooth pair overlaps where its flanks are not modelled: beyond a tip edge's turn, or in a fillet."""
+    t1, t2 = law.driver, law.driven
+    for side in range(2):
+        first, last = near_teeth(t1, t2, law.reach1, law.reach2, side, theta1, dx, dy)
+        for j in range(first, last + 1):
+            k = pair_contact(t1, t2, side, j, theta1, theta2, dx, dy)
+            if k.gap < law.play and not modelled(law, k):
+                if law.play > 0.0:
+                    k = deviate(t1, t2, law.flanks1, law.flanks2, side, j, theta1, theta2, dx, dy, k)
+                if k.gap < 0.0:
+                    return True
+    return False
 
 
 @compiled

@@ -10,7 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.fem.compiled import compiled
-from gearbench.fem.law import PAIRS, Law, contact_in, coupling, find_pairs, newton_step, overlaps, share_load
+from gearbench.fem.law import (
+    PAIRS,
+    Law,
+    contact_in,
+    coupling,
+    find_pairs,
+    newton_step,
+    off_flanks,
+    overlaps,
+    share_load,
+)
 
 Array = NDArray[np.float64]
 
@@ -27,7 +37,8 @@ class StaticCycle:
 
     load_kind "torque" [N m] or "dte" [m]; phase (phase,) [cycles]; transmission_error [m]; torque_driver,
     torque_driven [N m]; force [N] = torque_driver / driver base radius; stiffness_tangent [N/m] = dF/d dte;
-    stiffness_secant [N/m] = F / dte; load_share (load, phase, pair): share of each driver tooth, in order of meshing.
+    stiffness_secant [N/m] = F / (dte - unloaded); load_share (load, phase, pair): share of each driver tooth, in order
+    of meshing; unloaded (phase,): transmission error without load [m], which errors and micro-geometry make.
     """
 
     load_kind: Literal["torque", "dte"]
@@ -39,6 +50,7 @@ class StaticCycle:
     stiffness_tangent: Array
     stiffness_secant: Array
     load_share: Array
+    unloaded: Array
 
 
 @compiled
@@ -90,6 +102,7 @@ def static_cycle(
     te, t1, t2, tangent = (np.empty(shape) for _ in range(4))
     share = np.zeros((*shape, PAIRS))
     guess = 0.0
+    unloaded = np.array([unloaded_dte(law, float(phase)) for phase in phases])
     for i, load in enumerate(loads):
         for j, phase in enumerate(phases):
             if kind == "torque":
@@ -99,6 +112,7 @@ def static_cycle(
             n, sides, teeth, _, force, _, a, b, slope, _, ok = _at(law, float(phase), guess)
             if not ok:
                 raise ContactError(f"no static equilibrium at mesh phase {phase:g} and load {load:g}")
+            _check_flanks(law, float(phase), guess, f"{load:g} {'N m' if kind == 'torque' else 'm'}")
             te[i, j], t1[i, j], t2[i, j] = guess, a, b
             tangent[i, j] = slope / law.driver.rb**2
             total = max(float(force[:n].sum()), 1e-300)
@@ -110,11 +124,44 @@ def static_cycle(
                 progress((i * len(phases) + j + 1) / te.size)
     used = np.nonzero(share.any(axis=(0, 1)))[0]
     share = share[:, :, used[0] : used[-1] + 1] if len(used) else share[:, :, :1]
-    secant = t1 / law.driver.rb / te
-    return StaticCycle(kind, loads, np.asarray(phases), te, t1, t2, tangent, secant, share)
+    pressed = te - unloaded
+    # Where a given DTE does not close the gap nothing is pressed, and there is no stiffness.
+    secant = np.divide(t1 / law.driver.rb, pressed, out=np.zeros(shape), where=pressed > 0)
+    return StaticCycle(kind, loads, np.asarray(phases), te, t1, t2, tangent, secant, share, unloaded)
 
 
 STILL = np.zeros(2)
+
+
+def unloaded_dte(law: Law, phase: float, x: Array = STILL, y: Array = STILL) -> float:
+    """DTE [m] at which the first working flank touches without load: the manufactured transmission error, 0 for ideal
+    gears whose centres are held."""
+    if law.play == 0.0 and not (x.any() or y.any()):
+        return 0.0
+    opened = law.play + float(np.abs(x).sum() + np.abs(y).sum())
+    dte = 0.0
+    for _ in range(40):
+        theta1 = phase * law.driver.pitch + dte / law.driver.rb
+        place = law.centre + x[1] - x[0], y[1] - y[0]
+        sides, _, found, n = find_pairs(law, theta1, phase * law.driven.pitch, *place, 2.5 * opened + MARGIN)
+        gaps = found[:n, 0][sides[:n] == 0]
+        if not len(gaps):
+            break
+        least = float(gaps.min())
+        dte += least
+        if abs(least) <= 1e-15 * (1.0 + abs(phase) * law.driver.pitch * law.driver.rb):
+            return dte
+    raise ContactError(f"no tooth pair touches without load at mesh phase {phase:g}")
+
+
+def _check_flanks(law: Law, phase: float, dte: float, load: str) -> None:
+    """Raise ContactError where a pair overlaps beyond its modelled flanks."""
+    theta1 = phase * law.driver.pitch + dte / law.driver.rb
+    if off_flanks(law, theta1, phase * law.driven.pitch, law.centre, 0.0):
+        raise ContactError(
+            f"a load of {load} presses the teeth together by {1e6 * dte:.4g} um at mesh phase {phase:g}, where contact"
+            " leaves the modelled flanks: lower it"
+        )
 
 
 def _at(law: Law, phase: float, dte: float, x: Array = STILL, y: Array = STILL):
@@ -131,9 +178,13 @@ def solve_torque(
     """
     rb = law.driver.rb
     # Moving the centres by y opens the pair by up to |y|, so the search starts from there.
-    opened = float(np.abs(y).sum() + np.abs(x).sum())
+    opened = float(np.abs(y).sum() + np.abs(x).sum()) + law.play
     dte = guess if guess > 0 else opened + torque / rb / 1e8
     low, high = -opened, np.inf
+    if law.play > 0.0:
+        # Errors make the DTE of either sign: the search starts where the first pair touches.
+        low = unloaded_dte(law, phase, x, y) - 1e-12
+        dte = guess if guess > low else low + torque / rb / 1e8
     # Gaps are differences of angles that grow with the phase: below this the DTE is rounding.
     finest = 1e-15 * (1.0 + abs(phase) * law.driver.pitch) * rb
     for _ in range(200):

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from gearbench.fem.compiled import compiled
 from gearbench.fem.curve import lone_approach
-from gearbench.fem.law import PAIRS, contact_in, coupling, find_pairs, overlaps, share_load
+from gearbench.fem.law import PAIRS, contact_in, coupling, find_pairs, off_flanks, overlaps, share_load
 from gearbench.fem.machine import Machine, angles, contact_rows, hub_coupling, modal_flexibility, reaction, support_axes
 from gearbench.fem.small import arrow_factor, arrow_solve, arrow_times, plus, times
 from gearbench.fem.static import MARGIN, ContactError, position, solve_torque
@@ -244,7 +244,7 @@ def advance(machine: Machine, scheme: Scheme, state: State, torque: Array, subst
     """Integrate over len(torque) steps, `torque` being the driver torque at the end of each.
 
     Returns the state at the end, samples (len(torque)/substeps, CHANNELS) taken after every `substeps` steps, and the
-    step at which contact was not found (-1: none).
+    step at which contact was not found (-1: none; -2 - n: at step n it left the modelled flanks).
     """
     samples = np.zeros((len(torque) // substeps, CHANNELS))
     r = machine.rotations
@@ -257,6 +257,9 @@ def advance(machine: Machine, scheme: Scheme, state: State, torque: Array, subst
             samples[k, 0], samples[k, 1] = angles(machine, state.d, state.t)
             samples[k, 2], samples[k, 3] = state.d[r], state.d[r + 1]
             samples[k, 4] = moment
+            y = machine.axis_x * (state.d[r + 1] - state.d[r]), machine.axis_y * (state.d[r + 1] - state.d[r])
+            if off_flanks(machine.law, samples[k, 0], samples[k, 1], machine.law.centre + y[0], y[1]):
+                return state, samples, -2 - i
             for p in range(state.pairs):
                 samples[k, 5] += state.force[p] > 0.0
     return state, samples, -1
