@@ -85,6 +85,15 @@ def mesh_cycle() -> float:
     return median_time(lambda: static_cycle(law, phases, torque=[100.0]))
 
 
+def harris_map() -> float:
+    """64 static positions at each of 12 loads, after condensation."""
+    case = read_case(case_path("paper_fe"))
+    law = elastic_rig(case.rig, case.simulation).law
+    phases, loads = np.arange(64) / 64, np.linspace(10.0, 400.0, 12).tolist()
+    static_cycle(law, phases[:1], torque=[100.0])
+    return median_time(lambda: static_cycle(law, phases, torque=loads))
+
+
 def lumped_steps() -> float:
     """210 million Runge-Kutta steps of paper_lumped, scaled up from a tenth of them."""
     case = read_case(case_path("paper_lumped"))
@@ -110,5 +119,6 @@ CHECKS = [
     Check("time-condensation", "mesh and condensation of both gears at default", 4.0, "s", condensation),
     Check("time-cache", "the same from the cache", 0.2, "s", from_cache),
     Check("time-static-cycle", "static mesh cycle of 64 positions", 0.3, "s", mesh_cycle),
+    Check("time-harris-map", "static map of 64 positions x 12 loads", 3.0, "s", harris_map),
     Check("time-lumped", "210 million Runge-Kutta steps", 40.0, "s", lumped_steps),
 ]
