@@ -11,7 +11,7 @@ from scipy.interpolate import CubicSpline
 
 from gearbench.fem.compiled import compiled
 from gearbench.fem.kernel import Kernel, lagrange
-from gearbench.fem.kinematics import Contact, Tooth
+from gearbench.fem.kinematics import CORNER_SEPARATION, Contact, Tooth
 from gearbench.fem.line import gap_to_master, line_contact, touching_point
 
 Array = NDArray[np.float64]
@@ -25,7 +25,8 @@ EDGE_SEPARATION = 0.05  # of the module: how far a tip edge is followed beyond t
 class Curve(NamedTuple):
     """Tabulated approach per force [m/N] of a lone pair: cubic Hermite in the slave's roll length, Lagrange in ln F.
 
-    xi (n,) [m]; value, slope (loads, n); log_low, log_step of the load grid.
+    xi (n,) [m]; value, slope (loads, n); log_low, log_step of the load grid; corner: roll length of the slave's
+    undercut corner [m], from which contact then starts (-1: none).
     """
 
     xi: Array
@@ -33,6 +34,7 @@ class Curve(NamedTuple):
     slope: Array
     log_low: float
     log_step: float
+    corner: float = -1.0
 
 
 class Curves(NamedTuple):
@@ -62,18 +64,51 @@ def edge_reach(slave: Tooth, master: Tooth, a: float, separation: float) -> floa
 
 
 def tabulate(slave: Tooth, master: Tooth, ks: Kernel, km: Kernel, half_plane: float, a: float, reach: float) -> Curve:
-    """The line's approach at every node of load and roll length."""
+    """The line's approach at every node of load and roll length.
+
+    Where undercut limits the flanks, contact starts and ends on corners instead of tip edges. The gear with the corner
+    is then the slave as far as the line reaches; a mate without one never is, and its curve stays empty.
+    """
     width = min(ks.width, km.width)
     logs = np.linspace(log(LOAD_RANGE[0] * width), log(LOAD_RANGE[1] * width), LOADS)
     line = a * sin(acos((slave.rb + master.rb) / a))
     start = line - master.rho_end
     middle = 0.5 * (start + slave.rho_end) - BLEND * (slave.rho_end - start)
-    xi = _curve_nodes(slave, middle, reach)
+    if slave.corner >= 0.0:
+        last = line - master.corner if master.corner >= 0.0 else reach
+        xi = _corner_nodes(slave, master, a, last)
+        if master.corner < 0.0:
+            xi = np.unique(np.concatenate([xi[xi < middle], _curve_nodes(slave, middle, reach)]))
+    elif master.corner >= 0.0:
+        none = np.zeros((LOADS, 4))
+        return Curve(np.arange(4.0), none, none.copy(), float(logs[0]), float(logs[1] - logs[0]), -1.0)
+    else:
+        xi = _curve_nodes(slave, middle, reach)
     value = np.array(
         [[line_contact(slave, master, ks, km, half_plane, a, x, exp(f))[0] / exp(f) for x in xi] for f in logs]
     )
     slope = np.array([CubicSpline(xi, v)(xi, 1) for v in value])
-    return Curve(xi, value, slope, float(logs[0]), float(logs[1] - logs[0]))
+    return Curve(xi, value, slope, float(logs[0]), float(logs[1] - logs[0]), slave.corner)
+
+
+def _corner_nodes(slave: Tooth, master: Tooth, a: float, last: float) -> Array:
+    """Roll lengths up to `last`, dense around the slave's undercut corner, from where that has left the master."""
+    corner = slave.corner
+    step, below = 2e-6, [corner]
+    largest = CORNER_SEPARATION * slave.rb * slave.pitch
+    while len(below) < 100:
+        c, s, reference = touching_point(slave, master, below[-1] - step, a)
+        _, foot = gap_to_master(slave, master, c, a, s)
+        rolled = a * sin(acos((slave.rb + master.rb) / a)) - (below[-1] - step)
+        below.append(below[-1] - step)
+        if reference - (rolled - master.rb * acos((slave.rb + master.rb) / a)) > largest or foot > master.rho_end:
+            break
+        step = min(step * 1.4, 0.02 * slave.rb * slave.pitch)
+    step, above = 2e-6, [corner]
+    while above[-1] + step < last:
+        above.append(above[-1] + step)
+        step = min(step * 1.4, (last - corner) / 24)
+    return np.unique(np.concatenate([below, above, [last]]))
 
 
 def _curve_nodes(slave: Tooth, middle: float, reach: float) -> Array:
@@ -154,22 +189,33 @@ def curve_at(curve: Curve, xi: float, force: float):
 def lone_approach(curves: Curves, k: Contact, force: float):
     """Approach [m] of a lone pair under a force, and its slope [m/N].
 
-    The gear nearer its tip is the slave. Either choice gives the same to about 2e-5 in mid-path, where one passes
-    smoothly into the other, so that not even that much of a step is left.
+    The gear nearer its tip is the slave; with undercut corners the gear that has one, or is nearer to its own. Either
+    choice gives the same to about 2e-5 in mid-path, where one passes smoothly into the other, so that not even that
+    much of a step is left.
     """
     left1, left2 = curves.end1 - k.xi1, curves.end2 - k.xi2
+    corner1, corner2 = curves.driver.corner, curves.driven.corner
+    if corner1 >= 0.0 and corner2 >= 0.0:
+        left1, left2 = k.xi1 - corner1, k.xi2 - corner2
     t = 0.5 + (left2 - left1) / (4 * BLEND * (left1 + left2))
-    if k.slave == 1:
+    if k.slave == 1 or k.slave == 3:
         t = 1.0
-    elif k.slave == 2:
+    elif k.slave == 2 or k.slave == 4:
+        t = 0.0
+    if corner1 >= 0.0 and corner2 < 0.0:
+        t = 1.0
+    elif corner2 >= 0.0 and corner1 < 0.0:
         t = 0.0
     t = min(max(t, 0.0), 1.0)
     w = t * t * t * (10 - 15 * t + 6 * t * t)
     u, slope = 0.0, 0.0
     if w > 0.0:
-        u1, slope1 = curve_at(curves.driver, k.xi1, force)
+        # A tip edge on its way to the mate's corner is felt as in that corner.
+        xi = curves.driver.xi[0] if k.slave == 2 and corner1 >= 0.0 else k.xi1
+        u1, slope1 = curve_at(curves.driver, xi, force)
         u, slope = w * u1, w * slope1
     if w < 1.0:
-        u2, slope2 = curve_at(curves.driven, k.xi2, force)
+        xi = curves.driven.xi[0] if k.slave == 1 and corner2 >= 0.0 else k.xi2
+        u2, slope2 = curve_at(curves.driven, xi, force)
         u, slope = u + (1 - w) * u2, slope + (1 - w) * slope2
     return u, slope

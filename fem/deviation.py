@@ -191,6 +191,13 @@ def edge_deviation(
 
 
 @compiled
+def corner_tilt(slave: Tooth, master: Tooth, s: float, lever: float, foot: float, slope: float) -> float:
+    """What the slope of the master's flank adds to the lever of a slave that touches it with its undercut corner."""
+    square = slave.rb * (slave.rb + 2.0 * s) - lever * lever
+    return slope * master.rb * sqrt(max(square, 0.0)) / max(foot, LEAST_ROLL)
+
+
+@compiled
 def deviate(
     t1: Tooth, t2: Tooth, f1: Flanks, f2: Flanks, side: int, tooth: int,
     theta1: float, theta2: float, dx: float, dy: float, k: Contact,
@@ -200,8 +207,8 @@ def deviate(
     line = sqrt(a * a - (t1.rb + t2.rb) ** 2)
     shift = 0.5 * min(k.gap, 0.0)
     # Rigid roll lengths: those without elastic approach, which follow the rotation of one gear alone.
-    rho1 = k.xi1 if k.slave == 2 else k.xi1 - shift
-    rho2 = k.xi2 if k.slave == 1 else k.xi2 - shift
+    rho1 = k.xi1 if k.slave in (2, 4) else k.xi1 - shift
+    rho2 = k.xi2 if k.slave in (1, 3) else k.xi2 - shift
     # Teeth differ on their working flanks only, where both numbers are the same.
     i1, i2 = tooth % len(f1.pitch), tooth % len(f2.pitch)
     v1, e1 = deviation(f1, side, i1, rho1)

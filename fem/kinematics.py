@@ -6,7 +6,7 @@ that both gears look alike (see physics, section 1). A back-flank contact is the
 
 from __future__ import annotations
 
-from math import acos, atan2, cos, hypot, pi, sin, sqrt, tan
+from math import acos, atan2, cos, hypot, inf, pi, sin, sqrt, tan
 from typing import NamedTuple
 
 import numpy as np
@@ -15,11 +15,15 @@ from gearbench.fem.compiled import compiled
 from gearbench.geometry.pair import Pair
 from gearbench.geometry.profile import Profile
 
+APART = 1.0  # gap of a pair that cannot touch [m]
+CORNER_SEPARATION = 0.017  # of the base pitch (0.05 modules): how far a corner is followed beyond the line of action
+
 
 class Tooth(NamedTuple):
     """What contact needs of one gear: base radius [m], involute origin angle, tooth pitch angle, angle of tooth 0 at
     mesh phase 0, roll length at the end of the involute [m], polar coordinates of the tip-edge centre, edge radius
-    and the arc lengths of form point, end of involute and tip [m]."""
+    and the arc lengths of form point, end of involute and tip [m], and the roll length of the outward corner in which
+    undercut ends the flank, where the mate reaches it (-1: it does not, or there is none) [m]."""
 
     rb: float
     psi: float
@@ -32,13 +36,16 @@ class Tooth(NamedTuple):
     s_form: float
     s_end: float
     s_tip: float
+    corner: float = -1.0
 
 
 class Contact(NamedTuple):
     """Contact of one tooth pair in a given rigid configuration.
 
-    gap [m] (negative: overlap); slave 0: on the line of action, 1: driver's tip edge, 2: driven gear's tip edge;
-    xi1, xi2: roll lengths of the contact point, elastic approach shared equally, beyond rho_end on a tip edge [m];
+    gap [m] (negative: overlap); slave 0: on the line of action, 1: driver's tip edge, 2: driven gear's tip edge,
+    3: driver's undercut corner, 4: driven gear's undercut corner;
+    xi1, xi2: roll lengths of the contact point, elastic approach shared equally, beyond rho_end on a tip edge, short of
+    the corner on a corner [m];
     s1, s2: arc lengths of the contact points [m]; lever1, lever2 [m]; nx, ny: direction of the force on the driven.
     """
 
@@ -54,8 +61,9 @@ class Contact(NamedTuple):
     ny: float
 
 
-def tooth_of(shape: Profile, working_pressure_angle: float) -> Tooth:
-    """Contact constants of a gear; tooth 0 passes the pitch point at mesh phase 0."""
+def tooth_of(shape: Profile, working_pressure_angle: float, least: float = inf) -> Tooth:
+    """Contact constants of a gear; tooth 0 passes the pitch point at mesh phase 0. `least`: roll length to which the
+    mate's tip reaches down on it [m]."""
     centre = shape.edge_centre
     return Tooth(
         rb=shape.base_radius,
@@ -69,13 +77,17 @@ def tooth_of(shape: Profile, working_pressure_angle: float) -> Tooth:
         s_form=shape.s_form,
         s_end=shape.rho_end**2 / (2 * shape.base_radius),
         s_tip=shape.s_tip,
+        corner=shape.rho_form if shape.undercut and least < shape.rho_form else -1.0,
     )
 
 
 def teeth_of(pair: Pair) -> tuple[Tooth, Tooth]:
     """Contact constants of driver and driven gear."""
     alpha = pair.working_pressure_angle
-    return tooth_of(pair.driver, alpha), tooth_of(pair.driven, alpha)
+    line = pair.line_of_action
+    return tooth_of(pair.driver, alpha, line - pair.driven.rho_end), tooth_of(
+        pair.driven, alpha, line - pair.driver.rho_end
+    )
 
 
 @compiled
@@ -104,6 +116,43 @@ def edge_contact(slave: Tooth, master: Tooth, c_slave: float, c_master: float, d
 
 
 @compiled
+def corner_contact(slave: Tooth, master: Tooth, c_slave: float, c_master: float, dx: float, dy: float):
+    """Gap of the slave's undercut corner to the master's involute, or to its tip edge beyond: as `edge_contact` with a
+    point instead of the slave's arc.
+
+    Returns gap, tangent angle of the master's normal, roll length of the master's foot (or of its involute's end), its
+    arc length, and the levers on slave and master.
+    """
+    angle = slave.psi + c_slave - slave.corner / slave.rb
+    wx = slave.rb * cos(angle) - slave.corner * sin(angle)
+    wy = slave.rb * sin(angle) + slave.corner * cos(angle)
+    vx, vy = dx - wx, dy - wy
+    v = hypot(vx, vy)
+    if v <= master.rb:
+        return APART, 0.0, 0.0, 0.0, slave.rb, master.rb
+    alpha = acos(master.rb / v)
+    polar = atan2(vy, vx)
+    gap = master.rb * (polar + tan(alpha) - alpha - master.psi - c_master)
+    foot = sqrt(v * v - master.rb**2) - gap
+    phi = polar - alpha
+    at = foot * foot / (2 * master.rb)
+    if foot > master.rho_end:
+        # The corner, in the master's frame, before the arc of the tip edge.
+        angle = c_master + master.edge_angle
+        ex, ey = vx - master.edge_r * cos(angle), vy - master.edge_r * sin(angle)
+        gap = hypot(ex, ey) - master.edge_radius
+        phi = atan2(-ex, ey)
+        turned = master.psi + c_master - master.rho_end / master.rb - phi
+        foot, at = master.rho_end, master.s_end + master.edge_radius * max(turned, 0.0)
+        if at > master.s_tip:
+            gap = APART
+    if foot <= 0.0 or gap > CORNER_SEPARATION * slave.rb * slave.pitch:
+        gap = APART
+    nx, ny = -sin(phi), cos(phi)
+    return gap, phi, foot, at, wx * ny - wy * nx, vx * ny - vy * nx
+
+
+@compiled
 def contact(t1: Tooth, t2: Tooth, c1: float, c2: float, dx: float, dy: float) -> Contact:
     """Contact of one pair: c1, c2 are the teeth's angles in their frames; (dx, dy) from driver to driven centre."""
     a = hypot(dx, dy)
@@ -113,9 +162,17 @@ def contact(t1: Tooth, t2: Tooth, c1: float, c2: float, dx: float, dy: float) ->
     rho2 = t2.rb * (t2.psi + c2 - phi)
     gap = a * sin(alpha) - rho1 - rho2
     over1, over2 = rho1 - t1.rho_end, rho2 - t2.rho_end
+    if rho1 < t1.corner and not (over2 > 0.0 and edge_contact(t2, t1, c2, c1, dx, dy)[2] >= t1.corner):
+        gap, phi, foot, at, lever1, lever2 = corner_contact(t1, t2, c1, c2, dx, dy)
+        xi1 = rho1 + 0.5 * min(gap, 0.0)
+        return Contact(gap, 3, xi1, foot, t1.s_form, at, lever1, lever2, -sin(phi), cos(phi))
+    if rho2 < t2.corner and not (over1 > 0.0 and edge_contact(t1, t2, c1, c2, dx, dy)[2] >= t2.corner):
+        gap, phi, foot, at, lever2, lever1 = corner_contact(t2, t1, c2, c1, dx, dy)
+        xi2 = rho2 + 0.5 * min(gap, 0.0)
+        return Contact(gap, 4, foot, xi2, at, t2.s_form, lever1, lever2, -sin(phi), cos(phi))
     if over1 <= 0.0 and over2 <= 0.0:
         shift = 0.5 * min(gap, 0.0)
-        xi1, xi2 = rho1 + shift, rho2 + shift
+        xi1, xi2 = max(rho1 + shift, t1.corner), max(rho2 + shift, t2.corner)
         s1 = xi1 * xi1 / (2 * t1.rb)
         s2 = xi2 * xi2 / (2 * t2.rb)
         return Contact(gap, 0, xi1, xi2, s1, s2, t1.rb, t2.rb, -sin(phi), cos(phi))

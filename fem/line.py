@@ -56,7 +56,9 @@ def touching_point(slave: Tooth, master: Tooth, xi: float, a: float):
     """Slave angle, arc length and gap reference of the point that touches when the slave's roll length is xi."""
     phi = -acos((slave.rb + master.rb) / a)
     c = xi / slave.rb + phi - slave.psi
-    if xi <= slave.rho_end:
+    if xi < slave.corner:
+        s = slave.s_form
+    elif xi <= slave.rho_end:
         s = xi * xi / (2 * slave.rb)
     else:
         _, _, _, _, moved = edge_contact(slave, master, c, 0.0, a, 0.0)
@@ -67,13 +69,13 @@ def touching_point(slave: Tooth, master: Tooth, xi: float, a: float):
 
 @compiled
 def window(slave: Tooth, master: Tooth, xi: float, a: float, force: float, compliance: float):
-    """First guess of the loaded stretch of the slave's boundary, and whether it reaches the tip edge.
+    """First guess of the loaded stretch of the slave's boundary, and whether it reaches the tip edge or a corner.
 
     compliance: 4/(pi E* b) [m/N], so that the Hertz half-width is sqrt(compliance R force).
     """
     _, s0, _ = touching_point(slave, master, xi, a)
-    rho_s = min(xi, slave.rho_end)
-    rho_m = max(a * sin(acos((slave.rb + master.rb) / a)) - xi, 1e-4)
+    rho_s = min(max(xi, slave.corner), slave.rho_end)
+    rho_m = max(a * sin(acos((slave.rb + master.rb) / a)) - max(xi, slave.corner), 1e-4)
     half = sqrt(compliance * force * rho_s * rho_m / (rho_s + rho_m))
     low = s0 - 1.25 * half
     high = s0 + 1.25 * half
@@ -82,6 +84,10 @@ def window(slave: Tooth, master: Tooth, xi: float, a: float, force: float, compl
         narrow = sqrt(compliance * force * max(slave.edge_radius, 1e-6))
         low = min(s0, slave.s_end) - 2.0 * half
         high = min(s0 + 2.5 * narrow, slave.s_tip) if s0 > slave.s_end else min(slave.s_end + 2.5 * narrow, slave.s_tip)
+    if slave.corner >= 0.0 and low < slave.s_form:
+        # Cut short by the corner, the loaded stretch reaches further to the other side.
+        high = min(s0 + 2.5 * half, slave.s_tip)
+        edge = True
     return max(low, slave.s_form), high, edge
 
 
@@ -188,7 +194,8 @@ def line_contact(
     """Elastic approach of one pair under a force, neighbours unloaded.
 
     half_plane: 2/(pi E* b) [m/N]; a: centre distance; xi: roll length of the contact on the slave (beyond rho_end on
-    its tip edge). Returns approach [m], its slope [m/N], cell edges [m] and cell forces [N].
+    its tip edge, short of `corner` on its undercut corner). Returns approach [m], its slope [m/N], cell edges [m] and
+    cell forces [N].
     """
     c, s0, reference = touching_point(slave, master, xi, a)
     low, high, edge = window(slave, master, xi, a, force, 2 * half_plane)
