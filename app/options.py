@@ -12,6 +12,8 @@ import typer
 if TYPE_CHECKING:
     from gearbench.rig import Case
 
+PICTURES = (".png", ".svg", ".pdf")
+
 CaseArgument = Annotated[
     str, typer.Argument(metavar="CASE", help="case file, or the name of a shipped case (see `cases`)")
 ]
@@ -32,6 +34,18 @@ def check_out(out: Path, inputs: Sequence[Path | str] = ()) -> None:
         raise InputError(f"--out {out} must end in .nc: the result is a NetCDF-4 file")
     if any(out.resolve() == Path(path).resolve() for path in inputs):
         raise InputError(f"--out {out} is one of the inputs, which it would replace: choose another name")
+
+
+def check_picture(path: Path, inputs: Sequence[Path | str] = ()) -> None:
+    """Refuse a picture that cannot be written, or that would replace an input, before any work is done."""
+    from gearbench.failure import InputError
+
+    if not path.parent.is_dir():
+        raise InputError(f"--figure {path} cannot be written: the folder {path.parent} must exist")
+    if path.suffix not in PICTURES:
+        raise InputError(f"--figure {path} must end in {' or '.join(PICTURES)}")
+    if any(path.resolve() == Path(one).resolve() for one in inputs):
+        raise InputError(f"--figure {path} is one of the other files, which it would replace: choose another name")
 
 
 def load_case(name: str, settings: Sequence[str] | None) -> Case:

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 import typer
 
-from gearbench.options import CaseArgument, JsonOption, SetOption, check_out, load_case, print_json
+from gearbench.options import CaseArgument, JsonOption, SetOption, check_out, check_picture, load_case, print_json
 from gearbench.progress import Progress
 
 
@@ -21,6 +21,10 @@ def static(
         list[float] | None, typer.Option("--dte-um", help="transmission errors [um], instead of torques")
     ] = None,
     positions: Annotated[int, typer.Option("--positions", help="mesh phases over one cycle")] = 64,
+    cycles: Annotated[int, typer.Option("--cycles", help="mesh cycles, where teeth differ from one another")] = 1,
+    figure: Annotated[
+        Path | None, typer.Option("--figure", help="picture of the result as well (.png, .svg, .pdf)")
+    ] = None,
     model: Annotated[
         Literal["lumped", "reduced"] | None,
         typer.Option("--model", help="absent: the case's simulation.model"),
@@ -31,6 +35,8 @@ def static(
     """Static response of the pair over one mesh cycle, hub centres held."""
     loaded = load_case(case, settings)
     check_out(out, [case])
+    if figure is not None:
+        check_picture(figure, [case, out])
     from gearbench.bench.static import static as solve
     from gearbench.records.storage import write_atomically
 
@@ -42,9 +48,15 @@ def static(
             torque=torque_nm or (),
             dte=[1e-6 * value for value in dte_um or ()],
             positions=positions,
+            cycles=cycles,
             progress=progress,
         )
         write_atomically(out, lambda path: result.to_netcdf(path, engine="h5netcdf"))
+        if figure is not None:
+            progress.step("figure")
+            from gearbench.figures_static import plot_static
+
+            plot_static(result, figure)
     from gearbench.static_methods import methods_data, methods_lines, stiffness_tables
 
     tables = stiffness_tables(loaded, result)

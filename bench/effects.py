@@ -2,9 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+from math import lcm
+
 from gearbench.bench.errors import BenchError
-from gearbench.rig import Case, Rig
-from gearbench.rig.neutral import effects_in
+from gearbench.geometry.iso1328 import drawn_gear
+from gearbench.geometry.micro import teeth_alike
+from gearbench.rig import Case, Gear, Rig
+from gearbench.rig.neutral import FLANK_FIELDS, effects_in
+from gearbench.rig.value import key_of
+
+# Keys of a gear that move its flanks: what finite elements represent, but for what changes stiffness.
+FLANK_KEYS = frozenset(f"rig.{side}.{key_of(Gear, name)}" for side in ("driver", "driven") for name in FLANK_FIELDS)
 
 # What the non-linear lumped model represents; a key counts with all keys below it.
 LUMPED = tuple(
@@ -27,14 +36,21 @@ def is_nonlinear(case: Case) -> bool:
     return case.simulation.mesh_stiffness == "finite-element" or bool(effects_in(case.rig))
 
 
-def refuse_effects(rig: Rig, model: str, tables: tuple[str, ...] = ("rig",)) -> None:
+def refuse_effects(rig: Rig, model: str, tables: tuple[str, ...] = ("rig",), represented: Collection[str] = ()) -> None:
     """Raise BenchError for the first effect, in the given tables of a case, that a model cannot represent."""
     for key in effects_in(rig):
-        if any(key.startswith(table) for table in tables):
+        if any(key.startswith(table) for table in tables) and key not in represented:
             raise BenchError(
                 f"the {model} does not represent {key}: leave it at its neutral value, or set simulation.model ="
                 ' "lumped", which has it'
             )
+
+
+def cycles_to_repeat(rig: Rig) -> int:
+    """Mesh cycles after which the same teeth with the same errors meet again: 1 where all are alike, the teeth of the
+    gear whose teeth differ, or, where those of both do, the hunting period."""
+    gears = (drawn_gear(rig.driver, "rig.driver"), drawn_gear(rig.driven, "rig.driven"))
+    return lcm(*(1 if teeth_alike(gear) else gear.teeth for gear in gears))
 
 
 def refuse_unknown(rig: Rig) -> None:

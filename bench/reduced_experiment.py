@@ -13,7 +13,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from gearbench.bench.attributes import lost_contact, rig_attributes
-from gearbench.bench.effects import refuse_effects
+from gearbench.bench.effects import FLANK_KEYS, cycles_to_repeat, refuse_effects
 from gearbench.bench.errors import BenchError
 from gearbench.bench.excitation import Torque, torque_realisation
 from gearbench.bench.reduced_rig import ElasticRig, choose_substeps, elastic_rig, machine_for
@@ -36,13 +36,15 @@ class Run:
     """Recorded blocks of one realisation.
 
     samples (n, CHANNELS); torque (n,) [N m]; start [s] of the record, the simulation having begun one block
-    before 0; residual: period-to-period change of the DTE over its standard deviation.
+    before 0; residual: period-to-period change of the DTE over its standard deviation (see `_long_run` for a rig that
+    does not repeat within the record); settling: excitation periods before the record.
     """
 
     samples: Array
     torque: Array
     start: float
     residual: float
+    settling: int
 
 
 def simulate_reduced(case: Case, progress: ProgressReport | None = None) -> xr.Dataset:
@@ -51,8 +53,8 @@ def simulate_reduced(case: Case, progress: ProgressReport | None = None) -> xr.D
     Raises GeometryError, BenchError or ContactError (each one sentence) for what cannot be simulated.
     """
     report = progress or (lambda fraction, note: None)
-    refuse_effects(case.rig, "reduced finite-element model")
-    plan = schedule(case.experiment, case.rig)
+    refuse_effects(case.rig, "reduced finite-element model", represented=FLANK_KEYS)
+    plan = schedule(case.experiment, case.rig, cycles_to_repeat(case.rig))
     elastic = elastic_rig(case.rig, case.simulation, lambda note: report(0.0, note))
     machine = machine_for(elastic, plan.mesh_frequency)
     substeps = choose_substeps(machine, case, plan)
@@ -73,6 +75,8 @@ def simulate_reduced(case: Case, progress: ProgressReport | None = None) -> xr.D
                 report(float(done.mean()), f"realisation {number + 1} of {total}")
 
         torque = torque_realisation(case.experiment, number, case.rig)
+        if not plan.repeats:
+            return _long_run(machine, scheme, plan, case.experiment, torque, substeps, tell)
         return _run(machine, scheme, start, plan, case.experiment, torque, substeps, tell)
 
     runs = realisations(run, total, stop)
@@ -101,9 +105,7 @@ def _run(
     finished = 0
     last = np.zeros(CHANNELS)  # belongs to the first block, which only settles
     while len(blocks) < wanted:
-        state, samples = _block(
-            machine, scheme, state, fine, substeps, partial(_tell_part, tell, finished, wanted)
-        )
+        state, samples = _block(machine, scheme, state, fine, substeps, partial(_tell_part, tell, finished, wanted))
         # The last sample of a block is the first one of the next.
         block, last = np.vstack([last[None], samples[:-1]]), samples[-1]
         finished += 1
@@ -125,7 +127,60 @@ def _run(
     kept = blocks[len(blocks) - plan.blocks :]
     duration = plan.block_samples / plan.sampling_rate
     start = (finished - len(kept) - 1) * duration
-    return Run(np.vstack(kept), np.tile(coarse, plan.blocks), start, residual)
+    settling = (finished - len(kept)) * plan.block_periods
+    return Run(np.vstack(kept), np.tile(coarse, plan.blocks), start, residual, settling)
+
+
+def _long_run(
+    machine: Machine,
+    scheme: Scheme,
+    plan: Schedule,
+    experiment: Experiment,
+    torque: Torque,
+    substeps: int,
+    tell: Callable[[float], None],
+) -> Run:
+    """A record shorter than what repeats, from mesh phase 0 on.
+
+    No period is like the one before, so the steady state shows in another way: two histories, one begun an excitation
+    period before the other, must agree over the first recorded period.
+    """
+    period = torque.sample(plan.samples_per_period * substeps)
+    fine = np.roll(period, -1)
+    duration = plan.samples_per_period / plan.sampling_rate
+    total = plan.block_periods + 2 * experiment.settling_periods_max
+
+    def first_period(settling: int) -> tuple[State, Array, Array]:
+        state = initial_state(machine, experiment.torque_mean, -settling * duration)
+        last = np.zeros(CHANNELS)
+        for part in range(settling + 1):
+            state, samples = _block(
+                machine, scheme, state, fine, substeps, partial(_tell_part, tell, settling + part, total)
+            )
+            block, last = np.vstack([last[None], samples[:-1]]), samples[-1]
+        return state, block, last
+
+    _, before, _ = first_period(1)
+    settling = 2
+    while True:
+        state, block, last = first_period(settling)
+        residual = _change(machine, before, block)
+        if residual <= experiment.settling_tolerance:
+            break
+        if settling >= experiment.settling_periods_max:
+            raise BenchError(
+                f"no steady state: after {settling} excitation periods the DTE still depends by {residual:.3g} of its"
+                " standard deviation on when the simulation began (experiment.settling_tolerance ="
+                f" {experiment.settling_tolerance:g}); raise settling_periods_max ="
+                f" {experiment.settling_periods_max} or the damping"
+            )
+        before, settling = block, settling + 1
+    blocks = [block]
+    for part in range(1, plan.block_periods):
+        state, samples = _block(machine, scheme, state, fine, substeps, partial(_tell_part, tell, part, total))
+        block, last = np.vstack([last[None], samples[:-1]]), samples[-1]
+        blocks.append(block)
+    return Run(np.vstack(blocks), np.tile(period[::substeps], plan.block_periods), 0.0, residual, settling)
 
 
 def _tell_part(tell: Callable[[float], None], finished: int, wanted: int, fraction: float) -> None:
@@ -146,10 +201,14 @@ def _block(
     for at in range(0, len(torque), CHUNK * substeps):
         piece = torque[at : at + CHUNK * substeps]
         state, samples, failed = advance(machine, scheme, state, piece, substeps)
+        if failed < -1:
+            raise BenchError(
+                f"at t = {state.t:.6g} s the teeth overlap where contact leaves the modelled flanks: lower"
+                " experiment.torque_mean_nm or the multisine"
+            )
         if failed >= 0:
             raise BenchError(
-                f"contact was not found at t = {state.t:.6g} s; more simulation.substeps than {substeps} may"
-                " help"
+                f"contact was not found at t = {state.t:.6g} s; more simulation.substeps than {substeps} may help"
             )
         if not np.isfinite(samples).all():
             raise BenchError(f"the integration diverged before t = {state.t:.6g} s")
@@ -212,6 +271,8 @@ def _record(case: Case, elastic: ElasticRig, plan: Schedule, runs: list[Run], su
         # Also where both gears turn freely, since the driven torque then balances the driver's.
         "force": torque / elastic.pair.driver.base_radius,
     }
+    repeat = cycles_to_repeat(case.rig)
+    warnings = [lost_contact(lost, samples.shape[0] * samples.shape[1]), _unlike_periods(plan, repeat)]
     settings = {
         "model": "reduced",
         "substeps": substeps,
@@ -229,14 +290,24 @@ def _record(case: Case, elastic: ElasticRig, plan: Schedule, runs: list[Run], su
         "mesh_phase_origin": "geometry",
         "torque_mean": case.experiment.torque_mean,
         "settling_residual": max(run.residual for run in runs),
-        "settling_periods": round((start * plan.sampling_rate / plan.block_samples + 1) * plan.block_periods),
+        "settling_periods": max(run.settling for run in runs),
+        "repeats_after_mesh_cycles": repeat,
+        "hunting_period": repeat * plan.mesh_period,
         "contact_lost_samples": lost,
-        "warnings": lost_contact(lost, samples.shape[0] * samples.shape[1]),
+        "warnings": "; ".join(filter(None, warnings)) or None,
         "model": "reduced",
         "substeps": substeps,
         "provenance": provenance(dump_case(case), case.experiment.seed, settings),
     }
     return make_record(channels, attributes, start=start)
+
+
+def _unlike_periods(plan: Schedule, repeat: int) -> str | None:
+    """Warning where the mesh period is not the period of what happens."""
+    if repeat == 1:
+        return None
+    after = f"the teeth differ, so the rig repeats after {repeat} mesh periods ({repeat * plan.mesh_period:.4g} s)"
+    return after if plan.repeats else f"{after}, longer than the record: none of its excitation periods is like another"
 
 
 def _aligned(samples: Array, runs: list[Run], plan: Schedule) -> Array:

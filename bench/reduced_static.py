@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from gearbench.bench.effects import refuse_effects
+from gearbench.bench.effects import FLANK_KEYS, cycles_to_repeat, refuse_effects
 from gearbench.bench.errors import BenchError
 from gearbench.bench.reduced_rig import ElasticRig, elastic_rig
 from gearbench.bench.schedule import ProgressReport
@@ -32,15 +32,14 @@ def _check_range(elastic: ElasticRig, unit: str, values: Array) -> None:
         )
 
 
-def static_reduced(
-    case: Case, loads: Loads, phase: Array, progress: ProgressReport | None = None
-) -> xr.Dataset:
+def static_reduced(case: Case, loads: Loads, phase: Array, progress: ProgressReport | None = None) -> xr.Dataset:
     """Static cycle with tip-edge contact, backlash and load sharing.
 
     Raises GeometryError, and ContactError where contact leaves the modelled flanks.
     """
     report = progress or (lambda fraction, note: None)
-    refuse_effects(case.rig, "static finite-element solution", ("rig.driver", "rig.driven", "rig.mesh"))
+    tables = ("rig.driver", "rig.driven", "rig.mesh")
+    refuse_effects(case.rig, "static finite-element solution", tables, FLANK_KEYS)
     elastic = elastic_rig(case.rig, case.simulation, lambda note: report(0.0, note))
     unit, values = loads
     _check_range(elastic, unit, values)
@@ -59,10 +58,12 @@ def static_reduced(
         secant=cycle.stiffness_secant,
         tangent=cycle.stiffness_tangent,
         share=cycle.load_share,
+        unloaded=cycle.unloaded,
         attributes={
             "model": "reduced",
             "base_radius_driver": elastic.pair.driver.base_radius,
             "stress_state": case.rig.material.state,
+            "repeats_after_mesh_cycles": cycles_to_repeat(case.rig),
             "unknowns_driver": elastic.gears[0].unknowns,
             "unknowns_driven": elastic.gears[1].unknowns,
         },

@@ -19,7 +19,8 @@ ProgressReport = Callable[[float, str], None]
 
 @dataclass(frozen=True)
 class Schedule:
-    """When is what: a block is the shortest run after which excitation and mesh both repeat.
+    """When is what: a block is the shortest run after which excitation and mesh both repeat, or the whole record where
+    `repeats` is false: teeth that differ then meet again only after a longer time.
 
     `block_periods` excitation periods of `samples_per_period` samples make a block; it holds
     `mesh_cycles` mesh periods; the record has `blocks` of them. `sampling_rate` in Hz, speeds in rad/s,
@@ -33,6 +34,7 @@ class Schedule:
     mesh_cycles: int
     speed_driver: float
     speed_driven: float
+    repeats: bool = True
 
     @property
     def block_samples(self) -> int:
@@ -50,8 +52,8 @@ class Schedule:
         return 1.0 / self.mesh_frequency
 
 
-def schedule(experiment: Experiment, rig: Rig) -> Schedule:
-    """The schedule of an experiment.
+def schedule(experiment: Experiment, rig: Rig, repeat: int = 1) -> Schedule:
+    """The schedule of an experiment on a rig that repeats after `repeat` mesh cycles.
 
     Raises BenchError unless the record holds a whole number of mesh periods.
     """
@@ -71,11 +73,13 @@ def schedule(experiment: Experiment, rig: Rig) -> Schedule:
             f"the record of {record:g} s (periods x samples_per_period / sampling_rate_hz) holds"
             f" {wanted * record:.6g} mesh periods at {wanted:g} Hz, which must be a whole number; {nearest}"
         )
-    block_periods = next(
+    whole = (
         n
         for n in range(1, experiment.periods + 1)
-        if not experiment.periods % n and not n * cycles % experiment.periods
+        if not experiment.periods % n and not n * cycles % (experiment.periods * repeat)
     )
+    found = next(whole, None)
+    block_periods = found or experiment.periods
     blocks = experiment.periods // block_periods
     mesh_cycles = cycles // blocks
     frequency = mesh_cycles / (block_periods * period)
@@ -87,4 +91,5 @@ def schedule(experiment: Experiment, rig: Rig) -> Schedule:
         mesh_cycles=mesh_cycles,
         speed_driver=2 * pi * frequency / rig.driver.teeth,
         speed_driven=2 * pi * frequency / rig.driven.teeth,
+        repeats=found is not None,
     )

@@ -35,24 +35,30 @@ def static(
     torque: Sequence[float] = (),
     dte: Sequence[float] = (),
     positions: int = 64,
+    cycles: int = 1,
     progress: ProgressReport | None = None,
 ) -> xr.Dataset:
-    """Static response of the case's pair at `positions` uniform mesh phases.
+    """Static response of the case's pair at `positions` uniform mesh phases of each of `cycles` mesh cycles.
 
+    From mesh phase 0 on, where tooth 0 of both gears touches at the pitch point; where teeth differ, a cycle is unlike
+    the next one.
     Loads are driver torques [N m] or transmission errors [m]; without either, the experiment's mean torque.
     Raises BenchError for bad loads or an unknown model, and what the solver raises.
     """
     name = model or case.simulation.model
     if name not in SOLVERS:
-        raise BenchError(
-            f"simulation.model = {name!r} has no static solution, unlike {', '.join(sorted(SOLVERS))}"
-        )
+        raise BenchError(f"simulation.model = {name!r} has no static solution, unlike {', '.join(sorted(SOLVERS))}")
     if len(torque) and len(dte):
         raise BenchError("static loads are torques or transmission errors: give one kind")
     if positions < 2:
         raise BenchError(f"positions = {positions} must be at least 2")
-    if positions > MOST_POSITIONS:
-        raise BenchError(f"positions = {positions} must be at most {MOST_POSITIONS}")
+    if cycles < 1:
+        raise BenchError(f"cycles = {cycles} must be at least 1")
+    if positions * cycles > MOST_POSITIONS:
+        times = f" x cycles = {cycles}" if cycles > 1 else ""
+        raise BenchError(f"positions = {positions}{times} must be at most {MOST_POSITIONS}")
+    if cycles > 1 and name != "reduced":
+        raise BenchError(f"cycles = {cycles} must be 1 for the model {name}, which has no teeth of their own at rest")
     unit, values = ("m", dte) if len(dte) else ("N m", torque or (case.experiment.torque_mean,))
     loads = np.asarray(values, dtype=float)
     for load in loads:
@@ -60,7 +66,7 @@ def static(
             raise BenchError(f"static load = {load:g} {unit} must be greater than 0 {unit}")
     module, function = SOLVERS[name]
     solver: StaticSolver = getattr(import_module(module), function)
-    return solver(case, (unit, loads), np.arange(positions) / positions, progress)
+    return solver(case, (unit, loads), np.arange(positions * cycles) / positions, progress)
 
 
 def static_dataset(
@@ -73,8 +79,10 @@ def static_dataset(
     tangent: Array,
     attributes: dict[str, object],
     share: Array | None = None,
+    unloaded: Array | None = None,
 ) -> xr.Dataset:
-    """The results as a dataset (DESIGN: static.nc); arrays (load, phase), `share` (load, phase, pair)."""
+    """The results as a dataset (DESIGN: static.nc); arrays (load, phase), `share` (load, phase, pair), `unloaded`
+    (phase,): the transmission error without load."""
     unit, values = loads
     fields = {
         "transmission_error": (transmission_error, "m"),
@@ -88,4 +96,6 @@ def static_dataset(
     coordinates = {"load": ("load", values, {"units": unit}), "phase": ("phase", phase, {"units": "cycles"})}
     if share is not None:
         variables["load_share"] = (("load", "phase", "pair"), share, {"units": "1"})
+    if unloaded is not None:
+        variables["transmission_error_unloaded"] = (("phase",), unloaded, {"units": "m"})
     return xr.Dataset(variables, coords=coordinates, attrs={"schema": SCHEMA, **attributes})
