@@ -14,7 +14,8 @@ COLOURS = {
     "finite elements, hub to hub": BLUE,
     "finite elements, bodies rigid in torsion": BLUE,
     "lumped model": BLUE,
-    "potential energy": ORANGE,
+    "potential energy, hub to hub": ORANGE,
+    "potential energy, bodies rigid in torsion": ORANGE,
     "Weber-Banaschek": GREEN,
 }
 

@@ -14,11 +14,11 @@ def stiffness_lines(table: StiffnessTable) -> list[str]:
     """Lines of text: a head, a row for each method, the notes."""
     lines = [
         f"mesh stiffness at {table.torque:.4g} N m [N/um] (force along the line of action over transmission error)",
-        f"  {'':<40}{'one pair':>10}{'mean':>10}{'least':>10}{'most':>10}{'mean/width':>12}",
+        f"  {'':<43}{'one pair':>10}{'mean':>10}{'least':>10}{'most':>10}{'mean/width':>12}",
     ]
     for row in table.rows:
         figures = "".join(f"{_figure(value):>10}" for value in (row.single, row.mean, row.least, row.most))
-        lines.append(f"  {row.model:<40}{figures}{row.mean / table.face_width / 1e9:>12.2f}")
+        lines.append(f"  {row.model:<43}{figures}{row.mean / table.face_width / 1e9:>12.2f}")
     lines.append("  one pair: at the pitch point, for ISO c'; mean/width in N/(mm um), for ISO c_gamma")
     return lines + [f"  note: {note}" for note in table.notes]
 

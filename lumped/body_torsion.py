@@ -1,7 +1,8 @@
 """Torsion of the gear body between the rigid hub circle and the root circle.
 
-Finite elements from hub to hub contain it; ISO 6336, Weber-Banaschek and the potential energy method do not. To
-compare like with like, its compliance is taken off.
+Finite elements from hub to hub contain it, and so does the foundation of Sainsot, Velex and Duverger (2004), a ring
+held at its inner circle: as the hub shrinks, its compliance grows by the torsion. ISO 6336 and Weber-Banaschek do not:
+their foundation is a half-plane. To compare like with like, the torsion is taken off.
 """
 
 from __future__ import annotations

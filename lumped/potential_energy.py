@@ -5,8 +5,8 @@ into a lateral part F cos(alpha) and an axial part F sin(alpha); the energies of
 compression are integrated over the true outline (trochoidal fillet and involute), from the root circle to
 the contact point (Yang and Lin 1987; Tian 2004; outline from the root circle as Ma et al. 2014). The gear
 body adds the fillet foundation deflection of Sainsot, Velex and Duverger (2004), the contact the linear
-Hertz deflection of Yang and Sun (1985). Torsion of the gear body between foundation and hub is not part
-of the method (physics, section 5).
+Hertz deflection of Yang and Sun (1985). The foundation is a ring held at the hub circle, so torsion of the
+gear body is in it: taking the torsion off leaves a compliance that hardly depends on the hub radius.
 """
 
 from __future__ import annotations
@@ -121,9 +121,7 @@ def foundation_polynomials(h: float, theta: float) -> tuple[float, float, float,
     return values[0], values[1], values[2], values[3]
 
 
-def foundation_compliance(
-    tooth: Profile, hub_radius: float, alpha: Array, *, youngs: float, width: float
-) -> Array:
+def foundation_compliance(tooth: Profile, hub_radius: float, alpha: Array, *, youngs: float, width: float) -> Array:
     """Compliance (n,) [m/N] of the gear body under the tooth (Sainsot, Velex and Duverger 2004, equation 9).
 
     The body is a ring between the root circle and the rigid hub circle; `alpha` (n,) as in `beam_compliance`.
@@ -169,9 +167,7 @@ def pair_stiffness(rig: Rig, meshing: Pair, rho_driver: ArrayLike) -> Array:
     rho = np.atleast_1d(np.asarray(rho_driver, dtype=float))
     width = meshing.face_width
     one = tooth_compliance(meshing.driver, rig.driver.hub_radius, width, rig.material, rho)
-    two = tooth_compliance(
-        meshing.driven, rig.driven.hub_radius, width, rig.material, meshing.line_of_action - rho
-    )
+    two = tooth_compliance(meshing.driven, rig.driven.hub_radius, width, rig.material, meshing.line_of_action - rho)
     return 1 / (one.total + two.total + hertz_compliance(rig.material, width))
 
 

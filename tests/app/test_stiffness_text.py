@@ -32,14 +32,14 @@ def table(case: Case) -> StiffnessTable:
 def test_every_row_is_a_line_with_its_figures(table: StiffnessTable) -> None:
     lines = stiffness_lines(table)
     assert lines[0].startswith("mesh stiffness at 50 N m [N/um]")
-    assert [line[2:42].strip() for line in lines[2:6]] == [row.model for row in table.rows]
-    lumped, energy, _, iso = lines[2:6]
-    figures = [float(word) for word in energy[42:].split()]
+    assert [line[2:45].strip() for line in lines[2:7]] == [row.model for row in table.rows]
+    lumped, energy, *_, iso = lines[2:7]
+    figures = [float(word) for word in energy[45:].split()]
     row = table.rows[1]
     wanted = [value / 1e6 for value in (row.single, row.mean, row.least, row.most)]
     assert figures[:4] == pytest.approx(wanted, abs=0.06)
     assert figures[4] == pytest.approx(row.mean / 0.02 / 1e9, abs=6e-3)
-    assert lumped[42:].split()[0] == "-" and iso[42:].split()[2:4] == ["-", "-"]
+    assert lumped[45:].split()[0] == "-" and iso[45:].split()[2:4] == ["-", "-"]
     assert lines[-1].startswith("  note: load 40.3 N/mm is below")
 
 
@@ -48,9 +48,9 @@ def test_json_has_the_same(table: StiffnessTable) -> None:
     assert data["torque_nm"] == pytest.approx(50.0)
     assert data["notes"] == list(table.notes)
     row = data["rows"][1]
-    assert (row["model"], row["contains_body_torsion"]) == ("potential energy", False)
+    assert (row["model"], row["contains_body_torsion"]) == ("potential energy, hub to hub", True)
     assert row["mean_n_per_um"] * 1e6 == pytest.approx(table.rows[1].mean)
-    assert data["rows"][3]["least_n_per_um"] is None
+    assert data["rows"][4]["least_n_per_um"] is None
 
 
 def test_picture(tmp_path: Path, table: StiffnessTable) -> None:

@@ -11,6 +11,7 @@ from scipy.integrate import quad
 from gearbench.geometry import pair
 from gearbench.lumped.body_torsion import body_stiffness, without_body_torsion
 from gearbench.lumped.errors import LumpedError
+from gearbench.lumped.potential_energy import pair_stiffness
 from gearbench.rig import Gear, Material, Rig, Support, Supports
 
 
@@ -54,3 +55,17 @@ def test_ring_without_height_is_rigid() -> None:
     tooth = pair(rig).driver
     flat = rig.driver.model_copy(update={"hub_radius": tooth.root_radius})
     assert body_stiffness(flat, tooth, rig.material) == inf
+
+
+def test_sainsot_s_foundation_contains_it() -> None:
+    """From large to small hubs the potential energy method's compliance grows by the torsion, to a tenth."""
+    support = Support(stiffness=1e8)
+    found, torsion = [], []
+    for ratio in (1.6, 5.0):
+        gear = Gear(teeth=62, module=2e-3, face_width=0.02, hub_radius=59.5e-3 / ratio, tip_edge_radius=0.0)
+        rig = Rig(driver=gear, driven=gear, support=Supports(driver=support, driven=support))
+        meshing = pair(rig)
+        found.append(1 / pair_stiffness(rig, meshing, meshing.rho_pitch[0])[0])
+        torsion.append(2 / body_stiffness(gear, meshing.driver, rig.material))
+    assert found[-1] - found[0] == pytest.approx(torsion[-1] - torsion[0], rel=0.1)
+    assert torsion[-1] > 0.4 * found[-1]
