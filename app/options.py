@@ -36,16 +36,16 @@ def check_out(out: Path, inputs: Sequence[Path | str] = ()) -> None:
         raise InputError(f"--out {out} is one of the inputs, which it would replace: choose another name")
 
 
-def check_picture(path: Path, inputs: Sequence[Path | str] = ()) -> None:
+def check_picture(path: Path, inputs: Sequence[Path | str] = (), option: str = "--figure") -> None:
     """Refuse a picture that cannot be written, or that would replace an input, before any work is done."""
     from gearbench.failure import InputError
 
     if not path.parent.is_dir():
-        raise InputError(f"--figure {path} cannot be written: the folder {path.parent} must exist")
+        raise InputError(f"{option} {path} cannot be written: the folder {path.parent} must exist")
     if path.suffix not in PICTURES:
-        raise InputError(f"--figure {path} must end in {' or '.join(PICTURES)}")
+        raise InputError(f"{option} {path} must end in {' or '.join(PICTURES)}")
     if any(path.resolve() == Path(one).resolve() for one in inputs):
-        raise InputError(f"--figure {path} is one of the other files, which it would replace: choose another name")
+        raise InputError(f"{option} {path} is one of the other files, which it would replace: choose another name")
 
 
 def load_case(name: str, settings: Sequence[str] | None) -> Case:

@@ -25,6 +25,9 @@ def static(
     figure: Annotated[
         Path | None, typer.Option("--figure", help="picture of the result as well (.png, .svg, .pdf)")
     ] = None,
+    stiffness_figure: Annotated[
+        Path | None, typer.Option("--stiffness-figure", help="picture of the mesh stiffness by every method as well")
+    ] = None,
     model: Annotated[
         Literal["lumped", "reduced"] | None,
         typer.Option("--model", help="absent: the case's simulation.model"),
@@ -37,6 +40,8 @@ def static(
     check_out(out, [case])
     if figure is not None:
         check_picture(figure, [case, out])
+    if stiffness_figure is not None:
+        check_picture(stiffness_figure, [case, out, *([figure] if figure else [])], "--stiffness-figure")
     from gearbench.bench.static import static as solve
     from gearbench.records.storage import write_atomically
 
@@ -57,22 +62,27 @@ def static(
             from gearbench.figures_static import plot_static
 
             plot_static(result, figure)
-    from gearbench.static_methods import methods_data, methods_lines, stiffness_tables
+    from gearbench.static_methods import draw_largest, methods_data, methods_lines, stiffness_tables
 
     tables = stiffness_tables(loaded, result)
+    if stiffness_figure is not None:
+        draw_largest(tables, stiffness_figure)
     summary = static_summary(result, out) | methods_data(loaded, tables)
     if as_json:
         print_json(summary)
         return
-    for row in summary["loads"]:
-        typer.echo(
-            f"{row['load']:g} {summary['unit']}: TE {row['te_mean_um']:.4g} um mean,"
-            f" {row['te_peak_to_peak_um']:.4g} um peak to peak; tangent stiffness"
-            f" {row['stiffness_least_n_per_um']:.4g} .. {row['stiffness_most_n_per_um']:.4g} N/um"
-        )
-    for line in methods_lines(loaded, tables):
+    for line in [*_lines(summary), *methods_lines(loaded, tables), str(out)]:
         typer.echo(line)
-    typer.echo(str(out))
+
+
+def _lines(summary: dict[str, Any]) -> list[str]:
+    """A line for each load."""
+    return [
+        f"{row['load']:g} {summary['unit']}: TE {row['te_mean_um']:.4g} um mean,"
+        f" {row['te_peak_to_peak_um']:.4g} um peak to peak; tangent stiffness"
+        f" {row['stiffness_least_n_per_um']:.4g} .. {row['stiffness_most_n_per_um']:.4g} N/um"
+        for row in summary["loads"]
+    ]
 
 
 def static_summary(result: Any, path: Path) -> dict[str, Any]:

@@ -8,6 +8,8 @@ from gearbench.root_stress_text import root_stress_data, root_stress_lines
 from gearbench.stiffness_text import stiffness_data, stiffness_lines
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     import xarray as xr
 
     from gearbench.bench.stiffness_table import StiffnessTable
@@ -34,5 +36,20 @@ def methods_lines(case: Case, tables: list[StiffnessTable]) -> list[str]:
     """The same as text, for the largest torque only."""
     if not tables:
         return []
-    table = max(tables, key=lambda one: one.torque)
+    table = largest(tables)
     return [*stiffness_lines(table), *root_stress_lines(root_stress_data(case.rig, table.torque))]
+
+
+def largest(tables: list[StiffnessTable]) -> StiffnessTable:
+    """The table of the largest torque."""
+    return max(tables, key=lambda one: one.torque)
+
+
+def draw_largest(tables: list[StiffnessTable], path: Path) -> None:
+    """Picture of the stiffness by every method under the largest torque. Raises InputError where no load carries."""
+    from gearbench.failure import InputError
+    from gearbench.figures_stiffness import draw_stiffness_table
+
+    if not tables:
+        raise InputError("--stiffness-figure needs a load that closes the gap at every mesh phase: none does")
+    draw_stiffness_table(path, largest(tables))

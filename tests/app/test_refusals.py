@@ -26,6 +26,14 @@ from gearbench.summary_text import headline
         (["identify", "a.nc", "a.nc", "--out", "f.nc"], "names 1 file(s)"),
         (["static", "quick_lumped", "--out", "notes.txt"], "must end in .nc"),
         (["static", "quick_lumped", "--out", "s.nc", "--positions", "1000000000"], "at most 65536"),
+        (
+            ["static", "quick_lumped", "--out", "s.nc", "--stiffness-figure", "notes.txt"],
+            "--stiffness-figure notes.txt must end in .png",
+        ),
+        (
+            ["static", "quick_lumped", "--out", "s.nc", "--figure", "k.png", "--stiffness-figure", "k.png"],
+            "--stiffness-figure k.png is one of the other files",
+        ),
         (["check", "quick_fe", "--set", "experiment.mesh_frequency_hz=20.3"], "20.3 mesh periods"),
         (["check", "quick_fe", "--set", "experiment.mesh_frequency_hz=4096"], "must lie below half"),
     ],

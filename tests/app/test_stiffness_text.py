@@ -10,12 +10,13 @@ import pytest
 from gearbench.bench.static import static
 from gearbench.bench.stiffness_table import StiffnessTable, stiffness_table
 from gearbench.cases import case_path
+from gearbench.failure import InputError
 from gearbench.figures_stiffness import draw_stiffness_table
 from gearbench.geometry import pair
 from gearbench.lumped.iso6336_root import root_stress
 from gearbench.rig import Case, read_case
 from gearbench.root_stress_text import root_stress_data, root_stress_lines
-from gearbench.static_methods import methods_data, methods_lines, stiffness_tables
+from gearbench.static_methods import draw_largest, methods_data, methods_lines, stiffness_tables
 from gearbench.stiffness_text import stiffness_data, stiffness_lines
 
 
@@ -93,3 +94,11 @@ def test_every_load_that_carries_has_a_table(case: Case) -> None:
     result["stiffness_secant"].values[1, 3] = 0.0  # a gap that a given error does not close
     assert [table.torque for table in stiffness_tables(case, result)] == pytest.approx([50.0, 100.0])
     assert methods_lines(case, []) == []
+
+
+def test_picture_shows_the_largest_load(tmp_path: Path, case: Case) -> None:
+    tables = stiffness_tables(case, static(case, "lumped", torque=[150.0, 50.0], positions=8))
+    draw_largest(tables, tmp_path / "k.svg")
+    assert "Mesh stiffness at 150 N m" in (tmp_path / "k.svg").read_text(encoding="utf-8")
+    with pytest.raises(InputError, match="needs a load"):
+        draw_largest([], tmp_path / "none.svg")
