@@ -162,15 +162,20 @@ def contact(t1: Tooth, t2: Tooth, c1: float, c2: float, dx: float, dy: float) ->
     rho2 = t2.rb * (t2.psi + c2 - phi)
     gap = a * sin(alpha) - rho1 - rho2
     over1, over2 = rho1 - t1.rho_end, rho2 - t2.rho_end
-    if rho1 < t1.corner and not (over2 > 0.0 and edge_contact(t2, t1, c2, c1, dx, dy)[2] >= t1.corner):
+    before = False  # a tip edge that has not yet passed the mate's corner still faces the flank beyond it
+    if rho1 < t1.corner:
         gap, phi, foot, at, lever1, lever2 = corner_contact(t1, t2, c1, c2, dx, dy)
-        xi1 = rho1 + 0.5 * min(gap, 0.0)
-        return Contact(gap, 3, xi1, foot, t1.s_form, at, lever1, lever2, -sin(phi), cos(phi))
-    if rho2 < t2.corner and not (over1 > 0.0 and edge_contact(t1, t2, c1, c2, dx, dy)[2] >= t2.corner):
+        before = at > t2.s_end and edge_contact(t2, t1, c2, c1, dx, dy)[2] >= t1.corner
+        if not before:
+            xi1 = rho1 + 0.5 * min(gap, 0.0)
+            return Contact(gap, 3, xi1, foot, t1.s_form, at, lever1, lever2, -sin(phi), cos(phi))
+    if rho2 < t2.corner:
         gap, phi, foot, at, lever2, lever1 = corner_contact(t2, t1, c2, c1, dx, dy)
-        xi2 = rho2 + 0.5 * min(gap, 0.0)
-        return Contact(gap, 4, foot, xi2, at, t2.s_form, lever1, lever2, -sin(phi), cos(phi))
-    if over1 <= 0.0 and over2 <= 0.0:
+        before = at > t1.s_end and edge_contact(t1, t2, c1, c2, dx, dy)[2] >= t2.corner
+        if not before:
+            xi2 = rho2 + 0.5 * min(gap, 0.0)
+            return Contact(gap, 4, foot, xi2, at, t2.s_form, lever1, lever2, -sin(phi), cos(phi))
+    if not before and over1 <= 0.0 and over2 <= 0.0:
         shift = 0.5 * min(gap, 0.0)
         xi1, xi2 = max(rho1 + shift, t1.corner), max(rho2 + shift, t2.corner)
         s1 = xi1 * xi1 / (2 * t1.rb)
