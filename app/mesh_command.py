@@ -9,19 +9,25 @@ import typer
 
 from gearbench.options import CaseArgument, JsonOption, SetOption, load_case, print_json
 from gearbench.progress import Progress
+from gearbench.rig import Rig
 
 
 def mesh(
     case: CaseArgument,
-    out: Annotated[Path, typer.Option("--out", help="file to write: .msh (gmsh) or .vtu (ParaView)")],
+    out: Annotated[
+        Path, typer.Option("--out", help="file to write: .msh (gmsh), .vtu (ParaView), .dxf or .step (outlines, mm)")
+    ],
     gear: Annotated[
         Literal["both", "driver", "driven"], typer.Option("--gear", help="one gear in its own frame, or both")
     ] = "both",
     settings: SetOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Mesh the gears of a case and write the mesh to a file."""
+    """Mesh the gears of a case and write the mesh, or draw their outlines, at mesh phase 0, to a file."""
     loaded = load_case(case, settings)
+    if out.suffix in (".dxf", ".step"):
+        _draw(loaded.rig, out, gear, as_json)
+        return
     from gearbench.geometry import mesh_pair, pair, quality, write_mesh
     from gearbench.geometry.export import gear_plane, mesh_gear
 
@@ -51,3 +57,17 @@ def mesh(
             f"{out}: {found.triangles} triangles, {found.nodes} nodes, smallest angle"
             f" {summary['smallest_angle_deg']:.1f} deg, smallest relative Jacobian {found.jacobian:.2f}"
         )
+
+
+def _draw(rig: Rig, out: Path, which: str, as_json: bool) -> None:
+    """Outlines of both gears where they stand at mesh phase 0, or of one of them."""
+    from gearbench.geometry.drawing import placed_gears, write_dxf, write_step
+
+    gears = [gear for gear in placed_gears(rig) if which in ("both", gear.name.lower())]
+    with Progress("mesh") as progress:
+        progress.step("drawing")
+        (write_dxf if out.suffix == ".dxf" else write_step)(out, gears)
+    if as_json:
+        print_json({"file": str(out), "gears": len(gears), "unit": "mm"})
+    else:
+        typer.echo(f"{out}: {' and '.join(gear.name.lower() for gear in gears)}, in mm")

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
 from dataclasses import dataclass
 from math import pi
 from pathlib import Path
@@ -12,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.geometry.error import GeometryError
+from gearbench.geometry.files import written_whole
 from gearbench.geometry.mesh import GearMesh, full_mesh, sector_mesh
 from gearbench.geometry.pair import Pair, pair
 from gearbench.geometry.profile import Profile
@@ -81,9 +80,9 @@ def write_mesh(path: str | Path, mesh: PlaneMesh) -> Path:
 
     target = Path(path)
     if target.suffix not in _FORMATS:
-        raise GeometryError(f"out = {target.name} has no known mesh format: the suffix must be .msh or .vtu")
-    if not target.parent.is_dir():
-        raise GeometryError(f"out = {target} cannot be written: the folder {target.parent} must exist")
+        raise GeometryError(
+            f"out = {target.name} has no known mesh format: the suffix must be .msh, .vtu, .dxf or .step"
+        )
     cells = {"gear": [mesh.gear.astype(np.int32)], "tooth": [mesh.tooth.astype(np.int32)]}
     if target.suffix == ".msh":
         group = (mesh.gear + 1).astype(np.int32)
@@ -92,20 +91,6 @@ def write_mesh(path: str | Path, mesh: PlaneMesh) -> Path:
     points = np.column_stack((mesh.points, np.zeros(len(mesh.points))))
     content = meshio.Mesh(points, [("triangle6", mesh.triangles)], cell_data=cells)
     options = {"binary": False} if target.suffix == ".msh" else {}
-    handle, temporary = tempfile.mkstemp(prefix=f".{target.stem}-", suffix=target.suffix, dir=target.parent)
-    os.close(handle)
-    try:
-        meshio.write(temporary, content, file_format=_FORMATS[target.suffix], **options)
-        os.chmod(temporary, 0o666 & ~_umask())
-        os.replace(temporary, target)
-    except BaseException:
-        os.unlink(temporary)
-        raise
-    return target
-
-
-def _umask() -> int:
-    """The process's file mode mask; mkstemp ignores it."""
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
+    return written_whole(
+        target, lambda name: meshio.write(str(name), content, file_format=_FORMATS[target.suffix], **options)
+    )

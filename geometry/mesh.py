@@ -7,6 +7,8 @@ boundary node, mid-side nodes included, lies on the exact profile. The other hal
 from __future__ import annotations
 
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import pairwise
 from math import pi
@@ -108,14 +110,10 @@ def _import_gmsh() -> Any:
     return gmsh
 
 
-def _fill(ring: Array) -> tuple[Array, Index]:
-    """Triangulate inside the closed polygon `ring` (n, 2) without adding nodes to it.
-
-    Returns corners (m, 2), the first n of which are the ring, and triangles (k, 3). Sizes inside follow the
-    ring's.
-    """
+@contextmanager
+def gmsh_session() -> Iterator[Any]:
+    """gmsh, for one thread at a time; someone else's session is left as it was. Raises MeshingUnavailable."""
     gmsh = _import_gmsh()
-    scale = 1 / np.ptp(ring, axis=0).max()  # gmsh's tolerances are absolute
     with _GMSH:
         ours = not gmsh.isInitialized()
         if ours:
@@ -123,19 +121,30 @@ def _fill(ring: Array) -> tuple[Array, Index]:
         before = [] if ours else [(option, gmsh.option.getNumber(option)) for option, _ in _OPTIONS]
         current = "" if ours else gmsh.model.getCurrent()
         try:
-            return _triangulate(gmsh, ring, scale)
+            for option, value in _OPTIONS:
+                gmsh.option.setNumber(option, value)
+            yield gmsh
         finally:
             if ours:
                 gmsh.finalize()
-            else:  # someone else's session: leave it as it was
+            else:
                 for option, value in before:
                     gmsh.option.setNumber(option, value)
                 gmsh.model.setCurrent(current)
 
 
+def _fill(ring: Array) -> tuple[Array, Index]:
+    """Triangulate inside the closed polygon `ring` (n, 2) without adding nodes to it.
+
+    Returns corners (m, 2), the first n of which are the ring, and triangles (k, 3). Sizes inside follow the
+    ring's.
+    """
+    scale = 1 / np.ptp(ring, axis=0).max()  # gmsh's tolerances are absolute
+    with gmsh_session() as gmsh:
+        return _triangulate(gmsh, ring, scale)
+
+
 def _triangulate(gmsh: Any, ring: Array, scale: float) -> tuple[Array, Index]:
-    for option, value in _OPTIONS:
-        gmsh.option.setNumber(option, value)
     gmsh.model.add("gearbench tooth sector")
     try:
         geo, count = gmsh.model.geo, len(ring)

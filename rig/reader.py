@@ -114,6 +114,11 @@ class Reader:
         place = f"{_dot(where)}{key}"
         if key.startswith(("helix", "beta", "helical")):
             return f"{place}: helical gears are not supported: spur gears only"
+        if key.startswith(("web", "rim")) and "hub_radius_mm" in known:
+            return (
+                f"{place}: webs and rims are not modelled: a gear is as thick as its face width from hub_radius_mm to"
+                " the teeth, so give a thin rim by hub_radius_mm, and a web's masses by mass_kg and inertia_kg_m2"
+            )
         if any(word in key for word in ("crown", "lead", "face_form", "end_relief")):
             return f"{place}: what varies across the face width is not supported: the gears are plane models"
         stems = {unit_key: unit_key for unit_key in known}
