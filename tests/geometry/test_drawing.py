@@ -19,8 +19,11 @@ MakeRig = Callable[..., Rig]
 
 @pytest.fixture
 def bench(gear: MakeGear, rig: MakeRig) -> Rig:
-    """An undercut pinion and a wheel with a bore."""
-    return rig(gear(teeth=10, hub_radius=4e-3), gear(teeth=31, hub_radius=15e-3, bore_radius=8e-3, face_width=0.016))
+    """An undercut pinion and a wheel with a bore and an odd number of thinned teeth."""
+    return rig(
+        gear(teeth=10, hub_radius=4e-3),
+        gear(teeth=31, hub_radius=15e-3, bore_radius=8e-3, face_width=0.016, thinning=4e-5),
+    )
 
 
 def entities(path: Path) -> list[dict[int, str]]:
