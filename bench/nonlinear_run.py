@@ -47,6 +47,11 @@ class Setup:
         """Integration step [s]."""
         return 1.0 / (self.sampling_rate * self.substeps)
 
+    @property
+    def mesh_frequency(self) -> float:
+        """Mesh frequency [Hz]."""
+        return self.cycles_per_sample * self.sampling_rate
+
     def phase_at(self, sample: int) -> float:
         """Mesh phase [cycles] of a sample."""
         return self.first_phase + sample * self.cycles_per_sample
@@ -66,17 +71,26 @@ class Setup:
     def advance(self, force: Array, state: Array, start: int, samples: int) -> tuple[Array, Array]:
         """Final state and outputs (samples, 7) from sample `start`; force [N]: one excitation period, half steps."""
         if self.table is not None and start == 0 and samples == self.block_samples:
-            return integrate(self.model, self.table, force, state, step=self.step, substeps=self.substeps)
+            return self._integrate(self.table, force, state, 0)
         parts, stop = [], start + samples
         most = max(MOST_ENTRIES // (2 * self.substeps), 1)
         for at in range(start, stop, most):
             table = self.table_for(at, min(most, stop - at))
-            first = 2 * self.substeps * at % force.size
-            state, out = integrate(
-                self.model, table, force, state, step=self.step, substeps=self.substeps, first_entry=first
-            )
+            state, out = self._integrate(table, force, state, 2 * self.substeps * at % force.size)
             parts.append(out)
         return state, np.concatenate(parts)
+
+    def _integrate(self, table: Array, force: Array, state: Array, first_entry: int) -> tuple[Array, Array]:
+        return integrate(
+            self.model,
+            table,
+            force,
+            state,
+            step=self.step,
+            substeps=self.substeps,
+            mesh_frequency=self.mesh_frequency,
+            first_entry=first_entry,
+        )
 
     def dte(self, outputs: Array) -> Array:
         """DTE [m] of outputs (samples, 7)."""
@@ -96,7 +110,7 @@ class Setup:
             return out
         total = sum(self.model.masses[:3])
         radius, z1 = self.model.base_radii[0], self.model.rig.driver.teeth
-        speed = 2 * np.pi * self.cycles_per_sample * self.sampling_rate / z1
+        speed = 2 * np.pi * self.mesh_frequency / z1
         for order, size, angle in zip(ripple.orders, ripple.amplitude, ripple.phase, strict=True):
             turn = 2 * np.pi * order * phase / z1 + angle
             rate = order * speed

@@ -141,7 +141,8 @@ class MeshLaw:
     def friction(self, phase: ArrayLike, transition: float = 0.0) -> tuple[Array, Array, Array]:
         """Levers of friction: sums over the pairs of share sgn rho1 [m], share sgn [-] and share sgn rho2 [m].
 
-        sgn is +1 after the pitch point, where the driver's flank slides faster, and -1 before. Friction of coefficient
+        sgn is that of the steady rotation, which vibration may turn round (`lumped.nonlinear`): +1 after the pitch
+        point, where the driver's flank slides faster, and -1 before. Friction of coefficient
         mu at the normal force N is mu N (-m1, -s sin a_w, +m2, +s sin a_w) on (driver rotation, driver y, driven
         rotation, driven y). `transition` [m] > 0 makes sgn a tanh of the distance from the pitch point over it.
         """

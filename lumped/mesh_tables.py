@@ -1,4 +1,4 @@
-"""What the non-linear mesh reads at every half step: phase, excess material, gain, friction, ripple.
+"""What the non-linear mesh reads at every half step: phase, excess material, gain, ripple.
 
 Tooth numbers, mesh phase and shaft angles are those of the steady rotation; the tables hold one stretch of it. Filled
 by a compiled loop, since diagnosis fills them again for every trial of an effect.
@@ -7,20 +7,20 @@ by a compiled loop, since diagnosis fills them again for every trial of an effec
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import cos, floor, pi, sin, tanh
+from math import cos, floor, pi, sin
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from gearbench.lumped.nonlinear import NonLinear, sliding_factor
+from gearbench.lumped.nonlinear import NonLinear
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 # Columns of the table.
-POSITION, EXCESS, EXCESS_RATE, GAIN, PULL1, PULL_Y, PULL2, RIPPLE, BACK = range(9)
-COLUMNS = 9
+POSITION, EXCESS, EXCESS_RATE, GAIN, RIPPLE, BACK = range(6)
+COLUMNS = 6
 
 
 @dataclass(frozen=True)
@@ -66,27 +66,17 @@ def teeth_of(model: NonLinear) -> Teeth:
 
 
 def tables(model: NonLinear, motion: Motion) -> Array:
-    """Table (entries + 1, COLUMNS): row of the force table; excess a [m] and a' [m/s]; gain of the force; friction on
-    driver rotation, supports and driven rotation per normal force; ripple [N]; excess on the back flanks [m]."""
+    """Table (entries + 1, COLUMNS): row of the force table; excess a [m] and a' [m/s]; gain of the force; ripple [N];
+    excess on the back flanks [m]."""
     rig, law = model.rig, model.law
-    z = np.array([rig.driver.teeth, rig.driven.teeth])
     share, bending = law.closed
     series = _series(rig.mesh.stiffness_cos, rig.mesh.stiffness_sin)
     errors = _series(rig.mesh.error_cos, rig.mesh.error_sin)
     runout = np.array([[g.runout / 2, g.runout_phase] for g in (rig.driver, rig.driven)])
-    speeds = 2 * pi * motion.mesh_frequency / z
-    slip = rig.friction.transition_speed / float(speeds.sum()) / law.base_pitch
-    centre = law.pitch_roll
-    radius1, radius2 = model.base_radii
-    mu = rig.friction.coefficient
-    levers = np.array(
-        [centre[0] / radius1, law.base_pitch / radius1, centre[1] / radius2, law.base_pitch / radius2, mu, slip]
-    )
-    levers = np.append(levers, sliding_factor(model))
     ripple = rig.drive.ripple
     waves = np.zeros((0, 3))
     if ripple is not None:
-        size = np.array(ripple.amplitude) / radius1
+        size = np.array(ripple.amplitude) / model.base_radii[0]
         waves = np.column_stack([np.array(ripple.orders) / rig.driver.teeth, size, ripple.phase])
     # One entry before and one behind, for the rate of the excess.
     out = np.empty((motion.entries + 3, COLUMNS))
@@ -95,7 +85,7 @@ def tables(model: NonLinear, motion: Motion) -> Array:
     teeth = teeth_of(model)
     _fill(
         out, motion.first_phase, step, law.offsets, share, bending,
-        teeth.excess1, teeth.excess2, teeth.growth1, teeth.growth2, base, series, errors, runout, levers, waves,
+        teeth.excess1, teeth.excess2, teeth.growth1, teeth.growth2, base, series, errors, runout, waves,
     )  # fmt: skip
     rate = (out[2:, EXCESS] - out[:-2, EXCESS]) / motion.step
     out = out[1:-1]
@@ -122,12 +112,11 @@ def _wave(series: Array, phase: float) -> float:
 def _fill(
     out: Array, first_phase: float, step: float, offsets: Integers, share: Array, bending: Array,
     excess1: Array, excess2: Array, growth1: Array, growth2: Array, base: Array, series: Array, errors: Array,
-    runout: Array, levers: Array, waves: Array,
+    runout: Array, waves: Array,
 ) -> None:  # fmt: skip
     """Fill the table; entry n belongs to the phase first_phase + (n - 1) step."""
     rows = share.shape[0] - 1
     z1, z2 = len(excess1), len(excess2)
-    centre1, pitch1, centre2, pitch2, mu, slip, slide = levers
     for n in range(out.shape[0]):
         phase = first_phase + (n - 1) * step
         whole = floor(phase)
@@ -135,7 +124,7 @@ def _fill(
         position = min(cycle * rows, rows * (1.0 - 1e-16))
         row = int(position)
         weight = position - row
-        excess, softness, m1, s, m2 = 0.0, 0.0, 0.0, 0.0, 0.0
+        excess, softness = 0.0, 0.0
         for o in range(len(offsets)):
             part = share[row, o] + weight * (share[row + 1, o] - share[row, o])
             if part == 0.0:
@@ -148,12 +137,6 @@ def _fill(
                 b2 = bending[row, o, 1] + weight * (bending[row + 1, o, 1] - bending[row, o, 1])
                 grown = b1 * growth1[one] + b2 * growth2[two]
                 softness += part * grown / (1.0 + grown)
-            if mu != 0.0:
-                away = cycle - offsets[o]
-                sign = part * tanh(away / slip)
-                m1 += sign * (centre1 + away * pitch1)
-                s += sign
-                m2 += sign * (centre2 - away * pitch2)
         turned = 0.0
         for i in range(2):
             if runout[i, 0] != 0.0:
@@ -165,6 +148,5 @@ def _fill(
         out[n, POSITION] = position
         out[n, EXCESS] = excess + every
         out[n, GAIN] = base[0] * (1.0 + _wave(series, cycle)) * (1.0 - softness)
-        out[n, PULL1], out[n, PULL_Y], out[n, PULL2] = mu * m1, mu * s * slide, mu * m2
         out[n, RIPPLE] = ripple
         out[n, BACK] = turned

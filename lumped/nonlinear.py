@@ -12,7 +12,16 @@ contact, weighted with their shares in the mesh stiffness: pitch errors, run-out
 pairs. G is scale and series of the mesh correction times what a cracked tooth leaves: the tangent compliance of its
 pair grows by (bending part) (1/(1 - loss) - 1). f is zero while the flanks are apart and pulls the other way, without
 friction, once the back flanks touch; on both sides damping acts only in contact and never holds the flanks together.
-mu has the levers (m1, s, m2) of `MeshLaw.friction`. T_r is the torque ripple.
+T_r is the torque ripple.
+
+Friction of every pair acts against its own sliding velocity at that instant, vibration included (sin(a_w) only where
+supports are tangential; Omega1, Omega2 the steady speeds, rho1 and rho2 the roll lengths):
+
+    v = rho1 (Omega1 + u1'/rb1) - rho2 (Omega2 + u2'/rb2) + (y1' - y2') sin(a_w)
+    (m1, s, m2) = sum over pairs of share tanh(v/v0) (rho1, 1, rho2)
+
+With v of the steady rotation alone these are the levers of `MeshLaw.friction`; where vibration slides faster than
+that, it turns dry friction into a smaller mean force and a damper.
 
 A rotor beyond a coupling, w = rb1 (theta_r - Omega1 t), takes T1 + T_r where the coupling has a stiffness: M_r w'' =
 (T1 + T_r)/rb1 - S (w - u1) - D (w' - u1'), and the gear only the bracket; without a stiffness its inertia turns with
@@ -21,15 +30,14 @@ the gear. m_e counts the rotor in both cases, so that a stiffer and stiffer coup
 Where both gears turn freely T2 balances driver torque and friction at any time: T2/rb2 = T1/rb1 - mu f (m1/rb1 -
 m2/rb2); the mean speed then stays, and ripple alone moves both gears together.
 
-Mesh phase, shaft angles and the direction of sliding are those of the steady rotation, not of the vibrating gears:
-vibrations of 10 um shift the phase by a thousandth of a cycle. With a prescribed driven speed the phase is exact, as
-it is the driven gear's.
+Mesh phase and shaft angles are those of the steady rotation, not of the vibrating gears: vibrations of 10 um shift
+the phase by a thousandth of a cycle. With a prescribed driven speed the phase is exact, as it is the driven gear's.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import cos, sin
+from math import cos, pi, sin
 from typing import NamedTuple
 
 import numpy as np
@@ -44,13 +52,16 @@ from gearbench.rig import Rig
 Array = NDArray[np.float64]
 
 COORDINATES = 5  # u1, y1, y2, u2, w
+# Of friction's decay rate, what a step resolves like a mode: Runge-Kutta then is stable up to 0.7 of the largest
+# tabulated force. Beyond it, sliding turns round at every step; the force stays bounded.
+RESOLVED = 0.125
 
 LIMITS = (
     "forces of unbalance, also of eccentric gears, are left out",
     "the centres move along the support direction only: friction acts on rotations and tangential supports",
     "errors act through one spring, weighted with the pairs' shares at a reference load, not pair by pair",
     "back flanks are free of friction, pitch errors and cracks",
-    "mesh phase and sliding are those of the steady rotation",
+    "mesh phase is that of the steady rotation",
 )
 
 
@@ -78,6 +89,22 @@ class Constants(NamedTuple):
     backlash: float  # [m]
     root: float  # grid steps per root of deflection [m^-1/2]
     mirror: float  # phase at which back flanks pass the pitch point, in rows of the force table
+
+
+class Rubbing(NamedTuple):
+    """Friction, as the integrator needs it. A pair `away` cycles behind the pitch point has the roll lengths rb_i
+    (centre_i +- away pitch_i) and in the steady rotation the sliding velocity away drift."""
+
+    coefficient: float
+    steepness: float  # 1 / v0 [s/m]
+    drift: float  # [m/s] per cycle
+    centre1: float
+    centre2: float
+    pitch1: float
+    pitch2: float
+    slide: float  # sin(a_w), or 0 along the line of action
+    offset: float  # of the first column of `share`
+    share: Array  # (phases + 1, n_o)
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,6 +167,34 @@ class NonLinear:
             mirror=self.law.mirror * self.law.phases,
         )
 
+    def rubbing(self, mesh_frequency: float) -> Rubbing | None:
+        """What the integrator needs for friction at a mesh frequency [Hz]; None without friction."""
+        friction, law = self.rig.friction, self.law
+        if friction.coefficient == 0.0:
+            return None
+        (r1, r2), (roll1, roll2) = self.base_radii, law.pitch_roll
+        speeds = 2 * pi * mesh_frequency * (1 / self.rig.driver.teeth + 1 / self.rig.driven.teeth)
+        return Rubbing(
+            coefficient=friction.coefficient,
+            steepness=1.0 / friction.transition_speed,
+            drift=law.base_pitch * speeds,
+            centre1=roll1 / r1,
+            centre2=roll2 / r2,
+            pitch1=law.base_pitch / r1,
+            pitch2=law.base_pitch / r2,
+            slide=sliding_factor(self),
+            offset=float(law.offsets[0]),
+            share=law.closed[0],
+        )
+
+    def friction_rate(self) -> float:
+        """Decay rate [1/s] of sliding at the pitch point where it turns round, at the largest tabulated force."""
+        c, friction, across = self.constants(), self.rig.friction, sliding_factor(self)
+        levers = [roll / radius for roll, radius in zip(self.law.pitch_roll, self.base_radii, strict=True)]
+        yielding = levers[0] ** 2 * c.inverse_u1 + levers[1] ** 2 * c.inverse_u2
+        yielding += across**2 * (c.inverse_y1 + c.inverse_y2)
+        return friction.coefficient * float(self.law.force.max()) / friction.transition_speed * yielding
+
     def support_deflection(self, force: float) -> tuple[float, float]:
         """y1, y2 [m] at rest under the mesh force [N]."""
         out = []
@@ -168,7 +223,10 @@ class NonLinear:
         return np.array([u1, y1, y2, 0.0, u1 + twist, 0.0, 0.0, 0.0, 0.0, 0.0])
 
     def linearised(self, stiffness: float, force: float) -> Array:
-        """State matrix (2 x COORDINATES, 2 x COORDINATES) at a mesh stiffness [N/m], supports at rest under `force`."""
+        """State matrix (2 x COORDINATES, 2 x COORDINATES) at a mesh stiffness [N/m], supports at rest under `force`.
+
+        Without friction: away from the pitch point small vibrations do not turn the steady direction of sliding.
+        """
         c = self.constants()
         inverse = np.array([c.inverse_u1, c.inverse_y1, c.inverse_y2, c.inverse_u2, c.inverse_w])
         mesh = np.array([1.0, c.factor, -c.factor, -1.0, 0.0])
@@ -189,11 +247,13 @@ class NonLinear:
         return matrix
 
     def fastest_rate(self, force: float) -> float:
-        """Largest magnitude [rad/s] of an eigenvalue over the mesh cycle, at the largest tabulated deflection."""
+        """Largest magnitude [rad/s] of an eigenvalue over the mesh cycle, at the largest tabulated deflection; or more,
+        where friction turns round faster than a step of such a mode bears."""
         gain = self.rig.mesh.stiffness_scale
         gain *= 1 + sum(np.hypot(self.rig.mesh.stiffness_cos, self.rig.mesh.stiffness_sin)) if self._shaped else 1.0
         _, tangent = self.law.evaluate(self.law.approach[-1], np.arange(self.law.phases) / self.law.phases)
-        return float(np.abs(np.linalg.eigvals(self.linearised(gain * float(tangent.max()), force))).max())
+        mode = float(np.abs(np.linalg.eigvals(self.linearised(gain * float(tangent.max()), force))).max())
+        return max(mode, RESOLVED * self.friction_rate())
 
     @property
     def _shaped(self) -> bool:

@@ -6,15 +6,15 @@ loop allocates nothing and releases the interpreter lock.
 
 from __future__ import annotations
 
-from math import copysign, sqrt
+from math import copysign, sqrt, tanh
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from gearbench.lumped.errors import LumpedError
-from gearbench.lumped.mesh_tables import BACK, EXCESS, EXCESS_RATE, GAIN, POSITION, PULL1, PULL2, PULL_Y, RIPPLE
-from gearbench.lumped.nonlinear import COORDINATES, Constants, NonLinear
+from gearbench.lumped.mesh_tables import BACK, EXCESS, EXCESS_RATE, GAIN, POSITION, RIPPLE
+from gearbench.lumped.nonlinear import COORDINATES, Constants, NonLinear, Rubbing
 
 Array = NDArray[np.float64]
 
@@ -24,11 +24,20 @@ OUTPUTS = ("u1", "y1", "y2", "u2", "w", "mesh_force", "load_force")
 
 
 def integrate(
-    model: NonLinear, table: Array, force: Array, state: Array, *, step: float, substeps: int, first_entry: int = 0
+    model: NonLinear,
+    table: Array,
+    force: Array,
+    state: Array,
+    *,
+    step: float,
+    substeps: int,
+    mesh_frequency: float,
+    first_entry: int = 0,
 ) -> tuple[Array, Array]:
     """Run through the whole `table` (entries + 1, columns of `mesh_tables`) from `state` (2 COORDINATES,).
 
     `force` (n,) [N] is T1/rb1 on the half-step grid; it repeats, and `first_entry` of it belongs to the table's first.
+    `mesh_frequency` [Hz]: that of the table, for the steady part of the sliding velocity.
     Returns the final state and OUTPUTS (samples, 7) at the start of each sample: coordinates [m], mesh force and force
     at the load's base circle [N]. Raises LumpedError for tables that do not fit and for overflow.
     """
@@ -41,7 +50,8 @@ def integrate(
     out = np.empty((entries // (2 * substeps), len(OUTPUTS)))
     secant = np.ascontiguousarray(model.law.secant)
     free = 1.0 if model.free else 0.0
-    _run(final, table, force, first_entry, secant, model.constants(), free, step, substeps, out)
+    rubbing = model.rubbing(mesh_frequency)
+    _run(final, table, force, first_entry, secant, model.constants(), rubbing, free, step, substeps, out)
     if not np.isfinite(final).all():
         raise LumpedError(f"the integration overflowed: steps of {step:.3g} s are too long")
     return final, out
@@ -88,20 +98,43 @@ def _spring(y: float, stiffness: float, exponent: float, reference: float) -> fl
 
 
 @njit(nogil=True, cache=True, fastmath=FASTMATH, error_model="numpy")
-def _rates(a, b, c, d, e, va, vb, vc, vd, ve, table, i, force, secant, p, free):  # type: ignore[no-untyped-def]
+def _friction(va: float, vb: float, vc: float, vd: float, position: float, r: Rubbing) -> tuple[float, float, float]:
+    """Friction on driver rotation, supports and driven rotation per normal force, at the rates of u1, y1, y2, u2."""
+    row = int(position)
+    weight = position - row
+    cycle = position / (r.share.shape[0] - 1)
+    # The sliding velocity is linear in the distance from the pitch point.
+    middle = r.centre1 * va - r.centre2 * vd + r.slide * (vb - vc)
+    slope = r.drift + r.pitch1 * va + r.pitch2 * vd
+    m1, s, m2 = 0.0, 0.0, 0.0
+    for o in range(r.share.shape[1]):
+        part = r.share[row, o] + weight * (r.share[row + 1, o] - r.share[row, o])
+        if part != 0.0:
+            away = cycle - r.offset - o
+            part *= r.coefficient * tanh((middle + away * slope) * r.steepness)
+            m1 += part * (r.centre1 + away * r.pitch1)
+            s += part
+            m2 += part * (r.centre2 - away * r.pitch2)
+    return m1, s * r.slide, m2
+
+
+@njit(nogil=True, cache=True, fastmath=FASTMATH, error_model="numpy")
+def _rates(a, b, c, d, e, va, vb, vc, vd, ve, table, i, force, secant, p, r, free):  # type: ignore[no-untyped-def]
     """Accelerations of u1, y1, y2, u2, w, the mesh force and the force at the load's base circle."""
     f = _mesh(a - d + p.factor * (b - c), va - vd + p.factor * (vb - vc), table, i, secant, p)
-    normal = max(f, 0.0)
-    pull = normal * table[i, PULL1]
+    pull, pull_y, pull2 = 0.0, 0.0, 0.0
+    if r is not None and f > 0.0:  # without friction r is None, known to the compiler
+        pull, pull_y, pull2 = _friction(va, vb, vc, vd, table[i, POSITION], r)
+        pull, pull_y, pull2 = f * pull, f * pull_y, f * pull2
     shaft = p.shaft_stiffness * (e - a) + p.shaft_damping * (ve - va)
     drive = force + table[i, RIPPLE]
-    load = free * (force - pull) + (1.0 - free) * f + normal * table[i, PULL2]
-    across = p.factor * f + normal * table[i, PULL_Y]
+    load = free * (force - pull) + (1.0 - free) * f + pull2
+    across = p.factor * f + pull_y
     return (
         p.inverse_u1 * (p.rigid * drive + shaft - f - pull),
         p.inverse_y1 * (-across - p.damping1 * vb - _spring(b, p.stiffness1, p.exponent1, p.reference1)),
         p.inverse_y2 * (across - p.damping2 * vc - _spring(c, p.stiffness2, p.exponent2, p.reference2)),
-        p.inverse_u2 * (f + normal * table[i, PULL2] - load),
+        p.inverse_u2 * (f + pull2 - load),
         p.inverse_w * (drive - shaft),
         f,
         load,
@@ -110,8 +143,8 @@ def _rates(a, b, c, d, e, va, vb, vc, vd, ve, table, i, force, secant, p, free):
 
 @njit(nogil=True, cache=True, fastmath=FASTMATH, error_model="numpy")
 def _run(
-    state: Array, table: Array, force: Array, first: int, secant: Array, p: Constants, free: float, h: float,
-    substeps: int, out: Array,
+    state: Array, table: Array, force: Array, first: int, secant: Array, p: Constants, r: Rubbing | None, free: float,
+    h: float, substeps: int, out: Array,
 ) -> None:  # fmt: skip
     """Advance `state` in place and fill `out`. Letters: a u1, b y1, c y2, d u2, e w; v their rates, k accelerations;
     1 to 4 the stages."""
@@ -124,7 +157,7 @@ def _run(
         out[sample, 0], out[sample, 1], out[sample, 2], out[sample, 3], out[sample, 4] = a, b, c, d, e
         for sub in range(substeps):
             ka1, kb1, kc1, kd1, ke1, f, load = _rates(
-                a, b, c, d, e, va, vb, vc, vd, ve, table, i, force[j], secant, p, free
+                a, b, c, d, e, va, vb, vc, vd, ve, table, i, force[j], secant, p, r, free
             )
             if sub == 0:
                 out[sample, 5], out[sample, 6] = f, load
@@ -132,20 +165,20 @@ def _run(
             vd2, ve2 = vd + half * kd1, ve + half * ke1
             ka2, kb2, kc2, kd2, ke2, f, load = _rates(
                 a + half * va, b + half * vb, c + half * vc, d + half * vd, e + half * ve,
-                va2, vb2, vc2, vd2, ve2, table, i + 1, force[j + 1], secant, p, free,
+                va2, vb2, vc2, vd2, ve2, table, i + 1, force[j + 1], secant, p, r, free,
             )  # fmt: skip
             va3, vb3, vc3 = va + half * ka2, vb + half * kb2, vc + half * kc2
             vd3, ve3 = vd + half * kd2, ve + half * ke2
             ka3, kb3, kc3, kd3, ke3, f, load = _rates(
                 a + half * va2, b + half * vb2, c + half * vc2, d + half * vd2, e + half * ve2,
-                va3, vb3, vc3, vd3, ve3, table, i + 1, force[j + 1], secant, p, free,
+                va3, vb3, vc3, vd3, ve3, table, i + 1, force[j + 1], secant, p, r, free,
             )  # fmt: skip
             i += 2
             j = j + 2 if j + 2 < n else 0
             va4, vb4, vc4, vd4, ve4 = va + h * ka3, vb + h * kb3, vc + h * kc3, vd + h * kd3, ve + h * ke3
             ka4, kb4, kc4, kd4, ke4, f, load = _rates(
                 a + h * va3, b + h * vb3, c + h * vc3, d + h * vd3, e + h * ve3,
-                va4, vb4, vc4, vd4, ve4, table, i, force[j], secant, p, free,
+                va4, vb4, vc4, vd4, ve4, table, i, force[j], secant, p, r, free,
             )  # fmt: skip
             a += sixth * (va + 2.0 * (va2 + va3) + va4)
             b += sixth * (vb + 2.0 * (vb2 + vb3) + vb4)

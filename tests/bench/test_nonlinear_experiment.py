@@ -284,7 +284,7 @@ def test_a_rig_at_rest_shows_its_errors() -> None:
     np.testing.assert_allclose(again["torque"].values, stiffness * 8e-6 * found.attrs["base_radius_driver"], rtol=5e-3)
 
 
-@pytest.mark.parametrize("effect", EFFECTS)
+@pytest.mark.parametrize("effect", sorted(EFFECTS.keys() - {"pitch error", "run-out"}))
 def test_finite_elements_refuse_what_they_do_not_represent(effect: str) -> None:
     case = make_case(**EFFECTS[effect][0])
     with pytest.raises(BenchError, match=r"reduced finite-element model does not represent rig\.[a-z_.]+: leave"):
@@ -313,14 +313,17 @@ def test_tables_made_in_pieces_give_the_same_record(monkeypatch: pytest.MonkeyPa
         np.testing.assert_allclose(pieces[name].values, whole[name].values, atol=1e-6 * scale, err_msg=name)
 
 
-def test_friction_is_paid_for_in_the_reaction() -> None:
+@pytest.mark.parametrize("transition", [1e-3, 0.2])
+def test_friction_is_paid_for_in_the_reaction(transition: float) -> None:
     mu = 0.06
-    case = make_case(friction=Friction(coefficient=mu, transition_speed=1e-4), experiment={"multisine": None})
+    case = make_case(friction=Friction(coefficient=mu, transition_speed=transition), experiment={"multisine": None})
     record = simulate(case)
     r1, r2 = record.attrs["base_radius_driver"], record.attrs["base_radius_driven"]
     lost = 1 - record["torque_driven"].values.mean() * r1 / r2 / 100.0
     law = mesh_law(case.rig, case.simulation, 300.0)
     phase = np.arange(2000) / 2000
     numbers, share = law.pairs(phase)
-    slid = (share * np.abs(phase[:, None] - numbers)).sum(axis=1).mean() * law.base_pitch
+    path = (phase[:, None] - numbers) * law.base_pitch
+    speeds = 2 * np.pi * (1 / case.rig.driver.teeth + 1 / case.rig.driven.teeth) / record.attrs["mesh_period"]
+    slid = (share * path * np.tanh(path * speeds / transition)).sum(axis=1).mean()
     assert lost == pytest.approx(mu * slid * (1 / r1 + 1 / r2), rel=0.05)

@@ -96,10 +96,12 @@ def plain_equations(rig: Rig, mesh_frequency: float, torque: Callable[[float], f
                 grown = 1 + BENDING[1] * (1 / (1 - crack.stiffness_loss) - 1)
                 gain *= 1 - share * (1 - 1 / grown)
             path = (phase - n) * BASE_PITCH
-            slides = tanh(path * (speed1 + speed2) / friction.transition_speed)
-            levers[0] += share * slides * (PITCH_ROLL[0] + path)
+            roll1, roll2 = PITCH_ROLL[0] + path, PITCH_ROLL[1] - path
+            sliding = path * (speed1 + speed2) + roll1 * v1 / r1 - roll2 * v2 / r2 + (vy1 - vy2) * sin(ALPHA)
+            slides = tanh(sliding / friction.transition_speed)
+            levers[0] += share * slides * roll1
             levers[1] += share * slides
-            levers[2] += share * slides * (PITCH_ROLL[1] - path)
+            levers[2] += share * slides * roll2
         force = 0.0
         if delta > 0:
             k = float(stiffness(phase)) * gain
@@ -179,7 +181,8 @@ def test_without_effects_it_is_the_linear_model(boundary: str) -> None:
         tabulate(linear, cycles=int(cycles), steps=steps, step=step), force, state, samples=steps, substeps=1
     )
     start = np.array([*state[:3], 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
-    _, out = integrate(model, tables(model, Motion(cycles, 2 * steps, step)), force, start, step=step, substeps=1)
+    table = tables(model, Motion(cycles, 2 * steps, step))
+    _, out = integrate(model, table, force, start, step=step, substeps=1, mesh_frequency=frequency)
     np.testing.assert_allclose(out[:, 0] - out[:, 3], expected[:, 0], rtol=1e-9)
     np.testing.assert_allclose(out[:, 1:3], expected[:, 1:3], rtol=1e-9)
     np.testing.assert_allclose(out[:, 5], expected[:, 3], rtol=1e-9)
@@ -195,12 +198,11 @@ def test_runs_of_consecutive_stretches_are_one_run() -> None:
     force = 3500 + 300 * np.sin(2 * pi * np.arange(2 * steps) / (2 * steps))
     whole = tables(model, Motion(3.0, 2 * steps, step, 0.25))
     state = np.array([2e-5, -3e-5, 2e-5, 0.0, 4e-5, 0, 0, 0, 0, 0])
-    end, out = integrate(model, whole, force, state, step=step, substeps=3)
-    middle, first = integrate(
-        model, tables(model, Motion(1.0, 2 * steps // 3, step, 0.25)), force, state, step=step, substeps=3
-    )
+    how = {"step": step, "substeps": 3, "mesh_frequency": 3.0 / (steps * step)}
+    end, out = integrate(model, whole, force, state, **how)
+    middle, first = integrate(model, tables(model, Motion(1.0, 2 * steps // 3, step, 0.25)), force, state, **how)
     table = tables(model, Motion(2.0, 4 * steps // 3, step, 1.25))
-    again, second = integrate(model, table, force, middle, step=step, substeps=3, first_entry=2 * steps // 3)
+    again, second = integrate(model, table, force, middle, first_entry=2 * steps // 3, **how)
     np.testing.assert_allclose(np.concatenate([first, second]), out, rtol=1e-7, atol=1e-12)
     np.testing.assert_allclose(again, end, rtol=1e-7, atol=1e-12)
 
@@ -209,9 +211,9 @@ def test_tables_that_do_not_fit_and_overflow_are_refused() -> None:
     model = make_model(make_rig())
     table = tables(model, Motion(1.0, 100, 1e-5))
     with pytest.raises(LumpedError, match="do not hold whole samples"):
-        integrate(model, table, np.zeros(10), np.zeros(10), step=1e-5, substeps=3)
+        integrate(model, table, np.zeros(10), np.zeros(10), step=1e-5, substeps=3, mesh_frequency=2e3)
     with pytest.raises(LumpedError, match=r"shape \(6,\), not \(10,\)"):
-        integrate(model, table, np.zeros(10), np.zeros(6), step=1e-5, substeps=5)
+        integrate(model, table, np.zeros(10), np.zeros(6), step=1e-5, substeps=5, mesh_frequency=2e3)
     coarse = tables(model, Motion(1.0, 20000, 1.0))
     with pytest.raises(LumpedError, match="overflowed"):
-        integrate(model, coarse, np.full(10, 3e3), np.zeros(10), step=1.0, substeps=5)
+        integrate(model, coarse, np.full(10, 3e3), np.zeros(10), step=1.0, substeps=5, mesh_frequency=1e-4)

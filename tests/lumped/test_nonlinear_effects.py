@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from math import cos, pi, sin, tan
+from math import cos, pi
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from shared.effect_rig import GEARS, MASSES, make_model, make_rig, run
-from shared.hat_mesh import ALPHA, BACKLASH, BASE_PITCH, BENDING, PITCH_ROLL, RADII, hat, hat_law, stiffness
+from shared.effect_rig import FORCE, GEARS, MASSES, make_model, make_rig, run, steady_dte
+from shared.hat_mesh import ALPHA, BACKLASH, BENDING, RADII, hat, hat_law, stiffness
 
 from gearbench.geometry import pair
-from gearbench.lumped.mesh_tables import EXCESS, GAIN, PULL1, PULL2, PULL_Y, Motion, tables
-from gearbench.lumped.nonlinear import NonLinear, nonlinear_model
+from gearbench.lumped.mesh_tables import GAIN, Motion, tables
+from gearbench.lumped.nonlinear import nonlinear_model
 from gearbench.lumped.nonlinear_step import integrate
 from gearbench.rig import (
     Coupling,
@@ -23,7 +23,6 @@ from gearbench.rig import (
     Friction,
     Load,
     MeshCorrection,
-    Rig,
     Ripple,
     Support,
     Supports,
@@ -31,23 +30,7 @@ from gearbench.rig import (
 
 Array = NDArray[np.float64]
 
-FORCE = 3500.0  # T1 / rb1 [N]
 HUNTING = 60
-
-
-def steady_dte(rig: Rig, *, frequency: float = 4.0, swing: float = 0.0) -> tuple[Array, Array]:
-    """Mesh phase and DTE over one hunting period at constant torque, turning so slowly that the rig follows."""
-    model = make_model(rig, hat_law(swing=swing, bend=0.0))
-    state = model.equilibrium(FORCE, *first_entry(model), 0.0)
-    steps = 60 * 20000
-    time, out = run(model, lambda t: np.full(t.shape, FORCE), state, mesh_frequency=frequency, cycles=60.0, steps=steps)
-    dte = out[:, 0] - out[:, 3] + cos(ALPHA) * (out[:, 1] - out[:, 2])
-    return time[::100] * frequency, dte[::100]
-
-
-def first_entry(model: NonLinear) -> tuple[float, float]:
-    row = tables(model, Motion(1.0, 2, 1.0))[0]
-    return float(row[EXCESS]), float(row[GAIN])
 
 
 def order(dte: Array, number: int) -> complex:
@@ -101,63 +84,6 @@ def test_corrections_scale_and_shape_the_stiffness() -> None:
     phase = np.arange(64) / 32
     expected = 0.8 * (1 + 0.1 * np.cos(2 * pi * phase) - 0.05 * np.sin(4 * pi * phase))
     np.testing.assert_allclose(gain, expected, rtol=1e-12)
-
-
-@pytest.mark.parametrize("boundary", ["speed", "torque"])
-def test_friction_takes_what_its_sliding_dissipates(boundary: str) -> None:
-    mu, v0, frequency = 0.08, 20e-3, 50.0
-    rig = make_rig(friction=Friction(coefficient=mu, transition_speed=v0), load=Load(boundary=boundary))
-    model = make_model(rig, hat_law(swing=0.0, bend=0.0))
-    state = model.equilibrium(FORCE, 0.0, 1.0, 0.0)
-    _, out = run(model, lambda t: np.full(t.shape, FORCE), state, mesh_frequency=frequency, cycles=60.0, steps=60000)
-    last = out[-30000:]
-    speeds = 2 * pi * frequency / 20, 2 * pi * frequency / 30
-    power = speeds[0] * FORCE * RADII[0] - speeds[1] * RADII[1] * last[:, 6].mean()
-    # Normal force times mu times sliding speed of both pairs, over one cycle; the gears hardly vibrate.
-    phase = (np.arange(4000) + 0.5) / 4000
-    loss = np.zeros_like(phase)
-    for number in (0, 1):
-        speed = (phase - number) * BASE_PITCH * sum(speeds)
-        loss += hat(phase - number) * mu * speed * np.tanh(speed / v0)
-    normal = last[:, 5].reshape(-1, 1000).mean(axis=0)
-    force = np.interp(phase, np.arange(1000) / 1000, normal, period=1.0)
-    assert power == pytest.approx(float((force * loss).mean()), rel=1e-3)
-    assert power > 0
-
-
-def test_friction_makes_the_normal_force_jump_at_the_pitch_point() -> None:
-    # With moments about the driver: T1 = N (rb1 + mu s rho1), s = -1 before and +1 after the pitch point.
-    mu = 0.06
-    _, still = steady_dte(make_rig())
-    phase, dte = steady_dte(make_rig(friction=Friction(coefficient=mu, transition_speed=1e-6)))
-    # Just before a pair reaches the pitch point only its share counts, as the other pair has hardly any.
-    before, after = (dte[np.argmin(np.abs(phase - at))] for at in (30.0 - 0.02, 30.0 + 0.02))
-    lever = PITCH_ROLL[0] / RADII[0]
-
-    def share_of_sliding(away: float) -> float:
-        # One pair at `away`, the other one nearly a cycle off on the other side.
-        first = float(hat(away)) * np.sign(away) * (PITCH_ROLL[0] + away * BASE_PITCH)
-        other = away - np.sign(away)
-        return float((first + hat(other) * np.sign(other) * (PITCH_ROLL[0] + other * BASE_PITCH)) / RADII[0])
-
-    for found, away in ((before, -0.02), (after, 0.02)):
-        assert found == pytest.approx(FORCE / 3e8 / (1 + mu * share_of_sliding(away)), rel=2e-3)
-    assert before - after == pytest.approx(2 * mu * lever * FORCE / 3e8, rel=0.1)
-    assert np.ptp(still) < 1e-3 * (before - after)
-    assert lever == pytest.approx(tan(ALPHA), rel=1e-3)
-
-
-def test_friction_pushes_the_centres_along_the_flank() -> None:
-    rig = make_rig(friction=Friction(coefficient=0.1, transition_speed=1e-6))
-    row = tables(make_model(rig), Motion(1.0, 8, 1.0))[2]  # a quarter of a cycle behind the pitch point
-    near, far = 0.75, 0.25
-    assert row[PULL_Y] == pytest.approx(0.1 * sin(ALPHA) * (near - far))
-    behind, before = PITCH_ROLL[1] - 0.25 * BASE_PITCH, PITCH_ROLL[1] + 0.75 * BASE_PITCH
-    assert row[PULL2] == pytest.approx(0.1 * (near * behind - far * before) / RADII[1])
-    along = rig.model_copy(update={"support": rig.support.model_copy(update={"direction": "line-of-action"})})
-    row = tables(make_model(along), Motion(1.0, 8, 1.0))[2]
-    assert row[PULL_Y] == 0.0
-    assert row[PULL1] != 0.0
 
 
 @pytest.mark.parametrize("boundary", ["speed", "torque"])
@@ -275,9 +201,9 @@ def test_back_flanks_carry_with_the_stiffness_of_their_own_phase(cycle: float) -
     push = 2000.0
     # Turning imperceptibly, pressed backwards: the mesh rests at the phase of the last sample.
     motion = Motion(cycles=1e-6, entries=80000, step=5e-6, first_phase=cycle)
-    _, out = integrate(
-        model, tables(model, motion), np.full(2, -push), np.r_[-BACKLASH, np.zeros(9)], step=5e-6, substeps=1
-    )
+    state = np.r_[-BACKLASH, np.zeros(9)]
+    table = tables(model, motion)
+    _, out = integrate(model, table, np.full(2, -push), state, step=5e-6, substeps=1, mesh_frequency=5e-6)
     dte = out[-1, 0] + cos(ALPHA) * (out[-1, 1] - out[-1, 2])
     assert out[-1, 5] == pytest.approx(-push, rel=1e-6)
     assert dte == pytest.approx(-BACKLASH - push / float(stiffness(0.3 - cycle)), rel=1e-6)

@@ -12,7 +12,7 @@ from shared.hat_mesh import ALPHA, RADII, hat_law
 
 from gearbench.lumped import equivalent_mass
 from gearbench.lumped.mesh_law import MeshLaw
-from gearbench.lumped.mesh_tables import Motion, tables
+from gearbench.lumped.mesh_tables import EXCESS, GAIN, Motion, tables
 from gearbench.lumped.nonlinear import NonLinear
 from gearbench.lumped.nonlinear_step import integrate
 from gearbench.rig import Damping, Gear, Rig, Support, Supports
@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 GEARS = (2.3e-4, 1.2e-3)  # inertias [kg m^2]
 MASSES = (2.0, 3.0)
 ZETA = 0.05
+FORCE = 3500.0  # T1 / rb1 [N]
 
 
 def make_rig(driver: dict[str, Any] | None = None, driven: dict[str, Any] | None = None, **fields: Any) -> Rig:
@@ -51,5 +52,20 @@ def run(
     step = cycles / mesh_frequency / steps
     table = tables(model, Motion(cycles=cycles, entries=2 * steps, step=step))
     excitation = force(np.arange(2 * steps) * step / 2)
-    _, out = integrate(model, table, excitation, state, step=step, substeps=1)
+    _, out = integrate(model, table, excitation, state, step=step, substeps=1, mesh_frequency=mesh_frequency)
     return np.arange(steps) * step, out
+
+
+def steady_dte(rig: Rig, *, frequency: float = 4.0, swing: float = 0.0) -> tuple[Array, Array]:
+    """Mesh phase and DTE over one hunting period at constant torque, turning so slowly that the rig follows."""
+    model = make_model(rig, hat_law(swing=swing, bend=0.0))
+    state = model.equilibrium(FORCE, *first_entry(model), 0.0)
+    steps = 60 * 20000
+    time, out = run(model, lambda t: np.full(t.shape, FORCE), state, mesh_frequency=frequency, cycles=60.0, steps=steps)
+    dte = out[:, 0] - out[:, 3] + cos(ALPHA) * (out[:, 1] - out[:, 2])
+    return time[::100] * frequency, dte[::100]
+
+
+def first_entry(model: NonLinear) -> tuple[float, float]:
+    row = tables(model, Motion(1.0, 2, 1.0))[0]
+    return float(row[EXCESS]), float(row[GAIN])
