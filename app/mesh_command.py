@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
 from gearbench.options import CaseArgument, JsonOption, SetOption, load_case, print_json
 from gearbench.progress import Progress
-from gearbench.rig import Rig
+
+if TYPE_CHECKING:
+    from gearbench.rig import Rig
 
 
 def mesh(
