@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from math import atan2, cos, hypot, pi
+from math import atan2, cos, hypot, pi, sin
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +41,7 @@ class Unknowns:
     where: Layout
     p: Array
     std: Array
+    torque_mean: float  # over the conditions [N m]
 
     def of(self, key: str) -> Array:
         """Values of a block."""
@@ -119,7 +120,7 @@ def _backlash(rig: Rig, hypothesis: Hypothesis, found: Unknowns) -> Applied:
         gear = getattr(rig, side)
         thinning = gear.thinning + 0.5 * more / cos(gear.pressure_angle)
         rig = _change(rig, side, thinning=max(thinning, 0.0))
-    return rig, [Estimate("normal_backlash_added", more * 1e6, std * 1e6, "um")]
+    return rig, [Estimate("more", more * 1e6, std * 1e6, "um")]
 
 
 def _friction(rig: Rig, hypothesis: Hypothesis, found: Unknowns) -> Applied:
@@ -129,31 +130,31 @@ def _friction(rig: Rig, hypothesis: Hypothesis, found: Unknowns) -> Applied:
 
 
 def _eccentricity(rig: Rig, hypothesis: Hypothesis, found: Unknowns) -> Applied:
-    values, stds = found.of("eccentricity"), found.std_of("eccentricity")
     out = []
-    for i, side in enumerate(SIDES):
-        gear = getattr(rig, side)
-        cosine = values[2 * i] + 0.5 * gear.runout * cos(gear.runout_phase)
-        sine = values[2 * i + 1] + 0.5 * gear.runout * np.sin(gear.runout_phase)
+    for side in SIDES:
+        gear, key = getattr(rig, side), f"eccentricity-{side}"
+        cosine = found.of(key)[0] + 0.5 * gear.runout * cos(gear.runout_phase)
+        sine = found.of(key)[1] + 0.5 * gear.runout * sin(gear.runout_phase)
         size, phase = hypot(cosine, sine), atan2(sine, cosine)
-        std = float(np.hypot(*stds[2 * i : 2 * i + 2])) / np.sqrt(2)
+        std = float(np.sqrt((found.std_of(key) ** 2).mean()))
         rig = _change(rig, side, runout=2 * size, runout_phase=phase)
-        out.append(Estimate(f"runout_{side}", 2e6 * size, 2e6 * std, "um"))
-        out.append(Estimate(f"runout_phase_{side}", phase * 180 / pi, min(std / max(size, 1e-12), pi) * 180 / pi, "deg"))
+        if key in hypothesis.groups:
+            angle = min(std / max(size, 1e-12), pi)
+            out.append(Estimate(f"{side}.runout", 2e6 * size, 2e6 * std, "um"))
+            out.append(Estimate(f"{side}.runout_phase", phase * 180 / pi, angle * 180 / pi, "deg"))
     return rig, out
 
 
 def _pitch(rig: Rig, hypothesis: Hypothesis, found: Unknowns) -> Applied:
-    values, stds = found.of("pitch"), found.std_of("pitch")
-    z1 = found.machine.teeth[0]
     out = []
-    for side, mine, std in (("driver", values[:z1], stds[:z1]), ("driven", values[z1:], stds[z1:])):
-        gear = getattr(rig, side)
+    for side in SIDES:
+        gear, key = getattr(rig, side), f"pitch-{side}"
         present = np.array(gear.pitch_error) if gear.pitch_error else np.zeros(gear.teeth)
-        total = present + mine
+        total = present + found.of(key)
         rig = _change(rig, side, pitch_error=tuple(float(v) for v in total))
-        rms = float(np.std(total))
-        out.append(Estimate(f"pitch_rms_{side}", rms * 1e6, float(np.sqrt((std**2).mean() / 2)) * 1e6, "um"))
+        if key in hypothesis.groups:
+            std = float(np.sqrt((found.std_of(key) ** 2).mean() / 2))
+            out.append(Estimate(f"{side}.rms", float(np.std(total)) * 1e6, std * 1e6, "um"))
     return rig, out
 
 
@@ -163,7 +164,10 @@ def _crack(rig: Rig, hypothesis: Hypothesis, found: Unknowns) -> Applied:
     side, tooth = ("driver", entry) if entry < z1 else ("driven", entry - z1)
     value, std = float(found.of("crack")[entry]), float(found.std_of("crack")[entry])
     rig = _change(rig, side, crack=Crack(tooth=tooth, stiffness_loss=min(max(value, 0.0), 0.95)))
-    return rig, [Estimate(f"tooth_{side}", float(tooth), 0.0, "1"), Estimate("stiffness_loss", value, std, "1")]
+    return rig, [
+        Estimate(f"{side}.tooth", float(tooth), 0.0, "1"),
+        Estimate(f"{side}.stiffness_loss", value, std, "1"),
+    ]
 
 
 def _coupling(rig: Rig, hypothesis: Hypothesis, found: Unknowns) -> Applied:
@@ -192,7 +196,7 @@ def _bearing(rig: Rig, hypothesis: Hypothesis, found: Unknowns) -> Applied:
         update={"exponent": min(max(exponent, -0.89), 3.0), "reference_deflection": found.machine.reference[i]}
     )
     rig = _change(rig, "support", **{side: changed})
-    return rig, [Estimate(f"exponent_{side}", exponent, float(found.std_of(key)[0]), "1")]
+    return rig, [Estimate(f"{side}.exponent", exponent, float(found.std_of(key)[0]), "1")]
 
 
 def _delay(rig: Rig, hypothesis: Hypothesis, found: Unknowns) -> Applied:
@@ -200,7 +204,7 @@ def _delay(rig: Rig, hypothesis: Hypothesis, found: Unknowns) -> Applied:
     field = key.replace("-", "_", 1)
     lag, std = float(found.of(key)[0]), float(found.std_of(key)[0])
     rig = _change(rig, "sensors", **{field: getattr(rig.sensors, field) + lag})
-    return rig, [Estimate(field, lag * 1e6, std * 1e6, "us")]
+    return rig, [Estimate(f"{key.removeprefix('delay-')}.delay", lag * 1e6, std * 1e6, "us")]
 
 
 def _ripple(rig: Rig, hypothesis: Hypothesis, found: Unknowns) -> Applied:
@@ -214,7 +218,8 @@ def _ripple(rig: Rig, hypothesis: Hypothesis, found: Unknowns) -> Applied:
         # A cos(o theta + phase) = A cos(phase) cos - A sin(phase) sin.
         phases.append(atan2(-sine, cosine))
         std = float(np.sqrt(np.mean(stds[chosen] ** 2) * 2 / len(chosen)))
-        out.append(Estimate(f"amplitude_order_{order}", amplitudes[-1], std, "N m"))
+        mean = found.torque_mean
+        out.append(Estimate(f"order_{order}.relative_amplitude", amplitudes[-1] / mean, std / mean, "1"))
     ripple = Ripple(orders=RIPPLE_ORDERS, amplitude=tuple(amplitudes), phase=tuple(phases))
     return _change(rig, "drive", ripple=ripple), out
 

@@ -7,9 +7,10 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-KNOTS = (0.0, 150.0, 350.0, 600.0, 900.0, 1250.0, 1650.0, 2100.0, 2550.0, 3000.0)  # [Hz]
+# Where the pieces meet, as parts of the band: denser at low frequencies, where the supports resonate.
+KNOTS = (0.0, 0.05, 0.12, 0.2, 0.3, 0.42, 0.55, 0.7, 0.85, 1.0)
 
 
-def hats(frequency: Array) -> Array:
-    """Piecewise linear basis (knots, K) on KNOTS; constant beyond the last."""
-    return np.stack([np.interp(frequency, KNOTS, column) for column in np.eye(len(KNOTS))])
+def hats(frequency: Array, band: float) -> Array:
+    """Piecewise linear basis (knots, K) over frequencies [Hz] of 0 .. `band`; constant beyond the last knot."""
+    return np.stack([np.interp(frequency, band * np.array(KNOTS), column) for column in np.eye(len(KNOTS))])

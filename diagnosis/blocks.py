@@ -23,9 +23,11 @@ Complex = NDArray[np.complex128]
 
 KINDS = ("operating", "excited", "driver-shaft", "driven-shaft", "other")
 BLOCK = 8  # bins
+OPERATING_BLOCK = 3  # as mesh orders fall off steeply
 SHRINK = 1.5  # exponent of the prior on lambda
-ALIASED = 2e-5  # of the mean mesh force: what folds back from beyond the sampled band
+ALIASED = 1.5e-4  # of the mean mesh force: what folds back from beyond the band, and what friction makes of noise
 AUDIBLE = 3.0  # times the noise
+SIDEBANDS = 0.5  # part of the band in which shaft sidebands are used: errors of teeth act slowly
 EXCITED = 0.05  # of the largest torque line
 
 
@@ -66,8 +68,9 @@ def cut(machine: Machine, condition: Condition, level: Array, relative: Array, s
     kinds, counts, centres = [], [], []
     for label in range(2 if separates else len(KINDS)):
         bins = np.flatnonzero(kind == label)
-        for start in range(0, len(bins), BLOCK):
-            chosen = bins[start : start + BLOCK]
+        if KINDS[label] not in ("operating", "excited"):
+            bins = bins[bins < SIDEBANDS * condition.bins]
+        for chosen in _runs(bins, KINDS[label]):
             of_bin[chosen] = len(kinds)
             kinds.append(label)
             counts.append(len(chosen))
@@ -79,7 +82,7 @@ def cut(machine: Machine, condition: Condition, level: Array, relative: Array, s
     def mean(values: Array) -> Array:
         return np.bincount(of_bin[inside], values[inside], number) / counted
 
-    noise = _noise(machine, condition) + (ALIASED * condition.force_level) ** 2
+    noise = noise_of_rows(machine, condition) + (ALIASED * condition.force_level) ** 2
     size = np.median([mean(np.abs(level[row]) ** 2) for row in present], axis=0)
     moved = mean(np.abs(level[-1]) ** 2)
     # In bins of noise alone there is nothing to explain.
@@ -99,7 +102,15 @@ def cut(machine: Machine, condition: Condition, level: Array, relative: Array, s
     )
 
 
-def _noise(machine: Machine, condition: Condition) -> Array:
+def _runs(bins: NDArray[np.int64], kind: str) -> list[NDArray[np.int64]]:
+    """Bins of one kind in runs that make blocks; the mean has one of its own, as it dwarfs its neighbours."""
+    if kind == "operating" and bins.size and bins[0] == 0:
+        return [bins[:1], *_runs(bins[1:], kind)]
+    length = OPERATING_BLOCK if kind == "operating" else BLOCK
+    return [bins[start : start + length] for start in range(0, len(bins), length)]
+
+
+def noise_of_rows(machine: Machine, condition: Condition) -> Array:
     """Variance (rows + 1, K) [N^2] that the channels' noise puts into each row and into the mesh force."""
     omega = condition.omega[: condition.bins]
     rb1, rb2 = machine.base_radius
@@ -130,10 +141,18 @@ class Split:
     level: Array
 
 
+def floors(blocks: Blocks, found: Residuals) -> Array:
+    """Variances (rows + 1, B) of the rows that the record has and of the mesh, whose errors are errors of motion: as
+    forces they grow with the stiffness."""
+    out = blocks.floor[[*blocks.rows, len(ROWS)]].copy()
+    out[-1] *= np.exp(2 * found.stiffening)
+    return out
+
+
 def split(blocks: Blocks, found: Residuals, factor: Array) -> Split:
     """The split of residuals (in the used bins) under lambda (rows + 1, blocks)."""
     use = blocks.rows
-    d = blocks.floor[[*use, len(ROWS)]] * factor[:, blocks.of_bin]
+    d = floors(blocks, found) * factor[:, blocks.of_bin]
     r, g = found.left[use], found.share[use]
     weight = np.conj(g) / d[:-1]
     precision = 1.0 / d[-1] + (weight * g).real.sum(axis=0)
@@ -152,7 +171,7 @@ def missing(blocks: Blocks, found: Residuals, start: Array, rounds: int) -> tupl
     """
     use, number = blocks.rows, len(blocks.count)
     r, g = found.left[use], found.share[use]
-    floor = blocks.floor[[*use, len(ROWS)]]
+    floor = floors(blocks, found)
     factor = start
     for _ in range(rounds):
         parts = split(blocks, found, factor)
@@ -174,17 +193,24 @@ def cost_of(blocks: Blocks, found: Residuals, factor: Array) -> float:
     return float((square + logdet + np.log(parts.level)).sum() + SHRINK * np.log(factor).sum())
 
 
+def square_of(blocks: Blocks, found: Residuals, factor: Array) -> float:
+    """r^H V^-1 r alone."""
+    parts = split(blocks, found, factor)
+    r = found.left[blocks.rows]
+    return float(((np.abs(r) ** 2 / parts.variance[:-1]).sum(axis=0) - np.abs(parts.mean) ** 2 * parts.precision).sum())
+
+
 def whitened(blocks: Blocks, found: Residuals, columns: Complex, factor: Array) -> tuple[Array, Array]:
     """Residuals (2 rows B,) and columns (2 rows B, unknowns), real, whose squares add up to r^H V^-1 r; all in the
     used bins."""
     use = blocks.rows
-    d = blocks.floor[[*use, len(ROWS)]] * factor[:, blocks.of_bin]
-    g = found.share[use] / np.sqrt(d[:-1])
-    r = found.left[use] / np.sqrt(d[:-1])
-    j = columns[use] / np.sqrt(d[:-1])[..., None]
+    d = floors(blocks, found) * factor[:, blocks.of_bin]
+    g = (found.share[use] / np.sqrt(d[:-1])).astype(columns.dtype)
+    r = (found.left[use] / np.sqrt(d[:-1])).astype(columns.dtype)
+    j = columns[use] * (1 / np.sqrt(d[:-1])).astype(r.real.dtype)[..., None]
     # (1 + dm g g^H)^(-1/2) = 1 - t g g^H with one scalar a bin.
     norm = (np.abs(g) ** 2).sum(axis=0)
-    t = (1.0 - 1.0 / np.sqrt(1.0 + d[-1] * norm)) / np.maximum(norm, 1e-300)
+    t = ((1.0 - 1.0 / np.sqrt(1.0 + d[-1] * norm)) / np.maximum(norm, 1e-30)).astype(norm.dtype)
     r = r - g * (t * (np.conj(g) * r).sum(axis=0))
     j = j - g[..., None] * (t[:, None] * np.einsum("rk,rkp->kp", np.conj(g), j))
     flat, tall = r.ravel(), j.reshape(-1, j.shape[-1])
@@ -192,13 +218,17 @@ def whitened(blocks: Blocks, found: Residuals, columns: Complex, factor: Array) 
 
 
 def of_level(
-    blocks: Blocks, found: Residuals, columns: Complex, pressing: Complex, factor: Array
+    blocks: Blocks, found: Residuals, columns: Complex, pressing: Complex, factor: Array, stiffening: Array
 ) -> tuple[Array, Array]:
-    """Gradient (unknowns,) and curvature (unknowns, unknowns), without its negative part, of the cost's part that the
-    force's own size makes."""
+    """Gradient (unknowns,) of the cost's parts that the force's own size and the mesh's variance make, and curvature
+    (unknowns, unknowns) of the former without its negative part; `stiffening` (unknowns,) is the gradient of the mean
+    logarithm of the mesh stiffness."""
     parts = split(blocks, found, factor)
-    change = pressing + np.einsum("rk,rkp->kp", parts.weight, columns[blocks.rows]) / parts.precision[:, None]
+    weight = (parts.weight / parts.precision).astype(columns.dtype)
+    change = pressing + np.einsum("rk,rkp->kp", weight, columns[blocks.rows])
     gradient = 2 * ((np.conj(parts.force) / parts.level) @ change).real
-    scaled = change / np.sqrt(parts.level)[:, None]
+    mesh = parts.variance[-1]
+    gradient += 2 * stiffening * float((1 - 1 / (mesh * parts.precision) - np.abs(parts.mean) ** 2 / mesh).sum())
+    scaled = change / np.sqrt(parts.level).astype(change.real.dtype)[:, None]
     tall = np.concatenate([scaled.real, scaled.imag])
     return np.asarray(gradient), np.asarray(2 * tall.T @ tall)

@@ -27,6 +27,7 @@ from gearbench.diagnosis.rows import (
     mesh,
     modulation,
     order_bin,
+    radial_impedance,
     softened,
     support_force,
 )
@@ -95,13 +96,19 @@ def _mesh_columns(
     viscous = state.viscosity * state.rate * state.touching
     put("scale", state.elastic + 0.5 * viscous)
     put("mesh-ratio", viscous)
+    put("dissipation", np.abs(state.rate) * state.rate * state.touching)
     put("offset", state.tangent)
-    put("eccentricity", *(state.tangent * w for w in (np.cos(first), np.sin(first), np.cos(second), np.sin(second))))
+    put("eccentricity-driver", state.tangent * np.cos(first), state.tangent * np.sin(first))
+    put("eccentricity-driven", state.tangent * np.cos(second), state.tangent * np.sin(second))
     put("shape", *(state.elastic * wave for wave in waves))
     put("profile", *(state.tangent * wave for wave in waves))
     level = np.maximum(np.abs(state.elastic), 1e-3 * condition.force_level) / condition.force_level
     put("curvature", state.elastic * np.log(level))
     put("backlash", _backlash(machine, condition, where, p, state))
+    impedance, spring, damper = radial_impedance(machine, condition, where, p)
+    softening = machine.transverse_factor**2 * condition.force_full / impedance**2
+    changes = np.concatenate([softening * spring[:, None], softening * damper])
+    put("radial", *(state.tangent * (np.fft.irfft(changes, n, axis=-1) * n)))
     bins = np.zeros((2 * len(KNOTS), n // 2 + 1), dtype=complex)
     bins[: len(KNOTS)] = condition.hats_full * condition.force_full / condition.stiffness_level
     bins[len(KNOTS) :] = 1j * bins[: len(KNOTS)]
@@ -117,12 +124,12 @@ def _mesh_columns(
     soft = softened(condition, p[where["crack"]])
     left = (condition.share * soft).sum(axis=-1)
     weaker = (condition.share * soft**2)[..., None] * condition.bending
-    for key, weights, lever in (
-        ("pitch", np.stack([condition.share, condition.share], axis=-1), state.tangent),
-        ("crack", weaker, -state.elastic / left),
-    ):
-        own = 1.0 if key == "pitch" else (1.0 - p[where["crack"], None]) ** -2
-        put(key, *(own * _of_teeth(condition, weights * lever[:, None, None])))
+    both = np.stack([condition.share, condition.share], axis=-1)
+    teeth = _of_teeth(condition, both * state.tangent[:, None, None])
+    put("pitch-driver", *teeth[: condition.teeth[0]])
+    put("pitch-driven", *teeth[condition.teeth[0] :])
+    own = (1.0 - p[where["crack"], None]) ** -2
+    put("crack", *(own * _of_teeth(condition, weaker * (-state.elastic / left)[:, None, None])))
     index = [at for at, _ in listed]
     values = np.fft.rfft(np.stack([value for _, value in listed]), axis=-1)[:, used] / n
     return index, np.asarray(values)

@@ -21,7 +21,7 @@ CHANNELS = ("angle_driver", "angle_driven", "y_driver", "y_driven", "torque_driv
 
 @dataclass(frozen=True)
 class Condition:
-    """What the rows need of one condition; N samples of one row, `cycles` mesh periods, K bins up to the band's end.
+    """What the rows need of one condition; N samples of one row, `cycles` mesh periods, K bins up to `band` [Hz].
 
     `spectra` maps a channel to its full half-spectrum (N/2 + 1,) = rfft/N of the period mean, angles as departures
     u = rb (theta - nominal rotation) [m]; `omega` (N/2 + 1,) [rad/s]; `phase` (N,) mesh phase [cycles]; `tooth`
@@ -29,13 +29,14 @@ class Condition:
     (3, N) friction levers over base radius, for driver rotation, y and driven rotation; `rotation` (2, N) angle [rad]
     of both gears, `pitch_speed` rb speed [m/s]; `noise` variance of one bin of each
     channel's spectrum; `force_level` [N] and `stiffness_level` [N/m] of the mesh at the mean torque; `force_full`
-    (N/2 + 1,) spectrum of the mesh force that the nominal drive row gives, zero beyond the used bins; `hats_full` basis
+    (N/2 + 1,) spectrum of the mesh force that a nominal row gives, zero beyond the used bins; `hats_full` basis
     of smooth functions of frequency (knots, N/2 + 1).
     """
 
     name: str
     samples: int
     bins: int
+    band: float
     rate: float
     cycles: int
     spectra: Mapping[str, Complex]
@@ -69,16 +70,15 @@ def prepare(measured: Measurement, machine: Machine, band: float) -> Condition:
     omega = 2 * np.pi * np.fft.rfftfreq(samples, 1 / rate)
     bins = min(int(np.searchsorted(omega, 2 * np.pi * band, side="right")), samples // 2)
     numbers, share = machine.law.pairs(phase)
-    m1, s, m2 = machine.law.friction(phase)
-    rb1, rb2 = machine.base_radius
+    rb1 = machine.base_radius[0]
     mean = float(spectra["torque_driver"][0].real)
-    turning = (machine.inertia[0] + machine.rotor) * omega**2 * spectra["angle_driver"] / rb1
-    drive = (spectra["torque_driver"] + turning) / rb1
-    drive[bins:] = 0.0
+    force = _force(machine, spectra, omega)
+    force[bins:] = 0.0
     return Condition(
         name=measured.name,
         samples=samples,
         bins=bins,
+        band=band,
         rate=rate,
         cycles=measured.mesh_cycles,
         spectra=spectra,
@@ -88,15 +88,15 @@ def prepare(measured: Measurement, machine: Machine, band: float) -> Condition:
         tooth=np.stack([numbers % machine.teeth[0], numbers % machine.teeth[1]]),
         share=share,
         bending=machine.law.bending_of(phase),
-        arms=np.stack([m1 / rb1, s * machine.cross_factor / machine.support_factor, m2 / rb2]),
+        arms=_arms(machine, measured.mesh_frequency, phase, spectra, omega),
         rotation=np.stack([2 * np.pi * phase / z for z in machine.teeth]),
         pitch_speed=2 * np.pi * measured.mesh_frequency / machine.teeth[0] * rb1,
         teeth=machine.teeth,
         torque_mean=mean,
         force_level=abs(mean) / rb1,
         stiffness_level=_stiffness(machine, abs(mean) / rb1),
-        force_full=drive,
-        hats_full=hats(omega / (2 * np.pi)),
+        force_full=force,
+        hats_full=hats(omega / (2 * np.pi), band),
     )
 
 
@@ -121,7 +121,45 @@ def _spectra(measured: Measurement, machine: Machine) -> tuple[dict[str, Complex
     return spectra, noise
 
 
+def _force(machine: Machine, spectra: Mapping[str, Complex], omega: Array) -> Complex:
+    """Spectrum [N] of the mesh force by the nominal load row, or the drive row of a record without load torque."""
+    rb1, rb2 = machine.base_radius
+    if "torque_driven" in spectra:
+        turning = machine.inertia[1] * omega**2 * spectra["angle_driven"] / rb2
+        return np.asarray((spectra["torque_driven"] - turning) / rb2)
+    turning = (machine.inertia[0] + machine.rotor) * omega**2 * spectra["angle_driver"] / rb1
+    return np.asarray((spectra["torque_driver"] + turning) / rb1)
+
+
 def _stiffness(machine: Machine, force: float) -> float:
     """Secant stiffness [N/m] of the mesh at a force [N], mean over the cycle."""
     mean = machine.law.force.mean(axis=0)
     return force / float(np.interp(force, mean, machine.law.approach))
+
+
+def _arms(machine: Machine, mesh_frequency: float, phase: Array, spectra: Mapping[str, Complex], omega: Array) -> Array:
+    """Friction levers over base radius (3, N), for driver rotation, supports and driven rotation.
+
+    The direction of sliding is that of the measured motion: vibration is as fast as the rolling teeth slide near the
+    pitch point, and turns part of Coulomb's friction into damping.
+    """
+    law, n = machine.law, phase.size
+    numbers, share = law.pairs(phase)
+    travel = (phase[:, None] - numbers) * law.base_pitch
+    centre1, centre2 = law.pitch_roll
+    rho1, rho2 = centre1 + travel, centre2 - travel
+    rb1, rb2 = machine.base_radius
+
+    def rate(channel: str) -> Array:
+        if channel not in spectra:
+            return np.zeros(n)
+        return np.asarray(np.fft.irfft(1j * omega * spectra[channel], n) * n)
+
+    turn1, turn2 = (2 * np.pi * mesh_frequency / z for z in machine.teeth)
+    speed1, speed2 = turn1 + rate("angle_driver") / rb1, turn2 + rate("angle_driven") / rb2
+    across = machine.cross_factor * (rate("y_driver") - rate("y_driven"))
+    sliding = rho1 * speed1[:, None] - rho2 * speed2[:, None] + across[:, None]
+    weight = share * np.tanh(sliding / machine.transition)
+    m1, m2 = (weight * rho1).sum(axis=-1), (weight * rho2).sum(axis=-1)
+    factor = machine.cross_factor / machine.support_factor
+    return np.stack([m1 / rb1, weight.sum(axis=-1) * factor, m2 / rb2])

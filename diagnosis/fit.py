@@ -9,13 +9,13 @@ the missing parts lambda re-estimated between them; a step that does not lower t
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
-from gearbench.diagnosis.blocks import Blocks, missing, of_level, whitened
+from gearbench.diagnosis.blocks import Blocks, missing, of_level, square_of, whitened
 from gearbench.diagnosis.columns import rows_and_columns, stiffening
 from gearbench.diagnosis.condition import Condition
 from gearbench.diagnosis.machine import Machine
@@ -27,6 +27,8 @@ Array = NDArray[np.float64]
 
 ROUNDS = 12  # of expectation-maximisation between two steps
 HALVINGS = 4
+LONGEST = 12.0  # prior standard deviations that one step may move an unknown
+COARSE_STEPS = 6
 ENOUGH = 1.0  # change of the cost that no longer matters
 
 
@@ -61,26 +63,44 @@ class Fit:
         return np.sqrt(np.diag(np.linalg.inv(self.precision)))
 
 
-def _score(problem: Problem, p: Array, sd: Array, factors: Sequence[Array], rounds: int) -> tuple[float, list[Array]]:
-    total, found = 0.5 * float(((p / sd) ** 2).sum()) - stretch(problem, p)[0], []
+def score(
+    problem: Problem, p: Array, sd: Array, factors: Sequence[Array], rounds: int = ROUNDS
+) -> tuple[float, list[Array]]:
+    """Cost of unknowns (P,), and the lambda found there from those given. No rounds: plain weighted squares with the
+    lambda given."""
+    total, found = 0.5 * float(((p / sd) ** 2).sum()), []
+    if rounds:
+        total -= stretch(problem, p)[0]
     for condition, blocks, start in zip(problem.conditions, problem.blocks, factors, strict=True):
         found_here = rows(problem.machine, condition, problem.where, p).at(blocks.used)
+        if rounds == 0:
+            total += square_of(blocks, replace(found_here, stiffening=0.0), start)
+            found.append(start)
+            continue
         factor, cost = missing(blocks, found_here, start, rounds)
         total += cost
         found.append(factor)
     return total, found
 
 
-def _normal(problem: Problem, p: Array, factors: Sequence[Array]) -> tuple[Array, Array]:
+def _normal(problem: Problem, p: Array, factors: Sequence[Array], plain: bool = False) -> tuple[Array, Array]:
+    """Information (P, P) and gradient (P,) of the data's cost; `plain`: of the weighted squares alone."""
     size = problem.where.size
     information, gradient = np.zeros((size, size)), np.zeros(size)
     for condition, blocks, factor in zip(problem.conditions, problem.blocks, factors, strict=True):
         found, columns, pressing = rows_and_columns(problem.machine, condition, problem.where, p, blocks.used)
+        if plain:
+            r, j = whitened(blocks, replace(found, stiffening=0.0), columns, factor)
+            information += 2 * (j.T @ j)
+            gradient += 2 * (j.T @ r)
+            continue
         r, j = whitened(blocks, found, columns, factor)
-        slope, curve = of_level(blocks, found, columns, pressing, factor)
+        slope, curve = of_level(
+            blocks, found, columns, pressing, factor, stiffening(condition, problem.where, p)[1]
+        )
         information += 2 * (j.T @ j) + curve
         gradient += 2 * (j.T @ r) + slope
-    return information, gradient - stretch(problem, p)[1]
+    return information, gradient if plain else gradient - stretch(problem, p)[1]
 
 
 def stretch(problem: Problem, p: Array) -> tuple[float, Array]:
@@ -106,33 +126,60 @@ def stretch(problem: Problem, p: Array) -> tuple[float, Array]:
     return total, gradient
 
 
-def refit(problem: Problem, sd: Array, start: Array, factors: Sequence[Array] | None = None, *, most: int = 12) -> Fit:
-    """The fit under prior standard deviations `sd` (P,), from `start` (P,) and, if known, lambda there."""
+def refit(
+    problem: Problem,
+    sd: Array,
+    start: Array,
+    factors: Sequence[Array] | None = None,
+    *,
+    most: int = 12,
+    coarse: Sequence[float] = (),
+) -> Fit:
+    """The fit under prior standard deviations `sd` (P,), from `start` (P,) and, if known, lambda there.
+
+    `coarse` lists values of lambda, the same everywhere, for first rounds of plain weighted least squares: no block is
+    given up before the unknowns have had their chance (graduated non-convexity).
+    """
     low, high = problem.where.bounds()
     p = np.clip(start, low, high)
     if factors is None:
         factors = [np.ones((len(ROWS) + 1, len(b.count)))[[*b.rows, len(ROWS)]] for b in problem.blocks]
-    cost, lambdas = _score(problem, p, sd, factors, 4 * ROUNDS)
+    steps = 0
+    for least in coarse:
+        fixed = [np.full_like(factor, least) for factor in factors]
+        p, _, _, taken = _descend(problem, sd, p, fixed, COARSE_STEPS, 0)
+        steps += taken
+    p, cost, lambdas, taken = _descend(problem, sd, p, factors, most, ROUNDS)
+    information, gradient = _normal(problem, p, lambdas)
+    precision = information + np.diag(1 / sd**2)
+    scaled = precision * sd[:, None] * sd[None, :]
+    evidence = -cost - 0.5 * float(np.linalg.slogdet(scaled)[1])
+    pull = information @ p - gradient
+    return Fit(p, sd, precision, information, pull, tuple(lambdas), cost, evidence, steps + taken)
+
+
+def _descend(
+    problem: Problem, sd: Array, p: Array, factors: Sequence[Array], most: int, rounds: int
+) -> tuple[Array, float, Sequence[Array], int]:
+    """Unknowns, cost, lambda and number of steps after at most `most` steps downhill."""
+    low, high = problem.where.bounds()
+    cost, lambdas = score(problem, p, sd, factors, 4 * rounds)
     steps = 0
     for _ in range(most):
         steps += 1
-        information, gradient = _normal(problem, p, lambdas)
+        information, gradient = _normal(problem, p, lambdas, plain=rounds == 0)
         move = -_solve(information, sd, gradient + p / sd**2)
-        length, before = 1.0, cost
+        length, before = min(1.0, LONGEST / float(np.abs(move / sd).max())), cost
         for _ in range(HALVINGS):
             trial = np.clip(p + length * move, low, high)
-            value, found = _score(problem, trial, sd, lambdas, ROUNDS)
+            value, found = score(problem, trial, sd, lambdas, rounds)
             if value < cost:
                 p, cost, lambdas = trial, value, found
                 break
             length *= 0.4
         if before - cost < ENOUGH:
             break
-    information, gradient = _normal(problem, p, lambdas)
-    precision = information + np.diag(1 / sd**2)
-    scaled = precision * sd[:, None] * sd[None, :]
-    evidence = -cost - 0.5 * float(np.linalg.slogdet(scaled)[1])
-    return Fit(p, sd, precision, information, information @ p - gradient, tuple(lambdas), cost, evidence, steps)
+    return p, cost, lambdas, steps
 
 
 def _solve(information: Array, sd: Array, right: Array) -> Array:

@@ -46,9 +46,15 @@ class Hypothesis:
 
 def library(where: Layout, without: tuple[str, ...] = ()) -> tuple[Hypothesis, ...]:
     """Every single effect of the library in every place where it may be."""
-    found = [
-        Hypothesis(name, name, "mesh", (name,))
-        for name in ("backlash", "friction", "eccentricity", "pitch-error")
+    found = [Hypothesis(name, name, "mesh", (name,)) for name in ("backlash", "friction")]
+    found += [
+        Hypothesis(f"eccentricity {side}", "eccentricity", "mesh", (f"eccentricity-{side}",), (), 2)
+        for side in ("driver", "driven")
+    ]
+    found += [
+        Hypothesis("pitch-error driver", "pitch-error", "mesh", ("pitch-driver",), (), 3),
+        Hypothesis("pitch-error driven", "pitch-error", "mesh", ("pitch-driven",), (), 3),
+        Hypothesis("pitch-error both", "pitch-error", "mesh", ("pitch-driver", "pitch-driven"), (), 3),
     ]
     teeth = range(*where["crack"].indices(where.size))
     found += [
@@ -70,9 +76,30 @@ def library(where: Layout, without: tuple[str, ...] = ()) -> tuple[Hypothesis, .
 
 def free_forms() -> tuple[Hypothesis, ...]:
     """Competitors that name a place but no effect."""
-    found = [Hypothesis("free mesh", "", "mesh", ("tooth-contrast",))]
+    found = [
+        Hypothesis("free mesh", "", "mesh", ("tooth-contrast",)),
+        Hypothesis("free dissipation", "", "mesh", ("free-dissipation",)),
+    ]
     found += [Hypothesis(f"free {row}", "", row, (f"free-{row}",)) for row in ROWS]
     return tuple(found)
+
+
+def starts(hypothesis: Hypothesis, where: Layout) -> tuple[Array, ...]:
+    """Departures (P,) from the background's fit to begin from, for effects whose influence is far from linear."""
+    if hypothesis.effect == "coupling":
+        # Compliances at which the rotor resonates with the gear between the prior's 6 kHz and a seventh of it.
+        values = [where.block("coupling").narrow[0] * ratio**2 for ratio in (2.0, 2.7, 3.6, 4.8, 6.5)]
+    elif hypothesis.effect == "sensor-delay":
+        values = [-60e-6, -30e-6, 30e-6, 60e-6]
+    else:
+        return ()
+    entry = where[hypothesis.groups[0]].start
+    out = []
+    for value in values:
+        move = np.zeros(where.size)
+        move[entry] = value
+        out.append(move)
+    return tuple(out)
 
 
 def predicted_evidence(fit: Fit, sd: Array) -> float:

@@ -49,6 +49,7 @@ class Machine:
     mesh_ratio: float
     scale: float
     friction: float
+    transition: float  # sliding speed at which friction has changed its direction [m/s]
     law: MeshLaw
     sd_stiffness: tuple[float, float]
     sd_damping: tuple[float, float]
@@ -105,6 +106,7 @@ def machine(nominal: Case, load: float, mean: float) -> Machine:
         mesh_ratio=rig.damping.mesh_ratio,
         scale=rig.mesh.stiffness_scale,
         friction=rig.friction.coefficient,
+        transition=rig.friction.transition_speed,
         law=mesh_law(rig, nominal.simulation, load),
         sd_stiffness=known.both("rig.support.{}.stiffness", [s.stiffness for s in supports], "support_stiffness"),
         sd_damping=known.both("rig.support.{}.damping", [s.damping for s in supports], "support_damping"),

@@ -30,13 +30,15 @@ from gearbench.diagnosis.unknowns import DELAYED, RIPPLE_ORDERS, ROWS, SHAPE_ORD
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
+RADIAL_STIFFNESS, RADIAL_DAMPING = 5.0, 1.5  # of radial supports, as multiples of the tangential ones'
 LOSS_FACTOR = 0.05  # of a coupling that the nominal rig takes for rigid
 
 
 @dataclass(frozen=True)
 class Mesh:
     """The mesh of one condition under given unknowns, over time (N,): deflection [m], force without damping [N], its
-    tangent [N/m], damping coefficient [N s/m], rate of the DTE [m/s], the whole force [N] and the touching flags."""
+    tangent [N/m], damping coefficient [N s/m], rate of the DTE [m/s], the whole force [N] and the touching flags; `stiffening` is the
+    mean logarithm of the stiffness's factor."""
 
     delta: Array
     elastic: Array
@@ -45,6 +47,7 @@ class Mesh:
     rate: Array
     force: Array
     touching: NDArray[np.bool_]
+    stiffening: float
 
 
 def corrected(condition: Condition, where: Layout, p: Array) -> dict[str, Complex]:
@@ -71,10 +74,11 @@ def _advance(condition: Condition, channel: str) -> float:
 def excess(condition: Condition, where: Layout, p: Array) -> Array:
     """Excess material (N,) [m] of the contact by offset, run-out, pitch errors and profile."""
     a = np.full(condition.samples, p[where["offset"]][0])
-    cos1, sin1, cos2, sin2 = p[where["eccentricity"]]
+    cos1, sin1 = p[where["eccentricity-driver"]]
+    cos2, sin2 = p[where["eccentricity-driven"]]
     first, second = condition.rotation
     a += cos1 * np.cos(first) + sin1 * np.sin(first) + cos2 * np.cos(second) + sin2 * np.sin(second)
-    a += per_tooth(condition, p[where["pitch"]], condition.share)
+    a += per_tooth(condition, np.concatenate([p[where["pitch-driver"]], p[where["pitch-driven"]]]), condition.share)
     profile = p[where["profile"]]
     for n in range(SHAPE_ORDERS):
         angle = 2 * np.pi * (n + 1) * condition.phase
@@ -123,7 +127,8 @@ def mesh(machine: Machine, condition: Condition, where: Layout, p: Array, spectr
     rate = np.fft.irfft(1j * condition.omega * closing, n) * n
     law = replace(machine.law, backlash=max(machine.law.backlash + p[where["backlash"]][0], 0.0))
     force, tangent = law.evaluate(delta, condition.phase)
-    factor = machine.scale * modulation(condition, where, p)
+    modulated = modulation(condition, where, p)
+    factor = machine.scale * modulated
     curve = p[where["curvature"]][0]
     if curve:
         level = np.maximum(np.abs(force), 1e-3 * condition.force_level) / condition.force_level
@@ -132,15 +137,28 @@ def mesh(machine: Machine, condition: Condition, where: Layout, p: Array, spectr
     touching = force != 0.0
     ratio = machine.mesh_ratio * np.exp(p[where["mesh-ratio"]][0])
     viscosity = 2 * ratio * np.sqrt(np.maximum(tangent, 0.0) * machine.mesh_mass)
-    return Mesh(delta, elastic, tangent, viscosity, rate, elastic + viscosity * rate * touching, touching)
+    quadratic = p[where["dissipation"]][0] * np.abs(rate)
+    stiffening = float(np.log(np.maximum(modulated, 1e-3)).mean())
+    return Mesh(delta, elastic, tangent, viscosity, rate, elastic + (viscosity + quadratic) * rate * touching, touching, stiffening)
+
+
+def radial_impedance(machine: Machine, condition: Condition, where: Layout, p: Array) -> tuple[Complex, Array, Complex]:
+    """Dynamic stiffness (2, N/2 + 1) [N/m] of both gears' radial supports, their springs (2,) and dampers' part."""
+    values = p[where["radial"]]
+    spring = RADIAL_STIFFNESS * np.array(machine.stiffness) * np.exp(values[:2])
+    damping = RADIAL_DAMPING * np.array(machine.damping) * np.exp(values[2:])
+    damper = 1j * condition.omega * damping[:, None]
+    return spring[:, None] + damper - np.array(machine.mass)[:, None] * condition.omega**2, spring, damper
 
 
 def _yielding(machine: Machine, condition: Condition, where: Layout, p: Array) -> Complex:
-    """Departure of the deflection's spectrum by compliance that moves no channel: radial supports, webs."""
+    """Departure of the deflection's spectrum by what moves no measured channel: radial supports, webs and shafts."""
     values = p[where["compliance"]]
     count = len(KNOTS)
-    gain = (values[:count] + 1j * values[count:]) @ condition.hats_full
-    return np.asarray(gain * condition.force_full / condition.stiffness_level)
+    gain = (values[:count] + 1j * values[count:]) @ condition.hats_full / condition.stiffness_level
+    impedance, _, _ = radial_impedance(machine, condition, where, p)
+    gain = gain - machine.transverse_factor**2 * (1 / impedance).sum(axis=0)
+    return np.asarray(gain * condition.force_full)
 
 
 def coupling_compliance(machine: Machine, condition: Condition, where: Layout, p: Array) -> Complex:
@@ -163,15 +181,16 @@ def support_force(machine: Machine, side: int, y: Array, log_stiffness: float, m
 @dataclass(frozen=True)
 class Residuals:
     """Force residuals `left` (4, K) [N], `share` (4, K) of an error of the mesh force in each, and the spectrum
-    `force` (K,) [N] of the mesh force itself. Rows of channels that the record lacks are NaN."""
+    `force` (K,) [N] of the mesh force itself; `stiffening` the mean logarithm of the mesh stiffness's factor. Rows of channels that the record lacks are NaN."""
 
     left: Complex
     share: Complex
     force: Complex
+    stiffening: float
 
     def at(self, used: NDArray[np.int64]) -> Residuals:
         """The same at some bins."""
-        return Residuals(self.left[:, used], self.share[:, used], self.force[used])
+        return Residuals(self.left[:, used], self.share[:, used], self.force[used], self.stiffening)
 
 
 def rows(machine: Machine, condition: Condition, where: Layout, p: Array) -> Residuals:
@@ -215,7 +234,7 @@ def assemble(
         out[row] = sign * support(machine, condition, where, p, side, spectra[channel]) - middle
     filters = _filters(condition, where, p)
     out += filters * np.stack([share[0] * first, middle, last, middle])
-    return Residuals(out, share, _transform(condition, state.force))
+    return Residuals(out, share, _transform(condition, state.force), state.stiffening)
 
 
 def support(machine: Machine, condition: Condition, where: Layout, p: Array, side: int, y: Complex) -> Complex:

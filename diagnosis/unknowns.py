@@ -37,6 +37,10 @@ def unknowns(machine: Machine, conditions: Sequence[Condition]) -> Layout:
     torque = float(np.mean([condition.torque_mean for condition in conditions]))
     gear = 1.0 / (1.0 / max(machine.rotor, 1e-12) + 1.0 / machine.inertia[0])
 
+    # Force of rate times its size that equals a tenth of the linear damping at 30 mm/s.
+    level = float(np.mean([condition.stiffness_level for condition in conditions]))
+    quadratic = 0.1 * 2 * machine.mesh_ratio * float(np.sqrt(level * machine.mesh_mass)) / 0.03
+
     def softness(frequency: float) -> float:
         return 1.0 / (gear * (2 * np.pi * frequency) ** 2)
 
@@ -45,17 +49,21 @@ def unknowns(machine: Machine, conditions: Sequence[Condition]) -> Layout:
         block("damping", NUISANCE, "1", ("driver", "driven"), 1.0, low=-3.0, high=3.0),
         block("mass", NUISANCE, "1", ("driver", "driven"), 1.0),
         block("inertia", NUISANCE, "1", ("driver", "driven", "rotor"), 1.0),
-        block("scale", NUISANCE, "1", ("mesh",), machine.sd_scale, low=-0.7, high=0.7),
+        block("scale", NUISANCE, "1", ("mesh",), machine.sd_scale, low=-0.5, high=0.5),
         block("mesh-ratio", NUISANCE, "1", ("mesh",), machine.sd_mesh_ratio, low=-3.0, high=3.0),
         block("offset", NUISANCE, "m", ("excess",), 5e-6),
-        block("curvature", NUISANCE, "1", ("mesh",), 0.05, low=-0.5, high=0.5),
+        block("curvature", NUISANCE, "1", ("mesh",), 0.05, low=-0.3, high=0.3),
         block("shape", NUISANCE, "1", 2 * SHAPE_ORDERS, 0.04),
         block("profile", NUISANCE, "m", 2 * SHAPE_ORDERS, 0.5e-6),
         block("compliance", NUISANCE, "1", complex_knots, 0.25),
+        block("radial", NUISANCE, "1", ("k1", "k2", "c1", "c2"), 0.6, low=-2.5, high=2.5),
         *(block(f"filter-{row}", f"free-{row}", "1", complex_knots, 0.03, 1.0) for row in ROWS),
+        block("dissipation", "free-dissipation", "N s2/m2", ("quadratic",), quadratic, 20 * quadratic),
         block("friction", "friction", "1", ("coefficient",), 0.006, 0.08),
-        block("eccentricity", "eccentricity", "m", ("cos1", "sin1", "cos2", "sin2"), 0.5e-6, 6e-6),
-        block("pitch", "pitch-error", "m", z1 + z2, 0.35e-6, 3e-6),
+        block("eccentricity-driver", "eccentricity-driver", "m", ("cos", "sin"), 0.3e-6, 3e-6),
+        block("eccentricity-driven", "eccentricity-driven", "m", ("cos", "sin"), 0.3e-6, 3e-6),
+        block("pitch-driver", "pitch-driver", "m", z1, 0.25e-6, 2.5e-6),
+        block("pitch-driven", "pitch-driven", "m", z2, 0.25e-6, 2.5e-6),
         block("crack", "tooth-contrast", "1", z1 + z2, 0.02, 0.35, low=-2.0, high=0.9),
         block("coupling", "coupling", "rad/(N m)", ("compliance",), softness(6e3), softness(1.3e3), low=0.0),
         block("bearing-driver", "bearing-driver", "1", ("exponent",), 0.03, 0.35, low=-0.8, high=2.0),
@@ -70,6 +78,7 @@ def unknowns(machine: Machine, conditions: Sequence[Condition]) -> Layout:
         ("damping", machine.sd_damping),
         ("mass", machine.sd_mass),
         ("inertia", (*machine.sd_inertia, machine.sd_rotor)),
+        ("compliance", 2 * tuple(0.01 + 0.07 * min(1.0, (knot / 0.4) ** 2) for knot in KNOTS)),
     ):
         entry = found.block(key)
         entry.narrow[:] = deviations

@@ -68,7 +68,7 @@ def test_one_blocks_covariance_is_the_dense_one() -> None:
     factor = rng.uniform(1.0, 3.0, (5, 1))
     blocks = Blocks(np.arange(bins), np.zeros(bins, int), np.zeros(1, int), np.array([5.0]), np.ones(1), floor, np.arange(4))
     force = 3 * rng.standard_normal(bins) + 1j
-    found = Residuals(r, g, force)
+    found = Residuals(r, g, force, 0.0)
     flat, tall = whitened(blocks, found, j, factor)
     level = np.mean(np.abs(split(blocks, found, factor).force) ** 2)
     square, gram, cost = 0.0, np.zeros((unknown, unknown)), 0.0
@@ -98,7 +98,7 @@ def test_missing_part_is_found_in_the_row_that_has_it() -> None:
     mesh = noise(1.0)
     r = np.stack([noise(1.0), noise(5.0), noise(1.0), noise(1.0)]) - mesh
     blocks = Blocks(np.arange(bins), numbers, np.zeros(100, int), np.full(100, 8.0), np.ones(100), np.ones((5, bins)), np.arange(4))
-    found = Residuals(r, g, 10 * g[0])
+    found = Residuals(r, g, 10 * g[0], 0.0)
     factor, cost = missing(blocks, found, np.ones((5, 100)), 100)
     level = np.median(factor, axis=1)
     assert level[1] == pytest.approx(25.0, rel=0.25)

@@ -1,0 +1,70 @@
+"""From measurements and a nominal case to the problem that all hypotheses share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.diagnosis.blocks import EXCITED, cut
+from gearbench.diagnosis.condition import Condition, prepare
+from gearbench.diagnosis.fit import Problem
+from gearbench.diagnosis.intake import Measurement
+from gearbench.diagnosis.machine import Machine, machine
+from gearbench.diagnosis.rows import assemble, carried, corrected, mesh
+from gearbench.diagnosis.unknowns import ROWS, unknowns
+from gearbench.rig import Case
+
+Array = NDArray[np.float64]
+
+# Errors that a sound rig's rows and mesh have because the model is simpler than the rig, as parts of the mesh force.
+ROW_FLOOR = 0.03
+MESH_FLOOR = 0.08
+# Part of the time beyond which flanks count as separating.
+SEPARATED = 0.03
+LOAD_MARGIN = 1.3
+OFF_COMB = 1.02  # how far beyond the highest excited line bins are used
+
+
+def problem_of(measurements: Sequence[Measurement], nominal: Case) -> tuple[Problem, tuple[bool, ...]]:
+    """The problem, and for each condition whether its flanks separate now and then."""
+    torques = [measured.mean("torque_driver") for measured in measurements]
+    largest = max(float(np.abs(torque).max()) for torque in torques)
+    made = machine(nominal, LOAD_MARGIN * largest, float(np.mean([torque.mean() for torque in torques])))
+    band = max(excited_band(measured) for measured in measurements)
+    conditions = tuple(prepare(measured, made, band) for measured in measurements)
+    where = unknowns(made, conditions)
+    blocks, apart = [], []
+    for condition in conditions:
+        level, separates = _levels(made, condition)
+        relative = np.full((len(ROWS) + 1, condition.bins), ROW_FLOOR)
+        relative[-1] = MESH_FLOOR
+        blocks.append(cut(made, condition, level, relative, separates))
+        apart.append(separates)
+    return Problem(made, conditions, where, tuple(blocks)), tuple(apart)
+
+
+def excited_band(measured: Measurement) -> float:
+    """Highest frequency [Hz] that is worth a look: just beyond the highest excited line, or a third of the sampling
+    rate for constant torque."""
+    torque = measured.mean("torque_driver")
+    lines = np.abs(np.fft.rfft(torque - torque.mean()))
+    spacing = measured.sampling_rate / torque.size
+    noise = measured.noise.get("torque_driver", 0.0) * np.sqrt(torque.size)
+    loud = np.flatnonzero(lines > max(EXCITED * lines.max(), 6 * noise))
+    if not loud.size:
+        return measured.sampling_rate / 3
+    return float(min(OFF_COMB * loud[-1] * spacing, measured.sampling_rate / 2.2))
+
+
+def _levels(made: Machine, condition: Condition) -> tuple[Array, bool]:
+    """The mesh force (rows + 1, K) [N] as each row and the nominal mesh law have it, and whether flanks separate."""
+    where = unknowns(made, [condition])
+    nothing = np.zeros(where.size)
+    spectra = corrected(condition, where, nothing)
+    state = mesh(made, condition, where, nothing, spectra)
+    found = assemble(made, condition, where, nothing, spectra, state)
+    forces = carried(made, condition, where, nothing, state.force)
+    rows = found.left + found.share * forces[[0, 1, 2, 1]]
+    return np.vstack([np.abs(rows), np.abs(found.force)[None]]), bool((~state.touching).mean() > SEPARATED)

@@ -1,0 +1,146 @@
+"""The search: the background alone, then every hypothesis that could matter, each refitted with everything else."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.diagnosis.fit import Fit, Problem, refit, score
+from gearbench.diagnosis.hypotheses import Hypothesis, free_forms, library, predicted_gains, starts
+from gearbench.diagnosis.unknowns import ROWS
+
+Array = NDArray[np.float64]
+Report = Callable[[str], None]
+
+PROMISING = -1.5  # predicted gain below which a hypothesis is not refitted
+MOST = 7  # refits of single hypotheses
+MOST_TEETH = 2  # of these, single cracked teeth
+STEPS_BASE, STEPS = 20, 15
+RADIAL_TRIALS = (-0.6, -0.2, 0.2, 0.7)  # logarithms of stiffness over the prior's
+COARSE = (4.0,)  # lambda of the first rounds
+
+
+@dataclass(frozen=True)
+class Tried:
+    """A hypothesis, how much log evidence it adds to the background alone, and its fit (None: not promising)."""
+
+    hypothesis: Hypothesis
+    gain: float
+    fit: Fit | None
+
+
+@dataclass(frozen=True)
+class Search:
+    """The background's fit and all hypotheses tried, the best first."""
+
+    base: Fit
+    tried: tuple[Tried, ...]
+
+    def best(self, *, free: bool) -> Tried | None:
+        """The best effect of the library, or the best free form; None if none was worth a refit."""
+        found = [one for one in self.tried if bool(one.hypothesis.effect) != free and one.fit is not None]
+        return found[0] if found else None
+
+
+def search(problem: Problem, without: Sequence[str] = (), report: Report = lambda step: None) -> Search:
+    """Fit the background, then refit the hypotheses that its quadratic predicts to be worth it."""
+    where = problem.where
+    report("background")
+    begin = begin_of(problem)
+    base = refit(problem, where.prior(), begin, most=STEPS_BASE, coarse=COARSE)
+    report("everything at once")
+    everything = [h for h in library(where, tuple(without)) if not h.entries]
+    sd = where.prior({group for h in everything for group in h.groups})
+    free = refit(problem, sd, begin, most=STEPS, coarse=COARSE)
+    again = refit(problem, where.prior(), free.p, free.factors, most=STEPS_BASE)
+    base = again if again.cost < base.cost else base
+    hypotheses = library(where, tuple(without)) + free_forms()
+    gains = predicted_gains(base, where, hypotheses)
+    begun = [_start(problem, (base, free), hypothesis) for hypothesis in hypotheses]
+    gains = np.array([max(gain, ahead) for gain, (_, ahead) in zip(gains, begun, strict=True)])
+    gains = np.maximum(gains, [min(gain, 1.0) for gain in predicted_gains(free, where, hypotheses)])
+    chosen = _promising(hypotheses, gains)
+    tried = []
+    for number, (hypothesis, gain) in enumerate(zip(hypotheses, gains, strict=True)):
+        if number not in chosen:
+            tried.append(Tried(hypothesis, min(float(gain), 0.0), None))
+            continue
+        report(hypothesis.name)
+        start, factors = begun[number][0]
+        fit = refit(problem, hypothesis.prior(where), start, factors, most=STEPS)
+        tried.append(Tried(hypothesis, fit.log_evidence - float(np.log(hypothesis.choices)), fit))
+    base, tried = _level(problem, base, tried)
+    return Search(base, tuple(sorted(tried, key=lambda one: -one.gain)))
+
+
+def begin_of(problem: Problem) -> Array:
+    """Where to begin (P,): the radial supports, whose resonances may lie anywhere in the band, by trial."""
+    where, sd = problem.where, problem.where.prior()
+    even = [np.full((len(b.rows) + 1, len(b.count)), COARSE[0]) for b in problem.blocks]
+    best, least = np.zeros(where.size), np.inf
+    for first in RADIAL_TRIALS:
+        for second in RADIAL_TRIALS:
+            trial = np.zeros(where.size)
+            trial[where["radial"]] = (first, second, 0.0, 0.0)
+            cost = score(problem, trial, sd, even, rounds=0)[0]
+            if cost < least:
+                best, least = trial, cost
+    return best
+
+
+Start = tuple[Array, tuple[Array, ...]]
+
+
+def _start(problem: Problem, fits: tuple[Fit, Fit], hypothesis: Hypothesis) -> tuple[Start, float]:
+    """Where to begin the refit: unknowns (P,) and lambda, those of the background's fit or of everything at once or
+    a departure from the former; and by how much the cost there lies below that of the background's fit."""
+    base, free = fits
+    sd = hypothesis.prior(problem.where)
+    low, high = problem.where.bounds()
+    # What the hypothesis does not hold for possible must go back to the background's size.
+    calm = np.where(sd < free.sd, np.clip(free.p, -2 * sd, 2 * sd), free.p)
+    trials = [base.p + move for move in starts(hypothesis, problem.where)]
+    candidates = [(base.p, base.factors), (calm, free.factors), *((trial, base.factors) for trial in trials)]
+    costs = [score(problem, np.clip(p, low, high), sd, factors)[0] for p, factors in candidates]
+    best = int(np.argmin(costs))
+    p, factors = candidates[best]
+    return (np.clip(p, low, high), factors), costs[0] - costs[best] if best else -np.inf
+
+
+def _level(problem: Problem, base: Fit, tried: list[Tried]) -> tuple[Fit, list[Tried]]:
+    """The background fitted again from the best refit, which may have found a way that it had missed, and the gains
+    over it of all that was tried."""
+    refits = [one for one in tried if one.fit is not None]
+    if refits:
+        best = max(refits, key=lambda one: one.gain)
+        assert best.fit is not None
+        again = refit(problem, base.sd, best.fit.p, best.fit.factors, most=STEPS)
+        base = again if again.cost < base.cost else base
+    gains = [one.gain - base.log_evidence if one.fit else one.gain for one in tried]
+    return base, [Tried(one.hypothesis, gain, one.fit) for one, gain in zip(tried, gains, strict=True)]
+
+
+def _promising(hypotheses: Sequence[Hypothesis], gains: Array) -> set[int]:
+    """Numbers of the hypotheses to refit."""
+    chosen: set[int] = set()
+    teeth = 0
+    for number in np.argsort(-gains):
+        if gains[number] < PROMISING or len(chosen) == MOST:
+            break
+        if hypotheses[number].entries:
+            teeth += 1
+            if teeth > MOST_TEETH:
+                continue
+        chosen.add(int(number))
+    return chosen
+
+
+def missing_by_row(problem: Problem, fit: Fit) -> Array:
+    """What a fit leaves unexplained, by row, the mesh last (rows + 1,): sum over blocks of bins times log lambda."""
+    total = np.zeros(len(ROWS) + 1)
+    for blocks, factor in zip(problem.blocks, fit.factors, strict=True):
+        total[[*blocks.rows, len(ROWS)]] += (np.log(factor) * blocks.count).sum(axis=1)
+    return total
