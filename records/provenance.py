@@ -16,7 +16,17 @@ SOURCE_PACKAGES = (
     "gearbench",
     *(
         f"gearbench.{name}"
-        for name in ("rig", "records", "geometry", "fem", "lumped", "identification", "bench", "diagnosis")
+        for name in (
+            "rig",
+            "records",
+            "geometry",
+            "fem",
+            "lumped",
+            "identification",
+            "bench",
+            "diagnosis",
+            "challenge",
+        )
     ),
 )
 

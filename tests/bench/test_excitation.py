@@ -142,6 +142,6 @@ def test_every_condition_of_the_demonstration_has_its_comb() -> None:
     assert found == {
         "base": (100.0, 40.0, 119),
         "light": (40.0, 60.0, 119),
-        "fast": (70.0, 40.0, 99),
+        "fast": (90.0, 40.0, 99),
         "held-out": (80.0, 40.0, 119),
     }
