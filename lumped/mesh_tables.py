@@ -72,7 +72,11 @@ def tables(model: NonLinear, motion: Motion) -> Array:
     share, bending = law.closed
     series = _series(rig.mesh.stiffness_cos, rig.mesh.stiffness_sin)
     errors = _series(rig.mesh.error_cos, rig.mesh.error_sin)
-    runout = np.array([[g.runout / 2, g.runout_phase] for g in (rig.driver, rig.driven)])
+    # Run-out moves whole gears, and the normals of working and back flanks are pi - 2 alpha_w apart: by so much of its
+    # rotation the driver's back flanks are earlier, those of the driven gear, which turns the other way, later.
+    turn = pi - 2 * model.working_pressure_angle
+    gears = ((rig.driver, turn), (rig.driven, -turn))
+    runout = np.array([[g.runout / 2, g.runout_phase, g.runout_phase - t] for g, t in gears])
     ripple = rig.drive.ripple
     waves = np.zeros((0, 3))
     if ripple is not None:
@@ -137,10 +141,12 @@ def _fill(
                 b2 = bending[row, o, 1] + weight * (bending[row + 1, o, 1] - bending[row, o, 1])
                 grown = b1 * growth1[one] + b2 * growth2[two]
                 softness += part * grown / (1.0 + grown)
-        turned = 0.0
+        turned, turned_back = 0.0, 0.0
         for i in range(2):
             if runout[i, 0] != 0.0:
-                turned += runout[i, 0] * cos(2 * pi * phase / (z1 if i == 0 else z2) - runout[i, 1])
+                angle = 2 * pi * phase / (z1 if i == 0 else z2)
+                turned += runout[i, 0] * cos(angle - runout[i, 1])
+                turned_back += runout[i, 0] * cos(angle - runout[i, 2])
         every = base[1] + _wave(errors, cycle) + turned
         ripple = 0.0
         for i in range(waves.shape[0]):
@@ -149,4 +155,4 @@ def _fill(
         out[n, EXCESS] = excess + every
         out[n, GAIN] = base[0] * (1.0 + _wave(series, cycle)) * (1.0 - softness)
         out[n, RIPPLE] = ripple
-        out[n, BACK] = turned
+        out[n, BACK] = turned_back
