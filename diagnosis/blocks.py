@@ -59,13 +59,18 @@ def kinds_of(condition: Condition) -> NDArray[np.int64]:
 
 
 def cut(machine: Machine, condition: Condition, level: Array, relative: Array, separates: bool) -> Blocks:
-    """Blocks of a condition. `level` (rows + 1, K) [N] is the mesh force as each row (NaN: no such row) and the nominal
-    mesh law have it, `relative` (rows + 1, K) the floors as shares of the block's force. Where flanks separate, impacts reach beyond the
-    sampled band and only excited and operating bins are used."""
+    """Blocks of a condition.
+
+    `level` (rows + 1, K) [N] is the mesh force as each row (NaN: no such row) and the nominal mesh law have it,
+    `relative` (rows + 1, K) the floors as shares of the block's force. Where flanks separate, impacts reach beyond
+    the sampled band and only excited and operating bins are used.
+    """
     kind = kinds_of(condition)
     present = np.flatnonzero(np.isfinite(level[:-1]).all(axis=1))
     of_bin = np.full(condition.bins, -1)
-    kinds, counts, centres = [], [], []
+    kinds: list[int] = []
+    counts: list[int] = []
+    centres: list[float] = []
     for label in range(2 if separates else len(KINDS)):
         bins = np.flatnonzero(kind == label)
         if KINDS[label] not in ("operating", "excited"):
@@ -74,7 +79,7 @@ def cut(machine: Machine, condition: Condition, level: Array, relative: Array, s
             of_bin[chosen] = len(kinds)
             kinds.append(label)
             counts.append(len(chosen))
-            centres.append(condition.frequency[chosen].mean())
+            centres.append(float(condition.frequency[chosen].mean()))
     number = len(kinds)
     inside = of_bin >= 0
     counted = np.array(counts, dtype=float)
@@ -115,8 +120,10 @@ def noise_of_rows(machine: Machine, condition: Condition) -> Array:
     omega = condition.omega[: condition.bins]
     rb1, rb2 = machine.base_radius
     g, noise = machine.support_factor, condition.noise
-    first = (noise["torque_driver"] + ((machine.inertia[0] + machine.rotor) * omega**2 / rb1) ** 2 * noise["angle_driver"]) / rb1**2
-    last = (noise.get("torque_driven", 0.0) + (machine.inertia[1] * omega**2 / rb2) ** 2 * noise["angle_driven"]) / rb2**2
+    turning1 = (machine.inertia[0] + machine.rotor) * omega**2 / rb1
+    turning2 = machine.inertia[1] * omega**2 / rb2
+    first = (noise["torque_driver"] + turning1**2 * noise["angle_driver"]) / rb1**2
+    last = (noise.get("torque_driven", 0.0) + turning2**2 * noise["angle_driven"]) / rb2**2
     out = [first]
     for side, channel in enumerate(("y_driver", "y_driven")):
         dynamic = np.abs(machine.stiffness[side] + 1j * omega * machine.damping[side] - omega**2 * machine.mass[side])
@@ -154,7 +161,7 @@ def split(blocks: Blocks, found: Residuals, factor: Array) -> Split:
     use = blocks.rows
     d = floors(blocks, found) * factor[:, blocks.of_bin]
     r, g = found.left[use], found.share[use]
-    weight = np.conj(g) / d[:-1]
+    weight = np.asarray(np.conj(g) / d[:-1], dtype=np.complex128)
     precision = 1.0 / d[-1] + (weight * g).real.sum(axis=0)
     mean = -(weight * r).sum(axis=0) / precision
     force = found.force - mean

@@ -24,13 +24,12 @@ class Condition:
     """What the rows need of one condition; N samples of one row, `cycles` mesh periods, K bins up to `band` [Hz].
 
     `spectra` maps a channel to its full half-spectrum (N/2 + 1,) = rfft/N of the period mean, angles as departures
-    u = rb (theta - nominal rotation) [m]; `omega` (N/2 + 1,) [rad/s]; `phase` (N,) mesh phase [cycles]; `tooth`
-    (2, N, n_o) tooth numbers of the pairs in contact, `share` (N, n_o) their shares, `bending` (N, n_o, 2); `arms`
-    (3, N) friction levers over base radius, for driver rotation, y and driven rotation; `rotation` (2, N) angle [rad]
-    of both gears, `pitch_speed` rb speed [m/s]; `noise` variance of one bin of each
-    channel's spectrum; `force_level` [N] and `stiffness_level` [N/m] of the mesh at the mean torque; `force_full`
-    (N/2 + 1,) spectrum of the mesh force that a nominal row gives, zero beyond the used bins; `hats_full` basis
-    of smooth functions of frequency (knots, N/2 + 1).
+    u = rb (theta - nominal rotation) [m]; `noise` to the variance of one of its bins; `omega` (N/2 + 1,) [rad/s];
+    `phase` (N,) mesh phase [cycles]; `tooth` (2, N, n_o) tooth numbers of the pairs in contact, `share` (N, n_o) their
+    shares, `bending` (N, n_o, 2); `arms` (3, N) friction levers over base radius, for driver rotation, y and driven
+    rotation; `rotation` (2, N) angle [rad] of both gears, `pitch_speed` rb speed [m/s]; `force_level` [N] and
+    `stiffness_level` [N/m] of the mesh at the mean torque; `force_full` (N/2 + 1,) spectrum of the mesh force that a
+    nominal row gives, zero beyond the used bins; `hats_full` basis of smooth functions of frequency (knots, N/2 + 1).
     """
 
     name: str
@@ -67,7 +66,7 @@ def prepare(measured: Measurement, machine: Machine, band: float) -> Condition:
     phase, rate = measured.phase, measured.sampling_rate
     samples = phase.size
     spectra, noise = _spectra(measured, machine)
-    omega = 2 * np.pi * np.fft.rfftfreq(samples, 1 / rate)
+    omega = np.asarray(2 * np.pi * np.fft.rfftfreq(samples, 1 / rate), dtype=np.float64)
     bins = min(int(np.searchsorted(omega, 2 * np.pi * band, side="right")), samples // 2)
     numbers, share = machine.law.pairs(phase)
     rb1 = machine.base_radius[0]

@@ -2,8 +2,8 @@
 
 The cost is the negative logarithm of the posterior: that of `blocks`, plus the Gaussian prior, less the logarithm of
 how much the unknowns stretch the measured motion into forces (without it, zero stiffness would explain every error of
-motion). Gauss-Newton steps with
-the missing parts lambda re-estimated between them; a step that does not lower the cost is halved, then refused.
+motion). Gauss-Newton steps with the missing parts lambda re-estimated between them; a step that does not lower the
+cost is shortened, then refused.
 """
 
 from __future__ import annotations
@@ -44,8 +44,12 @@ class Problem:
 
 @dataclass(frozen=True)
 class Fit:
-    """The unknowns (P,) of one hypothesis, prior `sd` (P,), `precision` (P, P) of the posterior, `information` (P, P)
-    of the data alone and their `pull` (P,): the data's cost is p' information p / 2 - pull p to second order; lambda of every condition, cost without the prior's normalisation, and log evidence."""
+    """The fit of one hypothesis.
+
+    Unknowns `p` (P,), prior `sd` (P,), `precision` (P, P) of the posterior, `information` (P, P) of the data alone and
+    their `pull` (P,): the data's cost is p' information p / 2 - pull p to second order. `factors`: lambda
+    (rows + 1, blocks) of every condition; `cost` without the prior's normalisation; `steps` taken.
+    """
 
     p: Array
     sd: Array

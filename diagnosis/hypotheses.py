@@ -64,7 +64,9 @@ def library(where: Layout, without: tuple[str, ...] = ()) -> tuple[Hypothesis, .
     found.append(Hypothesis("coupling", "coupling", "drive", ("coupling",)))
     found.append(Hypothesis("torque-ripple", "torque-ripple", "drive", ("torque-ripple",)))
     found += [
-        Hypothesis(f"bearing-nonlinearity {side}", "bearing-nonlinearity", f"{side}-support", (f"bearing-{side}",), (), 2)
+        Hypothesis(
+            f"bearing-nonlinearity {side}", "bearing-nonlinearity", f"{side}-support", (f"bearing-{side}",), (), 2
+        )
         for side in ("driver", "driven")
     ]
     found += [

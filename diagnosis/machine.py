@@ -69,7 +69,8 @@ class Machine:
 def machine(nominal: Case, load: float, mean: float) -> Machine:
     """The machine of a nominal case whose mesh force law must reach `load` [N m] on the driver.
 
-    `mean` [N m] is a typical mean torque: a support that the case takes for linear is judged about the deflection there.
+    `mean` [N m] is a typical mean torque: a support that the case takes for linear is judged about its deflection
+    there.
     """
     rig = nominal.rig
     meshing = pair(rig)
