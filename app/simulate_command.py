@@ -26,7 +26,7 @@ def simulate(
 ) -> None:
     """Carry out the experiment of a case on a model and write the record.
 
-    A case with [[condition]] tables has one record for each: `--out DIR/record.nc` writes
+    A case with condition tables has one record for each: `--out DIR/record.nc` writes
     DIR/record-NAME.nc, NAME being the name of the condition.
     """
     loaded = load_case(case, settings)

@@ -18,7 +18,7 @@ def static(
         list[float] | None, typer.Option("--torque-nm", help="driver torques [N m]; absent: the case's mean")
     ] = None,
     dte_um: Annotated[
-        list[float] | None, typer.Option("--dte-um", help="transmission errors [um], instead of torques")
+        list[float] | None, typer.Option("--dte-um", help="transmission errors in um, instead of torques")
     ] = None,
     positions: Annotated[int, typer.Option("--positions", help="mesh phases over one cycle")] = 64,
     cycles: Annotated[int, typer.Option("--cycles", help="mesh cycles, where teeth differ from one another")] = 1,

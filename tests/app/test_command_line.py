@@ -8,14 +8,17 @@ import signal
 import subprocess
 import sys
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
 
 import meshio
 import numpy as np
 import pytest
+import typer
+from rich.markup import render
 
 from gearbench.cases import case_files, case_path
-from gearbench.cli import run_command_line
+from gearbench.cli import app, run_command_line
 from gearbench.options import expand_lists
 from gearbench.rig import read_case
 
@@ -134,6 +137,22 @@ def test_help_and_registration_import_nothing_heavy() -> None:
     )
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert out.splitlines()[-1] == "[]"
+
+
+def help_texts(command: typer.core.TyperCommand | typer.core.TyperGroup) -> Iterator[str]:
+    """Everything that --help shows of a command and those below it."""
+    yield command.help or ""
+    for parameter in command.params:
+        yield str(getattr(parameter, "help", None) or "")
+    for below in getattr(command, "commands", {}).values():
+        yield from help_texts(below)
+
+
+def test_help_shows_every_word_of_it() -> None:
+    texts = list(help_texts(typer.main.get_command(app)))
+    assert len(texts) > 50
+    for text in texts:
+        assert render(text).plain == text  # [um] would be a style, and vanish
 
 
 def test_schema_and_reference(capsys: pytest.CaptureFixture[str]) -> None:
