@@ -17,6 +17,14 @@ class NotRun(Exception):
 
 
 @dataclass(frozen=True)
+class Got:
+    """A number got, and what is to be said with it."""
+
+    value: float
+    note: str
+
+
+@dataclass(frozen=True)
 class Check:
     """One row: `measure` returns the number got, which passes when it is at most (or, `least`, at least) `reach`.
 
@@ -27,13 +35,13 @@ class Check:
     what: str
     reach: float
     unit: str
-    measure: Callable[[], float]
+    measure: Callable[[], float | Got]
     least: bool = False
 
 
 @dataclass(frozen=True)
 class Result:
-    """What a check got; `note` says why it did not run."""
+    """What a check got; `note` says what is to be said with it, or why it did not run."""
 
     check: Check
     got: float | None
@@ -77,5 +85,6 @@ def run(wanted: list[Check]) -> Iterator[Result]:
         except NotRun as reason:
             yield Result(check, None, "not-run", str(reason))
             continue
-        good = got >= check.reach if check.least else got <= check.reach
-        yield Result(check, got, "pass" if good else "fail")
+        value, note = (got.value, got.note) if isinstance(got, Got) else (got, "")
+        good = value >= check.reach if check.least else value <= check.reach
+        yield Result(check, value, "pass" if good else "fail", note)

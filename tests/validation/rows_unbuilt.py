@@ -26,13 +26,4 @@ CHECKS = [
     Check(
         "mesh-feedback-30db", "mesh-feedback ITF at 30 dB", 0.04, "", missing("the mesh-feedback estimator")
     ),
-    Check("diagnosis-time", "diagnosis of three conditions", 60.0, "s", missing("the diagnosis")),
-    Check(
-        "diagnosis-right",
-        "diagnosis right on withheld effects",
-        0.75,
-        "",
-        missing("the diagnosis"),
-        least=True,
-    ),
 ]
