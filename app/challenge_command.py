@@ -115,7 +115,7 @@ def diagnose_case(records: Sequence[Path], nominal: Path, folder: Path, without:
     from gearbench.rig import read_case
 
     try:
-        made = diagnose(take_in(records, read_case(nominal), without=without))
+        made = diagnose(take_in(records, read_case(nominal), without=without), shares=False, refine=False)
     except user_errors() as error:
         return str(error)
     write_verdict(made.verdict, folder / "verdict.json")

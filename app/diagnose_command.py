@@ -126,7 +126,7 @@ def report_of(diagnosis: Diagnosis, records: Sequence[Path], simulate: Simulate 
         draws["where"] = partial(draw_where, shares=verdict.where)
     if verdict.gap:
         draws["gap"] = partial(draw_gap, gaps=verdict.gap, record=diagnosis.taken.judged.name)
-        traces = traces_of(diagnosis, simulate or default_replay())
+        traces = traces_of(diagnosis, simulate or default_replay(diagnosis.taken))
         assert traces is not None
         draws["traces"] = partial(draw_traces, traces=traces)
     pictures = {name: (draw, PICTURES[name]) for name, draw in draws.items()}

@@ -80,23 +80,30 @@ def diagnose(
     simulate: Simulate | None = None,
     report: Report = lambda step: None,
     shares: bool = True,
+    refine: bool = True,
 ) -> Diagnosis:
-    """The whole diagnosis; without `shares` the budget is left out, which takes most of the time after the search.
+    """The whole diagnosis; without `shares` the budget is left out, without `refine` the rigs of the search are taken
+    as they are: both take as long as the search again.
 
     `find` and `simulate` stand in for the search and the replay (tests).
     """
-    search, simulate = find or default_search(), simulate or default_replay()
+    search, simulate = find or default_search(), simulate or default_replay(taken)
     report("cause")
     finding = search(taken.measurements, taken.nominal, held_out=taken.held_out, without=taken.without)
     report("how far the gap shrinks")
     from gearbench.diagnosis.gap import gaps
 
-    shrunk = gaps(taken.nominal, finding.recalibrated, finding.with_effect, taken.judged, simulate=simulate)
+    plain, improved = finding.recalibrated, finding.with_effect
+    if refine and taken.judged.phase_known:
+        from gearbench.diagnosis.refine import refined
+
+        plain, improved = refined(taken.nominal, finding.add, taken.measurements, simulate)
+    shrunk = gaps(taken.nominal, plain, improved, taken.judged, simulate=simulate)
     where = list(finding.where)
     if shares:
         report("where the gap is")
         where += _budget(taken, simulate)
-    return Diagnosis(taken, _verdict(taken, finding, where, shrunk), finding.recalibrated, finding.with_effect)
+    return Diagnosis(taken, _verdict(taken, finding, where, shrunk), plain, improved)
 
 
 def default_search() -> Callable[..., Any]:
@@ -106,11 +113,13 @@ def default_search() -> Callable[..., Any]:
     return find_cause
 
 
-def default_replay() -> Simulate:
-    """The replay on the non-linear lumped model."""
-    from gearbench.bench.replay import replay
+def default_replay(taken: Taken) -> Simulate:
+    """The replay on the non-linear lumped model, with one table of the mesh force for all records."""
+    from gearbench.diagnosis.replays import replays_of
 
-    return replay
+    everything = [*taken.measurements, *([taken.held_out] if taken.held_out else [])]
+    torque = max(float(abs(one.mean("torque_driver")).max()) for one in everything)
+    return replays_of(taken.nominal, 1.3 * torque)
 
 
 def traces_of(diagnosis: Diagnosis, simulate: Simulate) -> Traces | None:

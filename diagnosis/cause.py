@@ -9,11 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.diagnosis.apply import Estimate, Unknowns, apply_effect, recalibrated
-from gearbench.diagnosis.decision import PLACE_OF_ROW, Decision, decide
+from gearbench.diagnosis.decision import PLACE_OF_ROW, Decision, decide, named
 from gearbench.diagnosis.fit import Fit, Problem
 from gearbench.diagnosis.intake import Measurement
 from gearbench.diagnosis.problem import problem_of
+from gearbench.diagnosis.replays import replays
 from gearbench.diagnosis.search import Search, Tried, missing_by_row, search
+from gearbench.diagnosis.signals import measured_channels, simulated_channels
 from gearbench.diagnosis.steadiness import unsteadiness
 from gearbench.diagnosis.verdict import Candidate, Effect, Parameter, Share
 from gearbench.rig import Case
@@ -24,7 +26,8 @@ Report = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Finding:
-    """What the search found: fields of the verdict, and the nominal case recalibrated and with the effect added."""
+    """What the search found: fields of the verdict, the nominal case recalibrated and with the effect added, and `add`,
+    which puts the effect that was found into any case."""
 
     verdict: str
     probability: dict[str, float]
@@ -35,6 +38,7 @@ class Finding:
     recalibrated: Case
     with_effect: Case | None
     because: str
+    add: Callable[[Case], Case] | None = None
     indistinguishable: tuple[tuple[str, ...], ...] = ()
     advice: tuple[str, ...] = ()
     evidence: dict[str, float] = field(default_factory=dict)
@@ -55,11 +59,12 @@ def find_cause(
     """
     problem, _ = problem_of(measurements, nominal)
     found = search(problem, without, report)
-    best = found.best(free=False)
-    silent = missing_by_row(problem, best.fit if best and best.fit else found.base)
+    best = named(found)
+    fit = best.fit if best and best.fit else found.base
+    silent = missing_by_row(problem, fit)
     report("steadiness")
     band = problem.conditions[0].band
-    unsteady = unsteadiness(problem.machine, measurements, problem.where, (best.fit if best and best.fit else found.base).p, band)
+    unsteady = unsteadiness(problem.machine, measurements, problem.where, fit.p, band)
     decision = decide(found, silent, unsteady)
     plain = recalibrated(nominal, _unknowns(problem, found.base))
     effects, updated = _effects(problem, nominal, decision)
@@ -67,12 +72,13 @@ def find_cause(
         verdict=decision.verdict,
         probability=decision.probability,
         effects=effects,
-        candidates=_candidates(found),
+        candidates=_candidates(found, _gaps_held_out(problem, nominal, plain, found, held_out)),
         place=decision.place,
         where=_places(problem, found.base),
         recalibrated=plain,
         with_effect=updated,
         because=decision.because,
+        add=_adding(problem, decision.winner),
         evidence={one.hypothesis.name: one.gain for one in found.tried},
         audits={"silent": tuple(silent), "unsteady": tuple(unsteady), "base": tuple(missing_by_row(problem, found.base))},
     )
@@ -90,6 +96,13 @@ def with_hypothesis(problem: Problem, nominal: Case, tried: Tried) -> tuple[Case
     return apply_effect(recalibrated(nominal, unknowns), tried.hypothesis, unknowns)
 
 
+def _adding(problem: Problem, winner: Tried | None) -> Callable[[Case], Case] | None:
+    if winner is None or winner.fit is None:
+        return None
+    unknowns, hypothesis = _unknowns(problem, winner.fit), winner.hypothesis
+    return lambda case: apply_effect(case, hypothesis, unknowns)[0]
+
+
 def _effects(problem: Problem, nominal: Case, decision: Decision) -> tuple[tuple[Effect, ...], Case | None]:
     if decision.winner is None:
         return (), None
@@ -101,15 +114,42 @@ def _effects(problem: Problem, nominal: Case, decision: Decision) -> tuple[tuple
     return (effect,), updated
 
 
-def _candidates(found: Search) -> tuple[Candidate, ...]:
-    """The best hypothesis of each effect, and the background alone."""
-    best: dict[tuple[str, ...], float] = {(): 0.0}
-    for one in found.tried:
+def _candidates(found: Search, gaps: dict[str, float]) -> tuple[Candidate, ...]:
+    """The best hypothesis of each effect, and the background alone; `gaps` by the names of hypotheses."""
+    best: dict[tuple[str, ...], Tried | None] = {(): None}
+    for one in found.tried:  # the best first
         if one.hypothesis.effect:
-            key = (one.hypothesis.effect,)
-            best[key] = max(best.get(key, -np.inf), one.gain)
-    ranked = sorted(best.items(), key=lambda item: -item[1])
-    return tuple(Candidate(effects=effects, log_evidence=float(gain)) for effects, gain in ranked)
+            best.setdefault((one.hypothesis.effect,), one)
+    listed = [
+        Candidate(
+            effects=effects,
+            log_evidence=float(one.gain) if one else 0.0,
+            held_out=gaps.get(one.hypothesis.name if one else ""),
+        )
+        for effects, one in best.items()
+    ]
+    return tuple(sorted(listed, key=lambda candidate: -candidate.log_evidence))
+
+
+def _gaps_held_out(
+    problem: Problem, nominal: Case, plain: Case, found: Search, held_out: Measurement | None
+) -> dict[str, float]:
+    """Rms of what is left of the transmission error on the held-out record over its own fluctuation, by hypothesis
+    ("": the background alone), for those that were refitted and add evidence."""
+    if held_out is None or not held_out.phase_known:
+        return {}
+    simulate = replays(problem.machine.law)
+
+    def left(case: Case) -> float:
+        rows = measured_channels(held_out)["dte"].mean(axis=0)
+        rest = rows - simulated_channels(held_out, simulate(case, held_out.record))["dte"]
+        return float(np.std(rest) / np.std(rows))
+
+    out = {"": left(plain)}
+    for one in found.tried:
+        if one.hypothesis.effect and one.fit is not None and one.gain > 0.0:
+            out[one.hypothesis.name] = left(with_hypothesis(problem, nominal, one)[0])
+    return out
 
 
 def _places(problem: Problem, base: Fit) -> tuple[Share, ...]:

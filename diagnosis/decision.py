@@ -32,30 +32,40 @@ class Decision:
 def decide(found: Search, silent: Array, unsteady: Array, limits: Limits = LIMITS) -> Decision:
     """The decision. `silent` (rows + 1,) is what the best effect's fit (else the background's) leaves unexplained by
     row, `unsteady` (rows + 1,) the excess scatter between periods."""
-    best, free = found.best(free=False), found.best(free=True)
-    gain = best.gain if best else 0.0
+    best, free = named(found, limits), found.best(free=True)
     worst = int(np.argmax(unsteady / np.array(limits.unsteady)))
     if unsteady[worst] > limits.unsteady[worst]:
         place = PLACE_OF_ROW[worst]
         return _unknown(place, f"periods differ by more than noise in the row of the {place}")
-    if free and free.gain > max(limits.free, limits.competitor_factor * max(gain, 0.0) + limits.competitor_offset):
+    needed = limits.free if best is None else limits.competitor_factor * best.gain + limits.competitor_offset
+    if free and free.gain > needed:
         return _unknown(free.hypothesis.place, f"a free form at the {free.hypothesis.place} explains clearly more")
     loud = int(np.argmax(silent / np.array(limits.silent)))
-    if silent[loud] > limits.silent[loud] and not (best and gain > limits.effect and gain > silent[loud]):
+    if silent[loud] > limits.silent[loud] and not (best and best.gain > silent[loud]):
         place = PLACE_OF_ROW[loud]
         return _unknown(place, f"the row of the {place} keeps what should be silent")
-    if best and gain > limits.effect:
-        return Decision(
-            "effect", best.hypothesis.place, best, _shares(gain - limits.effect, 0.0), "its evidence clears the limit"
-        )
-    return Decision("none", "none", None, _shares(gain - limits.effect, 0.0), "no hypothesis clears its limit")
+    if best:
+        ahead = best.gain - limits.of(best.hypothesis.effect)
+        return Decision("effect", best.hypothesis.place, best, _shares(ahead), "its evidence clears the limit")
+    gains = [one.gain - limits.of(one.hypothesis.effect) for one in found.tried if one.hypothesis.effect and one.fit]
+    return Decision("none", "none", None, _shares(max(gains, default=-limits.effect)), "no hypothesis clears its limit")
+
+
+def named(found: Search, limits: Limits = LIMITS) -> Tried | None:
+    """The best effect of the library whose evidence clears its limit."""
+    cleared = [
+        one
+        for one in found.tried
+        if one.hypothesis.effect and one.fit is not None and one.gain > limits.of(one.hypothesis.effect)
+    ]
+    return max(cleared, key=lambda one: one.gain, default=None)
 
 
 def _unknown(place: str, because: str) -> Decision:
     return Decision("unknown", place, None, {"effect": 0.1, "none": 0.05, "unknown": 0.85}, because)
 
 
-def _shares(ahead: float, doubt: float) -> dict[str, float]:
+def _shares(ahead: float) -> dict[str, float]:
     """Probabilities by how far the evidence lies beyond the limit."""
     effect = 1.0 / (1.0 + np.exp(-np.clip(ahead / SHARPNESS, -40, 40)))
     return {"effect": 0.95 * effect, "none": 0.95 * (1 - effect), "unknown": 1.0 - 0.95}

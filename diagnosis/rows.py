@@ -25,7 +25,7 @@ from gearbench.diagnosis.basis import KNOTS
 from gearbench.diagnosis.condition import CHANNELS, Condition
 from gearbench.diagnosis.machine import Machine
 from gearbench.diagnosis.parameters import Layout
-from gearbench.diagnosis.unknowns import DELAYED, RIPPLE_ORDERS, ROWS, SHAPE_ORDERS
+from gearbench.diagnosis.unknowns import DELAYED, ROWS, SHAPE_ORDERS
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -36,13 +36,16 @@ LOSS_FACTOR = 0.05  # of a coupling that the nominal rig takes for rigid
 
 @dataclass(frozen=True)
 class Mesh:
-    """The mesh of one condition under given unknowns, over time (N,): deflection [m], force without damping [N], its
-    tangent [N/m], damping coefficient [N s/m], rate of the DTE [m/s], the whole force [N] and the touching flags; `stiffening` is the
-    mean logarithm of the stiffness's factor."""
+    """The mesh of one condition under given unknowns, over time (N,).
+
+    Deflection [m], force without damping [N], its tangent [N/m], damping coefficient [N s/m], rate of the DTE [m/s],
+    the whole force [N] and the touching flags; `stiffening` is the mean logarithm of the stiffness's factor.
+    """
 
     delta: Array
     elastic: Array
     tangent: Array
+    parts: Array
     viscosity: Array
     rate: Array
     force: Array
@@ -72,13 +75,12 @@ def _advance(condition: Condition, channel: str) -> float:
 
 
 def excess(condition: Condition, where: Layout, p: Array) -> Array:
-    """Excess material (N,) [m] of the contact by offset, run-out, pitch errors and profile."""
+    """Excess material (N,) [m] that all pairs share: offset, run-out and profile."""
     a = np.full(condition.samples, p[where["offset"]][0])
     cos1, sin1 = p[where["eccentricity-driver"]]
     cos2, sin2 = p[where["eccentricity-driven"]]
     first, second = condition.rotation
     a += cos1 * np.cos(first) + sin1 * np.sin(first) + cos2 * np.cos(second) + sin2 * np.sin(second)
-    a += per_tooth(condition, np.concatenate([p[where["pitch-driver"]], p[where["pitch-driven"]]]), condition.share)
     profile = p[where["profile"]]
     for n in range(SHAPE_ORDERS):
         angle = 2 * np.pi * (n + 1) * condition.phase
@@ -86,12 +88,9 @@ def excess(condition: Condition, where: Layout, p: Array) -> Array:
     return a
 
 
-def per_tooth(condition: Condition, values: Array, weight: Array) -> Array:
-    """Sum (N,) over the pairs of the teeth's values (z1 + z2,) times weights (N, n_o), or (N, n_o, 2) per side."""
-    z1 = int(condition.teeth[0])
-    first, second = (weight[..., 0], weight[..., 1]) if weight.ndim == 3 else (weight, weight)
-    total = values[:z1][condition.tooth[0]] * first + values[z1:][condition.tooth[1]] * second
-    return np.asarray(total.sum(axis=-1))
+def pitch_excess(condition: Condition, where: Layout, p: Array) -> Array:
+    """Excess material (N, n_o) [m] of each pair in contact by its teeth's pitch errors."""
+    return np.asarray(p[where["pitch-driver"]][condition.tooth[0]] + p[where["pitch-driven"]][condition.tooth[1]])
 
 
 def modulation(condition: Condition, where: Layout, p: Array) -> Array:
@@ -126,29 +125,39 @@ def mesh(machine: Machine, condition: Condition, where: Layout, p: Array, spectr
     delta = np.fft.irfft(filtered, n) * n + excess(condition, where, p)
     rate = np.fft.irfft(1j * condition.omega * closing, n) * n
     law = replace(machine.law, backlash=max(machine.law.backlash + p[where["backlash"]][0], 0.0))
-    force, tangent = law.evaluate(delta, condition.phase)
     modulated = modulation(condition, where, p)
     factor = machine.scale * modulated
+    # The errors of all pairs in contact act together, each by its part of the stiffness.
+    weight = condition.share * softened(condition, p[where["crack"]])
+    weight = weight / weight.sum(axis=-1, keepdims=True)
+    delta = delta + (weight * pitch_excess(condition, where, p)).sum(axis=-1)
+    force, slope = law.evaluate(delta, condition.phase)
+    parts = weight * slope[:, None]
     curve = p[where["curvature"]][0]
     if curve:
         level = np.maximum(np.abs(force), 1e-3 * condition.force_level) / condition.force_level
         factor = factor * level**curve
-    elastic, tangent = factor * force, factor * tangent
+    elastic, parts = factor * force, factor[:, None] * parts
+    tangent = parts.sum(axis=-1)
     touching = force != 0.0
     ratio = machine.mesh_ratio * np.exp(p[where["mesh-ratio"]][0])
     viscosity = 2 * ratio * np.sqrt(np.maximum(tangent, 0.0) * machine.mesh_mass)
     quadratic = p[where["dissipation"]][0] * np.abs(rate)
+    total = elastic + (viscosity + quadratic) * rate * touching
     stiffening = float(np.log(np.maximum(modulated, 1e-3)).mean())
-    return Mesh(delta, elastic, tangent, viscosity, rate, elastic + (viscosity + quadratic) * rate * touching, touching, stiffening)
+    return Mesh(delta, elastic, tangent, parts, viscosity, rate, total, touching, stiffening)
 
 
-def radial_impedance(machine: Machine, condition: Condition, where: Layout, p: Array) -> tuple[Complex, Array, Complex]:
+def radial_impedance(
+    machine: Machine, condition: Condition, where: Layout, p: Array
+) -> tuple[Complex, Array, Complex]:
     """Dynamic stiffness (2, N/2 + 1) [N/m] of both gears' radial supports, their springs (2,) and dampers' part."""
     values = p[where["radial"]]
     spring = RADIAL_STIFFNESS * np.array(machine.stiffness) * np.exp(values[:2])
     damping = RADIAL_DAMPING * np.array(machine.damping) * np.exp(values[2:])
-    damper = 1j * condition.omega * damping[:, None]
-    return spring[:, None] + damper - np.array(machine.mass)[:, None] * condition.omega**2, spring, damper
+    damper = np.asarray(1j * condition.omega * damping[:, None], dtype=np.complex128)
+    impedance = spring[:, None] + damper - np.array(machine.mass)[:, None] * condition.omega**2
+    return np.asarray(impedance, dtype=np.complex128), np.asarray(spring), damper
 
 
 def _yielding(machine: Machine, condition: Condition, where: Layout, p: Array) -> Complex:
@@ -181,7 +190,8 @@ def support_force(machine: Machine, side: int, y: Array, log_stiffness: float, m
 @dataclass(frozen=True)
 class Residuals:
     """Force residuals `left` (4, K) [N], `share` (4, K) of an error of the mesh force in each, and the spectrum
-    `force` (K,) [N] of the mesh force itself; `stiffening` the mean logarithm of the mesh stiffness's factor. Rows of channels that the record lacks are NaN."""
+    `force` (K,) [N] of the mesh force itself; `stiffening` the mean logarithm of the mesh stiffness's factor. Rows of
+    channels that the record lacks are NaN."""
 
     left: Complex
     share: Complex
@@ -214,7 +224,7 @@ def assemble(
     machine: Machine, condition: Condition, where: Layout, p: Array, spectra: Mapping[str, Complex], state: Mesh
 ) -> Residuals:
     """Residuals of given channel spectra (`corrected`) and mesh."""
-    k, n = condition.bins, condition.samples
+    k = condition.bins
     s = 1j * condition.omega[:k]
     rb1, rb2 = machine.base_radius
     inertia = machine.inertia * (1 + p[where["inertia"]][:2])

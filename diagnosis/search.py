@@ -16,9 +16,10 @@ Array = NDArray[np.float64]
 Report = Callable[[str], None]
 
 PROMISING = -1.5  # predicted gain below which a hypothesis is not refitted
-MOST = 7  # refits of single hypotheses
+MOST = 6  # refits of single hypotheses
 MOST_TEETH = 2  # of these, single cracked teeth
-STEPS_BASE, STEPS = 20, 15
+FROM_BEGINNING = ("friction",)  # always refitted
+STEPS_BASE, STEPS = 16, 12
 RADIAL_TRIALS = (-0.6, -0.2, 0.2, 0.7)  # logarithms of stiffness over the prior's
 COARSE = (4.0,)  # lambda of the first rounds
 
@@ -59,9 +60,12 @@ def search(problem: Problem, without: Sequence[str] = (), report: Report = lambd
     base = again if again.cost < base.cost else base
     hypotheses = library(where, tuple(without)) + free_forms()
     gains = predicted_gains(base, where, hypotheses)
-    begun = [_start(problem, (base, free), hypothesis) for hypothesis in hypotheses]
-    gains = np.array([max(gain, ahead) for gain, (_, ahead) in zip(gains, begun, strict=True)])
     gains = np.maximum(gains, [min(gain, 1.0) for gain in predicted_gains(free, where, hypotheses)])
+    begun: dict[int, tuple[Start, float]] = {}
+    for number, hypothesis in enumerate(hypotheses):
+        if gains[number] >= PROMISING or starts(hypothesis, where) or hypothesis.name in FROM_BEGINNING:
+            begun[number] = _start(problem, (base, free), hypothesis)
+            gains[number] = max(gains[number], begun[number][1])
     chosen = _promising(hypotheses, gains)
     tried = []
     for number, (hypothesis, gain) in enumerate(zip(hypotheses, gains, strict=True)):
@@ -69,8 +73,7 @@ def search(problem: Problem, without: Sequence[str] = (), report: Report = lambd
             tried.append(Tried(hypothesis, min(float(gain), 0.0), None))
             continue
         report(hypothesis.name)
-        start, factors = begun[number][0]
-        fit = refit(problem, hypothesis.prior(where), start, factors, most=STEPS)
+        fit = _best_fit(problem, hypothesis, begun[number][0], begin)
         tried.append(Tried(hypothesis, fit.log_evidence - float(np.log(hypothesis.choices)), fit))
     base, tried = _level(problem, base, tried)
     return Search(base, tuple(sorted(tried, key=lambda one: -one.gain)))
@@ -91,6 +94,19 @@ def begin_of(problem: Problem) -> Array:
     return best
 
 
+def _best_fit(problem: Problem, hypothesis: Hypothesis, start: Start, begin: Array) -> Fit:
+    """The refit of a hypothesis, of those that trade with the mesh's shape from the very beginning."""
+    sd = hypothesis.prior(problem.where)
+    if hypothesis.name in FROM_BEGINNING:
+        return refit(problem, sd, begin, most=STEPS, coarse=COARSE)
+    return refit(problem, sd, start[0], start[1], most=STEPS)
+
+
+def _calm(free: Fit, sd: Array) -> Array:
+    """The unknowns of everything at once, with what `sd` holds for background put back to its size."""
+    return np.where(sd < free.sd, np.clip(free.p, -2 * sd, 2 * sd), free.p)
+
+
 Start = tuple[Array, tuple[Array, ...]]
 
 
@@ -100,10 +116,8 @@ def _start(problem: Problem, fits: tuple[Fit, Fit], hypothesis: Hypothesis) -> t
     base, free = fits
     sd = hypothesis.prior(problem.where)
     low, high = problem.where.bounds()
-    # What the hypothesis does not hold for possible must go back to the background's size.
-    calm = np.where(sd < free.sd, np.clip(free.p, -2 * sd, 2 * sd), free.p)
     trials = [base.p + move for move in starts(hypothesis, problem.where)]
-    candidates = [(base.p, base.factors), (calm, free.factors), *((trial, base.factors) for trial in trials)]
+    candidates = [(base.p, base.factors), (_calm(free, sd), free.factors), *((trial, base.factors) for trial in trials)]
     costs = [score(problem, np.clip(p, low, high), sd, factors)[0] for p, factors in candidates]
     best = int(np.argmin(costs))
     p, factors = candidates[best]
@@ -125,10 +139,10 @@ def _level(problem: Problem, base: Fit, tried: list[Tried]) -> tuple[Fit, list[T
 
 def _promising(hypotheses: Sequence[Hypothesis], gains: Array) -> set[int]:
     """Numbers of the hypotheses to refit."""
-    chosen: set[int] = set()
+    chosen = {number for number, hypothesis in enumerate(hypotheses) if hypothesis.name in FROM_BEGINNING}
     teeth = 0
     for number in np.argsort(-gains):
-        if gains[number] < PROMISING or len(chosen) == MOST:
+        if gains[number] < PROMISING or len(chosen) >= MOST:
             break
         if hypotheses[number].entries:
             teeth += 1

@@ -59,7 +59,7 @@ def unknowns(machine: Machine, conditions: Sequence[Condition]) -> Layout:
         block("radial", NUISANCE, "1", ("k1", "k2", "c1", "c2"), 0.6, low=-2.5, high=2.5),
         *(block(f"filter-{row}", f"free-{row}", "1", complex_knots, 0.03, 1.0) for row in ROWS),
         block("dissipation", "free-dissipation", "N s2/m2", ("quadratic",), quadratic, 20 * quadratic),
-        block("friction", "friction", "1", ("coefficient",), 0.006, 0.08),
+        block("friction", "friction", "1", ("coefficient",), 0.004, 0.06),
         block("eccentricity-driver", "eccentricity-driver", "m", ("cos", "sin"), 0.3e-6, 3e-6),
         block("eccentricity-driven", "eccentricity-driven", "m", ("cos", "sin"), 0.3e-6, 3e-6),
         block("pitch-driver", "pitch-driver", "m", z1, 0.25e-6, 2.5e-6),

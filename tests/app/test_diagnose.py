@@ -81,7 +81,7 @@ def stand_in(monkeypatch: pytest.MonkeyPatch) -> dict:
         return said["find"](case)
 
     monkeypatch.setattr(job, "default_search", lambda: search)
-    monkeypatch.setattr(job, "default_replay", lambda: at_rest)
+    monkeypatch.setattr(job, "default_replay", lambda taken: at_rest)
     return said
 
 

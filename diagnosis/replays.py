@@ -1,0 +1,32 @@
+"""Replays of records that share one mesh force law: it is loaded once, and only its backlash follows the rig."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import xarray as xr
+
+from gearbench.geometry import pair
+from gearbench.lumped.mesh_law import MeshLaw
+from gearbench.rig import Case
+
+
+def replays(law: MeshLaw) -> Callable[[Case, xr.Dataset], xr.Dataset]:
+    """`simulate(case, record)`: one steady row of the case's rig under the record's torque, on the non-linear lumped
+    model with this law. Rigs may differ in everything but what changes the teeth's shape."""
+
+    def simulate(case: Case, record: xr.Dataset) -> xr.Dataset:
+        # Its time loop is compiled on import, which not every user of this module wants.
+        from gearbench.bench.replay import replay
+
+        return replay(case, record, replace(law, backlash=max(pair(case.rig).backlash_normal, 0.0)))
+
+    return simulate
+
+
+def replays_of(nominal: Case, torque: float) -> Callable[[Case, xr.Dataset], xr.Dataset]:
+    """The replays on the nominal rig's law, whose table reaches that driver torque [N m]."""
+    from gearbench.bench.mesh_law import mesh_law
+
+    return replays(mesh_law(nominal.rig, nominal.simulation, torque))
