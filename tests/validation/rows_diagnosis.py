@@ -32,7 +32,7 @@ MIX = "controls=3,per-effect=1,foreign=3"
 @cache
 def hidden_friction() -> tuple[Diagnosis, float]:
     """The diagnosis of three conditions of gap_demo with friction in the measured rig, the fourth held out, and the
-    processor time that it takes [s], reading and the gap table included, the budget's pictures not."""
+    processor time that it takes [s] from the files to the values of the verdict."""
     nominal = read_case(case_path("gap_demo"))
     real = nominal.model_copy(
         update={"rig": nominal.rig.model_copy(update={"friction": Friction(coefficient=HIDDEN)})}
@@ -88,7 +88,7 @@ def small_challenge() -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
         cases, answers = Path(folder) / "cases", Path(folder) / "answers.json"
         make_challenge(nominal, parse_mix(MIX), SEED, cases, answers, "development")
-        outcomes, _ = score_folder(cases, answers, read, diagnose_case, workers=0)
+        outcomes, _ = score_folder(cases, answers, read, diagnose_case)
     return score(outcomes)
 
 
