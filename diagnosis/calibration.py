@@ -9,7 +9,8 @@ from dataclasses import dataclass
 class Limits:
     """When what the search found counts.
 
-    `effect`: log evidence over the background from which an effect is named, `own` that of effects which a rig's
+    `effect`: log evidence over the background from which an effect is named, if it
+    is at least `size` times as large as a background; `own` the evidence of effects which a rig's
     structure imitates more easily; `free`: from which a free form alone means that something unknown is at work; a free
     form that beats the best effect by `competitor_factor` times its evidence plus `competitor_offset` refutes it.
     `silent`: sums of bins times log lambda, by row (drive, driver support, load, driven support, mesh), that a sound
@@ -17,6 +18,7 @@ class Limits:
     """
 
     effect: float
+    size: float
     own: dict[str, float]
     free: float
     competitor_factor: float
@@ -31,6 +33,7 @@ class Limits:
 
 LIMITS = Limits(
     effect=4.0,
+    size=2.0,
     own={"pitch-error": 35.0},
     free=8.0,
     competitor_factor=1.5,

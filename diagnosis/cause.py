@@ -80,7 +80,7 @@ def find_cause(
         because=decision.because,
         add=_adding(problem, decision.winner),
         evidence={one.hypothesis.name: one.gain for one in found.tried},
-        audits={"silent": tuple(silent), "unsteady": tuple(unsteady), "base": tuple(missing_by_row(problem, found.base))},
+        audits={"silent": tuple(silent), "unsteady": tuple(unsteady)},
     )
 
 

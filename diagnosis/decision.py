@@ -52,11 +52,14 @@ def decide(found: Search, silent: Array, unsteady: Array, limits: Limits = LIMIT
 
 
 def named(found: Search, limits: Limits = LIMITS) -> Tried | None:
-    """The best effect of the library whose evidence clears its limit."""
+    """The best effect of the library whose evidence clears its limit and whose size the background does not have."""
     cleared = [
         one
         for one in found.tried
-        if one.hypothesis.effect and one.fit is not None and one.gain > limits.of(one.hypothesis.effect)
+        if one.hypothesis.effect
+        and one.fit is not None
+        and one.size > limits.size
+        and one.gain > limits.of(one.hypothesis.effect)
     ]
     return max(cleared, key=lambda one: one.gain, default=None)
 

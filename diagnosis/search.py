@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,11 +26,13 @@ COARSE = (4.0,)  # lambda of the first rounds
 
 @dataclass(frozen=True)
 class Tried:
-    """A hypothesis, how much log evidence it adds to the background alone, and its fit (None: not promising)."""
+    """A hypothesis, how much log evidence it adds to the background alone, its fit (None: not promising), and how large
+    the fit takes the effect to be: rms of its unknowns over their background's standard deviations."""
 
     hypothesis: Hypothesis
     gain: float
     fit: Fit | None
+    size: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -74,7 +76,8 @@ def search(problem: Problem, without: Sequence[str] = (), report: Report = lambd
             continue
         report(hypothesis.name)
         fit = _best_fit(problem, hypothesis, begun[number][0], begin)
-        tried.append(Tried(hypothesis, fit.log_evidence - float(np.log(hypothesis.choices)), fit))
+        evidence = fit.log_evidence - float(np.log(hypothesis.choices))
+        tried.append(Tried(hypothesis, evidence, fit, _size(problem, hypothesis, fit)))
     base, tried = _level(problem, base, tried)
     return Search(base, tuple(sorted(tried, key=lambda one: -one.gain)))
 
@@ -124,6 +127,14 @@ def _start(problem: Problem, fits: tuple[Fit, Fit], hypothesis: Hypothesis) -> t
     return (np.clip(p, low, high), factors), costs[0] - costs[best] if best else -np.inf
 
 
+def _size(problem: Problem, hypothesis: Hypothesis, fit: Fit) -> float:
+    """Rms of what a hypothesis makes wide, in standard deviations of the background."""
+    where = problem.where
+    members = [where.members(group) for group in hypothesis.groups] + [np.array(hypothesis.entries, dtype=np.int64)]
+    at = np.concatenate(members)
+    return float(np.sqrt(np.mean((fit.p[at] / where.prior()[at]) ** 2)))
+
+
 def _level(problem: Problem, base: Fit, tried: list[Tried]) -> tuple[Fit, list[Tried]]:
     """The background fitted again from the best refit, which may have found a way that it had missed, and the gains
     over it of all that was tried."""
@@ -134,7 +145,7 @@ def _level(problem: Problem, base: Fit, tried: list[Tried]) -> tuple[Fit, list[T
         again = refit(problem, base.sd, best.fit.p, best.fit.factors, most=STEPS)
         base = again if again.cost < base.cost else base
     gains = [one.gain - base.log_evidence if one.fit else one.gain for one in tried]
-    return base, [Tried(one.hypothesis, gain, one.fit) for one, gain in zip(tried, gains, strict=True)]
+    return base, [replace(one, gain=gain) for one, gain in zip(tried, gains, strict=True)]
 
 
 def _promising(hypotheses: Sequence[Hypothesis], gains: Array) -> set[int]:

@@ -47,11 +47,11 @@ def unsteadiness(
         whole = prepare(measured, machine, band)
         scatter = np.stack(single) - np.mean(single, axis=0)
         variance = noise_of_rows(machine, whole) * measured.rows + (ALIASED * whole.force_level) ** 2
-        total += _excess(scatter / np.sqrt(1 - 1 / measured.rows), found.share, variance)
+        total += excess_of(scatter / np.sqrt(1 - 1 / measured.rows), found.share, variance)
     return total
 
 
-def _excess(scatter: Complex, share: Complex, variance: Array) -> Array:
+def excess_of(scatter: Complex, share: Complex, variance: Array) -> Array:
     """Count times log lambda (rows + 1,) of scatter (P, rows, K) against known variance (rows + 1, K); `share`
     (rows, K) is that of the mesh's error in each row."""
     present = np.flatnonzero(np.isfinite(scatter).all(axis=(0, 2)))

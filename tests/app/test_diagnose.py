@@ -15,6 +15,7 @@ import pytest
 from shared.fake_diagnosis import at_rest, friction_found, nothing_found, unknown_found
 from shared.measured import channels, nominal, written
 
+import gearbench.diagnosis.refine as refine
 import gearbench.diagnosis_job as job
 from gearbench.bench.compare_records import differences
 from gearbench.cli import run_command_line
@@ -80,7 +81,12 @@ def stand_in(monkeypatch: pytest.MonkeyPatch) -> dict:
         said["calls"] += 1
         return said["find"](case)
 
+    def as_found(nominal: Case, add: object, measurements: tuple, simulate: object) -> tuple:
+        found = said["find"](nominal)
+        return found.recalibrated, found.with_effect
+
     monkeypatch.setattr(job, "default_search", lambda: search)
+    monkeypatch.setattr(refine, "refined", as_found)
     monkeypatch.setattr(job, "default_replay", lambda taken: at_rest)
     return said
 

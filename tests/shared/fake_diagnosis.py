@@ -22,6 +22,7 @@ class Finding:
     probability: dict[str, float]
     recalibrated: Case
     with_effect: Case | None = None
+    add: None = None
     effects: tuple[Effect, ...] = ()
     candidates: tuple[Candidate, ...] = ()
     place: str = "none"
