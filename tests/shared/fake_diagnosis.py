@@ -22,7 +22,6 @@ class Finding:
     probability: dict[str, float]
     recalibrated: Case
     with_effect: Case | None = None
-    add: None = None
     effects: tuple[Effect, ...] = ()
     candidates: tuple[Candidate, ...] = ()
     place: str = "none"
@@ -30,6 +29,7 @@ class Finding:
     indistinguishable: tuple[tuple[str, ...], ...] = ()
     advice: tuple[str, ...] = ()
     calls: list = field(default_factory=list)
+    add: None = None
 
 
 def recalibrated(nominal: Case) -> Case:
