@@ -80,6 +80,7 @@ def test_no_effect_without_enough_of_it(tried: tuple[Tried, ...]) -> None:
 def test_an_effect_below_its_own_limit_gives_way_to_one_above() -> None:
     found = decided(effect("pitch-error", 29.0), effect("friction", 6.0))
     assert found.winner is not None and found.winner.hypothesis.effect == "friction"
+    assert decided(effect("pitch-error", 29.0)).probability["none"] > 0.5
     found = decided(effect("pitch-error", 31.0), effect("friction", 6.0))
     assert found.winner is not None and found.winner.hypothesis.effect == "pitch-error"
 

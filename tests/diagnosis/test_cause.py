@@ -1,0 +1,52 @@
+"""One whole search: a motor's torque ripple, simulated in time domain with noise, is found, sized and put back."""
+
+from __future__ import annotations
+
+from math import radians
+
+import numpy as np
+import pytest
+
+from gearbench.bench import simulate
+from gearbench.bench.replay import replay
+from gearbench.cases import case_files
+from gearbench.diagnosis.cause import find_cause
+from gearbench.diagnosis.intake import measurement
+from gearbench.rig import read_case
+
+RIPPLE = {"orders": "[6, 12]", "amplitude_nm": "[1.5, 0.8]", "phase_deg": "[30, -60]"}
+
+
+def test_torque_ripple_from_records_to_the_rig_that_has_it() -> None:
+    path = case_files()["gap_demo"]
+    nominal = read_case(path)
+    real = read_case(path, [f"rig.drive.ripple.{key}={value}" for key, value in RIPPLE.items()])
+    records = {condition.name: simulate(real.under(condition)) for condition in real.conditions[::3]}
+    base, held_out = (measurement(record, name, nominal) for name, record in records.items())
+    steps: list[str] = []
+    found = find_cause([base], nominal, report=steps.append)
+
+    assert (found.verdict, found.place) == ("effect", "drive")
+    assert [effect.name for effect in found.effects] == ["torque-ripple"]
+    assert found.probability["effect"] > 0.9 and sum(found.probability.values()) == pytest.approx(1.0)
+    assert found.candidates[0].effects == ("torque-ripple",)
+    assert "background" in steps and "torque-ripple" in steps
+    # What no row of a steady, complete model keeps.
+    assert max(found.audits["unsteady"]) < 100 and max(found.audits["silent"][1:]) < 100
+
+    parameters = found.effects[0].parameters
+    for order, amplitude in ((6, 1.5), (12, 0.8)):
+        one = parameters[f"order_{order}.relative_amplitude"]
+        assert one.std < 0.001 and abs(one.value - amplitude / 100) < 4 * one.std
+
+    assert found.with_effect is not None
+    ripple = found.with_effect.rig.drive.ripple
+    assert ripple is not None and ripple.phase[:2] == pytest.approx((radians(30), radians(-60)), abs=0.1)
+    assert found.recalibrated.rig.drive.ripple is None
+    # A record that the search has not seen, in the bins of the ripple: 6 and 12 times 2.5 Hz, angle of the driver.
+    errors = []
+    for case in (found.recalibrated, found.with_effect):
+        simulated = measurement(replay(case, held_out.record), "held-out", nominal)
+        left = np.fft.rfft(held_out.mean("angle_driver") - simulated.mean("angle_driver"))
+        errors.append(np.linalg.norm(left[[18, 36]]))
+    assert errors[1] < 0.1 * errors[0]
