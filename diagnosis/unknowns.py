@@ -36,10 +36,7 @@ def unknowns(machine: Machine, conditions: Sequence[Condition]) -> Layout:
     ]
     torque = float(np.mean([condition.torque_mean for condition in conditions]))
     gear = 1.0 / (1.0 / max(machine.rotor, 1e-12) + 1.0 / machine.inertia[0])
-
-    # Force of rate times its size that equals a tenth of the linear damping at 30 mm/s.
-    level = float(np.mean([condition.stiffness_level for condition in conditions]))
-    quadratic = 0.1 * 2 * machine.mesh_ratio * float(np.sqrt(level * machine.mesh_mass)) / 0.03
+    quadratic = _quadratic(machine, conditions)
 
     def softness(frequency: float) -> float:
         return 1.0 / (gear * (2 * np.pi * frequency) ** 2)
@@ -84,3 +81,9 @@ def unknowns(machine: Machine, conditions: Sequence[Condition]) -> Layout:
         entry.narrow[:] = deviations
         entry.wide[:] = deviations
     return found
+
+
+def _quadratic(machine: Machine, conditions: Sequence[Condition]) -> float:
+    """Force [N s2/m2] of rate times its size that equals a tenth of the mesh's linear damping at 30 mm/s."""
+    level = float(np.mean([condition.stiffness_level for condition in conditions]))
+    return 0.1 * 2 * machine.mesh_ratio * float(np.sqrt(level * machine.mesh_mass)) / 0.03
