@@ -103,7 +103,7 @@ def test_a_free_form_that_explains_clearly_more_refutes_an_effect() -> None:
 
 
 @pytest.mark.parametrize(
-    ("number", "place"), enumerate(("drive", "driver-support", "load", "driven-support", "mesh"))
+    ("number", "place"), list(enumerate(("drive", "driver-support", "load", "driven-support", "mesh")))
 )
 def test_a_row_beyond_its_limit_is_an_unknown_cause_there(number: int, place: str) -> None:
     strong = effect("friction", 60.0)
