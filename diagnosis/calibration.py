@@ -1,4 +1,4 @@
-"""Limits of the decision, calibrated on truth rigs of the calibration family (benchmarks/diagnosis.md tells how)."""
+"""Limits of the decision, set on truth rigs of the development family (benchmarks/diagnosis.md tells how)."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from dataclasses import dataclass
 class Limits:
     """When what the search found counts.
 
-    `effect`: log evidence over the background from which an effect is named, if it
-    is at least `size` times as large as a background; `own` the evidence of effects which a rig's
-    structure imitates more easily; `free`: from which a free form alone means that something unknown is at work; a free
-    form that beats the best effect by `competitor_factor` times its evidence plus `competitor_offset` refutes it.
+    `effect`: log evidence over the background from which an effect is named, if it is at least `size` times as large as
+    a background; `own`: the evidence that effects need which a rig's structure imitates more easily; `free`: from which
+    a free form alone means that something unknown is at work; a free form that beats the best effect by
+    `competitor_factor` times its evidence plus `competitor_offset` refutes it.
     `silent`: sums of bins times log lambda, by row (drive, driver support, load, driven support, mesh), that a sound
     rig does not exceed; `unsteady`: the same between periods.
     """
