@@ -45,7 +45,6 @@ class Mesh:
     delta: Array
     elastic: Array
     tangent: Array
-    parts: Array
     viscosity: Array
     rate: Array
     force: Array
@@ -132,20 +131,18 @@ def mesh(machine: Machine, condition: Condition, where: Layout, p: Array, spectr
     weight = weight / weight.sum(axis=-1, keepdims=True)
     delta = delta + (weight * pitch_excess(condition, where, p)).sum(axis=-1)
     force, slope = law.evaluate(delta, condition.phase)
-    parts = weight * slope[:, None]
     curve = p[where["curvature"]][0]
     if curve:
         level = np.maximum(np.abs(force), 1e-3 * condition.force_level) / condition.force_level
         factor = factor * level**curve
-    elastic, parts = factor * force, factor[:, None] * parts
-    tangent = parts.sum(axis=-1)
+    elastic, tangent = factor * force, factor * slope
     touching = force != 0.0
     ratio = machine.mesh_ratio * np.exp(p[where["mesh-ratio"]][0])
     viscosity = 2 * ratio * np.sqrt(np.maximum(tangent, 0.0) * machine.mesh_mass)
     quadratic = p[where["dissipation"]][0] * np.abs(rate)
     total = elastic + (viscosity + quadratic) * rate * touching
     stiffening = float(np.log(np.maximum(modulated, 1e-3)).mean())
-    return Mesh(delta, elastic, tangent, parts, viscosity, rate, total, touching, stiffening)
+    return Mesh(delta, elastic, tangent, viscosity, rate, total, touching, stiffening)
 
 
 def radial_impedance(
