@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.stats import binom
+from shared.fake_verdicts import says_friction, verdict
 
 from gearbench.challenge.answers import Answer, read_answers, write_answers
 from gearbench.challenge.errors import ChallengeError
@@ -30,25 +31,6 @@ CRACK = Answer("effect", ("tooth-crack",), "mesh", {"tooth-crack": {}}, {"tooth-
 NONE = Answer("none")
 DRIFT = Answer("foreign", ("temperature-drift",), "mesh", {"temperature-drift": {}}, {"temperature-drift": 1.0})
 TWO = Answer("effect", ("friction", "coupling"), "mesh", {"friction": {}, "coupling": {}})
-
-
-def verdict(
-    said: str = "effect", *effects: str, place: str = "mesh", stated: float = 0.9, **more: Any
-) -> dict[str, Any]:
-    rest = (1 - stated) / 2
-    probability = {key: stated if key == said else rest for key in ("effect", "none", "unknown")}
-    named = [{"name": name, "probability": stated, "parameters": {}} for name in effects]
-    return {
-        "schema": "gearbench-verdict/1",
-        "verdict": said,
-        "probability": probability,
-        "effects": named,
-        "place": place,
-        "candidates": [],
-        "indistinguishable": [],
-        "gap": [],
-        **more,
-    }
 
 
 @pytest.mark.parametrize(
@@ -238,15 +220,6 @@ def test_text_says_the_figures() -> None:
 def read(path: Path) -> dict[str, Any]:
     content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
     return content
-
-
-def says_friction(records: Any, nominal: Path, folder: Path, left_out: Any) -> str | None:
-    """A diagnosis that always finds the same, or refuses where that is left out; it fails on the last case."""
-    if folder.name == "c3" or folder.parent.name == "c3":
-        return "no wish to"
-    made = verdict("unknown") if "friction" in left_out else verdict("effect", "friction")
-    (folder / "verdict.json").write_text(json.dumps({**made, "seen": [p.name for p in records]}), encoding="utf-8")
-    return None
 
 
 @pytest.fixture
