@@ -121,7 +121,8 @@ def area_by_fans(tooth: Profile) -> float:
     for points in (tooth.fillet(np.arctan(slope)), tooth.involute(_between_all(tooth, turn)), tooth.points(bend)):
         x, y = points.T
         step = np.arange(len(x), dtype=float)
-        total += abs(float(simpson(x * np.gradient(y, step) - y * np.gradient(x, step), x=step)))
+        # From root to tip the left flank turns clockwise; an undercut fillet turns back on its way.
+        total -= float(simpson(x * np.gradient(y, step) - y * np.gradient(x, step), x=step))
     return tooth.teeth * total
 
 
