@@ -118,8 +118,7 @@ def default_replay(taken: Taken) -> Simulate:
     from gearbench.diagnosis.replays import replays_of
 
     everything = [*taken.measurements, *([taken.held_out] if taken.held_out else [])]
-    torque = max(float(abs(one.mean("torque_driver")).max()) for one in everything)
-    return replays_of(taken.nominal, 1.3 * torque)
+    return replays_of(taken.nominal, everything)
 
 
 def traces_of(diagnosis: Diagnosis, simulate: Simulate) -> Traces | None:

@@ -33,15 +33,13 @@ EXCITED = 0.05  # of the largest torque line
 
 @dataclass(frozen=True)
 class Blocks:
-    """Blocks of one condition: `used` (B,) bins in which anything but noise is heard, `of_bin` (B,) their blocks;
-    `kind` (blocks,) index into KINDS, `count` (blocks,) bins, `frequency` (blocks,) centre [Hz]; `floor` (rows + 1, B)
-    variances [N^2], the mesh last; `rows` those that the record has channels for."""
+    """Blocks of one condition: `used` (B,) bins in which anything but noise is heard, `of_bin` (B,) their blocks,
+    `count` (blocks,) bins of each; `floor` (rows + 1, B) variances [N^2], the mesh last; `rows` those that the record
+    has channels for."""
 
     used: NDArray[np.int64]
     of_bin: NDArray[np.int64]
-    kind: NDArray[np.int64]
     count: Array
-    frequency: Array
     floor: Array
     rows: NDArray[np.int64]
 
@@ -68,19 +66,15 @@ def cut(machine: Machine, condition: Condition, level: Array, relative: Array, s
     kind = kinds_of(condition)
     present = np.flatnonzero(np.isfinite(level[:-1]).all(axis=1))
     of_bin = np.full(condition.bins, -1)
-    kinds: list[int] = []
     counts: list[int] = []
-    centres: list[float] = []
     for label in range(2 if separates else len(KINDS)):
         bins = np.flatnonzero(kind == label)
         if KINDS[label] not in ("operating", "excited"):
             bins = bins[bins < SIDEBANDS * condition.bins]
         for chosen in _runs(bins, KINDS[label]):
-            of_bin[chosen] = len(kinds)
-            kinds.append(label)
+            of_bin[chosen] = len(counts)
             counts.append(len(chosen))
-            centres.append(float(condition.frequency[chosen].mean()))
-    number = len(kinds)
+    number = len(counts)
     inside = of_bin >= 0
     counted = np.array(counts, dtype=float)
 
@@ -99,9 +93,7 @@ def cut(machine: Machine, condition: Condition, level: Array, relative: Array, s
     return Blocks(
         used=used,
         of_bin=renumber[of_bin[used]],
-        kind=np.array(kinds)[heard],
         count=counted[heard],
-        frequency=np.array(centres)[heard],
         floor=floor[:, used],
         rows=present,
     )
@@ -147,6 +139,11 @@ class Split:
     force: Complex
     level: Array
 
+    def square(self, left: Complex) -> Array:
+        """r^H V^-1 r (B,) of the residuals r = `left` (rows, B)."""
+        explained = np.abs(self.mean) ** 2 * self.precision
+        return np.asarray((np.abs(left) ** 2 / self.variance[:-1]).sum(axis=0) - explained)
+
 
 def floors(blocks: Blocks, found: Residuals) -> Array:
     """Variances (rows + 1, B) of the rows that the record has and of the mesh, whose errors are errors of motion: as
@@ -160,14 +157,27 @@ def split(blocks: Blocks, found: Residuals, factor: Array) -> Split:
     """The split of residuals (in the used bins) under lambda (rows + 1, blocks)."""
     use = blocks.rows
     d = floors(blocks, found) * factor[:, blocks.of_bin]
-    r, g = found.left[use], found.share[use]
-    weight = np.asarray(np.conj(g) / d[:-1], dtype=np.complex128)
-    precision = 1.0 / d[-1] + (weight * g).real.sum(axis=0)
-    mean = -(weight * r).sum(axis=0) / precision
+    weight, precision, mean = mesh_error(found.left[use], found.share[use], d)
     force = found.force - mean
     number = len(blocks.count)
     level = np.bincount(blocks.of_bin, np.abs(force) ** 2, number) / blocks.count
     return Split(d, weight, precision, mean, force, level[blocks.of_bin])
+
+
+def mesh_error(r: Complex, g: Complex, variance: Array) -> tuple[Complex, Array, Complex]:
+    """What residuals r (..., rows, B) say of the error that all rows share: the rows' weights conj(g)/d (rows, B), its
+    precision (B,) and its expectation (..., B). g (rows, B) is its part in each row, `variance` (rows + 1, B) d."""
+    weight = np.asarray(np.conj(g) / variance[:-1], dtype=np.complex128)
+    precision = 1.0 / variance[-1] + (weight * g).real.sum(axis=0)
+    return weight, precision, -(weight * r).sum(axis=-2) / precision
+
+
+def expected_squares(r: Complex, g: Complex, variance: Array) -> Array:
+    """Expected squares (..., rows + 1, B) of the rows' own errors and, last, of the mesh's, given residuals."""
+    _, precision, mean = mesh_error(r, g, variance)
+    own = np.abs(r + g * mean[..., None, :]) ** 2 + np.abs(g) ** 2 / precision
+    shared = np.abs(mean) ** 2 + 1.0 / precision
+    return np.concatenate([own, shared[..., None, :]], axis=-2)
 
 
 def missing(blocks: Blocks, found: Residuals, start: Array, rounds: int) -> tuple[Array, float]:
@@ -181,30 +191,23 @@ def missing(blocks: Blocks, found: Residuals, start: Array, rounds: int) -> tupl
     floor = floors(blocks, found)
     factor = start
     for _ in range(rounds):
-        parts = split(blocks, found, factor)
-        second = np.empty_like(floor)
-        second[-1] = np.abs(parts.mean) ** 2 + 1.0 / parts.precision
-        second[:-1] = np.abs(r + g * parts.mean) ** 2 + np.abs(g) ** 2 / parts.precision
-        total = np.stack([np.bincount(blocks.of_bin, row, number) for row in second / floor])
+        squares = expected_squares(r, g, floor * factor[:, blocks.of_bin])
+        total = np.stack([np.bincount(blocks.of_bin, row, number) for row in squares / floor])
         factor = np.maximum(total / (blocks.count + SHRINK), 1.0)
     return factor, cost_of(blocks, found, factor)
 
 
 def cost_of(blocks: Blocks, found: Residuals, factor: Array) -> float:
     """The cost of residuals (in the used bins) under given lambda."""
-    r = found.left[blocks.rows]
     parts = split(blocks, found, factor)
-    through = np.abs(parts.mean) ** 2 * parts.precision
-    square = (np.abs(r) ** 2 / parts.variance[:-1]).sum(axis=0) - through
+    square = parts.square(found.left[blocks.rows])
     logdet = np.log(parts.variance).sum(axis=0) + np.log(parts.precision)
     return float((square + logdet + np.log(parts.level)).sum() + SHRINK * np.log(factor).sum())
 
 
 def square_of(blocks: Blocks, found: Residuals, factor: Array) -> float:
     """r^H V^-1 r alone."""
-    parts = split(blocks, found, factor)
-    r = found.left[blocks.rows]
-    return float(((np.abs(r) ** 2 / parts.variance[:-1]).sum(axis=0) - np.abs(parts.mean) ** 2 * parts.precision).sum())
+    return float(split(blocks, found, factor).square(found.left[blocks.rows]).sum())
 
 
 def whitened(blocks: Blocks, found: Residuals, columns: Complex, factor: Array) -> tuple[Array, Array]:
@@ -212,12 +215,12 @@ def whitened(blocks: Blocks, found: Residuals, columns: Complex, factor: Array) 
     used bins."""
     use = blocks.rows
     d = floors(blocks, found) * factor[:, blocks.of_bin]
-    g = (found.share[use] / np.sqrt(d[:-1])).astype(columns.dtype)
-    r = (found.left[use] / np.sqrt(d[:-1])).astype(columns.dtype)
-    j = columns[use] * (1 / np.sqrt(d[:-1])).astype(r.real.dtype)[..., None]
+    g = found.share[use] / np.sqrt(d[:-1])
+    r = found.left[use] / np.sqrt(d[:-1])
+    j = columns[use] / np.sqrt(d[:-1])[..., None]
     # (1 + dm g g^H)^(-1/2) = 1 - t g g^H with one scalar a bin.
     norm = (np.abs(g) ** 2).sum(axis=0)
-    t = ((1.0 - 1.0 / np.sqrt(1.0 + d[-1] * norm)) / np.maximum(norm, 1e-30)).astype(norm.dtype)
+    t = (1.0 - 1.0 / np.sqrt(1.0 + d[-1] * norm)) / np.maximum(norm, 1e-30)
     r = r - g * (t * (np.conj(g) * r).sum(axis=0))
     j = j - g[..., None] * (t[:, None] * np.einsum("rk,rkp->kp", np.conj(g), j))
     flat, tall = r.ravel(), j.reshape(-1, j.shape[-1])
@@ -231,11 +234,10 @@ def of_level(
     (unknowns, unknowns) of the former without its negative part; `stiffening` (unknowns,) is the gradient of the mean
     logarithm of the mesh stiffness."""
     parts = split(blocks, found, factor)
-    weight = (parts.weight / parts.precision).astype(columns.dtype)
-    change = pressing + np.einsum("rk,rkp->kp", weight, columns[blocks.rows])
+    change = pressing + np.einsum("rk,rkp->kp", parts.weight / parts.precision, columns[blocks.rows])
     gradient = 2 * ((np.conj(parts.force) / parts.level) @ change).real
     mesh = parts.variance[-1]
     gradient += 2 * stiffening * float((1 - 1 / (mesh * parts.precision) - np.abs(parts.mean) ** 2 / mesh).sum())
-    scaled = change / np.sqrt(parts.level).astype(change.real.dtype)[:, None]
+    scaled = change / np.sqrt(parts.level)[:, None]
     tall = np.concatenate([scaled.real, scaled.imag])
     return np.asarray(gradient), np.asarray(2 * tall.T @ tall)

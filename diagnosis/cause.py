@@ -57,7 +57,7 @@ def find_cause(
 
     `without` leaves effects out of the library. Raises DiagnosisError for measurements that cannot be used.
     """
-    problem, _ = problem_of(measurements, nominal)
+    problem = problem_of(measurements, nominal)
     found = search(problem, without, report)
     best = named(found)
     fit = best.fit if best and best.fit else found.base
@@ -139,9 +139,9 @@ def _gaps_held_out(
     if held_out is None or not held_out.phase_known:
         return {}
     simulate = replays(problem.machine.law)
+    rows = measured_channels(held_out)["dte"].mean(axis=0)
 
     def left(case: Case) -> float:
-        rows = measured_channels(held_out)["dte"].mean(axis=0)
         rest = rows - simulated_channels(held_out, simulate(case, held_out.record))["dte"]
         return float(np.std(rest) / np.std(rows))
 

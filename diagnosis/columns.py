@@ -27,12 +27,12 @@ from gearbench.diagnosis.rows import (
     coupling_compliance,
     mesh,
     modulation,
-    order_bin,
     radial_impedance,
+    ripple_lines,
     softened,
     support_force,
 )
-from gearbench.diagnosis.unknowns import DELAYED, ROWS, SHAPE_ORDERS
+from gearbench.diagnosis.unknowns import DELAYED, ROWS, SHAPE_ORDERS, SUPPORTS
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -167,10 +167,9 @@ def _support_columns(
 ) -> None:
     n, k, g = condition.samples, condition.bins, machine.support_factor
     s = 1j * condition.omega[:k]
-    for side, (row, channel, sign) in enumerate(((1, "y_driver", -1.0), (3, "y_driven", 1.0))):
+    for side, (row, channel, sign, name) in enumerate(SUPPORTS):
         if channel not in spectra:
             continue
-        name = ("bearing-driver", "bearing-driven")[side]
         y = spectra[channel]
         stiffness = p[where["stiffness"]][side]
         values = support_force(machine, side, np.fft.irfft(y, n) * n, stiffness, p[where[name]][0])
@@ -210,13 +209,10 @@ def _drive_columns(
     put(0, start + 2, -machine.rotor * (turning + s**2 * soft * shaft) / rb1)
     put(0, where["coupling"].start, -rotor * s**2 * (1 - 1j * LOSS_FACTOR * (s.imag > 0)) * shaft / rb1)
     put(0, where["delay-angle_driver"].start, -(rotor + share * inertia) * s * turning / rb1)
-    for i, name in enumerate(where.block("ripple").names):
-        label, order, part = name.rsplit(":", 2)
-        if label == condition.name:
-            at = order_bin(condition, int(order))
-            line = np.zeros(k, dtype=complex)
-            line[at] = 0.5 * (1.0 if part == "cos" else -1j) / rb1
-            put(0, where["ripple"].start + i, line)
+    for entry, at, unit in ripple_lines(condition, where):
+        line = np.zeros(k, dtype=complex)
+        line[at] = unit / rb1
+        put(0, entry, line)
     if "torque_driven" in spectra:
         moving = machine.inertia[1] * s**2 * spectra["angle_driven"][:k] / rb2
         put(2, start + 1, moving / rb2)
@@ -239,8 +235,8 @@ def _row_columns(
             put(row, at + len(KNOTS) + knot, 1j * spectrum)
 
 
-def stiffening(condition: Condition, where: Layout, p: Array) -> tuple[float, Array]:
-    """Mean over the row of the logarithm of the mesh stiffness's factor, and its gradient (unknowns,)."""
+def stiffening_slope(condition: Condition, where: Layout, p: Array) -> Array:
+    """Gradient (unknowns,) of `Mesh.stiffening`: the row's mean logarithm of the mesh stiffness's factor."""
     gradient = np.zeros(where.size)
     gradient[where["scale"]] = 1.0
     loss = p[where["crack"]]
@@ -252,4 +248,4 @@ def stiffening(condition: Condition, where: Layout, p: Array) -> tuple[float, Ar
         total = np.bincount(condition.tooth[side].ravel(), weaker[..., side].ravel(), count) / condition.samples
         at = slice(where["crack"].start + start, where["crack"].start + start + count)
         gradient[at] = -total / (1.0 - loss[start : start + count]) ** 2
-    return float(np.log(np.maximum(modulation(condition, where, p), 1e-3)).mean()), gradient
+    return gradient

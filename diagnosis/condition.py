@@ -36,7 +36,6 @@ class Condition:
     samples: int
     bins: int
     band: float
-    rate: float
     cycles: int
     spectra: Mapping[str, Complex]
     noise: Mapping[str, float]
@@ -54,11 +53,6 @@ class Condition:
     stiffness_level: float
     force_full: Complex
     hats_full: Array
-
-    @property
-    def frequency(self) -> Array:
-        """Frequencies (K,) [Hz] of the bins that are used."""
-        return self.omega[: self.bins] / (2 * np.pi)
 
 
 def prepare(measured: Measurement, machine: Machine, band: float) -> Condition:
@@ -78,7 +72,6 @@ def prepare(measured: Measurement, machine: Machine, band: float) -> Condition:
         samples=samples,
         bins=bins,
         band=band,
-        rate=rate,
         cycles=measured.mesh_cycles,
         spectra=spectra,
         noise=noise,

@@ -32,7 +32,7 @@ class Decision:
 def decide(found: Search, silent: Array, unsteady: Array, limits: Limits = LIMITS) -> Decision:
     """The decision. `silent` (rows + 1,) is what the best effect's fit (else the background's) leaves unexplained by
     row, `unsteady` (rows + 1,) the excess scatter between periods."""
-    best, free = named(found, limits), found.best(free=True)
+    best, free = named(found, limits), found.best_free
     worst = int(np.argmax(unsteady / np.array(limits.unsteady)))
     if unsteady[worst] > limits.unsteady[worst]:
         place = PLACE_OF_ROW[worst]

@@ -8,7 +8,7 @@ cost is shortened, then refused.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,14 +16,15 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from gearbench.diagnosis.blocks import Blocks, missing, of_level, square_of, whitened
-from gearbench.diagnosis.columns import rows_and_columns, stiffening
+from gearbench.diagnosis.columns import rows_and_columns, stiffening_slope
 from gearbench.diagnosis.condition import Condition
 from gearbench.diagnosis.machine import Machine
 from gearbench.diagnosis.parameters import Layout
 from gearbench.diagnosis.rows import rows
-from gearbench.diagnosis.unknowns import ROWS
+from gearbench.diagnosis.unknowns import ROWS, SUPPORTS
 
 Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 
 ROUNDS = 12  # of expectation-maximisation between two steps
 HALVINGS = 4
@@ -73,8 +74,6 @@ def score(
     """Cost of unknowns (P,), and the lambda found there from those given. No rounds: plain weighted squares with the
     lambda given."""
     total, found = 0.5 * float(((p / sd) ** 2).sum()), []
-    if rounds:
-        total -= stretch(problem, p)[0]
     for condition, blocks, start in zip(problem.conditions, problem.blocks, factors, strict=True):
         found_here = rows(problem.machine, condition, problem.where, p).at(blocks.used)
         if rounds == 0:
@@ -82,7 +81,7 @@ def score(
             found.append(start)
             continue
         factor, cost = missing(blocks, found_here, start, rounds)
-        total += cost
+        total += cost - stretch(problem, condition, blocks, p, found_here.stiffening)
         found.append(factor)
     return total, found
 
@@ -99,35 +98,45 @@ def _normal(problem: Problem, p: Array, factors: Sequence[Array], plain: bool = 
             gradient += 2 * (j.T @ r)
             continue
         r, j = whitened(blocks, found, columns, factor)
-        slope, curve = of_level(
-            blocks, found, columns, pressing, factor, stiffening(condition, problem.where, p)[1]
-        )
+        stiffer = stiffening_slope(condition, problem.where, p)
+        slope, curve = of_level(blocks, found, columns, pressing, factor, stiffer)
         information += 2 * (j.T @ j) + curve
-        gradient += 2 * (j.T @ r) + slope
-    return information, gradient if plain else gradient - stretch(problem, p)[1]
+        gradient += 2 * (j.T @ r) + slope - stretch_slope(problem, condition, blocks, p, stiffer)
+    return information, gradient
 
 
-def stretch(problem: Problem, p: Array) -> tuple[float, Array]:
-    """Log of the volume by which the unknowns stretch measured motion into the residuals, and its gradient (P,): mesh
-    stiffness for the deflection, dynamic stiffness for the supports."""
-    where, machine = problem.where, problem.machine
-    total, gradient = 0.0, np.zeros(where.size)
-    for condition, blocks in zip(problem.conditions, problem.blocks, strict=True):
-        level, slope = stiffening(condition, where, p)
-        total += 2 * blocks.used.size * level
-        gradient += 2 * blocks.used.size * slope
-        omega = condition.omega[blocks.used]
-        for side, row in enumerate((1, 3)):
-            if row not in blocks.rows:
-                continue
-            spring = machine.stiffness[side] * np.exp(p[where["stiffness"]][side])
-            damper = 1j * omega * machine.damping[side] * np.exp(p[where["damping"]][side])
-            inertia = -(omega**2) * machine.mass[side]
-            whole = spring + damper + inertia * (1 + p[where["mass"]][side])
-            total += 2 * float(np.log(np.abs(whole)).sum())
-            for key, part in (("stiffness", spring), ("damping", damper), ("mass", inertia)):
-                gradient[where[key].start + side] += 2 * float((part / whole).real.sum())
-    return total, gradient
+def stretch(problem: Problem, condition: Condition, blocks: Blocks, p: Array, stiffening: float) -> float:
+    """Log of the volume by which the unknowns stretch one condition's measured motion into residuals: the mesh's
+    stiffness (`stiffening` is the mean logarithm of its factor) the deflection, dynamic stiffness the supports."""
+    total = 2 * blocks.used.size * stiffening
+    for _, _, whole in _dynamic_stiffness(problem, condition, blocks, p):
+        total += 2 * float(np.log(np.abs(whole)).sum())
+    return total
+
+
+def stretch_slope(problem: Problem, condition: Condition, blocks: Blocks, p: Array, stiffer: Array) -> Array:
+    """Gradient (P,) of `stretch`; `stiffer` (P,) is that of its `stiffening`."""
+    gradient = 2 * blocks.used.size * stiffer
+    for side, parts, whole in _dynamic_stiffness(problem, condition, blocks, p):
+        for key, part in parts.items():
+            gradient[problem.where[key].start + side] += 2 * float((part / whole).real.sum())
+    return gradient
+
+
+def _dynamic_stiffness(
+    problem: Problem, condition: Condition, blocks: Blocks, p: Array
+) -> Iterator[tuple[int, dict[str, Complex], Complex]]:
+    """Of each support that has a row: side, derivatives of its dynamic stiffness to its unknowns, and it (B,)."""
+    where, machine, omega = problem.where, problem.machine, condition.omega[blocks.used]
+    for side, (row, *_) in enumerate(SUPPORTS):
+        if row not in blocks.rows:
+            continue
+        spring = np.full(omega.size, machine.stiffness[side] * np.exp(p[where["stiffness"]][side]), dtype=complex)
+        damper = np.asarray(1j * omega * machine.damping[side] * np.exp(p[where["damping"]][side]), dtype=complex)
+        inertia = -(omega**2) * machine.mass[side] + 0j
+        whole = spring + damper + inertia * (1 + p[where["mass"]][side])
+        parts = {"stiffness": spring, "damping": damper, "mass": np.asarray(inertia, dtype=complex)}
+        yield side, parts, whole
 
 
 def refit(

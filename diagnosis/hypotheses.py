@@ -24,7 +24,6 @@ LIBRARY = (
     "sensor-delay",
     "torque-ripple",
 )
-PLACES = ("mesh", "drive", "driver-support", "driven-support", "load", "sensor", "none")
 
 
 @dataclass(frozen=True)

@@ -41,13 +41,13 @@ def block(
     group: str,
     unit: str,
     names: Sequence[str] | int,
-    narrow: float,
+    narrow: float | Array,
     wide: float | None = None,
     *,
     low: float = -np.inf,
     high: float = np.inf,
 ) -> Block:
-    """A block whose entries share their priors; `names` may be a count."""
+    """A block; `names` may be a count, and priors are shared by all its entries unless given for each."""
     listed = tuple(str(i) for i in range(names)) if isinstance(names, int) else tuple(names)
     ones = np.ones(len(listed))
     return Block(key, group, unit, listed, narrow * ones, (narrow if wide is None else wide) * ones, low, high)

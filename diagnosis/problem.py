@@ -12,6 +12,8 @@ from gearbench.diagnosis.condition import Condition, prepare
 from gearbench.diagnosis.fit import Problem
 from gearbench.diagnosis.intake import Measurement
 from gearbench.diagnosis.machine import Machine, machine
+from gearbench.diagnosis.parameters import Layout
+from gearbench.diagnosis.replays import table_load
 from gearbench.diagnosis.rows import assemble, carried, corrected, mesh
 from gearbench.diagnosis.unknowns import ROWS, unknowns
 from gearbench.rig import Case
@@ -23,26 +25,23 @@ ROW_FLOOR = 0.03
 MESH_FLOOR = 0.08
 # Part of the time beyond which flanks count as separating.
 SEPARATED = 0.03
-LOAD_MARGIN = 1.3
 OFF_COMB = 1.02  # how far beyond the highest excited line bins are used
 
 
-def problem_of(measurements: Sequence[Measurement], nominal: Case) -> tuple[Problem, tuple[bool, ...]]:
-    """The problem, and for each condition whether its flanks separate now and then."""
-    torques = [measured.mean("torque_driver") for measured in measurements]
-    largest = max(float(np.abs(torque).max()) for torque in torques)
-    made = machine(nominal, LOAD_MARGIN * largest, float(np.mean([torque.mean() for torque in torques])))
+def problem_of(measurements: Sequence[Measurement], nominal: Case) -> Problem:
+    """The problem that the measurements pose to the nominal case."""
+    mean = float(np.mean([measured.mean("torque_driver").mean() for measured in measurements]))
+    made = machine(nominal, table_load(measurements), mean)
     band = max(excited_band(measured) for measured in measurements)
     conditions = tuple(prepare(measured, made, band) for measured in measurements)
     where = unknowns(made, conditions)
-    blocks, apart = [], []
+    blocks = []
     for condition in conditions:
-        level, separates = _levels(made, condition)
+        level, separates = _levels(made, condition, where)
         relative = np.full((len(ROWS) + 1, condition.bins), ROW_FLOOR)
         relative[-1] = MESH_FLOOR
         blocks.append(cut(made, condition, level, relative, separates))
-        apart.append(separates)
-    return Problem(made, conditions, where, tuple(blocks)), tuple(apart)
+    return Problem(made, conditions, where, tuple(blocks))
 
 
 def excited_band(measured: Measurement) -> float:
@@ -58,9 +57,8 @@ def excited_band(measured: Measurement) -> float:
     return float(min(OFF_COMB * loud[-1] * spacing, measured.sampling_rate / 2.2))
 
 
-def _levels(made: Machine, condition: Condition) -> tuple[Array, bool]:
+def _levels(made: Machine, condition: Condition, where: Layout) -> tuple[Array, bool]:
     """The mesh force (rows + 1, K) [N] as each row and the nominal mesh law have it, and whether flanks separate."""
-    where = unknowns(made, [condition])
     nothing = np.zeros(where.size)
     spectra = corrected(condition, where, nothing)
     state = mesh(made, condition, where, nothing, spectra)

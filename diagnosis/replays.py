@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+import numpy as np
 import xarray as xr
 
+from gearbench.diagnosis.intake import Measurement
 from gearbench.geometry import pair
 from gearbench.lumped.mesh_law import MeshLaw
 from gearbench.rig import Case
+
+LOAD_MARGIN = 1.3  # of the largest torque, as the mesh's force swings beyond it
 
 
 def replays(law: MeshLaw) -> Callable[[Case, xr.Dataset], xr.Dataset]:
@@ -25,8 +29,13 @@ def replays(law: MeshLaw) -> Callable[[Case, xr.Dataset], xr.Dataset]:
     return simulate
 
 
-def replays_of(nominal: Case, torque: float) -> Callable[[Case, xr.Dataset], xr.Dataset]:
-    """The replays on the nominal rig's law, whose table reaches that driver torque [N m]."""
+def replays_of(nominal: Case, measurements: Sequence[Measurement]) -> Callable[[Case, xr.Dataset], xr.Dataset]:
+    """The replays of these measurements on the nominal rig's law."""
     from gearbench.bench.mesh_law import mesh_law
 
-    return replays(mesh_law(nominal.rig, nominal.simulation, torque))
+    return replays(mesh_law(nominal.rig, nominal.simulation, table_load(measurements)))
+
+
+def table_load(measurements: Sequence[Measurement]) -> float:
+    """Driver torque [N m] that the table of the mesh force must reach for these measurements."""
+    return LOAD_MARGIN * max(float(np.abs(measured.mean("torque_driver")).max()) for measured in measurements)

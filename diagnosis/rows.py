@@ -25,7 +25,7 @@ from gearbench.diagnosis.basis import KNOTS
 from gearbench.diagnosis.condition import CHANNELS, Condition
 from gearbench.diagnosis.machine import Machine
 from gearbench.diagnosis.parameters import Layout
-from gearbench.diagnosis.unknowns import DELAYED, ROWS, SHAPE_ORDERS
+from gearbench.diagnosis.unknowns import DELAYED, ROWS, SHAPE_ORDERS, SUPPORTS
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -235,7 +235,7 @@ def assemble(
     out[0] = (torque - (rotor + share[0] * inertia[0]) * s**2 * theta1) / rb1 - share[0] * first
     if "torque_driven" in spectra:
         out[2] = (spectra["torque_driven"][:k] + inertia[1] * s**2 * theta2) / rb2 - last
-    for side, (row, channel, sign) in enumerate(((1, "y_driver", -1.0), (3, "y_driven", 1.0))):
+    for side, (row, channel, sign, _) in enumerate(SUPPORTS):
         if channel not in spectra:
             continue
         out[row] = sign * support(machine, condition, where, p, side, spectra[channel]) - middle
@@ -248,10 +248,8 @@ def support(machine: Machine, condition: Condition, where: Layout, p: Array, sid
     """Force (K,) [N] along the line of action that moves one gear's centre as measured: y its spectrum (N/2 + 1,)."""
     k, n = condition.bins, condition.samples
     s = 1j * condition.omega[:k]
-    name = ("bearing-driver", "bearing-driven")[side]
-    spring, _ = support_force(
-        machine, side, np.fft.irfft(y, n) * n, p[where["stiffness"]][side], p[where[name]][0]
-    )
+    exponent = p[where[SUPPORTS[side][-1]]][0]
+    spring, _ = support_force(machine, side, np.fft.irfft(y, n) * n, p[where["stiffness"]][side], exponent)
     mass = machine.mass[side] * (1 + p[where["mass"]][side])
     damping = machine.damping[side] * np.exp(p[where["damping"]][side])
     moving = (mass * s**2 + damping * s) * y[:k] + _transform(condition, spring)
@@ -261,18 +259,21 @@ def support(machine: Machine, condition: Condition, where: Layout, p: Array, sid
 def ripple(machine: Machine, condition: Condition, where: Layout, p: Array) -> Complex:
     """Spectrum (K,) of the torque ripple [N m]."""
     out = np.zeros(condition.bins, dtype=complex)
-    values = p[where["ripple"]]
-    names = where.block("ripple").names
-    for i, name in enumerate(names):
-        label, order, part = name.rsplit(":", 2)
-        if label == condition.name:
-            out[order_bin(condition, int(order))] += 0.5 * values[i] * (1.0 if part == "cos" else -1j)
+    for entry, at, unit in ripple_lines(condition, where):
+        out[at] += p[entry] * unit
     return out
 
 
-def order_bin(condition: Condition, order: int) -> int:
-    """Bin of an order of the driver's rotation."""
-    return order * condition.cycles // condition.teeth[0]
+def ripple_lines(condition: Condition, where: Layout) -> list[tuple[int, int, complex]]:
+    """Of each unknown of this condition's ripple: its entry, its bin, and what it adds there per N m."""
+    start = where["ripple"].start
+    found = []
+    for i, name in enumerate(where.block("ripple").names):
+        label, order, part = name.rsplit(":", 2)
+        if label == condition.name:
+            at = int(order) * condition.cycles // condition.teeth[0]
+            found.append((start + i, at, 0.5 if part == "cos" else -0.5j))
+    return found
 
 
 def _filters(condition: Condition, where: Layout, p: Array) -> Complex:

@@ -18,7 +18,7 @@ Report = Callable[[str], None]
 PROMISING = -1.5  # predicted gain below which a hypothesis is not refitted
 MOST = 6  # refits of single hypotheses
 MOST_TEETH = 2  # of these, single cracked teeth
-FROM_BEGINNING = ("friction",)  # always refitted
+FROM_BEGINNING = ("friction",)  # always refitted, as it trades with the mesh's shape
 STEPS_BASE, STEPS = 16, 12
 RADIAL_TRIALS = (-0.6, -0.2, 0.2, 0.7)  # logarithms of stiffness over the prior's
 COARSE = (4.0,)  # lambda of the first rounds
@@ -42,10 +42,10 @@ class Search:
     base: Fit
     tried: tuple[Tried, ...]
 
-    def best(self, *, free: bool) -> Tried | None:
-        """The best effect of the library, or the best free form; None if none was worth a refit."""
-        found = [one for one in self.tried if bool(one.hypothesis.effect) != free and one.fit is not None]
-        return found[0] if found else None
+    @property
+    def best_free(self) -> Tried | None:
+        """The best free form; None if none was worth a refit."""
+        return next((one for one in self.tried if not one.hypothesis.effect and one.fit is not None), None)
 
 
 def search(problem: Problem, without: Sequence[str] = (), report: Report = lambda step: None) -> Search:
@@ -55,17 +55,17 @@ def search(problem: Problem, without: Sequence[str] = (), report: Report = lambd
     begin = begin_of(problem)
     base = refit(problem, where.prior(), begin, most=STEPS_BASE, coarse=COARSE)
     report("everything at once")
-    everything = [h for h in library(where, tuple(without)) if not h.entries]
-    sd = where.prior({group for h in everything for group in h.groups})
+    effects = library(where, tuple(without))
+    sd = where.prior({group for effect in effects for group in effect.groups})
     free = refit(problem, sd, begin, most=STEPS, coarse=COARSE)
     again = refit(problem, where.prior(), free.p, free.factors, most=STEPS_BASE)
     base = again if again.cost < base.cost else base
-    hypotheses = library(where, tuple(without)) + free_forms()
+    hypotheses = effects + free_forms()
     gains = predicted_gains(base, where, hypotheses)
     gains = np.maximum(gains, [min(gain, 1.0) for gain in predicted_gains(free, where, hypotheses)])
     begun: dict[int, tuple[Start, float]] = {}
     for number, hypothesis in enumerate(hypotheses):
-        if gains[number] >= PROMISING or starts(hypothesis, where) or hypothesis.name in FROM_BEGINNING:
+        if hypothesis.name not in FROM_BEGINNING and (gains[number] >= PROMISING or starts(hypothesis, where)):
             begun[number] = _start(problem, (base, free), hypothesis)
             gains[number] = max(gains[number], begun[number][1])
     chosen = _promising(hypotheses, gains)
@@ -75,7 +75,11 @@ def search(problem: Problem, without: Sequence[str] = (), report: Report = lambd
             tried.append(Tried(hypothesis, min(float(gain), 0.0), None))
             continue
         report(hypothesis.name)
-        fit = _best_fit(problem, hypothesis, begun[number][0], begin)
+        sd = hypothesis.prior(where)
+        if number in begun:
+            fit = refit(problem, sd, *begun[number][0], most=STEPS)
+        else:
+            fit = refit(problem, sd, begin, most=STEPS, coarse=COARSE)
         evidence = fit.log_evidence - float(np.log(hypothesis.choices))
         tried.append(Tried(hypothesis, evidence, fit, _size(problem, hypothesis, fit)))
     base, tried = _level(problem, base, tried)
@@ -95,14 +99,6 @@ def begin_of(problem: Problem) -> Array:
             if cost < least:
                 best, least = trial, cost
     return best
-
-
-def _best_fit(problem: Problem, hypothesis: Hypothesis, start: Start, begin: Array) -> Fit:
-    """The refit of a hypothesis, of those that trade with the mesh's shape from the very beginning."""
-    sd = hypothesis.prior(problem.where)
-    if hypothesis.name in FROM_BEGINNING:
-        return refit(problem, sd, begin, most=STEPS, coarse=COARSE)
-    return refit(problem, sd, start[0], start[1], most=STEPS)
 
 
 def _calm(free: Fit, sd: Array) -> Array:

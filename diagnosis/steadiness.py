@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.diagnosis.blocks import ALIASED, BLOCK, noise_of_rows
+from gearbench.diagnosis.blocks import ALIASED, BLOCK, expected_squares, noise_of_rows
 from gearbench.diagnosis.condition import prepare
 from gearbench.diagnosis.intake import Measurement
 from gearbench.diagnosis.machine import Machine
@@ -62,13 +62,8 @@ def excess_of(scatter: Complex, share: Complex, variance: Array) -> Array:
     count = np.bincount(of_bin) * float(len(r))
     factor = np.ones((len(floor), number))
     for _ in range(ROUNDS):
-        d = floor * factor[:, of_bin]
-        precision = 1.0 / d[-1] + (np.abs(g) ** 2 / d[:-1]).sum(axis=0)
-        mean = -(np.conj(g) * r / d[:-1]).sum(axis=1) / precision
-        second = np.empty_like(d)
-        second[-1] = (np.abs(mean) ** 2).sum(axis=0) + len(r) / precision
-        second[:-1] = (np.abs(r + g * mean[:, None]) ** 2).sum(axis=0) + len(r) * np.abs(g) ** 2 / precision
-        total = np.stack([np.bincount(of_bin, row, number) for row in second / floor])
+        squares = expected_squares(r, g, floor * factor[:, of_bin]).sum(axis=0)
+        total = np.stack([np.bincount(of_bin, row, number) for row in squares / floor])
         factor = np.maximum(total / count, 1.0)
     # A few degrees of freedom always scatter above their variance: only what is clearly more counts.
     clear = np.where(factor > 3.0, factor, 1.0)

@@ -21,6 +21,8 @@ Array = NDArray[np.float64]
 SHAPE_ORDERS = 6  # mesh orders of the free part of stiffness shape and profile error
 RIPPLE_ORDERS = (6, 12, 18, 24)  # per driver revolution: what commutation and slots of usual motors leave
 ROWS = ("drive", "driver-support", "load", "driven-support")
+# Of both gears: row, channel, sign of the support's force in it, and the unknown of its exponent.
+SUPPORTS = ((1, "y_driver", -1.0, "bearing-driver"), (3, "y_driven", 1.0, "bearing-driven"))
 DELAYED = ("angle_driver", "angle_driven", "y_driver", "y_driven")
 
 
@@ -37,22 +39,25 @@ def unknowns(machine: Machine, conditions: Sequence[Condition]) -> Layout:
     torque = float(np.mean([condition.torque_mean for condition in conditions]))
     gear = 1.0 / (1.0 / max(machine.rotor, 1e-12) + 1.0 / machine.inertia[0])
     quadratic = _quadratic(machine, conditions)
+    # Little at low frequencies, where it cannot be told from the mesh's own stiffness.
+    yielding = 0.01 + 0.07 * np.minimum(1.0, (np.array(KNOTS) / 0.4) ** 2)
 
     def softness(frequency: float) -> float:
         return 1.0 / (gear * (2 * np.pi * frequency) ** 2)
 
+    inertia = np.array((*machine.sd_inertia, machine.sd_rotor))
     blocks = [
-        block("stiffness", NUISANCE, "1", ("driver", "driven"), 1.0),
-        block("damping", NUISANCE, "1", ("driver", "driven"), 1.0, low=-3.0, high=3.0),
-        block("mass", NUISANCE, "1", ("driver", "driven"), 1.0),
-        block("inertia", NUISANCE, "1", ("driver", "driven", "rotor"), 1.0),
+        block("stiffness", NUISANCE, "1", ("driver", "driven"), np.array(machine.sd_stiffness)),
+        block("damping", NUISANCE, "1", ("driver", "driven"), np.array(machine.sd_damping), low=-3.0, high=3.0),
+        block("mass", NUISANCE, "1", ("driver", "driven"), np.array(machine.sd_mass)),
+        block("inertia", NUISANCE, "1", ("driver", "driven", "rotor"), inertia),
         block("scale", NUISANCE, "1", ("mesh",), machine.sd_scale, low=-0.5, high=0.5),
         block("mesh-ratio", NUISANCE, "1", ("mesh",), machine.sd_mesh_ratio, low=-3.0, high=3.0),
         block("offset", NUISANCE, "m", ("excess",), 5e-6),
         block("curvature", NUISANCE, "1", ("mesh",), 0.05, low=-0.3, high=0.3),
         block("shape", NUISANCE, "1", 2 * SHAPE_ORDERS, 0.04),
         block("profile", NUISANCE, "m", 2 * SHAPE_ORDERS, 0.5e-6),
-        block("compliance", NUISANCE, "1", complex_knots, 0.25),
+        block("compliance", NUISANCE, "1", complex_knots, np.tile(yielding, 2)),
         block("radial", NUISANCE, "1", ("k1", "k2", "c1", "c2"), 0.6, low=-2.5, high=2.5),
         *(block(f"filter-{row}", f"free-{row}", "1", complex_knots, 0.03, 1.0) for row in ROWS),
         block("dissipation", "free-dissipation", "N s2/m2", ("quadratic",), quadratic, 20 * quadratic),
@@ -69,18 +74,7 @@ def unknowns(machine: Machine, conditions: Sequence[Condition]) -> Layout:
         block("ripple", "torque-ripple", "N m", ripple, 0.0006 * torque, 0.006 * torque),
         block("backlash", "backlash", "m", ("more",), 8e-6, 80e-6),
     ]
-    found = layout(blocks)
-    for key, deviations in (
-        ("stiffness", machine.sd_stiffness),
-        ("damping", machine.sd_damping),
-        ("mass", machine.sd_mass),
-        ("inertia", (*machine.sd_inertia, machine.sd_rotor)),
-        ("compliance", 2 * tuple(0.01 + 0.07 * min(1.0, (knot / 0.4) ** 2) for knot in KNOTS)),
-    ):
-        entry = found.block(key)
-        entry.narrow[:] = deviations
-        entry.wide[:] = deviations
-    return found
+    return layout(blocks)
 
 
 def _quadratic(machine: Machine, conditions: Sequence[Condition]) -> float:

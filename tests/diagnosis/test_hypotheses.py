@@ -11,7 +11,6 @@ from gearbench.diagnosis.condition import prepare
 from gearbench.diagnosis.fit import Fit
 from gearbench.diagnosis.hypotheses import (
     LIBRARY,
-    PLACES,
     Hypothesis,
     free_forms,
     library,
@@ -21,6 +20,7 @@ from gearbench.diagnosis.hypotheses import (
 from gearbench.diagnosis.machine import machine
 from gearbench.diagnosis.parameters import NUISANCE, Layout, block, layout
 from gearbench.diagnosis.unknowns import unknowns
+from gearbench.diagnosis.verdict import PLACES
 
 SMALL = layout(
     [

@@ -10,9 +10,9 @@ from numpy.linalg import norm
 from shared.synthetic import measurement
 
 from gearbench.diagnosis.blocks import Blocks, cost_of, cut, missing, split, whitened
-from gearbench.diagnosis.columns import rows_and_columns
+from gearbench.diagnosis.columns import rows_and_columns, stiffening_slope
 from gearbench.diagnosis.condition import Condition, prepare
-from gearbench.diagnosis.fit import Fit, Problem, stretch
+from gearbench.diagnosis.fit import Fit, Problem, stretch, stretch_slope
 from gearbench.diagnosis.hypotheses import predicted_evidence
 from gearbench.diagnosis.machine import Machine, machine
 from gearbench.diagnosis.parameters import Layout
@@ -87,16 +87,21 @@ def test_gradient_of_the_stretch(prepared: tuple[Machine, Condition, Layout]) ->
     made, condition, where = prepared
     relative = np.full((len(ROWS) + 1, condition.bins), 0.05)
     level = np.full(relative.shape, 1e3)
-    problem = Problem(made, (condition,), where, (cut(made, condition, level, relative, separates=False),))
+    blocks = cut(made, condition, level, relative, separates=False)
+    problem = Problem(made, (condition,), where, (blocks,))
+
+    def value(unknowns: np.ndarray) -> float:
+        return stretch(problem, condition, blocks, unknowns, rows(made, condition, where, unknowns).stiffening)
+
     p = usual(where)
     p[where["crack"]] = 0.1
     p[where["shape"]] = 0.0  # of second order in the stiffness, left out
-    gradient = stretch(problem, p)[1]
+    gradient = stretch_slope(problem, condition, blocks, p, stiffening_slope(condition, where, p))
     keys = ("stiffness", "damping", "mass", "scale", "crack")
     for entry in (number for key in keys for number in range(*where[key].indices(where.size))):
         step = np.zeros(where.size)
         step[entry] = 1e-5
-        difference = (stretch(problem, p + step)[0] - stretch(problem, p - step)[0]) / 2e-5
+        difference = (value(p + step) - value(p - step)) / 2e-5
         assert gradient[entry] == pytest.approx(difference, rel=1e-4), where.names()[entry]
 
 
@@ -108,8 +113,7 @@ def test_one_blocks_covariance_is_the_dense_one() -> None:
     j = rng.standard_normal((4, bins, unknown)) + 1j * rng.standard_normal((4, bins, unknown))
     floor = rng.uniform(0.5, 2.0, (5, bins))
     factor = rng.uniform(1.0, 3.0, (5, 1))
-    number, kind = np.zeros(bins, int), np.zeros(1, int)
-    blocks = Blocks(np.arange(bins), number, kind, np.array([5.0]), np.ones(1), floor, np.arange(4))
+    blocks = Blocks(np.arange(bins), np.zeros(bins, int), np.array([5.0]), floor, np.arange(4))
     force = 3 * rng.standard_normal(bins) + 1j
     found = Residuals(r, g, force, 0.0)
     flat, tall = whitened(blocks, found, j, factor)
@@ -140,8 +144,7 @@ def test_missing_part_is_found_in_the_row_that_has_it() -> None:
     g = np.ones((4, bins), dtype=complex)
     mesh = noise(1.0)
     r = np.stack([noise(1.0), noise(5.0), noise(1.0), noise(1.0)]) - mesh
-    count, kind, floor = np.full(100, 8.0), np.zeros(100, int), np.ones((5, bins))
-    blocks = Blocks(np.arange(bins), numbers, kind, count, np.ones(100), floor, np.arange(4))
+    blocks = Blocks(np.arange(bins), numbers, np.full(100, 8.0), np.ones((5, bins)), np.arange(4))
     found = Residuals(r, g, 10 * g[0], 0.0)
     factor, cost = missing(blocks, found, np.ones((5, 100)), 100)
     level = np.median(factor, axis=1)
