@@ -1,7 +1,8 @@
 """Flank tolerances of ISO 1328-1:2013, and errors drawn so that a gear just satisfies a grade.
 
 Tolerances are in m. A grade's value is that of grade 5 times sqrt(2) for each grade more, rounded (clause 5.2.3): above
-10 um to 1 um, above 5 um to 0.5 um, below to 0.1 um.
+10 um to 1 um, above 5 um to 0.5 um, below to 0.1 um. Single pitch: formula 5; cumulative pitch: 6; profile slope, form
+and total: 7, 8 and 9; run-out: annex E. All are linear in the module, unlike those of the edition of 1995.
 """
 
 from __future__ import annotations
@@ -64,9 +65,9 @@ def tolerances(module: float, teeth: int, grade: int, name: str = "gear") -> Tol
                 f"{name}: ISO 1328-1 has no tolerance for {words} = {value:g}{unit}: between {low:g} and {high:g}{unit}"
             )
     step = sqrt(2.0) ** (grade - 5)
-    pitch = 0.002 * d + 0.55 * sqrt(d) + 0.7 * sqrt(m) + 12
+    pitch = 0.002 * d + 0.55 * sqrt(d) + 0.7 * m + 12
     slope, form = 0.4 * m + 0.001 * d + 4, 0.55 * m + 5
-    values = (0.001 * d + 0.4 * sqrt(m) + 5, pitch, 0.9 * pitch, slope, form, sqrt(slope**2 + form**2))
+    values = (0.001 * d + 0.4 * m + 5, pitch, 0.9 * pitch, slope, form, sqrt(slope**2 + form**2))
     return Tolerances(*(1e-6 * rounded_tolerance(value * step) for value in values))
 
 

@@ -31,13 +31,15 @@ def test_rounding(raw: float, shown: float) -> None:
 @pytest.mark.parametrize(
     ("module", "teeth", "grade", "expected"),
     [
-        # d = 120, m = 3, grade 5: f_p .12 + .693 + 5 = 5.81; F_p .24 + 6.025 + 1.212 + 12 = 19.48; F_r 17.53;
+        # d = 120, m = 3, grade 5: f_p .12 + 1.2 + 5 = 6.32; F_p .24 + 6.025 + 2.1 + 12 = 20.365; F_r 18.328;
         # f_Halpha 1.2 + .12 + 4 = 5.32; f_falpha 1.65 + 5 = 6.65; F_alpha 8.516.
-        (3e-3, 40, 5, (6.0, 19.0, 18.0, 5.5, 6.5, 8.5)),
+        (3e-3, 40, 5, (6.5, 20.0, 18.0, 5.5, 6.5, 8.5)),
         # d = 20, m = 1, grade 8, 2 sqrt(2) times 5.42; 15.1997; 13.6797; 4.42; 5.55; 7.0951.
         (1e-3, 20, 8, (15.0, 43.0, 39.0, 13.0, 16.0, 20.0)),
-        # grade 1, a quarter of 5.81; 19.477; 17.529; 5.32; 6.65; 8.516.
-        (3e-3, 40, 1, (1.5, 4.9, 4.4, 1.3, 1.7, 2.1)),
+        # grade 1, a quarter of 6.32; 20.365; 18.328; 5.32; 6.65; 8.516.
+        (3e-3, 40, 1, (1.6, 5.0, 4.6, 1.3, 1.7, 2.1)),
+        # d = 2000, m = 20, grade 6, sqrt(2) times 2 + 8 + 5; 4 + 24.597 + 14 + 12 = 54.597; 49.137; 14; 16; 21.260.
+        (20e-3, 100, 6, (21.0, 77.0, 69.0, 20.0, 23.0, 30.0)),
     ],
 )
 def test_tolerances(module: float, teeth: int, grade: int, expected: tuple[float, ...]) -> None:
@@ -47,6 +49,27 @@ def test_tolerances(module: float, teeth: int, grade: int, expected: tuple[float
         found.profile_total,
     )  # fmt: skip
     assert [1e6 * value for value in values] == pytest.approx(expected, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("module", "teeth", "grade", "name", "published"),
+    [
+        # Values in um that a public calculator of ISO 1328-1:2013, checked against the standard's own page, gives for
+        # m 3, z 40, class 6 (github.com, test_iso1328_flank_tolerances_class_6): formulas 5, 6 and 9.
+        (3e-3, 40, 6, "single_pitch", 9.0),
+        (3e-3, 40, 6, "cumulative_pitch", 29.0),
+        (3e-3, 40, 6, "profile_total", 12.0),
+    ],
+)
+def test_published_values(module: float, teeth: int, grade: int, name: str, published: float) -> None:
+    assert 1e6 * getattr(tolerances(module, teeth, grade), name) == pytest.approx(published, abs=1e-9)
+
+
+def test_pitch_tolerances_grow_linearly_with_the_module() -> None:
+    # At the same diameter, grade 9 (four times grade 5): 0.4 and 0.7 um a mm of module.
+    small, large = tolerances(2.5e-3, 400, 9), tolerances(25e-3, 40, 9)
+    assert 1e6 * (large.single_pitch - small.single_pitch) == pytest.approx(4 * 0.4 * 22.5, abs=1.0)
+    assert 1e6 * (large.cumulative_pitch - small.cumulative_pitch) == pytest.approx(4 * 0.7 * 22.5, abs=1.0)
 
 
 @pytest.mark.parametrize("grade", [1, 5, 8, 11])
