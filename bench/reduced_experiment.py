@@ -13,7 +13,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from gearbench.bench.attributes import lost_contact, rig_attributes
-from gearbench.bench.effects import FLANK_KEYS, cycles_to_repeat, refuse_effects
+from gearbench.bench.effects import ELASTIC_KEYS, cycles_to_repeat, refuse_effects
 from gearbench.bench.errors import BenchError
 from gearbench.bench.excitation import Torque, torque_realisation
 from gearbench.bench.reduced_rig import ElasticRig, choose_substeps, elastic_rig, machine_for
@@ -53,7 +53,7 @@ def simulate_reduced(case: Case, progress: ProgressReport | None = None) -> xr.D
     Raises GeometryError, BenchError or ContactError (each one sentence) for what cannot be simulated.
     """
     report = progress or (lambda fraction, note: None)
-    refuse_effects(case.rig, "reduced finite-element model", represented=FLANK_KEYS)
+    refuse_effects(case.rig, "reduced finite-element model", represented=ELASTIC_KEYS)
     plan = schedule(case.experiment, case.rig, cycles_to_repeat(case.rig))
     elastic = elastic_rig(case.rig, case.simulation, lambda note: report(0.0, note))
     machine = machine_for(elastic, plan.mesh_frequency)

@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from gearbench.bench.effects import FLANK_KEYS, cycles_to_repeat, refuse_effects
+from gearbench.bench.effects import ELASTIC_KEYS, cycles_to_repeat, refuse_effects
 from gearbench.bench.errors import BenchError
 from gearbench.bench.reduced_rig import ElasticRig, elastic_rig
 from gearbench.bench.schedule import ProgressReport
@@ -39,7 +39,7 @@ def static_reduced(case: Case, loads: Loads, phase: Array, progress: ProgressRep
     """
     report = progress or (lambda fraction, note: None)
     tables = ("rig.driver", "rig.driven", "rig.mesh")
-    refuse_effects(case.rig, "static finite-element solution", tables, FLANK_KEYS)
+    refuse_effects(case.rig, "static finite-element solution", tables, ELASTIC_KEYS)
     elastic = elastic_rig(case.rig, case.simulation, lambda note: report(0.0, note))
     unit, values = loads
     _check_range(elastic, unit, values)

@@ -9,16 +9,60 @@ from pydantic import model_validator
 
 from gearbench.rig.checks import items_within
 from gearbench.rig.flank_checks import check_flank
-from gearbench.rig.value import Value, quantity
+from gearbench.rig.value import Value, quantity, to_si
 
 _LARGEST_ERROR = 1e-3  # m
 
 
 class Crack(Value):
-    """A cracked tooth: its bending stiffness is lower, the contact of its flank is that of a sound one."""
+    """A cracked tooth, by what is lost or by the crack itself.
+
+    With `stiffness_loss` the tooth's bending stiffness is lower and the contact of its flank that of a sound one. With
+    `length` and `direction` a straight, open slit starts in the fillet below the working flank, where bending pulls:
+    there the fillet's tangent makes the angle `start` with the tooth's centre line, 30 degrees being the classical
+    critical section. `direction` is measured from the centre line too: at 0 the crack runs parallel to it towards the
+    hub, at 90 degrees straight across the tooth, between the two down into the rim, beyond 90 degrees up into the
+    tooth.
+    """
 
     tooth: int = quantity(ge=0, doc="number of the cracked tooth, 0 .. teeth - 1")
-    stiffness_loss: float = quantity(ge=0.0, le=0.95, doc="relative loss of that tooth's bending stiffness")
+    stiffness_loss: float = quantity(
+        0.0, ge=0.0, le=0.95, doc="relative loss of that tooth's bending stiffness; or give length and direction"
+    )
+    length: float | None = quantity(None, "mm", ge=0.0, le=0.2, doc="length of a crack in the mesh of that tooth")
+    direction: float | None = quantity(
+        None,
+        "deg",
+        ge=to_si(-30.0, "deg"),
+        le=to_si(150.0, "deg"),
+        doc="direction of the crack: 0 along the tooth's centre line to the hub, 90 straight across the tooth",
+    )
+    start: float = quantity(
+        to_si(30.0, "deg"),
+        "deg",
+        ge=0.0,
+        le=pi / 2,
+        doc="where it starts: angle of the working side's fillet to the tooth's centre line there",
+    )
+
+    @property
+    def meshed(self) -> bool:
+        """Whether the crack is one in the mesh, with a length."""
+        return bool(self.length)
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> Crack:
+        if (self.length is None) != (self.direction is None):
+            here, missing = ("length_mm", "direction_deg") if self.direction is None else ("direction_deg", "length_mm")
+            raise ValueError(f"{missing} is missing: {here} is given")
+        if self.length is None and "stiffness_loss" not in self.model_fields_set:
+            raise ValueError("stiffness_loss is missing, or length_mm and direction_deg in its place")
+        if self.length is not None and self.stiffness_loss:
+            raise ValueError(
+                f"stiffness_loss = {self.stiffness_loss:g} and length_mm = {1e3 * self.length:g} are both given: one"
+                " of them"
+            )
+        return self
 
 
 class Gear(Value):

@@ -54,8 +54,8 @@ def effects_in(rig: Rig) -> tuple[str, ...]:
 
     An effect is what an ideal rig lacks: tooth errors and cracks, non-linear supports, what stands behind a
     coupling, ripple, friction, corrections of the mesh, delays and noise of the sensors. A field with its
-    neutral value is none, and neither is an error of zero, a shape without an amount, a crack without loss or a
-    ripple of amplitude 0.
+    neutral value is none, and neither is an error of zero, a shape without an amount, a crack without loss or length,
+    or a ripple of amplitude 0.
     Backlash (thinning, centre distance) belongs to the geometry and is not listed.
     """
     found: list[str] = []
@@ -83,6 +83,8 @@ def _gear_effects(gear: Gear) -> list[str]:
             found.append(key_of(Gear, name))
     if gear.crack and gear.crack.stiffness_loss:
         found.append("crack")
+    if gear.crack and gear.crack.meshed:
+        found.append("crack.length_mm")
     return found
 
 

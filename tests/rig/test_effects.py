@@ -16,6 +16,7 @@ from gearbench.rig import Case, CaseError, Rig, dump_case, effects_in, read_case
 REFERENCE = case_path("reference")  # 62/62 teeth
 COUPLING = "rig.drive.coupling={inertia_kg_m2 = 2e-3, stiffness_nm_per_rad = 5e4, damping_nm_s_per_rad = 1.5}"
 RIPPLE = "rig.drive.ripple={orders = [6, 12], amplitude_nm = [0.6, 0.3], phase_deg = [0, 90]}"
+SLIT = "rig.driver.crack={tooth = 7, length_mm = 0.8, direction_deg = 60}"
 CRACK = "rig.driver.crack={tooth = 7, stiffness_loss = 0.35}"
 
 
@@ -42,6 +43,8 @@ def refusal(*settings: str) -> str:
         ("rig.driver.runout_um=12.3", lambda rig: rig.driver.runout, 12.3e-6),
         ("rig.driver.runout_phase_deg=90", lambda rig: rig.driver.runout_phase, pi / 2),
         (CRACK, lambda rig: (rig.driver.crack.tooth, rig.driver.crack.stiffness_loss), (7, 0.35)),
+        (SLIT, lambda rig: (rig.driver.crack.length, rig.driver.crack.direction), (0.8e-3, 1.0471975511965979)),
+        (SLIT, lambda rig: rig.driver.crack.start, 0.5235987755982989),
         ("rig.support.driven.exponent=0.35", lambda rig: rig.support.driven.exponent, 0.35),
         ("rig.support.reference_deflection_um=4.7", lambda rig: rig.support.driver.reference_deflection, 4.7e-6),
         (COUPLING, lambda rig: tuple(rig.drive.coupling.model_dump().values()), (2e-3, 5e4, 1.5)),
@@ -72,6 +75,7 @@ def test_a_rig_without_effects_has_none() -> None:
         ((errors(),), ("rig.driven.pitch_error_um",)),
         (("rig.driver.runout_um=10",), ("rig.driver.runout_um",)),
         ((CRACK,), ("rig.driver.crack",)),
+        ((SLIT,), ("rig.driver.crack.length_mm",)),
         (("rig.support.exponent=-0.2",), ("rig.support.driver.exponent", "rig.support.driven.exponent")),
         ((COUPLING,), ("rig.drive.coupling",)),
         ((RIPPLE,), ("rig.drive.ripple",)),
@@ -91,6 +95,7 @@ def test_a_rig_without_effects_has_none() -> None:
         (("rig.driver.runout_phase_deg=40", "rig.friction.transition_speed_m_per_s=1"), ()),
         (("rig.support.reference_deflection_um=1",), ()),
         (("rig.driver.thinning_um=30", "rig.driver.crack={tooth = 1, stiffness_loss = 0}"), ()),
+        (("rig.driver.crack={tooth = 1, length_mm = 0, direction_deg = 60}",), ()),
         (("rig.drive.ripple={orders = [6], amplitude_nm = [0], phase_deg = [30]}",), ()),
         (("rig.driver.pitch_error_um=[" + "0, " * 61 + "0.0]", "rig.mesh.error_cos_um=[]"), ()),
         (("rig.mesh.stiffness_scale={value = 1, sd = 0.06}",), ()),
@@ -125,7 +130,7 @@ def test_the_reference_file_shows_valid_optional_tables(tmp_path: Path) -> None:
         lines.append(line.removeprefix("# ") if inside else line)
     full = tmp_path / "full.toml"
     full.write_text("\n".join(lines), encoding="utf-8")
-    wanted = ("rig.driver.crack", "rig.driven.crack", "rig.drive.coupling", "rig.drive.ripple")
+    wanted = ("rig.driver.crack.length_mm", "rig.driven.crack.length_mm", "rig.drive.coupling", "rig.drive.ripple")
     assert effects_in(read_case(full).rig) == wanted
 
 
@@ -164,7 +169,13 @@ def test_standard_deviations_of_new_numbers() -> None:
         ("rig.driver.crack={tooth = -1, stiffness_loss = 0.1}", ["rig.driver.crack.tooth = -1", "at least 0"]),
         ("rig.driver.crack={tooth = 1.5, stiffness_loss = 0.1}", ["rig.driver.crack.tooth = 1.5", "whole number"]),
         ("rig.driver.crack={tooth = 1, stiffness_loss = 0.96}", ["stiffness_loss = 0.96", "at most 0.95"]),
-        ("rig.driver.crack={tooth = 1}", ["rig.driver.crack.stiffness_loss is missing"]),
+        (SLIT.replace("direction_deg = 60", "stiffness_loss = 0.1"), ["direction_deg is missing", "length_mm is given"]),
+        (SLIT.replace("length_mm = 0.8, ", ""), ["length_mm is missing", "direction_deg is given"]),
+        (SLIT.replace("}", ", stiffness_loss = 0.1}"), ["stiffness_loss = 0.1", "length_mm = 0.8", "one of them"]),
+        (SLIT.replace("= 60", "= 151"), ["rig.driver.crack.direction_deg = 151", "at most 150"]),
+        (SLIT.replace("= 60", "= 60, start_deg = -1"), ["rig.driver.crack.start_deg = -1", "at least 0"]),
+        (SLIT.replace("tooth = 7", "tooth = 62"), ["crack.tooth = 62", "teeth = 62"]),
+        ("rig.driver.crack={tooth = 1}", ["rig.driver.crack", "stiffness_loss is missing", "length_mm"]),
         ("rig.support.exponent=-0.9", ["rig.support.exponent = -0.9", "greater than -0.9"]),
         ("rig.support.driver.exponent=3.1", ["rig.support.driver.exponent = 3.1", "at most 3"]),
         ("rig.drive.coupling={stiffness_nm_per_rad = 1}", ["rig.drive.coupling.inertia_kg_m2 is missing"]),

@@ -45,7 +45,9 @@ def maybe(strategy: st.SearchStrategy[Any]) -> st.SearchStrategy[Any]:
     return st.none() | strategy
 
 
-CRACKS = st.builds(Crack, tooth=st.integers(0, 4), stiffness_loss=number(0, 0.95))
+CRACKS = st.builds(Crack, tooth=st.integers(0, 4), stiffness_loss=number(0, 0.95)) | st.builds(
+    Crack, tooth=st.integers(0, 4), length=number(0, 0.2), direction=number(-0.5, 2.6), start=number(0, 1.57)
+)
 ERRORS = st.integers(5, 12).flatmap(
     lambda teeth: st.fixed_dictionaries(
         {"teeth": st.just(teeth), "pitch_error": st.lists(number(-1e-3, 1e-3), min_size=teeth, max_size=teeth)}
