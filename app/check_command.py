@@ -10,7 +10,7 @@ import typer
 
 from gearbench.comb_report import comb_data, comb_lines, comb_reports
 from gearbench.options import CaseArgument, JsonOption, SetOption, load_case, print_json
-from gearbench.simulate_command import experiments, plan
+from gearbench.simulate_command import experiments
 
 
 def check(
@@ -24,13 +24,15 @@ def check(
 ) -> None:
     """Print the data sheet of a case: diameters, contact ratio, sliding, backlash, gauges, masses; or what is wrong.
 
+    What mesh, static and simulate would refuse is refused here, but for what only a solution can show.
     For a comb multisine also its residue and which kinds of response then share lines.
     """
     loaded = load_case(case, settings)
+    from gearbench.bench.readiness import check_case
     from gearbench.geometry import data_sheet
 
     rows = data_sheet(loaded.rig, [1e-3 * number for number in diameter or []])
-    plan(loaded)
+    check_case(loaded)
     names = [condition.name for condition in loaded.conditions] or [""]
     under = [experiment for experiment, _ in experiments(loaded, Path("record.nc"))]
     combs = comb_reports(list(zip(names, under, strict=True)))

@@ -12,7 +12,7 @@ from gearbench.failure import InputError
 from gearbench.options import CaseArgument, JsonOption, SetOption, load_case, print_json
 from gearbench.output import claimed, fingerprint
 from gearbench.progress import Progress
-from gearbench.simulate_command import experiments, plan
+from gearbench.simulate_command import experiments
 from gearbench.summary_text import headline
 
 
@@ -27,14 +27,13 @@ def run(
 ) -> None:
     """Run a case: geometry, mesh, simulation, identification, pictures, summary. Resumes in its own folder."""
     loaded = load_case(case, settings)
-    from gearbench.geometry import pair
+    from gearbench.bench.readiness import check_case
     from gearbench.pipeline import Job, run_experiment
     from gearbench.records.provenance import source_digest
     from gearbench.rig import dump_case
 
     # What cannot be run is refused before a folder is made.
-    pair(loaded.rig)
-    plan(loaded)
+    check_case(loaded)
     for experiment, _ in experiments(loaded, Path("record.nc")):
         if experiment.experiment.multisine is None:
             raise InputError(

@@ -31,10 +31,12 @@ def simulate(
     """
     loaded = load_case(case, settings)
     check_out(out, [case])
-    plan(loaded)
     from gearbench.bench import simulate as carry_out
+    from gearbench.bench.readiness import check_timing
     from gearbench.records import write_record
 
+    chosen = {"model": model or loaded.simulation.model}
+    check_timing(loaded.model_copy(update={"simulation": loaded.simulation.model_copy(update=chosen)}))
     summaries = []
     with Progress(f"simulate {loaded.name}") as progress:
         for experiment, path in experiments(loaded, out):
@@ -58,16 +60,6 @@ def experiments(case: Case, out: Path) -> list[tuple[Case, Path]]:
         return [(case, out)]
     names = [(condition, out.with_name(f"{out.stem}-{condition.name}{out.suffix}")) for condition in case.conditions]
     return [(case.under(condition), path) for condition, path in names]
-
-
-def plan(case: Case) -> None:
-    """Raise BenchError if one of the case's experiments cannot be timed: before any of them is run."""
-    from gearbench.bench.excitation import comb_for
-    from gearbench.bench.schedule import schedule
-
-    for experiment, _ in experiments(case, Path("record.nc")):
-        schedule(experiment.experiment, experiment.rig)
-        comb_for(experiment.experiment, experiment.rig)
 
 
 def record_summary(record: Any, path: Path) -> dict[str, Any]:

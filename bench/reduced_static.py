@@ -7,29 +7,15 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from gearbench.bench.effects import ELASTIC_KEYS, cycles_to_repeat, refuse_effects
-from gearbench.bench.errors import BenchError
-from gearbench.bench.reduced_rig import ElasticRig, elastic_rig
+from gearbench.bench.load_range import check_dte, check_torque
+from gearbench.bench.reduced_rig import elastic_rig
 from gearbench.bench.schedule import ProgressReport
-from gearbench.bench.static import Loads, static_dataset
-from gearbench.fem.law import EDGE_SEPARATION, LOAD_RANGE
+from gearbench.bench.static import Loads, load_key, static_dataset
+from gearbench.fem.law import elastic_pair
 from gearbench.fem.static import static_cycle
 from gearbench.rig import Case
 
 Array = NDArray[np.float64]
-
-
-def _check_range(elastic: ElasticRig, unit: str, values: Array) -> None:
-    """Refuse loads beyond the range for which contact lines have been solved."""
-    if unit == "N m":
-        width = min(gear.face_width for gear in elastic.gears)
-        most, key = LOAD_RANGE[1] * width * elastic.pair.driver.base_radius, "torque"
-    else:
-        most, key = EDGE_SEPARATION * elastic.pair.driver.module, "transmission error"
-    if values.max() > most:
-        raise BenchError(
-            f"static {key} = {values.max():g} {unit} is more than the modelled flanks can carry: at most"
-            f" {most:.4g} {unit} for this pair"
-        )
 
 
 def static_reduced(case: Case, loads: Loads, phase: Array, progress: ProgressReport | None = None) -> xr.Dataset:
@@ -40,9 +26,10 @@ def static_reduced(case: Case, loads: Loads, phase: Array, progress: ProgressRep
     report = progress or (lambda fraction, note: None)
     tables = ("rig.driver", "rig.driven", "rig.mesh")
     refuse_effects(case.rig, "static finite-element solution", tables, ELASTIC_KEYS)
-    elastic = elastic_rig(case.rig, case.simulation, lambda note: report(0.0, note))
     unit, values = loads
-    _check_range(elastic, unit, values)
+    check = check_dte if unit == "m" else check_torque
+    check(elastic_pair(case.rig), float(values.max()), load_key(unit)[0])
+    elastic = elastic_rig(case.rig, case.simulation, lambda note: report(0.0, note))
     cycle = static_cycle(
         elastic.law,
         phase,

@@ -8,6 +8,7 @@ from importlib import import_module
 import xarray as xr
 
 from gearbench.bench.errors import BenchError
+from gearbench.bench.readiness import check_gears
 from gearbench.bench.schedule import ProgressReport
 from gearbench.rig import Case
 
@@ -29,6 +30,7 @@ def simulate(case: Case, model: str | None = None, progress: ProgressReport | No
     name = model or case.simulation.model
     if name not in SIMULATORS:
         raise BenchError(f"simulation.model = {name!r} is not one of {', '.join(sorted(SIMULATORS))}")
+    check_gears(case.rig)
     module, function = SIMULATORS[name]
     chosen = case.model_copy(update={"simulation": case.simulation.model_copy(update={"model": name})})
     simulator: Simulator = getattr(import_module(module), function)

@@ -10,6 +10,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from gearbench.bench.errors import BenchError
+from gearbench.bench.readiness import check_gears
 from gearbench.bench.schedule import ProgressReport
 from gearbench.rig import Case
 
@@ -61,12 +62,19 @@ def static(
         raise BenchError(f"cycles = {cycles} must be 1 for the model {name}, which has no teeth of their own at rest")
     unit, values = ("m", dte) if len(dte) else ("N m", torque or (case.experiment.torque_mean,))
     loads = np.asarray(values, dtype=float)
-    for load in loads:
+    key, scale = load_key(unit)
+    for load in loads * scale:
         if not (np.isfinite(load) and load > 0):
-            raise BenchError(f"static load = {load:g} {unit} must be greater than 0 {unit}")
+            raise BenchError(f"{key} = {load:g} must be finite and greater than 0")
+    check_gears(case.rig)
     module, function = SOLVERS[name]
     solver: StaticSolver = getattr(import_module(module), function)
     return solver(case, (unit, loads), np.arange(positions * cycles) / positions, progress)
+
+
+def load_key(unit: str) -> tuple[str, float]:
+    """What a user calls a load, and the factor from SI to that unit."""
+    return ("dte_um", 1e6) if unit == "m" else ("torque_nm", 1.0)
 
 
 def static_dataset(

@@ -17,8 +17,18 @@ NECK_MODULES = 0.1
 # Smallest root radius and smallest hub radius that can be meshed, in modules.
 ROOT_MODULES = 0.1
 HUB_MODULES = 1e-3
+# Smallest module [m]: below it a length was probably given in metres.
+SMALLEST_MODULE = 0.02e-3
 # A rack tip this little (in modules) too wide for the rack tooth is rounding.
 ROUNDING = 1e-12
+
+
+def check_module(gear: Gear, name: str) -> None:
+    """Refuse a module that no gear has."""
+    if gear.module < SMALLEST_MODULE:
+        raise GeometryError(
+            f"{name}.module_mm = {gear.module * 1e3:g} is too small: at least {SMALLEST_MODULE * 1e3:g}; the unit is mm"
+        )
 
 
 def check_rack(gear: Gear, name: str, offset: float) -> None:

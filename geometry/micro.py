@@ -7,7 +7,7 @@ moves the flank and does not change its stiffness.
 
 from __future__ import annotations
 
-from math import pi
+from math import pi, sin
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,6 +20,9 @@ Array = NDArray[np.float64]
 
 # Part of the flank's roll length that a table must cover; beyond its ends it goes on as there.
 LEAST_COVER = 0.5
+# How far, in modules, a flank may depart from its involute, and teeth overlap that errors jam: several times what is
+# ground into real gears, and still small against radii of curvature.
+DEEPEST = 0.1
 
 
 def roll_length(shape: Profile, diameter: ArrayLike) -> Array:
@@ -35,10 +38,12 @@ def roll_angle(shape: Profile, rho: ArrayLike) -> Array:
 
 
 def check_micro(shape: Profile, gear: Gear, name: str = "gear") -> None:
-    """Raise GeometryError for relief that starts outside the involute, and for a table that misses the flank.
+    """Raise GeometryError for a flank that leaves its involute by more than DEEPEST, for relief that starts outside the
+    involute, and for a table that misses the flank.
 
     `name` is the gear's key in the case.
     """
+    _check_depths(gear, name)
     low, high = 2e3 * shape.form_radius, 2e3 * shape.end_radius
     for relief in ("tip_relief", "root_relief"):
         start = getattr(gear, f"{relief}_start_diameter")
@@ -66,6 +71,43 @@ def check_micro(shape: Profile, gear: Gear, name: str = "gear") -> None:
                 f" {_in_unit(getattr(gear, key)[-1], unit):.6g} {unit} and covers {cover:.0%} of the flank"
                 f" ({ends[0]:.6g} to {ends[1]:.6g} {unit}): at least {LEAST_COVER:.0%}"
             )
+
+
+def _check_depths(gear: Gear, name: str) -> None:
+    """Refuse amounts beside which the flank is no involute any more."""
+    limit = DEEPEST * gear.module
+    worn = max(gear.wear_tooth, default=1.0)
+    amounts = {
+        "tip_relief": gear.tip_relief,
+        "root_relief": gear.root_relief,
+        "profile_slope": abs(gear.profile_slope),
+        "profile_slope_tooth": max(map(abs, gear.profile_slope_tooth), default=0.0),
+        "profile_form": max(map(abs, gear.profile_form), default=0.0)
+        * max(map(abs, gear.profile_form_tooth), default=1.0),
+        "wear": gear.wear * worn,
+        "wear_depth": max(gear.wear_depth, default=0.0) * worn,
+    }
+    for key, amount in amounts.items():
+        if amount > limit * (1 + 1e-12):
+            raise GeometryError(
+                f"{name}.{key}_um moves the flank by {amount * 1e6:.6g} um: at most {limit * 1e6:g} um, {DEEPEST:g}"
+                " modules, beyond which it is no involute"
+            )
+
+
+def check_play(backlash_normal: float, gears: tuple[Gear, Gear]) -> None:
+    """Raise GeometryError for pitch errors and run-out of driver and driven gear that together close the mesh by more
+    than its normal backlash [m] and DEEPEST: the teeth would jam."""
+    limit = max(backlash_normal, 0.0) + DEEPEST * gears[0].module
+    closed = 0.0
+    for gear in gears:
+        pitch = max(gear.pitch_error) - min(gear.pitch_error) if gear.pitch_error else 0.0
+        closed += pitch + gear.runout * sin(gear.pressure_angle)
+    if closed > limit:
+        raise GeometryError(
+            f"pitch_error_um and runout_um of rig.driver and rig.driven close the mesh by up to {closed * 1e6:.4g} um:"
+            f" at most {limit * 1e6:.4g} um, the normal backlash and {DEEPEST:g} modules"
+        )
 
 
 def _in_unit(value: float, unit: str) -> float:

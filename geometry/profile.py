@@ -18,6 +18,7 @@ from gearbench.geometry.fillet import Trochoid, form_point, neck, radial, tangen
 from gearbench.geometry.limits import (
     NECK_MODULES,
     check_body,
+    check_module,
     check_neck,
     check_rack,
     check_root,
@@ -230,6 +231,7 @@ def profile(gear: Gear, name: str = "gear") -> Profile:
     bore that does not fit.
     """
     m = gear.module
+    check_module(gear, name)
     fillet, psi_b, room = generated(gear)
     reference = fillet.reference_radius
     base = reference * cos(gear.pressure_angle)

@@ -50,8 +50,8 @@ def test_default_load_is_the_mean_torque(case: Case) -> None:
     ("loads", "words"),
     [
         ({"torque": [1.0], "dte": [1e-6]}, "one kind"),
-        ({"torque": [0.0]}, "static load = 0 N m must be greater than 0"),
-        ({"dte": [float("nan")]}, "static load = nan m"),
+        ({"torque": [0.0]}, "torque_nm = 0 must be finite and greater than 0"),
+        ({"dte": [float("nan")]}, "dte_um = nan"),
         ({"positions": 1}, "positions = 1 must be at least 2"),
         ({"model": "cast-iron"}, "cast-iron"),
     ],
