@@ -12,11 +12,12 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import pairwise
 from math import pi
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gearbench.geometry.element_size import flank_size
 from gearbench.geometry.error import GeometryError
 from gearbench.geometry.grading import Chain, HalfBoundary, half_boundary
 from gearbench.geometry.profile import Profile
@@ -82,19 +83,30 @@ def sector_mesh(gear_profile: Profile, gear: Gear, element_size: float | None = 
     Raises GeometryError for an element size outside (module/400, module/2), and MeshingUnavailable without
     gmsh.
     """
-    size = gear.module / 12 if element_size is None else element_size
-    if not gear.module / 400 <= size <= gear.module / 2:
-        raise GeometryError(
-            f"simulation.element_size_um = {size * 1e6:g} must lie between {gear.module * 1e6 / 400:g}"
-            f" (module/400) and {gear.module * 1e6 / 2:g} (module/2)"
-        )
-    boundary = half_boundary(gear_profile, gear.hub_radius, size)
-    ring = np.concatenate([chain.corners[:-1] for chain in _sides(boundary)])
-    corners, triangles = _fill(ring)
-    return _mirrored(gear_profile.teeth, boundary, corners, triangles)
+    size = flank_size(gear.module, element_size)
+    return sector_within(gear_profile.teeth, half_boundary(gear_profile, gear.hub_radius, size))
 
 
-def _sides(boundary: HalfBoundary) -> tuple[Chain, Chain, Chain, Chain]:
+def sector_within(teeth: int, boundary: HalfBoundary) -> SectorMesh:
+    """The sector of a gear with that many teeth whose half has the given nodes on its boundary."""
+    ring = np.concatenate([chain.corners[:-1] for chain in sides_of(boundary)])
+    corners, triangles, _ = fill(ring)
+    points, half, edges = raise_order(corners, _ccw(corners, triangles), boundary)
+    # Mirroring turns the triangles over: corners 0 and 1 change places, hence the middles of 1-2 and 2-0.
+    whole = mirrored(teeth, points, half, edges, [1, 0, 2, 3, 5, 4])
+    return SectorMesh(
+        teeth=teeth,
+        points=whole.points,
+        triangles=whole.cells,
+        cut_low=whole.cut_low,
+        cut_high=whole.cut_high,
+        hub=whole.hub,
+        boundary_edges=whole.boundary_edges,
+        mirror=whole.mirror,
+    )
+
+
+def sides_of(boundary: HalfBoundary) -> tuple[Chain, Chain, Chain, Chain]:
     """The sides in order around the half sector."""
     return boundary.outline, boundary.cut, boundary.hub, boundary.axis
 
@@ -133,18 +145,18 @@ def gmsh_session() -> Iterator[Any]:
                 gmsh.model.setCurrent(current)
 
 
-def _fill(ring: Array) -> tuple[Array, Index]:
+def fill(ring: Array, recombine: bool = False) -> tuple[Array, Index, Index]:
     """Triangulate inside the closed polygon `ring` (n, 2) without adding nodes to it.
 
-    Returns corners (m, 2), the first n of which are the ring, and triangles (k, 3). Sizes inside follow the
-    ring's.
+    Returns corners (m, 2), the first n of which are the ring, triangles (k, 3) and, where `recombine` makes as many of
+    them as it can, quadrilaterals (l, 4). Sizes inside follow the ring's.
     """
     scale = 1 / np.ptp(ring, axis=0).max()  # gmsh's tolerances are absolute
     with gmsh_session() as gmsh:
-        return _triangulate(gmsh, ring, scale)
+        return _triangulate(gmsh, ring, scale, recombine)
 
 
-def _triangulate(gmsh: Any, ring: Array, scale: float) -> tuple[Array, Index]:
+def _triangulate(gmsh: Any, ring: Array, scale: float, recombine: bool) -> tuple[Array, Index, Index]:
     gmsh.model.add("gearbench tooth sector")
     try:
         geo, count = gmsh.model.geo, len(ring)
@@ -155,8 +167,10 @@ def _triangulate(gmsh: Any, ring: Array, scale: float) -> tuple[Array, Index]:
         for line in lines:
             gmsh.model.mesh.setTransfiniteCurve(line, 2)
         gmsh.model.mesh.generate(2)
+        if recombine:
+            gmsh.model.mesh.recombine()
         tags, flat, _ = gmsh.model.mesh.getNodes()
-        _, elements = gmsh.model.mesh.getElementsByType(2)
+        found = [gmsh.model.mesh.getElementsByType(kind)[1] for kind in (2, 3)]
         first = [int(gmsh.model.mesh.getNodes(0, node)[0][0]) for node in nodes]
     finally:
         gmsh.model.remove()
@@ -167,8 +181,11 @@ def _triangulate(gmsh: Any, ring: Array, scale: float) -> tuple[Array, Index]:
     for tag, point in zip(tags, flat.reshape(-1, 3), strict=True):
         corners[order[int(tag)]] = point[:2] / scale
     corners[:count] = ring
-    triangles = np.array([order[int(tag)] for tag in elements], dtype=np.int64).reshape(-1, 3)
-    return corners, triangles
+    triangles, quads = (
+        np.array([order[int(tag)] for tag in elements], dtype=np.int64).reshape(-1, sides)
+        for elements, sides in zip(found, (3, 4), strict=True)
+    )
+    return corners, triangles, quads
 
 
 def _ccw(points: Array, triangles: Index) -> Index:
@@ -183,21 +200,19 @@ def _ccw(points: Array, triangles: Index) -> Index:
     return turned
 
 
-def _raise_order(
-    corners: Array, triangles: Index, boundary: HalfBoundary
-) -> tuple[Array, Index, list[Index]]:
-    """Mid-side nodes: straight inside, the given ones on the boundary.
+def raise_order(corners: Array, cells: Index, boundary: HalfBoundary) -> tuple[Array, Index, list[Index]]:
+    """Mid-side nodes of cells (m, k): straight inside, the given ones on the boundary.
 
-    Returns points, triangles (m, 6) and, for each side of the boundary, its edges (k, 3) corner, corner,
-    middle.
+    Returns points, cells (m, 2 k) and, for each side of the boundary, its edges (n, 3) corner, corner, middle.
     """
-    edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    k = cells.shape[1]
+    edges = np.sort(cells[:, [[i, (i + 1) % k] for i in range(k)]].reshape(-1, 2), axis=1)
     unique, inverse = np.unique(edges, axis=0, return_inverse=True)
     middles = 0.5 * (corners[unique[:, 0]] + corners[unique[:, 1]])
     number = {(int(a), int(b)): i for i, (a, b) in enumerate(unique)}
     sides, start = [], 0
-    ring = sum(len(chain.mids) for chain in _sides(boundary))
-    for chain in _sides(boundary):
+    ring = sum(len(chain.mids) for chain in sides_of(boundary))
+    for chain in sides_of(boundary):
         nodes = (start + np.arange(len(chain.corners))) % ring
         index = np.array([number[min(a, b), max(a, b)] for a, b in pairwise(nodes.tolist())])
         middles[index] = chain.mids
@@ -205,7 +220,7 @@ def _raise_order(
         start += len(chain.mids)
     return (
         np.concatenate((corners, middles)),
-        np.column_stack((triangles, len(corners) + inverse.reshape(-1, 3))),
+        np.column_stack((cells, len(corners) + inverse.reshape(-1, k))),
         sides,
     )
 
@@ -215,9 +230,21 @@ def _walk(edges: Index) -> Index:
     return np.append(edges[:, [0, 2]].ravel(), edges[-1, 1])
 
 
-def _mirrored(teeth: int, boundary: HalfBoundary, corners: Array, triangles: Index) -> SectorMesh:
-    """The whole sector from its counter-clockwise half."""
-    points, half, (outline, cut, hub, axis) = _raise_order(corners, _ccw(corners, triangles), boundary)
+class Whole(NamedTuple):
+    """Fields of a whole sector, as in SectorMesh; `cells` of any kind."""
+
+    points: Array
+    cells: Index
+    cut_low: Index
+    cut_high: Index
+    hub: Index
+    boundary_edges: Index
+    mirror: Index
+
+
+def mirrored(teeth: int, points: Array, half: Index, sides: list[Index], turned: list[int]) -> Whole:
+    """The whole sector from its counter-clockwise half; `turned` is the order of a mirrored cell's nodes."""
+    outline, cut, hub, axis = sides
     on_axis = _walk(axis)
     points[on_axis, 1] = 0.0
     n = len(points)
@@ -225,22 +252,18 @@ def _mirrored(teeth: int, boundary: HalfBoundary, corners: Array, triangles: Ind
     image[on_axis] = on_axis
     free = np.flatnonzero(image < 0)
     image[free] = n + np.arange(len(free))
-    mirror = np.concatenate((image, free))
-    # Mirroring turns the triangles over: corners 0 and 1 change places, hence the middles of 1-2 and 2-0.
-    other = image[half][:, [1, 0, 2, 3, 5, 4]]
     angle = 2 * pi / teeth
     low, high = image[_walk(cut)][::-1], _walk(cut)[::-1]
     points = np.concatenate((points, points[free] * [1.0, -1.0]))
     points[low] = points[high] @ _rotation(-angle).T
-    return SectorMesh(
-        teeth=teeth,
+    return Whole(
         points=points,
-        triangles=np.concatenate((half, other)),
+        cells=np.concatenate((half, image[half][:, turned])),
         cut_low=low,
         cut_high=high,
         hub=np.concatenate((image[_walk(hub)], _walk(hub)[-2::-1])),
         boundary_edges=np.concatenate((image[outline][::-1][:, [1, 0, 2]], outline)),
-        mirror=mirror,
+        mirror=np.concatenate((image, free)),
     )
 
 
