@@ -41,11 +41,12 @@ def calculix() -> list[tuple[str, Law, list[dict[str, Any]]]]:
 
 
 def against_calculix(corner: bool) -> float:
-    """Largest relative difference of either torque at the positions with or without tip-corner contact."""
+    """Largest relative difference of either torque at the positions with or without contact on tip edges or undercut
+    corners."""
     worst = 0.0
     for _, law, positions in calculix():
         for position in positions:
-            if position["tip_corner"] == corner:
+            if (position["tip_corner"] or position.get("undercut_corner", False)) == corner:
                 cycle = static_cycle(law, np.array([position["phase"]]), dte=[position["dte"]])
                 for ours, key in (
                     (cycle.torque_driver, "torque_driver"),
@@ -95,7 +96,7 @@ CHECKS = [
     ),
     Check(
         "calculix-corner",
-        "torque at given DTE against CalculiX, at tip corners",
+        "torque at given DTE against CalculiX, at tip corners and undercut corners",
         1e-2,
         "",
         lambda: against_calculix(True),

@@ -73,6 +73,7 @@ def solve(rig_record: dict, phase: float, dte: float, work: Path, *, level: floa
         "teeth": [m.tooth for m in met],
         "gaps": [m.gap for m in met],
         "tip_corner": bool(any(tip_distance(m) < 0 and m.gap < dte for m in met)),
+        "undercut_corner": bool(any(m.corner >= 0 and m.gap < dte for m in met)),
         "element_mm": [t.size for t in touching],
         "level": level,
         "nlgeom": nlgeom,

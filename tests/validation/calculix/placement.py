@@ -17,6 +17,7 @@ from gearbench.rig import Gear, Material, Rig, Support, Supports
 Array = NDArray[np.float64]
 
 MARGIN = 2e-6  # pairs whose gap exceeds the DTE by more stay open [m]
+AT_CORNER = 1e-6  # a contact this close to an undercut corner is on it [m]
 
 
 @dataclass(frozen=True)
@@ -58,7 +59,8 @@ class Setup:
 class Meeting:
     """A tooth pair that closes: gap before the driver turns [m], contact points and ends of the involutes (2,
     2) of both gears [mm], estimated half-width [mm], slave gear, how far in radius the contact is beyond the
-    involute [mm]."""
+    involute [mm], starts (2, 2) of the involutes [mm], NaN where there is no undercut, and the gear that
+    touches with that corner (-1: none)."""
 
     tooth: int
     gap: float
@@ -67,6 +69,8 @@ class Meeting:
     ends: Array
     slave: int
     beyond: float
+    starts: Array
+    corner: int
 
 
 def tip_distance(m: Meeting) -> float:
@@ -125,7 +129,7 @@ def meetings(position: Setup) -> list[Meeting]:
     found = []
     for (tooth, gap, *local), depth in zip(near, overlap, strict=True):
         load = position.torque / shapes[0].base_radius / position.pair.face_width * depth / sum(overlap)
-        curvature, left, at, ends = 0.0, [], [], []
+        curvature, left, at, ends, starts, corner = 0.0, [], [], [], [], -1
         for g in (0, 1):
             matrix, centre = position.placed(g, tooth)
             end = shapes[g].involute(shapes[g].rho_end)
@@ -134,9 +138,16 @@ def meetings(position: Setup) -> list[Meeting]:
             curvature += 1 / roll if left[g] <= 0 else 1 / shapes[g].edge_radius
             at.append(centre + 1e3 * matrix @ local[g])
             ends.append(centre + 1e3 * matrix @ end)
+            start = shapes[g].involute(shapes[g].rho_form)
+            starts.append(centre + 1e3 * matrix @ start if shapes[g].undercut else np.full(2, np.nan))
+            if shapes[g].undercut and np.hypot(*(local[g] - start)) < AT_CORNER:
+                corner = g
         half_width = 1e3 * sqrt(4 * load / curvature / (pi * stiffness))
-        slave = int(left[1] > left[0])
-        found.append(Meeting(tooth, gap, np.array(at), half_width, np.array(ends), slave, 1e3 * max(left)))
+        slave = corner if corner >= 0 else int(left[1] > left[0])
+        beyond = 1e3 * max(left)
+        found.append(
+            Meeting(tooth, gap, np.array(at), half_width, np.array(ends), slave, beyond, np.array(starts), corner)
+        )
     return found
 
 
@@ -159,12 +170,13 @@ def spots(position: Setup, gear: int, met: list[Meeting], level: float) -> list[
     out = []
     for m in met:
         size = contact_size(m, level)
-        out.append(Spot(m.at[gear], size, 1.6 * m.half_width + 0.01))
-        for g in (0, 1):
-            distance = float(np.hypot(*(m.at[g] - m.ends[g])))
+        # On an undercut corner the load lies to one side.
+        out.append(Spot(m.at[gear], size, (1.6 if m.corner < 0 else 3.2) * m.half_width + 0.01))
+        for g, ends in ((0, m.ends), (1, m.ends), (0, m.starts), (1, m.starts)):
+            distance = float(np.hypot(*(m.at[g] - ends[g])))
             if distance < 4 * m.half_width + 0.05:
                 # The curvature jumps here; the mate needs the same size opposite.
-                opposite = m.ends[g] if gear == g else m.at[gear] + (m.ends[g] - m.at[g])
+                opposite = ends[g] if gear == g else m.at[gear] + (ends[g] - m.at[g])
                 out.append(Spot(opposite, min(size, 0.003 * level), 0.01))
         for tooth in (m.tooth - 1, m.tooth, m.tooth + 1):
             matrix, centre = position.placed(gear, tooth)

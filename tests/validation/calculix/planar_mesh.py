@@ -35,7 +35,8 @@ class Spot:
 @dataclass(frozen=True)
 class PlanarMesh:
     """points (n, 2); triangles (m, 6), corners counter-clockwise, then the mid-side nodes of 1-2, 2-3, 3-1;
-    hub (k,) nodes; flank: edges (element, local edge 0..2) of each tooth's working flank and tip edge."""
+    hub (k,) nodes; flank: edges (element, local edge 0..2) of each tooth's working flank and tip edge, and of
+    the fillet where that undercuts."""
 
     points: Array
     triangles: NDArray[np.int64]
@@ -138,7 +139,9 @@ def outline(shape: Profile, placed: Callable[[int], tuple[Array, Array]], turn: 
                 ends, middles = divide(curve, field)
                 corners.append(ends[:-1])
                 mids.append(middles)
-                working = not mirrored and name in ("involute", "edge")
+                # An undercut fillet turns away from the flank in a corner, about which the mate may bend.
+                touched = ("fillet", "involute", "edge") if shape.undercut else ("involute", "edge")
+                working = not mirrored and name in touched
                 flank.append(np.full(len(middles), j if working else NO_FLANK))
     return Outline(np.concatenate(corners), np.concatenate(mids), np.concatenate(flank))
 
