@@ -47,20 +47,27 @@ class Curves(NamedTuple):
 
 
 def edge_reach(slave: Tooth, master: Tooth, a: float, separation: float) -> float:
-    """Roll length at which the slave's tip edge has left the master's involute by `separation` or turned over."""
-    alpha = acos((slave.rb + master.rb) / a)
+    """Roll length to which the slave's tip edge is followed: there it has left the master's involute by `separation`,
+    has turned over, or its foot passes the beginning of the master's flank."""
     xi = slave.rho_end
     step = separation / 4
-    while True:
-        xi += step
-        c, s, reference = touching_point(slave, master, xi, a)
-        rho_m = a * sin(alpha) - xi
-        conjugate = rho_m - master.rb * alpha
-        left = reference - conjugate
-        _, foot = gap_to_master(slave, master, c, a, s)
-        turned = s >= slave.s_tip - 1e-12 and slave.edge_radius > 0
-        if left > separation or turned or foot**2 / (2 * master.rb) < master.s_form or rho_m <= step:
-            return xi - step
+    while step > separation / 1000:
+        if _follows(slave, master, a, xi + step, separation):
+            xi += step
+        else:
+            step /= 2
+    return xi
+
+
+def _follows(slave: Tooth, master: Tooth, a: float, xi: float, separation: float) -> bool:
+    """Whether contact of the slave's tip edge at this roll length still lies on both flanks."""
+    alpha = acos((slave.rb + master.rb) / a)
+    c, s, reference = touching_point(slave, master, xi, a)
+    rho_m = a * sin(alpha) - xi
+    left = reference - (rho_m - master.rb * alpha)
+    _, foot = gap_to_master(slave, master, c, a, s)
+    turned = s >= slave.s_tip - 1e-12 and slave.edge_radius > 0
+    return not (left > separation or turned or foot**2 / (2 * master.rb) < master.s_form or rho_m <= separation / 4)
 
 
 def tabulate(slave: Tooth, master: Tooth, ks: Kernel, km: Kernel, half_plane: float, a: float, reach: float) -> Curve:
