@@ -11,22 +11,40 @@ from gearbench.options import CaseArgument, JsonOption, SetOption, load_case, pr
 from gearbench.progress import Progress
 
 if TYPE_CHECKING:
-    from gearbench.rig import Rig
+    from gearbench.rig import Case, Rig
 
 
 def mesh(
     case: CaseArgument,
     out: Annotated[
-        Path, typer.Option("--out", help="file to write: .msh (gmsh), .vtu (ParaView), .dxf or .step (outlines, mm)")
+        Path,
+        typer.Option(
+            "--out",
+            help="file to write: .msh (gmsh), .vtu (ParaView), .inp (contact model for CalculiX, mm), .dxf or .step"
+            " (outlines, mm)",
+        ),
     ],
     gear: Annotated[
         Literal["both", "driver", "driven"], typer.Option("--gear", help="one gear in its own frame, or both")
     ] = "both",
+    phase: Annotated[float | None, typer.Option("--phase", help="mesh phase of the contact model; absent: 0")] = None,
+    torque_nm: Annotated[
+        float | None, typer.Option("--torque-nm", help="driver torque of the contact model; absent: the case's mean")
+    ] = None,
+    dte_um: Annotated[
+        float | None, typer.Option("--dte-um", help="its transmission error in um, instead of a torque")
+    ] = None,
     settings: SetOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Mesh the gears of a case and write the mesh, or draw their outlines, at mesh phase 0, to a file."""
+    """Mesh the gears of a case and write the mesh, or draw their outlines, at mesh phase 0, to a file.
+
+    To a file .inp it writes both gears in contact, for CalculiX to find the torque at a given transmission error.
+    """
     loaded = load_case(case, settings)
+    if out.suffix == ".inp":
+        _contact(loaded, case, out, phase or 0.0, torque_nm, dte_um, as_json)
+        return
     if out.suffix in (".dxf", ".step"):
         _draw(loaded.rig, out, gear, as_json)
         return
@@ -59,6 +77,38 @@ def mesh(
             f"{out}: {found.triangles} triangles, {found.nodes} nodes, smallest angle"
             f" {summary['smallest_angle_deg']:.1f} deg, smallest relative Jacobian {found.jacobian:.2f}"
         )
+
+
+def _contact(
+    case: Case, name: str, out: Path, phase: float, torque_nm: float | None, dte_um: float | None, as_json: bool
+) -> None:
+    """The contact model for CalculiX, and what it should find."""
+    from gearbench.bench.calculix import contact_model
+    from gearbench.geometry.calculix import write_deck
+
+    with Progress("mesh") as progress:
+        progress.step("contact")
+        dte = None if dte_um is None else 1e-6 * dte_um
+        model = contact_model(case, phase, dte=dte, torque=torque_nm, name=name)
+        progress.step("writing")
+        write_deck(out, model.deck)
+    summary = {
+        "file": str(out),
+        "nodes": sum(len(gear.mesh.points) for gear in model.deck.gears),
+        "mesh_phase": model.phase,
+        "dte_um": 1e6 * model.dte,
+        "expected_torque_driver_nm": model.torques[0],
+        "expected_torque_driven_nm": model.torques[1],
+        "tolerance_percent": model.tolerance,
+    }
+    if as_json:
+        print_json(summary)
+        return
+    typer.echo(
+        f"{out}: contact at mesh phase {model.phase:g}, DTE {summary['dte_um']:.6g} um, {summary['nodes']} nodes; ccx"
+        f" should find {model.torques[0]:.6g} N m at the driver and {model.torques[1]:.6g} N m at the driven gear,"
+        f" within {model.tolerance:g} % (how to read its result: the comment at the head of the file)"
+    )
 
 
 def _draw(rig: Rig, out: Path, which: str, as_json: bool) -> None:
