@@ -14,8 +14,8 @@ from gearbench.rig import Case, Gear, Rig
 
 def check_gears(rig: Rig) -> None:
     """Raise GeometryError for a pair that cannot run, for masses, and for flanks that no tooth can have: relief and
-    tables that miss the involute or are too deep, errors that jam the teeth, a grade that ISO 1328-1 has no tolerance
-    for."""
+    tables that miss the involute or are too deep, errors that jam the teeth, a crack that runs out of its tooth, a
+    grade that ISO 1328-1 has no tolerance for."""
     meshing = pair(rig)
     sides: tuple[tuple[str, Profile, Gear], ...] = (
         ("rig.driver", meshing.driver, rig.driver),
@@ -26,6 +26,11 @@ def check_gears(rig: Rig) -> None:
         body(shape, gear, rig.material.density, name)
         real.append(drawn_gear(gear, name))
         check_micro(shape, real[-1], name)
+        if gear.crack is not None and gear.crack.length:
+            # Imported on use: few gears have a crack.
+            from gearbench.geometry.crack import slit
+
+            slit(shape, gear, gear.crack, name)
     check_play(meshing.backlash_normal, (real[0], real[1]))
 
 

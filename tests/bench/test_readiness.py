@@ -63,6 +63,12 @@ def test_table_that_misses_the_flank_is_refused() -> None:
         check_case(case)
 
 
+def test_a_crack_that_runs_out_of_its_tooth_is_refused() -> None:
+    keys = "tooth = 0, length_mm = 30.0, direction_deg = 60.0"
+    with pytest.raises(GeometryError, match=r"rig\.driver\.crack\.length_mm = 30 .* less than"):
+        check_case(case_with(f"rig.driver.crack={{{keys}}}"))
+
+
 def test_grade_outside_the_standard_is_refused() -> None:
     gear: dict[str, Any] = {"module_mm": 0.4, "hub_radius_mm": 5, "thinning_um": 10, "bore_radius_mm": 0}
     both = [f"rig.{side}.{key}={value}" for side in ("driver", "driven") for key, value in gear.items()]
