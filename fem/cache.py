@@ -8,7 +8,7 @@ import os
 import tempfile
 import zipfile
 from collections.abc import Callable, Mapping
-from dataclasses import Field, fields
+from dataclasses import fields
 from functools import lru_cache
 from importlib.metadata import version
 from importlib.util import find_spec
@@ -19,6 +19,7 @@ import numpy as np
 
 from gearbench.fem.body import CondensedGear, condense, rounded
 from gearbench.fem.compiled import cache_folder
+from gearbench.fem.crack import CrackedTooth
 from gearbench.fem.law import Curve, Law, elastic_pair, make_law
 from gearbench.rig import Gear, Material, Rig, sound_gear
 from gearbench.rig.value import Value
@@ -77,12 +78,12 @@ def cached(key: str, make: Callable[[], Arrays]) -> Arrays:
 def stored_gear(gear: Gear, material: Material, element_size: float | None = None, modes: int = 8) -> CondensedGear:
     """`condense(...)`, from disk where it has been done before."""
     key = _gear_key(gear, material, element_size, modes)
-    arrays = cached(
-        key,
-        lambda: {f.name: np.asarray(v) for f, v in _fields(condense(gear, material, element_size, modes))},
-    )
+    arrays = cached(key, lambda: _arrays(condense(gear, material, element_size, modes)))
     scalars = {"teeth": int, "last": int, "unknowns": int, "face_width": float}
     values: dict[str, Any] = {name: scalars[name](v) if name in scalars else v for name, v in arrays.items()}
+    extra = values.pop("extra", None)
+    if extra is not None and gear.crack is not None:
+        values["crack"] = CrackedTooth(gear.crack.tooth, extra)
     return CondensedGear(**values)
 
 
@@ -91,7 +92,8 @@ def stored_law(
 ) -> Law:
     """`make_law(...)` of a rig's pair, its load-approach curves from disk where they have been solved before."""
     meshing = elastic_pair(rig)
-    parts = [_gear_key(g, rig.material, element_size, modes) for g in (rig.driver, rig.driven)]
+    # A crack adds to the flexibility beside the curves of sound teeth.
+    parts = [_gear_key(sound_gear(g), rig.material, element_size, modes) for g in (rig.driver, rig.driven)]
     key = key_for("law", {"driver": parts[0], "driven": parts[1], "centre": meshing.centre_distance})
     made: list[Law] = []
     real = (rig.driver, rig.driven)
@@ -113,11 +115,16 @@ def stored_law(
     return make_law(meshing, *gears, rig.material, curves=(curve(0), curve(1)), gears=real)
 
 
-def _fields(gear: CondensedGear) -> list[tuple[Field[Any], Any]]:
-    return [(f, getattr(gear, f.name)) for f in fields(gear)]
+def _arrays(gear: CondensedGear) -> Arrays:
+    """What is stored of a condensed gear."""
+    arrays = {f.name: np.asarray(getattr(gear, f.name)) for f in fields(gear) if f.name != "crack"}
+    return arrays if gear.crack is None else arrays | {"extra": gear.crack.extra}
 
 
 def _gear_key(gear: Gear, material: Material, element_size: float | None, modes: int) -> str:
-    """Cache entry of a condensed gear; totals of mass and inertia and tooth errors do not enter the condensation."""
+    """Cache entry of a condensed gear; totals of mass and inertia, tooth errors and the number of a cracked tooth do
+    not enter the condensation."""
     bare = sound_gear(rounded(gear)).model_copy(update={"mass": None, "inertia": None, "bore_radius": 0.0})
+    if gear.crack is not None and gear.crack.meshed:
+        bare = bare.model_copy(update={"crack": gear.crack.model_copy(update={"tooth": 0})})
     return key_for("gear", {"gear": bare, "material": material, "element_size": element_size, "modes": modes})

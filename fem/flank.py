@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,12 +37,12 @@ class BoundaryQuadrature:
 
 
 def boundary_quadrature(
-    shape: Profile, points: Array, triangles: Indices, edges: Indices, order: int = 8
+    shape: Profile, points: Array, triangles: Indices, edges: Indices, order: int = 8, sides: Sequence[int] = (0,)
 ) -> BoundaryQuadrature:
     """Gauss quadrature of `order` points on curved boundary edges (k, 3): corner, corner, middle node.
 
-    On the working flank, which carries the loads, points and normals are those of the exact profile: the isoparametric
-    boundary has kinks at its nodes, which a load beside one would see.
+    On the flanks that carry the loads (`sides`, 0: working, 1: back) points and normals are those of the exact profile:
+    the isoparametric boundary has kinks at its nodes, which a load beside one would see.
     """
     xi, weight = np.polynomial.legendre.leggauss(order)
     xi, weight = (xi + 1) / 2, weight / 2
@@ -53,11 +54,13 @@ def boundary_quadrature(
     centre = points[triangles[[owner[int(m)] for m in edges[:, 2]]][:, :3]].mean(axis=1)
     outward = np.sign(np.sum((points[edges[:, 2]] - centre) * normal[:, order // 2], axis=1))
     normal *= outward[:, None, None]
-    coordinate = flank_coordinate(shape, points)[edges]
-    flank = ~np.isnan(coordinate).any(axis=1)
-    s = np.einsum("qa,ka->kq", _shape(xi), coordinate[flank])
-    x[flank], normal[flank] = shape.points(s), shape.normals(s)
-    length[flank] = np.abs(np.einsum("qa,ka->kq", _slope(xi), coordinate[flank]))
+    for side in sides:
+        mirror = MIRROR if side else np.ones(2)
+        coordinate = flank_coordinate(shape, points * mirror)[edges]
+        flank = ~np.isnan(coordinate).any(axis=1)
+        s = np.einsum("qa,ka->kq", _shape(xi), coordinate[flank])
+        x[flank], normal[flank] = shape.points(s) * mirror, shape.normals(s) * mirror
+        length[flank] = np.abs(np.einsum("qa,ka->kq", _slope(xi), coordinate[flank]))
     k, n_q = len(edges), len(edges) * order
     rows, cols, data = [], [], []
     for a in range(3):

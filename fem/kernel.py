@@ -28,6 +28,8 @@ class Kernel(NamedTuple):
     kink between the pieces and are never interpolated across it.
     front, back: (2 reach + 1, n, n) as in `CondensedGear`, divided by the face width; width [m];
     modes_front, modes_back: (modes, teeth, n) modal displacement along the inward normal [kg^-1/2].
+    extra: what a crack adds, as in `CrackedTooth`, divided by the face width; no rows where all teeth are sound.
+    cracked: the cracked tooth's number, counter-clockwise.
     """
 
     front: Array
@@ -39,10 +41,15 @@ class Kernel(NamedTuple):
     width: float
     modes_front: Array
     modes_back: Array
+    extra: Array
+    cracked: int
 
 
-def make_kernel(gear: CondensedGear) -> Kernel:
-    """Resample a condensed gear's kernels by splines, piece by piece."""
+def make_kernel(gear: CondensedGear, order: int = 1) -> Kernel:
+    """Resample a condensed gear's kernels by splines, piece by piece.
+
+    order: 1 where the teeth of the case are numbered counter-clockwise, -1 where clockwise.
+    """
     s_end, s_tip = float(gear.s[gear.last]), float(gear.s[-1])
     arc_from = np.arange(gear.last, len(gear.s))
     flank_from = np.arange(gear.last, -1, -1)
@@ -75,6 +82,13 @@ def make_kernel(gear: CondensedGear) -> Kernel:
             return np.zeros((0, gear.teeth, POINTS))
         return np.concatenate([make_interp_spline(x, table[:, :, i], k=3, axis=2)(t) for i, x, t in pieces], axis=2)
 
+    def resample_crack(table: Array) -> Array:
+        splines = np.zeros((POINTS, len(gear.s)))
+        rows = np.split(np.arange(POINTS), [ARC_POINTS])
+        for to, (i, x, t) in zip(rows, pieces, strict=True):
+            splines[np.ix_(to, i)] += make_interp_spline(x, np.eye(len(i)), k=3)(t)
+        return np.ascontiguousarray(splines @ table @ splines.T / gear.face_width)
+
     return Kernel(
         resample(gear.front),
         resample(gear.back),
@@ -85,6 +99,8 @@ def make_kernel(gear: CondensedGear) -> Kernel:
         gear.face_width,
         resample_modes(gear.mode_front),
         resample_modes(gear.mode_back),
+        resample_crack(gear.crack.extra) if gear.crack else np.zeros((0, 0, 2, 2, 0, 0)),
+        (order * gear.crack.tooth) % gear.teeth if gear.crack else -1,
     )
 
 
@@ -149,3 +165,17 @@ def cross_flexibility(kernel: Kernel, side_load: int, x_load: float, side: int, 
     if side == side_load:
         return table_at(kernel.front[m + kernel.reach], x_load, x)
     return table_at(kernel.back[m + kernel.reach], x_load, x)
+
+
+@compiled
+def crack_flexibility(kernel: Kernel, side_load: int, load: int, x_load: float, side: int, tooth: int, x: float):
+    """What a crack adds to the inward displacement at grid position x of one flank per total force at x_load on
+    another, or on the same one [m/N]; teeth `load` and `tooth` by their numbers counter-clockwise."""
+    reach = len(kernel.extra) // 2
+    teeth = kernel.modes_front.shape[1]
+    # Teeth from the cracked one, to whichever side is nearer.
+    a = (load - kernel.cracked + teeth // 2) % teeth - teeth // 2
+    b = (tooth - kernel.cracked + teeth // 2) % teeth - teeth // 2
+    if kernel.cracked < 0 or abs(a) > reach or abs(b) > reach:
+        return 0.0
+    return table_at(kernel.extra[a + reach, b + reach, side_load, side], x_load, x)

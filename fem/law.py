@@ -13,7 +13,7 @@ from gearbench.fem.compiled import compiled
 from gearbench.fem.curve import EDGE_SEPARATION, LOAD_RANGE, Curve, Curves, edge_reach, lone_approach, tabulate
 from gearbench.fem.deviation import Flanks, deviate, flanks_of, ideal_flanks
 from gearbench.fem.elasticity import plane_moduli
-from gearbench.fem.kernel import Kernel, cross_flexibility, grid_position, make_kernel
+from gearbench.fem.kernel import Kernel, crack_flexibility, cross_flexibility, grid_position, make_kernel
 from gearbench.fem.kinematics import Contact, Tooth, pair_contact, teeth_of
 from gearbench.fem.small import eliminate
 from gearbench.geometry.iso1328 import drawn_gear
@@ -71,7 +71,8 @@ def make_law(
     half_plane = 4.0 / (pi * moduli.modulus * min(driver.face_width, driven.face_width))
     a = meshing.centre_distance
     approach_max = EDGE_SEPARATION * meshing.driver.module
-    k1, k2 = make_kernel(driver), make_kernel(driven)
+    # The driver's teeth are numbered clockwise, against its rotation.
+    k1, k2 = make_kernel(driver, -1), make_kernel(driven)
     reach1, reach2 = (edge_reach(t1, t2, a, approach_max), edge_reach(t2, t1, a, approach_max))
     if curves is None:
         curves = (tabulate(t1, t2, k1, k2, half_plane, a, reach1), tabulate(t2, t1, k2, k1, half_plane, a, reach2))
@@ -87,7 +88,7 @@ def make_law(
 
 def _deviations(meshing: Pair, gears: tuple[Gear, Gear] | None, reach1: float, reach2: float) -> tuple[Flanks, Flanks]:
     """What the flanks of driver and driven gear have too much. Raises GeometryError."""
-    if gears is None or all(gear == sound_gear(gear) for gear in gears):
+    if gears is None or all(gear.model_copy(update={"crack": None}) == sound_gear(gear) for gear in gears):
         return ideal_flanks(meshing.driver.teeth), ideal_flanks(meshing.driven.teeth)
     line = meshing.line_of_action
     found = []
@@ -182,22 +183,26 @@ def overlaps(found: Array, n: int) -> Array:
 
 @compiled
 def coupling(law: Law, sides, teeth, found: Array, n: int) -> Array:
-    """Approach at pair p per force on pair q [m/N]; zero diagonal (that is the pair's own curve)."""
+    """Approach at pair p per force on pair q [m/N]; on the diagonal, besides the pair's own curve, only what a crack
+    adds."""
     x1, x2 = np.empty(n), np.empty(n)
+    tooth1, tooth2 = np.empty(n, np.int64), np.empty(n, np.int64)
     for p in range(n):
         k = contact_in(found, p)
         x1[p], x2[p] = grid_position(law.k1, k.s1), grid_position(law.k2, k.s2)
+        # Counter-clockwise: the driver's numbers run clockwise; back pairs join driven tooth number + 1.
+        tooth1[p], tooth2[p] = -teeth[p], teeth[p] + sides[p]
     out = np.zeros((n, n))
     for p in range(n):
         for q in range(n):
-            if p == q:
-                continue
-            # Teeth counter-clockwise from the loaded one: the driver's numbers run clockwise, the driven gear's
-            # counter-clockwise, and back pairs join driven tooth number + 1.
-            apart1 = -(teeth[p] - teeth[q])
-            apart2 = teeth[p] + sides[p] - teeth[q] - sides[q]
-            out[p, q] = cross_flexibility(law.k1, sides[q], x1[q], sides[p], x1[p], apart1)
-            out[p, q] += cross_flexibility(law.k2, sides[q], x2[q], sides[p], x2[p], apart2)
+            if p != q:
+                apart1, apart2 = tooth1[p] - tooth1[q], tooth2[p] - tooth2[q]
+                out[p, q] = cross_flexibility(law.k1, sides[q], x1[q], sides[p], x1[p], apart1)
+                out[p, q] += cross_flexibility(law.k2, sides[q], x2[q], sides[p], x2[p], apart2)
+            if law.k1.cracked >= 0:
+                out[p, q] += crack_flexibility(law.k1, sides[q], tooth1[q], x1[q], sides[p], tooth1[p], x1[p])
+            if law.k2.cracked >= 0:
+                out[p, q] += crack_flexibility(law.k2, sides[q], tooth2[q], x2[q], sides[p], tooth2[p], x2[p])
     return out
 
 

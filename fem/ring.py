@@ -1,13 +1,15 @@
 """A gear as a ring of identical tooth sectors, each in the frame of its own tooth, tied to a rigid hub.
 
 Every sector is condensed once to its two radial cuts; the ring of cuts is block-circulant and solved by a discrete
-Fourier transform over the teeth. The result is that of the full gear's mesh, to rounding.
+Fourier transform over the teeth. One sector may differ from the others: it changes the ring by a matrix of low rank.
+The result is that of the full gear's mesh, to rounding.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from math import pi
 from typing import Protocol
 
@@ -72,6 +74,11 @@ class Ring:
         """Unknowns of both cuts, the lower one first."""
         return np.concatenate([self.low, self.high])
 
+    @cached_property
+    def hub_stiffness(self) -> tuple[csr_matrix, csr_matrix]:
+        """Stiffness between inner unknowns and hub, and between cuts and hub."""
+        return self.stiffness[self.inner][:, self.hub], self.stiffness[self.cuts][:, self.hub]
+
     @property
     def turn(self) -> Array:
         """Block rotation that takes a cut's displacement from the next sector's frame to this one's."""
@@ -106,25 +113,67 @@ def ring_response(ring: Ring, forces: SectorField, hub: SectorField, wanted: Ind
     forces(j): (unknowns of a sector, loads); hub(j): (hub unknowns, loads); both in sector j's own frame.
     Returns (len(wanted), unknowns of a sector, loads).
     """
-    k = ring.stiffness
-    cuts, inner = ring.cuts, ring.inner
-    k_ih, k_ch = k[inner][:, ring.hub], k[cuts][:, ring.hub]
     kept: dict[int, tuple[Array, Array]] = {}
     f_cut = []
     for j in range(ring.teeth):
         f, u_hub = forces(j), hub(j)
-        f_inner = f[inner] - k_ih @ u_hub
-        f_cut.append(f[cuts] - k_ch @ u_hub - ring.constraint_modes.T @ f_inner)
+        on_cuts, f_inner = to_cuts(ring, f, u_hub)
+        f_cut.append(on_cuts)
         if j in wanted:
             kept[j] = (f_inner, u_hub)
     u_cut = _solve_cuts(ring, np.array(f_cut))
-    out = np.zeros((len(wanted), k.shape[0], u_cut.shape[2]))
+    out = np.zeros((len(wanted), ring.stiffness.shape[0], u_cut.shape[2]))
     for n, j in enumerate(wanted):
         f_inner, u_hub = kept[int(j)]
-        out[n][ring.hub] = u_hub
-        out[n][cuts] = u_cut[j]
-        out[n][inner] = ring.solve_inner(f_inner) - ring.constraint_modes @ u_cut[j]
+        out[n] = from_cuts(ring, u_cut[j], f_inner, u_hub)
     return out
+
+
+def to_cuts(sector: Ring, forces: Array, hub: Array) -> tuple[Array, Array]:
+    """Forces (unknowns, loads) and hub displacements of one sector, condensed to its cuts; and what of them acts on its
+    inner unknowns."""
+    inner_hub, cuts_hub = sector.hub_stiffness
+    f_inner = forces[sector.inner] - inner_hub @ hub
+    return forces[sector.cuts] - cuts_hub @ hub - sector.constraint_modes.T @ f_inner, f_inner
+
+
+def from_cuts(sector: Ring, u_cut: Array, f_inner: Array, hub: Array) -> Array:
+    """Displacements (unknowns, loads) of one sector from those of its cuts."""
+    out = np.zeros((sector.stiffness.shape[0], u_cut.shape[1]))
+    out[sector.hub] = hub
+    out[sector.cuts] = u_cut
+    out[sector.inner] = sector.solve_inner(f_inner) - sector.constraint_modes @ u_cut
+    return out
+
+
+def cut_influence(ring: Ring) -> Array:
+    """Displacements (teeth, cut unknowns, cut unknowns) of all cuts under unit forces on those of sector 0."""
+    size = len(ring.cuts)
+    forces = np.zeros((ring.teeth, size, size))
+    forces[0] = np.eye(size)
+    return _solve_cuts(ring, forces)
+
+
+def odd_sector_forces(ring: Ring, odd: Ring, influence: Array, moved: Array) -> Array:
+    """What the cuts of sector 0 must be loaded with besides, for the ring to move as if that sector were `odd`.
+
+    odd: a sector that fits into the ring, condensed by `make_ring`; influence: `cut_influence`; moved (cut unknowns,
+    loads): those cuts' displacements without. With D the difference of both condensed stiffnesses and B the influence
+    on the cuts themselves, g = -D (u + B g) (Sherman, Morrison and Woodbury), which is exact.
+    """
+    change = odd.cut_stiffness - ring.cut_stiffness
+    return -np.linalg.solve(np.eye(len(change)) + change @ influence[0], change @ moved)
+
+
+def odd_ring_response(ring: Ring, odd: Ring, forces: SectorField, hub: SectorField, wanted: Indices) -> list[Array]:
+    """`ring_response` of a ring whose sector 0 is `odd`, with unknowns of its own."""
+    sectors = [odd, *[ring] * (ring.teeth - 1)]
+    moved = [hub(j) for j in range(ring.teeth)]
+    pairs = [to_cuts(sector, forces(j), moved[j]) for j, sector in enumerate(sectors)]
+    u_cut = _solve_cuts(ring, np.array([on_cuts for on_cuts, _ in pairs]))
+    influence = cut_influence(ring)
+    u_cut = u_cut + influence @ odd_sector_forces(ring, odd, influence, u_cut[0])
+    return [from_cuts(sectors[j], u_cut[j], pairs[j][1], moved[j]) for j in wanted]
 
 
 def _solve_cuts(ring: Ring, f_cut: Array) -> Array:

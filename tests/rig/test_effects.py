@@ -169,7 +169,7 @@ def test_standard_deviations_of_new_numbers() -> None:
         ("rig.driver.crack={tooth = -1, stiffness_loss = 0.1}", ["rig.driver.crack.tooth = -1", "at least 0"]),
         ("rig.driver.crack={tooth = 1.5, stiffness_loss = 0.1}", ["rig.driver.crack.tooth = 1.5", "whole number"]),
         ("rig.driver.crack={tooth = 1, stiffness_loss = 0.96}", ["stiffness_loss = 0.96", "at most 0.95"]),
-        (SLIT.replace("direction_deg = 60", "stiffness_loss = 0.1"), ["direction_deg is missing", "length_mm is given"]),
+        (SLIT.replace("direction_deg = 60", "stiffness_loss = 0.1"), ["direction_deg is missing", "length_mm"]),
         (SLIT.replace("length_mm = 0.8, ", ""), ["length_mm is missing", "direction_deg is given"]),
         (SLIT.replace("}", ", stiffness_loss = 0.1}"), ["stiffness_loss = 0.1", "length_mm = 0.8", "one of them"]),
         (SLIT.replace("= 60", "= 151"), ["rig.driver.crack.direction_deg = 151", "at most 150"]),
