@@ -40,7 +40,7 @@ for command in (run, simulate, static, identify, compare, diagnose, check, mesh,
 app.add_typer(challenge)
 
 # Options that take several numbers in a row.
-_LISTS = ("--torque-nm", "--dte-um")
+_LISTS = ("--torque-nm", "--dte-um", "--fields")
 
 
 def _print_version(wanted: bool) -> None:

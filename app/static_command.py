@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
 from gearbench.options import CaseArgument, JsonOption, SetOption, check_out, check_picture, load_case, print_json
 from gearbench.progress import Progress
+from gearbench.stress_output import field_files, field_phases, write_all
+from gearbench.stress_text import root_lines, root_tables
+
+if TYPE_CHECKING:
+    from gearbench.rig import Case
 
 
 def static(
@@ -28,6 +33,18 @@ def static(
     stiffness_figure: Annotated[
         Path | None, typer.Option("--stiffness-figure", help="picture of the mesh stiffness by every method as well")
     ] = None,
+    fields: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--fields",
+            metavar="PHASE",
+            help="mesh phases at which stress and displacement under the largest load are written beside --out as .vtu"
+            " and .png",
+        ),
+    ] = None,
+    root_figure: Annotated[
+        Path | None, typer.Option("--root-figure", help="picture of the root stress over the mesh cycle as well")
+    ] = None,
     model: Annotated[
         Literal["lumped", "reduced"] | None,
         typer.Option("--model", help="absent: the case's simulation.model"),
@@ -38,10 +55,14 @@ def static(
     """Static response of the pair over one mesh cycle, hub centres held."""
     loaded = load_case(case, settings)
     check_out(out, [case])
-    if figure is not None:
-        check_picture(figure, [case, out])
-    if stiffness_figure is not None:
-        check_picture(stiffness_figure, [case, out, *([figure] if figure else [])], "--stiffness-figure")
+    pictures = {"--figure": figure, "--stiffness-figure": stiffness_figure, "--root-figure": root_figure}
+    others: list[Path | str] = [case, out]
+    for option, picture in pictures.items():
+        if picture is not None:
+            check_picture(picture, others, option)
+            others.append(picture)
+    elastic = (model or loaded.simulation.model) == "reduced"
+    files = _check_stress(loaded, elastic, out, fields or [], root_figure, others)
     from gearbench.bench.static import static as solve
     from gearbench.records.storage import write_atomically
 
@@ -56,23 +77,73 @@ def static(
             cycles=cycles,
             progress=progress,
         )
+        if elastic:
+            progress.step("root stress")
+            result = _with_root_stress(loaded, result)
         write_atomically(out, lambda path: result.to_netcdf(path, engine="h5netcdf"))
         if figure is not None:
             progress.step("figure")
             from gearbench.figures_static import plot_static
 
             plot_static(result, figure)
+        written = _stress_files(loaded, result, files, root_figure, progress)
     from gearbench.static_methods import draw_largest, methods_data, methods_lines, stiffness_tables
 
     tables = stiffness_tables(loaded, result)
     if stiffness_figure is not None:
         draw_largest(tables, stiffness_figure)
+    roots = root_tables(loaded, result)
     summary = static_summary(result, out) | methods_data(loaded, tables)
+    summary |= {"root_stress": roots, "field_files": [str(path) for path in written]}
     if as_json:
         print_json(summary)
         return
-    for line in [*_lines(summary), *methods_lines(loaded, tables), str(out)]:
+    lines = [*_lines(summary), *methods_lines(loaded, tables)]
+    if roots:
+        lines += root_lines(max(roots, key=lambda one: float(one["torque_nm"])))
+    for line in [*lines, str(out), *map(str, written)]:
         typer.echo(line)
+
+
+def _check_stress(
+    case: Case, elastic: bool, out: Path, fields: list[str], root_figure: Path | None, others: list[Path | str]
+) -> list[tuple[float, Path, Path]]:
+    """The files of `--fields`; refuses what has no stress, before any work is done."""
+    from gearbench.failure import InputError
+
+    for option, wanted in (("--fields", bool(fields)), ("--root-figure", root_figure is not None)):
+        if wanted and not elastic:
+            raise InputError(f"{option} needs finite elements, not the lumped model: --model reduced")
+    files = field_files(out, field_phases(fields), others)
+    if files:
+        from gearbench.bench.stress_fields import refuse_cracks
+
+        refuse_cracks(case.rig)
+    return files
+
+
+def _with_root_stress(case: Case, result: Any) -> Any:
+    """The static result with the stress of the tooth roots."""
+    from gearbench.bench.reduced_rig import elastic_rig
+    from gearbench.bench.stress_root import with_root_stress
+
+    return with_root_stress(elastic_rig(case.rig, case.simulation), result, case.simulation.element_size)
+
+
+def _stress_files(
+    case: Case, result: Any, files: list[tuple[float, Path, Path]], root_figure: Path | None, progress: Progress
+) -> list[Path]:
+    """Write fields and the picture of root stress where asked for; the fields' files."""
+    if root_figure is not None:
+        from gearbench.failure import InputError
+        from gearbench.figures_stress import plot_root_stress
+
+        if "root_stress_note" in result.attrs:
+            raise InputError(f"--root-figure cannot be drawn: {result.attrs['root_stress_note']}")
+        (largest,) = sorted(root_tables(case, result), key=lambda one: float(one["torque_nm"]))[-1:]
+        iso = {name: gear["sigma_f0_mpa"] for name, gear in largest["gears"].items() if gear["sigma_f0_mpa"]}
+        plot_root_stress(result, root_figure, iso)
+    return write_all(case, result, files, progress) if files else []
 
 
 def _lines(summary: dict[str, Any]) -> list[str]:
