@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 GEARS = ("driver", "driven")
 DIFFERENCES = (
     "finite elements: largest tension of the true fillet, wherever it is; force shared as by the static solution",
-    "sigma_F0: bending at the 30 degree tangent times Y_S; whole force at the outer point of single contact; no factors",
+    "sigma_F0: bending at the 30 degree tangent times Y_S, without factors K; whole force at the outer point",
 )
 
 
