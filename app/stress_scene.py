@@ -74,7 +74,7 @@ def render_fields(fields: PairFields, module: float, path: Path) -> None:
         span = (0.0, top) if column == 0 else (-0.2 * top, top)
         scene.add_mesh(grid, scalars=name, cmap="turbo", clim=span, n_colors=64, lighting=False, scalar_bar_args=bar)
         title = f"von Mises stress, {heading(fields)}" if column == 0 else "largest principal stress"
-        scene.add_text(title, font_size=11, color="black", position=(10, 815))
+        scene.add_text(title, font_size=11, color="white", shadow=True, position=(10, 815))
         scene.set_background("white")
         scene.view_xy()
         scene.enable_parallel_projection()
