@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from gearbench.mesh_report import DEFAULT_LAYERS, check_mesh_options, mesh_report, report_line
 from gearbench.options import CaseArgument, JsonOption, SetOption, load_case, print_json
 from gearbench.progress import Progress
 
@@ -20,13 +21,20 @@ def mesh(
         Path,
         typer.Option(
             "--out",
-            help="file to write: .msh (gmsh), .vtu (ParaView), .inp (contact model for CalculiX, mm), .dxf or .step"
-            " (outlines, mm)",
+            help="file to write: .msh (gmsh), .vtu (ParaView), .inp (CalculiX, mm: the pair in contact or, with"
+            " --dimension 3, elements), .dxf or .step (outlines, mm)",
         ),
     ],
     gear: Annotated[
         Literal["both", "driver", "driven"], typer.Option("--gear", help="one gear in its own frame, or both")
     ] = "both",
+    element: Annotated[
+        Literal["triangle", "quadrilateral"], typer.Option("--element", help="kind of the plane elements")
+    ] = "triangle",
+    dimension: Annotated[
+        int, typer.Option("--dimension", help="2, or 3: swept over the face width to wedges or hexahedra")
+    ] = 2,
+    layers: Annotated[int | None, typer.Option("--layers", help="layers over the face width; absent: 8")] = None,
     phase: Annotated[float | None, typer.Option("--phase", help="mesh phase of the contact model; absent: 0")] = None,
     torque_nm: Annotated[
         float | None, typer.Option("--torque-nm", help="driver torque of the contact model; absent: the case's mean")
@@ -42,41 +50,45 @@ def mesh(
     To a file .inp it writes both gears in contact, for CalculiX to find the torque at a given transmission error.
     """
     loaded = load_case(case, settings)
-    if out.suffix == ".inp":
+    contact = {"--phase": phase, "--torque-nm": torque_nm, "--dte-um": dte_um}
+    check_mesh_options(out, dimension=dimension, layers=layers, element=element, gear=gear, contact=contact)
+    if out.suffix == ".inp" and dimension == 2:
         _contact(loaded, case, out, phase or 0.0, torque_nm, dte_um, as_json)
         return
     if out.suffix in (".dxf", ".step"):
         _draw(loaded.rig, out, gear, as_json)
         return
-    from gearbench.geometry import mesh_pair, pair, quality, write_mesh
-    from gearbench.geometry.export import gear_plane, mesh_gear
-
-    size = loaded.simulation.element_size
-    with Progress("mesh") as progress:
-        progress.step("meshing")
-        if gear == "both":
-            plane = mesh_pair(loaded.rig, size)
-        else:
-            meshing = pair(loaded.rig)
-            tooth, body = getattr(meshing, gear), getattr(loaded.rig, gear)
-            plane = gear_plane(mesh_gear(tooth, body, size), ("driver", "driven").index(gear))
-        progress.step("writing")
-        write_mesh(out, plane)
-        found = quality(plane.points, plane.triangles)
-    summary = {
-        "file": str(out),
-        "triangles": found.triangles,
-        "nodes": found.nodes,
-        "smallest_angle_deg": found.angle * 57.29577951308232,
-        "smallest_relative_jacobian": found.jacobian,
-    }
+    summary = _write_elements(loaded, out, gear, element, layers or DEFAULT_LAYERS if dimension == 3 else None)
     if as_json:
         print_json(summary)
     else:
-        typer.echo(
-            f"{out}: {found.triangles} triangles, {found.nodes} nodes, smallest angle"
-            f" {summary['smallest_angle_deg']:.1f} deg, smallest relative Jacobian {found.jacobian:.2f}"
-        )
+        typer.echo(report_line(summary))
+
+
+def _write_elements(
+    case: Case,
+    out: Path,
+    gear: Literal["both", "driver", "driven"],
+    element: Literal["triangle", "quadrilateral"],
+    layers: int | None,
+) -> dict[str, Any]:
+    """The elements of one gear or both, swept if there are layers; a summary."""
+    from gearbench.geometry import mesh_pair, pair, write_mesh
+    from gearbench.geometry.export import gear_plane, mesh_gear, sweep_plane
+
+    rig, size = case.rig, case.simulation.element_size
+    with Progress("mesh") as progress:
+        progress.step("meshing")
+        if gear == "both":
+            plane = mesh_pair(rig, size, element)
+        else:
+            tooth, body = getattr(pair(rig), gear), getattr(rig, gear)
+            plane = gear_plane(mesh_gear(tooth, body, size, element), ("driver", "driven").index(gear))
+        widths = rig.driver.face_width, rig.driven.face_width
+        solid = None if layers is None else sweep_plane(plane, widths, layers)
+        progress.step("writing")
+        write_mesh(out, solid or plane)
+        return {"file": str(out)} | mesh_report(plane, solid)
 
 
 def _contact(

@@ -104,7 +104,8 @@ def contact_model(
         raise BenchError("the contact model takes a torque or a transmission error: give one")
     for key, value, unit in (("transmission error", dte, "m"), ("torque", torque, "N m"), ("mesh phase", phase, "")):
         if value is not None and not (np.isfinite(value) and (value > 0 or not unit)):
-            raise BenchError(f"{key} = {value:g} {unit} must be {'greater than 0' if unit else 'a number'}")
+            limit = f"greater than 0 {unit}" if unit else "a number"
+            raise BenchError(f"{f'{key} = {value:g} {unit}'.rstrip()} must be {limit}")
     elastic = elastic_rig(case.rig, case.simulation)
     if dte is None:
         wanted = case.experiment.torque_mean if torque is None else torque

@@ -76,6 +76,11 @@ class GearMesh:
     boundary_edges: Index
     node_of: Index
 
+    @property
+    def cells(self) -> Index:
+        """The elements, whatever their kind."""
+        return self.triangles
+
 
 def sector_mesh(gear_profile: Profile, gear: Gear, element_size: float | None = None) -> SectorMesh:
     """Mesh one tooth sector. `element_size` [m] on flanks and fillets; default module/12.
@@ -278,12 +283,7 @@ def full_mesh(sector: SectorMesh, teeth: int | None = None) -> GearMesh:
     z = sector.teeth if teeth is None else teeth
     if z != sector.teeth:
         raise GeometryError(f"teeth = {z} cannot be made of sectors of a gear with {sector.teeth} teeth")
-    n = len(sector.points)
-    kept = np.setdiff1d(np.arange(n), sector.cut_high)
-    node_of = np.empty((z, n), dtype=np.int64)
-    node_of[:, kept] = np.arange(z)[:, None] * len(kept) + np.arange(len(kept))
-    node_of[:, sector.cut_high] = np.roll(node_of[:, sector.cut_low], -1, axis=0)
-    points = np.concatenate([sector.points[kept] @ _rotation(2 * pi * k / z).T for k in range(z)])
+    points, node_of = repeated(z, sector.points, sector.cut_low, sector.cut_high)
     return GearMesh(
         teeth=z,
         points=points,
@@ -292,3 +292,13 @@ def full_mesh(sector: SectorMesh, teeth: int | None = None) -> GearMesh:
         boundary_edges=node_of[:, sector.boundary_edges].reshape(-1, 3),
         node_of=node_of,
     )
+
+
+def repeated(teeth: int, points: Array, cut_low: Index, cut_high: Index) -> tuple[Array, Index]:
+    """A sector's nodes turned to every tooth, those of the cuts once, and their numbers (teeth, nodes)."""
+    n = len(points)
+    kept = np.setdiff1d(np.arange(n), cut_high)
+    node_of = np.empty((teeth, n), dtype=np.int64)
+    node_of[:, kept] = np.arange(teeth)[:, None] * len(kept) + np.arange(len(kept))
+    node_of[:, cut_high] = np.roll(node_of[:, cut_low], -1, axis=0)
+    return np.concatenate([points[kept] @ _rotation(2 * pi * k / teeth).T for k in range(teeth)]), node_of

@@ -85,3 +85,58 @@ def _growth(triangles: Index, area: Array) -> float:
     shared = np.flatnonzero(np.diff(middle[order]) == 0)
     ratio = np.sqrt(area[owner[shared]] / area[owner[shared + 1]])
     return float(np.maximum(ratio, 1 / ratio).max(initial=1.0))
+
+
+# The determinant of a nine-node quadrilateral is a polynomial of degree three in each reference coordinate: its
+# Bernstein coefficients, from values at four even steps, bound it.
+_STEPS = np.linspace(0.0, 1.0, 4)
+_BERNSTEIN = np.linalg.inv(
+    np.stack([comb * _STEPS**j * (1 - _STEPS) ** (3 - j) for j, comb in enumerate((1, 3, 3, 1))], axis=1)
+)
+# Reference coordinates of the nodes, in halves.
+_PLACES = np.array([[0, 0], [2, 0], [2, 2], [0, 2], [1, 0], [2, 1], [1, 2], [0, 1], [1, 1]])
+
+
+@dataclass(frozen=True)
+class QuadQuality:
+    """Measured on every quadrilateral; the worst is kept. `jacobian`: lower bound of the map's determinant over the
+    element, relative to its area (1: parallelogram; <= 0: folded). `angle`, `widest`: smallest and largest corner angle
+    of the straight-sided quadrilateral [rad]."""
+
+    quads: int
+    nodes: int
+    jacobian: float
+    angle: float
+    widest: float
+    area: float
+
+
+def quad_determinants(points: Array, quads: Index, at: Array) -> Array:
+    """Determinants (m, n, n) of the map of each quadrilateral (m, 9) of the unit square at all pairs of `at` (n,)."""
+    value = np.stack(((1 - at) * (1 - 2 * at), 4 * at * (1 - at), at * (2 * at - 1)), axis=1)
+    slope = np.stack((4 * at - 3, 4 - 8 * at, 4 * at - 1), axis=1)
+    x, y = _PLACES.T
+    nodes = points[quads]
+    along = np.einsum("ik,jk,mkc->mijc", slope[:, x], value[:, y], nodes)
+    across = np.einsum("ik,jk,mkc->mijc", value[:, x], slope[:, y], nodes)
+    return along[..., 0] * across[..., 1] - along[..., 1] * across[..., 0]
+
+
+def quad_quality(points: Array, quads: Index) -> QuadQuality:
+    """Measure a mesh of quadrilaterals: points (n, 2), quads (m, 9)."""
+    at, weight = np.polynomial.legendre.leggauss(3)
+    weight = weight / 2
+    area = np.einsum("mij,i,j->m", quad_determinants(points, quads, (at + 1) / 2), weight, weight)
+    bound = np.einsum("ai,bj,mij->mab", _BERNSTEIN, _BERNSTEIN, quad_determinants(points, quads, _STEPS))
+    corners = points[quads[:, :4]]
+    ahead, back = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
+    cross = ahead[..., 0] * back[..., 1] - ahead[..., 1] * back[..., 0]
+    angles = np.arctan2(cross, np.sum(ahead * back, axis=2)) % (2 * np.pi)
+    return QuadQuality(
+        quads=len(quads),
+        nodes=len(np.unique(quads)),
+        jacobian=float((bound.min(axis=(1, 2)) / area).min()),
+        angle=float(angles.min()),
+        widest=float(angles.max()),
+        area=float(area.sum()),
+    )

@@ -56,7 +56,7 @@ def test_gmsh_itself_reads_the_file(tmp_path: Path, tiny: PlaneMesh) -> None:
 def test_refusals_leave_nothing_behind(
     tmp_path: Path, tiny: PlaneMesh, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    with pytest.raises(GeometryError, match=r"^out = gear\.stl has no known .* \.msh, \.vtu, \.dxf or \.step$"):
+    with pytest.raises(GeometryError, match=r"^out = gear\.stl has no known .* \.msh, \.vtu, \.inp, \.dxf or \.step$"):
         write_mesh(tmp_path / "gear.stl", tiny)
     with pytest.raises(GeometryError, match=r"must exist$"):
         write_mesh(tmp_path / "missing" / "gear.vtu", tiny)
