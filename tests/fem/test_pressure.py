@@ -1,4 +1,4 @@
-"""Pressed strips of a half-plane against Flamant's line load, integrated, and against Hertz (McEwen 1949)."""
+"""Pressed strips of a half-plane: against Flamant's line load, integrated, and below a Hertzian pressure (McEwen 1949)."""
 
 from __future__ import annotations
 
