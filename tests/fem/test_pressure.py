@@ -1,4 +1,4 @@
-"""Pressed strips of a half-plane: against Flamant's line load, integrated, and below a Hertzian pressure (McEwen 1949)."""
+"""Pressed strips of a half-plane: against Flamant's line load, integrated, and below a Hertzian pressure."""
 
 from __future__ import annotations
 
@@ -78,6 +78,7 @@ def hertz(cells: int) -> Strips:
 
 
 def test_hertz_pressure_gives_mcewens_stress_below_the_surface() -> None:
+    # McEwen (1949), on the axis of symmetry.
     depth = np.linspace(0.0, 2.0, 201)
     x = np.column_stack([0 * depth, -depth])
     stress = hertz(28).stress(x)
