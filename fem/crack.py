@@ -1,4 +1,4 @@
-"""A cracked tooth in the ring: its sector is meshed and condensed on its own and adds flexibility to that of sound teeth.
+"""A cracked tooth in the ring: its sector, meshed and condensed on its own, adds flexibility to that of sound teeth.
 
 What is kept is the difference between the gear whose crack is open and the same mesh with the crack grown together: it
 vanishes with the crack, and no difference of two meshes is in it. The faces of the crack are free. Loads on the working
