@@ -174,8 +174,11 @@ def _without_ears(corners: Array, triangles: Index, quads: Index, ring: Array) -
             fan = [(one, two, len(points)) for one, two in pairwise([*loop, first])]
             points.append(np.mean([points[i] for i in loop], axis=0).tolist())
         cells += fan
-    kinds = (np.array([c for c in cells if len(c) == k], dtype=np.int64).reshape(-1, k) for k in (3, 4))
-    return np.array(points), *kinds
+    return np.array(points), _of_length(cells, 3), _of_length(cells, 4)
+
+
+def _of_length(cells: list[tuple[int, ...]], corners: int) -> Index:
+    return np.array([cell for cell in cells if len(cell) == corners], dtype=np.int64).reshape(-1, corners)
 
 
 def _boundary_first(points: Array, quads: Index, ring: Array) -> tuple[Array, Index]:
