@@ -241,7 +241,7 @@ def _head(case: Case, model: ContactModel, name: str) -> tuple[str, ...]:
     t1, t2 = (1e3 * t for t in model.torques)
     dte = f"{1e6 * model.dte:.9g}"
     limit = f"{model.tolerance:g} %" + ("" if model.on_line else " (a tip edge is in contact)")
-    state = case.rig.material.state
+    state: str = case.rig.material.state
     if state == "plane-stress":
         state += ", computed as plane strain of an equivalent material"
     return (
