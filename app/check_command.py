@@ -28,6 +28,7 @@ def check(
     For a comb multisine also its residue and which kinds of response then share lines.
     """
     loaded = load_case(case, settings)
+    from gearbench.bench.crack import crack_lines
     from gearbench.bench.readiness import check_case
     from gearbench.geometry import data_sheet
 
@@ -51,6 +52,8 @@ def check(
         if name != row.name:
             both = f"{_figure(row.value):>12} {_figure(driven[name]):>12}"
             typer.echo(f"  {name:<46} {both}  {row.unit}".rstrip())
+    for line in crack_lines(loaded.rig, loaded.simulation.element_size, loaded.simulation.modes):
+        typer.echo(f"\n  {line}")
     for comb in combs:
         typer.echo("\n  " + "\n  ".join(comb_lines(comb)))
 
