@@ -5,10 +5,11 @@ Cuts and hub circle carry the nodes of the sound sector, so that both kinds fit 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 from math import pi
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,22 +98,23 @@ def _split(pieces: list[Segment], cut: Slit) -> list[Segment]:
             out.append(piece)
             continue
         at, whole = cut.along, piece
-
-        def later(t: Array, function: Any, at: float = at) -> Array:
-            return np.asarray(function(t + at))
-
         before, after = whole.samples[whole.samples < at], whole.samples[whole.samples > at]
         out.append(replace(whole, length=at, samples=np.append(before, at)))
         out.append(
             Segment(
                 "fillet",
                 whole.length - at,
-                lambda t, f=whole.points: later(t, f),
-                lambda t, f=whole.curvature: later(t, f),
+                partial(_later, whole.points, at),
+                partial(_later, whole.curvature, at),
                 np.concatenate(([0.0], after - at)),
             )
         )
     return out
+
+
+def _later(function: Callable[[Array], Array], by: float, t: Array) -> Array:
+    """A curve's value `by` further along it."""
+    return function(t + by)
 
 
 def _flipped(chain: Chain) -> Chain:
