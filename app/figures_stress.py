@@ -81,7 +81,7 @@ def _contours(
     label: str,
 ) -> None:  # fmt: skip
     used, renumbered = np.unique(triangles, return_inverse=True)
-    net = Triangulation(*(1e3 * points[used]).T, renumbered.reshape(-1, 3))
+    net = Triangulation(1e3 * points[used, 0], 1e3 * points[used, 1], renumbered.reshape(-1, 3))
     levels = np.linspace(*span, LEVELS)
     shown = axes.tricontourf(net, values[used], levels, cmap="turbo", extend="both")
     drawing.colorbar(shown, ax=axes, label=label, shrink=0.85, ticks=np.linspace(*span, 6), format="%.0f")

@@ -62,7 +62,7 @@ def render_fields(fields: PairFields, module: float, path: Path) -> None:
 
     points = np.column_stack([1e3 * fields.points, np.zeros(len(fields.points))])
     quadratic = {pyvista.CellType.QUADRATIC_TRIANGLE: fields.triangles}
-    scene: Any = pyvista.Plotter(off_screen=True, shape=(1, 2), window_size=(1600, 850), border=False)
+    scene: Any = pyvista.Plotter(off_screen=True, shape=(1, 2), window_size=[1600, 850], border=False)
     (x, y), half = view(fields, module)
     names = ("von Mises [MPa]", "principal [MPa]")
     values = (fields.von_mises, fields.principal[:, 0])

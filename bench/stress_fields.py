@@ -85,8 +85,8 @@ def stress_gears(elastic: ElasticRig, element_size: float | None = None) -> tupl
 
 def field_dte(elastic: ElasticRig, phase: float, load: float, unit: str) -> float:
     """DTE [m] at a mesh phase under a load, a driver torque [N m] or itself a DTE [m]. Raises ContactError."""
-    given = {"torque": [load]} if unit == "N m" else {"dte": [load]}
-    return float(static_cycle(elastic.law, np.array([phase]), **given).transmission_error[0, 0])
+    torque, dte = ([load], None) if unit == "N m" else (None, [load])
+    return float(static_cycle(elastic.law, np.array([phase]), torque=torque, dte=dte).transmission_error[0, 0])
 
 
 def pair_fields(

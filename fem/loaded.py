@@ -48,8 +48,8 @@ def pair_loads(law: Law, phase: float, dte: float) -> list[PairLoad]:
     """The loaded pairs at a mesh phase [cycles] and DTE [m], hub centres held. Raises ContactError."""
     theta1 = phase * law.driver.pitch + dte / law.driver.rb
     found = position(law, theta1, phase * law.driven.pitch, 0.0, 0.0, 0.0, 0.0, np.zeros(PAIRS))
-    n, sides, teeth, contacts, force, active, ok = *found[:6], found[-1]
-    if not ok:
+    n, sides, teeth, contacts, force, active = found[:6]
+    if not found[-1]:
         raise ContactError(f"no static equilibrium at mesh phase {phase:g} and DTE {dte:g} m")
     return [
         PairLoad(int(sides[p]), int(teeth[p]), contact_in(contacts, p), float(force[p]))

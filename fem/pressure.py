@@ -43,8 +43,8 @@ class Strips:
 
     def turned(self, matrix: Array) -> Strips:
         """The same strips seen in a frame turned by a rotation matrix (2, 2)."""
-        parts = (part @ matrix.T for part in (self.middle, self.into, self.branch))
-        return Strips(*parts, self.half, self.mean, self.slope)
+        middle, into, branch = (part @ matrix.T for part in (self.middle, self.into, self.branch))
+        return Strips(middle, into, branch, self.half, self.mean, self.slope)
 
     def scaled(self, factor: Array) -> Strips:
         """The same strips with each pressure times a factor (c,)."""

@@ -54,9 +54,6 @@ class RootKernel:
     @cached_property
     def _splines(self) -> tuple[tuple[CubicSpline, CubicSpline], tuple[CubicSpline, CubicSpline]]:
         """Of working and back flank: on the involute, and on the tip edge, where the flank's normal turns."""
-        # Per moment: forces are known by their levers, and the flank's own normal may be a little off.
-        front, back = (table / self.levers[:, None] for table in (self.front, self.back))
-
         def pieces(table: Array) -> tuple[CubicSpline, CubicSpline]:
             i = self.last
             return (
@@ -64,7 +61,7 @@ class RootKernel:
                 CubicSpline(self.s[i:], table[:, i:], axis=1),
             )
 
-        return pieces(front), pieces(back)
+        return pieces(self.front), pieces(self.back)
 
     def of_moment(self, side: int, s: float, apart: int) -> Array:
         """Stress (k,) in the root of the tooth `apart` teeth counter-clockwise of the one loaded at s, per moment of
@@ -73,7 +70,11 @@ class RootKernel:
             return np.zeros(len(self.angle))
         flank, edge = self._splines[side]
         at = min(max(s, float(self.s[0])), float(self.s[-1]))
-        return np.asarray((edge if at > self.s[self.last] else flank)(at)[apart + self.reach])
+        # Forces are known by their levers, and the flank's own normal may be a little off. Its lever vanishes towards the
+        # end of the tip edge: what is interpolated is the stress, never its ratio to that.
+        i = self.last
+        lever = CubicSpline(self.s[i:], self.levers[i:])(at) if at > self.s[i] else self.levers[i]
+        return np.asarray((edge if at > self.s[i] else flank)(at)[apart + self.reach] / lever)
 
 
 @dataclass(frozen=True)

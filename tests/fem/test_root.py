@@ -105,3 +105,11 @@ def test_force_and_lever_enter_linearly(unequal: Any, kernel: RootKernel) -> Non
     np.testing.assert_allclose(
         root_stress(kernel, [later], 20, 0, 6), root_stress(kernel, [one], 20, 0, 19), rtol=1e-12, atol=1e-6
     )
+
+
+def test_on_the_tip_edge_stress_goes_on_from_the_flanks(kernel: RootKernel) -> None:
+    """The flank's normal turns away from the axis there, its lever to nothing; stress per moment stays smooth."""
+    end, tip = float(kernel.s[kernel.last]), float(kernel.s[-1])
+    at_end = kernel.of_moment(0, end, 0).max()
+    for part in (0.01, 0.05, 0.1, 0.2, 0.3):
+        assert kernel.of_moment(0, end + part * (tip - end), 0).max() == pytest.approx(at_end, rel=0.6 * part + 0.01)
