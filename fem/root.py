@@ -70,7 +70,7 @@ class RootKernel:
             return np.zeros(len(self.angle))
         flank, edge = self._splines[side]
         at = min(max(s, float(self.s[0])), float(self.s[-1]))
-        # Forces are known by their levers, and the flank's own normal may be a little off. Its lever vanishes towards the
+        # Forces are known by their levers, and the own normal of the flank may be off. Its lever vanishes towards the
         # end of the tip edge: what is interpolated is the stress, never its ratio to that.
         i = self.last
         lever = CubicSpline(self.s[i:], self.levers[i:])(at) if at > self.s[i] else self.levers[i]
