@@ -9,11 +9,12 @@ from math import atan2, cos, hypot, pi, sin
 import numpy as np
 from numpy.typing import NDArray
 
+from gearbench.diagnosis.basis import SHAPE_ORDERS
 from gearbench.diagnosis.hypotheses import Hypothesis
 from gearbench.diagnosis.machine import Machine
 from gearbench.diagnosis.parameters import Layout
 from gearbench.diagnosis.rows import LOSS_FACTOR
-from gearbench.diagnosis.unknowns import RIPPLE_ORDERS, SHAPE_ORDERS
+from gearbench.diagnosis.unknowns import RIPPLE_ORDERS
 from gearbench.rig import Case, Rig
 from gearbench.rig.drive import Coupling, Ripple
 from gearbench.rig.gear import Crack
@@ -207,17 +208,22 @@ def _delay(rig: Rig, hypothesis: Hypothesis, found: Unknowns) -> Applied:
     return rig, [Estimate(f"{key.removeprefix('delay-')}.delay", lag * 1e6, std * 1e6, "us")]
 
 
+def _average(values: Array, stds: Array, chosen: list[int]) -> float:
+    """Mean of the chosen values, the better known ones before the others."""
+    return float(np.average(values[chosen], weights=stds[chosen] ** -2.0))
+
+
 def _ripple(rig: Rig, hypothesis: Hypothesis, found: Unknowns) -> Applied:
     names, values, stds = found.where.block("ripple").names, found.of("ripple"), found.std_of("ripple")
     amplitudes, phases, out = [], [], []
     for order in RIPPLE_ORDERS:
         chosen = [i for i, name in enumerate(names) if name.split(":")[-2] == str(order)]
-        cosine = float(np.mean([values[i] for i in chosen if names[i].endswith("cos")]))
-        sine = float(np.mean([values[i] for i in chosen if names[i].endswith("sin")]))
+        parts = [[i for i in chosen if names[i].endswith(part)] for part in ("cos", "sin")]
+        cosine, sine = (_average(values, stds, part) for part in parts)
         amplitudes.append(hypot(cosine, sine))
         # A cos(o theta + phase) = A cos(phase) cos - A sin(phase) sin.
         phases.append(atan2(-sine, cosine))
-        std = float(np.sqrt(np.mean(stds[chosen] ** 2) * 2 / len(chosen)))
+        std = float(np.sqrt(2 / (1 / stds[chosen] ** 2).sum()))
         mean = found.torque_mean
         out.append(Estimate(f"order_{order}.relative_amplitude", amplitudes[-1] / mean, std / mean, "1"))
     ripple = Ripple(orders=RIPPLE_ORDERS, amplitude=tuple(amplitudes), phase=tuple(phases))

@@ -1,4 +1,4 @@
-"""Smooth functions of frequency, from which row filters and free forms are made."""
+"""Smooth functions of frequency and of mesh phase, from which row filters and shapes are made."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+SHAPE_ORDERS = 6  # mesh orders of the free part of stiffness shape and profile error
 # Where the pieces meet, as parts of the band: denser at low frequencies, where the supports resonate.
 KNOTS = (0.0, 0.05, 0.12, 0.2, 0.3, 0.42, 0.55, 0.7, 0.85, 1.0)
 
@@ -14,3 +15,9 @@ KNOTS = (0.0, 0.05, 0.12, 0.2, 0.3, 0.42, 0.55, 0.7, 0.85, 1.0)
 def hats(frequency: Array, band: float) -> Array:
     """Piecewise linear basis (knots, K) over frequencies [Hz] of 0 .. `band`; constant beyond the last knot."""
     return np.stack([np.interp(frequency, band * np.array(KNOTS), column) for column in np.eye(len(KNOTS))])
+
+
+def waves(phase: Array) -> Array:
+    """Cosine and sine (2 SHAPE_ORDERS, N) of every mesh order in turn at mesh phases [cycles]."""
+    angle = 2 * np.pi * np.arange(1, SHAPE_ORDERS + 1)[:, None] * phase
+    return np.stack([np.cos(angle), np.sin(angle)], axis=1).reshape(2 * SHAPE_ORDERS, -1)

@@ -12,9 +12,11 @@ from gearbench.diagnosis.apply import Estimate, Unknowns, apply_effect, recalibr
 from gearbench.diagnosis.decision import PLACE_OF_ROW, Decision, decide, named
 from gearbench.diagnosis.fit import Fit, Problem
 from gearbench.diagnosis.intake import Measurement
+from gearbench.diagnosis.parting import BACKLASH, with_backlash
 from gearbench.diagnosis.problem import problem_of
 from gearbench.diagnosis.replays import replays
 from gearbench.diagnosis.search import Search, Tried, missing_by_row, search
+from gearbench.diagnosis.separable import representatives, separability
 from gearbench.diagnosis.signals import measured_channels, simulated_channels
 from gearbench.diagnosis.steadiness import unsteadiness
 from gearbench.diagnosis.verdict import Candidate, Effect, Parameter, Share
@@ -40,7 +42,7 @@ class Finding:
     because: str
     add: Callable[[Case], Case] | None = None
     indistinguishable: tuple[tuple[str, ...], ...] = ()
-    advice: tuple[str, ...] = ()
+    invisible: tuple[str, ...] = ()
     evidence: dict[str, float] = field(default_factory=dict)
     audits: dict[str, tuple[float, ...]] = field(default_factory=dict)
 
@@ -57,17 +59,24 @@ def find_cause(
 
     `without` leaves effects out of the library. Raises DiagnosisError for measurements that cannot be used.
     """
-    problem = problem_of(measurements, nominal)
+    whole = problem_of(measurements, nominal)
+    problem = whole.steady
     found = search(problem, without, report)
+    if problem is not whole and BACKLASH not in without:
+        report(BACKLASH)
+        found = with_backlash(whole, found)
     best = named(found)
-    fit = best.fit if best and best.fit else found.base
+    partial = problem is not whole and best is not None and best.hypothesis.effect == BACKLASH
+    fit = best.fit if best and best.fit and not partial else found.base
     silent = missing_by_row(problem, fit)
     report("steadiness")
-    band = problem.conditions[0].band
-    unsteady = unsteadiness(problem.machine, measurements, problem.where, fit.p, band)
+    band, steady = problem.conditions[0].band, {condition.name for condition in problem.conditions}
+    kept = [measured for measured in measurements if measured.name in steady]
+    unsteady = unsteadiness(problem.machine, kept, problem.where, fit.p, band)
     decision = decide(found, silent, unsteady)
     plain = recalibrated(nominal, _unknowns(problem, found.base))
     effects, updated = _effects(problem, nominal, decision)
+    apart = separability(fit, problem.where, representatives(problem, without))
     return Finding(
         verdict=decision.verdict,
         probability=decision.probability,
@@ -79,6 +88,8 @@ def find_cause(
         with_effect=updated,
         because=decision.because,
         add=_adding(problem, decision.winner),
+        indistinguishable=apart.classes,
+        invisible=apart.invisible,
         evidence={one.hypothesis.name: one.gain for one in found.tried},
         audits={"silent": tuple(silent), "unsteady": tuple(unsteady)},
     )

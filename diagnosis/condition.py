@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.diagnosis.basis import hats
+from gearbench.diagnosis.basis import hats, waves
 from gearbench.diagnosis.intake import Measurement
 from gearbench.diagnosis.machine import Machine
 
@@ -27,7 +27,8 @@ class Condition:
     u = rb (theta - nominal rotation) [m]; `noise` to the variance of one of its bins; `omega` (N/2 + 1,) [rad/s];
     `phase` (N,) mesh phase [cycles]; `tooth` (2, N, n_o) tooth numbers of the pairs in contact, `share` (N, n_o) their
     shares, `bending` (N, n_o, 2); `arms` (3, N) friction levers over base radius, for driver rotation, y and driven
-    rotation; `rotation` (2, N) angle [rad] of both gears, `pitch_speed` rb speed [m/s]; `force_level` [N] and
+    rotation; `waves` (2 orders, N) of the mesh phase, `lobes` (2, 2, N) cosine and sine of both rotations;
+    `pitch_speed` rb speed [m/s]; `force_level` [N] and
     `stiffness_level` [N/m] of the mesh at the mean torque; `force_full` (N/2 + 1,) spectrum of the mesh force that a
     nominal row gives, zero beyond the used bins; `hats_full` basis of smooth functions of frequency (knots, N/2 + 1).
     """
@@ -45,7 +46,8 @@ class Condition:
     share: Array
     bending: Array
     arms: Array
-    rotation: Array
+    waves: Array
+    lobes: Array
     pitch_speed: float
     teeth: tuple[int, int]
     torque_mean: float
@@ -81,7 +83,8 @@ def prepare(measured: Measurement, machine: Machine, band: float) -> Condition:
         share=share,
         bending=machine.law.bending_of(phase),
         arms=_arms(machine, measured.mesh_frequency, phase, spectra, omega),
-        rotation=np.stack([2 * np.pi * phase / z for z in machine.teeth]),
+        waves=waves(phase),
+        lobes=np.stack([(np.cos(turn), np.sin(turn)) for turn in (2 * np.pi * phase / z for z in machine.teeth)]),
         pitch_speed=2 * np.pi * measured.mesh_frequency / machine.teeth[0] * rb1,
         teeth=machine.teeth,
         torque_mean=mean,

@@ -25,7 +25,7 @@ from gearbench.diagnosis.basis import KNOTS
 from gearbench.diagnosis.condition import CHANNELS, Condition
 from gearbench.diagnosis.machine import Machine
 from gearbench.diagnosis.parameters import Layout
-from gearbench.diagnosis.unknowns import DELAYED, ROWS, SHAPE_ORDERS, SUPPORTS
+from gearbench.diagnosis.unknowns import DELAYED, ROWS, SUPPORTS
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -39,7 +39,8 @@ class Mesh:
     """The mesh of one condition under given unknowns, over time (N,).
 
     Deflection [m], force without damping [N], its tangent [N/m], damping coefficient [N s/m], rate of the DTE [m/s],
-    the whole force [N] and the touching flags; `stiffening` is the mean logarithm of the stiffness's factor.
+    logarithm of the law's force over its level, relative growth of the tangent [1/m] by the law's curvature, the whole
+    force [N] and the touching flags; `stiffening` is the mean logarithm of the stiffness's factor.
     """
 
     delta: Array
@@ -47,6 +48,8 @@ class Mesh:
     tangent: Array
     viscosity: Array
     rate: Array
+    level: Array
+    hardening: Array
     force: Array
     touching: NDArray[np.bool_]
     stiffening: float
@@ -75,16 +78,9 @@ def _advance(condition: Condition, channel: str) -> float:
 
 def excess(condition: Condition, where: Layout, p: Array) -> Array:
     """Excess material (N,) [m] that all pairs share: offset, run-out and profile."""
-    a = np.full(condition.samples, p[where["offset"]][0])
-    cos1, sin1 = p[where["eccentricity-driver"]]
-    cos2, sin2 = p[where["eccentricity-driven"]]
-    first, second = condition.rotation
-    a += cos1 * np.cos(first) + sin1 * np.sin(first) + cos2 * np.cos(second) + sin2 * np.sin(second)
-    profile = p[where["profile"]]
-    for n in range(SHAPE_ORDERS):
-        angle = 2 * np.pi * (n + 1) * condition.phase
-        a += profile[2 * n] * np.cos(angle) + profile[2 * n + 1] * np.sin(angle)
-    return a
+    first, second = condition.lobes
+    lobes = p[where["eccentricity-driver"]] @ first + p[where["eccentricity-driven"]] @ second
+    return np.asarray(p[where["offset"]][0] + lobes + p[where["profile"]] @ condition.waves)
 
 
 def pitch_excess(condition: Condition, where: Layout, p: Array) -> Array:
@@ -94,11 +90,7 @@ def pitch_excess(condition: Condition, where: Layout, p: Array) -> Array:
 
 def modulation(condition: Condition, where: Layout, p: Array) -> Array:
     """Factor (N,) of the mesh stiffness: scale, shape and loss of single teeth."""
-    shape = p[where["shape"]]
-    factor = np.ones(condition.samples)
-    for n in range(SHAPE_ORDERS):
-        angle = 2 * np.pi * (n + 1) * condition.phase
-        factor += shape[2 * n] * np.cos(angle) + shape[2 * n + 1] * np.sin(angle)
+    factor = 1.0 + p[where["shape"]] @ condition.waves
     left = (condition.share * softened(condition, p[where["crack"]])).sum(axis=-1)
     return np.asarray(np.exp(p[where["scale"]][0]) * factor * left)
 
@@ -111,18 +103,24 @@ def softened(condition: Condition, loss: Array) -> Array:
     return np.asarray(1.0 / (1.0 + condition.bending[..., 0] * first + condition.bending[..., 1] * second))
 
 
+def closing(machine: Machine, spectra: Mapping[str, Complex]) -> Complex:
+    """Spectrum [m] of how far the gears' motion closes the mesh; supports without a channel stand still."""
+    g = machine.support_factor
+    total = spectra["angle_driver"] - spectra["angle_driven"]
+    if "y_driver" in spectra:
+        total = total + g * spectra["y_driver"]
+    if "y_driven" in spectra:
+        total = total - g * spectra["y_driven"]
+    return total
+
+
 def mesh(machine: Machine, condition: Condition, where: Layout, p: Array, spectra: Mapping[str, Complex]) -> Mesh:
     """The mesh force that the measured motion makes under the unknowns."""
-    g = machine.support_factor
-    closing = spectra["angle_driver"] - spectra["angle_driven"]
-    if "y_driver" in spectra:
-        closing = closing + g * spectra["y_driver"]
-    if "y_driven" in spectra:
-        closing = closing - g * spectra["y_driven"]
-    filtered = closing + _yielding(machine, condition, where, p)
+    dte = closing(machine, spectra)
+    filtered = dte + _yielding(machine, condition, where, p)
     n = condition.samples
     delta = np.fft.irfft(filtered, n) * n + excess(condition, where, p)
-    rate = np.fft.irfft(1j * condition.omega * closing, n) * n
+    rate = np.fft.irfft(1j * condition.omega * dte, n) * n
     law = replace(machine.law, backlash=max(machine.law.backlash + p[where["backlash"]][0], 0.0))
     modulated = modulation(condition, where, p)
     factor = machine.scale * modulated
@@ -132,17 +130,17 @@ def mesh(machine: Machine, condition: Condition, where: Layout, p: Array, spectr
     delta = delta + (weight * pitch_excess(condition, where, p)).sum(axis=-1)
     force, slope = law.evaluate(delta, condition.phase)
     curve = p[where["curvature"]][0]
-    if curve:
-        level = np.maximum(np.abs(force), 1e-3 * condition.force_level) / condition.force_level
-        factor = factor * level**curve
-    elastic, tangent = factor * force, factor * slope
+    level = np.log(np.maximum(np.abs(force) / condition.force_level, 1e-3))
+    factor = factor * np.exp(curve * level)
+    elastic, tangent = factor * force, (1 + curve) * factor * slope
     touching = force != 0.0
     ratio = machine.mesh_ratio * np.exp(p[where["mesh-ratio"]][0])
     viscosity = 2 * ratio * np.sqrt(np.maximum(tangent, 0.0) * machine.mesh_mass)
     quadratic = p[where["dissipation"]][0] * np.abs(rate)
     total = elastic + (viscosity + quadratic) * rate * touching
     stiffening = float(np.log(np.maximum(modulated, 1e-3)).mean())
-    return Mesh(delta, elastic, tangent, viscosity, rate, total, touching, stiffening)
+    hardening = curve * slope / np.maximum(np.abs(force), 1e-3 * condition.force_level)
+    return Mesh(delta, elastic, tangent, viscosity, rate, level, hardening, total, touching, stiffening)
 
 
 def radial_impedance(
@@ -239,8 +237,7 @@ def assemble(
         if channel not in spectra:
             continue
         out[row] = sign * support(machine, condition, where, p, side, spectra[channel]) - middle
-    filters = _filters(condition, where, p)
-    out += filters * np.stack([share[0] * first, middle, last, middle])
+    out += filters(condition, where, p) * np.stack([share[0] * first, middle, last, middle])
     return Residuals(out, share, _transform(condition, state.force), state.stiffening)
 
 
@@ -276,7 +273,8 @@ def ripple_lines(condition: Condition, where: Layout) -> list[tuple[int, int, co
     return found
 
 
-def _filters(condition: Condition, where: Layout, p: Array) -> Complex:
+def filters(condition: Condition, where: Layout, p: Array) -> Complex:
+    """Smooth complex gains (4, K) of the rows, which take this part of the mesh force away."""
     count = len(KNOTS)
     basis = condition.hats_full[:, : condition.bins]
     return np.stack([(v[:count] + 1j * v[count:]) @ basis for v in (p[where[f"filter-{row}"]] for row in ROWS)])

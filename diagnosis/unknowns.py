@@ -11,14 +11,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.diagnosis.basis import KNOTS
+from gearbench.diagnosis.basis import KNOTS, SHAPE_ORDERS
 from gearbench.diagnosis.condition import Condition
 from gearbench.diagnosis.machine import Machine
 from gearbench.diagnosis.parameters import NUISANCE, Layout, block, layout
 
 Array = NDArray[np.float64]
 
-SHAPE_ORDERS = 6  # mesh orders of the free part of stiffness shape and profile error
 RIPPLE_ORDERS = (6, 12, 18, 24)  # per driver revolution: what commutation and slots of usual motors leave
 ROWS = ("drive", "driver-support", "load", "driven-support")
 # Of both gears: row, channel, sign of the support's force in it, and the unknown of its exponent.

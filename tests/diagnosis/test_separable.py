@@ -1,0 +1,68 @@
+"""Which effects records cannot tell apart, against marginal likelihoods of drawn data."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gearbench.diagnosis.calibration import LIMITS
+from gearbench.diagnosis.fit import Fit
+from gearbench.diagnosis.hypotheses import Hypothesis
+from gearbench.diagnosis.parameters import NUISANCE, block, layout
+from gearbench.diagnosis.separable import expected_gains, separability
+
+SMALL = layout(
+    [
+        block("offset", NUISANCE, "m", 2, 1.0),
+        block("lobe", "eccentricity", "m", 2, 0.1, 1.0),
+        block("rub", "friction", "1", 1, 0.1, 1.0),
+        block("lag", "sensor-delay", "s", 1, 0.1, 1.0),
+    ]
+)
+LOBE = Hypothesis("eccentricity", "eccentricity", "mesh", ("eccentricity",), (), 2)
+RUB = Hypothesis("friction", "friction", "mesh", ("friction",))
+LAG = Hypothesis("sensor-delay", "sensor-delay", "sensor", ("sensor-delay",))
+
+
+def fit_of(columns: np.ndarray) -> Fit:
+    nothing, sd = np.zeros(SMALL.size), SMALL.prior()
+    information = columns.T @ columns
+    return Fit(nothing, sd, information + np.diag(1 / sd**2), information, nothing, (), 0.0, 0.0, 0)
+
+
+def log_likelihood(data: np.ndarray, columns: np.ndarray, sd: np.ndarray) -> np.ndarray:
+    """Of data (draws, n), unknowns integrated out."""
+    covariance = np.eye(len(columns)) + (columns * sd**2) @ columns.T
+    square = np.einsum("dn,dn->d", data, np.linalg.solve(covariance, data.T).T)
+    return -0.5 * square - 0.5 * np.linalg.slogdet(covariance)[1]
+
+
+@pytest.mark.parametrize("truth", [LOBE, RUB])
+def test_expected_gains_are_means_of_marginal_likelihoods(truth: Hypothesis) -> None:
+    rng = np.random.default_rng(3)
+    columns = rng.standard_normal((12, SMALL.size)) * np.array([1, 1, 3, 3, 2, 2])
+    beyond = np.sqrt(truth.prior(SMALL) ** 2 - SMALL.prior() ** 2)
+    drawn = rng.standard_normal((40_000, SMALL.size)) * beyond
+    data = drawn @ columns.T + rng.standard_normal((40_000, 12))
+    plain = log_likelihood(data, columns, SMALL.prior())
+    listed = (LOBE, RUB, LAG)
+    wanted = [
+        np.mean(log_likelihood(data, columns, h.prior(SMALL)) - plain) - np.log(h.choices) for h in listed
+    ]
+    got = expected_gains(fit_of(columns), SMALL, listed)[listed.index(truth)]
+    assert got == pytest.approx(wanted, abs=0.15, rel=0.02)
+
+
+def test_what_moves_the_rows_alike_cannot_be_told_apart() -> None:
+    columns = np.diag([1.0, 1.0, 30.0, 30.0, 30.0, 0.0])
+    columns[:, 5] = columns[:, 4] + 1e-3
+    found = separability(fit_of(columns), SMALL, (LOBE, RUB, LAG))
+    assert found.classes == (("friction", "sensor-delay"),)
+    assert found.invisible == ()
+
+
+def test_what_moves_nothing_is_invisible() -> None:
+    columns = np.diag([1.0, 1.0, 30.0, 30.0, 30.0, 0.01])
+    found = separability(fit_of(columns), SMALL, (LOBE, RUB, LAG))
+    assert found.classes == () and found.invisible == ("sensor-delay",)
+    assert LIMITS.of("friction") > 0
