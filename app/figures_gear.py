@@ -37,7 +37,7 @@ def draw_pair(path: Path, rig: Rig, meshing: Pair, mesh: PlaneMesh | None) -> No
             near.set_title("Where the teeth touch")
         else:
             _draw_mesh(near, mesh, np.array([pitch, 0.0]) * 1e-3, 1.6e-3 * reach)
-            near.set_title(f"Mesh where the teeth touch ({len(mesh.triangles)} triangles in all)")
+            near.set_title(f"Mesh where the teeth touch ({len(mesh.triangles)} elements in all)")
         _draw_line_of_action(near, meshing)
         near.set_xlim(pitch - reach, pitch + reach)
         near.set_ylim(-reach, reach)
@@ -110,12 +110,13 @@ def _draw_line_of_action(axes: Any, meshing: Pair) -> None:
 
 
 def _draw_mesh(axes: Any, mesh: PlaneMesh, centre: Array, reach: float) -> None:
-    """Corner edges of the triangles near the contact, the boundary stronger, with its curved middles."""
-    middle = mesh.points[mesh.triangles[:, :3]].mean(axis=1)
+    """Sides of the elements near the contact, the boundary stronger, with its curved middles."""
+    n = 3 if mesh.kind == "triangle6" else 4
+    middle = mesh.points[mesh.triangles[:, :n]].mean(axis=1)
     near = np.abs(middle - centre).max(axis=1) < reach
     for gear, colour, name in ((0, BLUE, "driver"), (1, ORANGE, "driven gear")):
-        corners = mesh.triangles[near & (mesh.gear == gear)]
-        sides = np.concatenate([corners[:, [0, 3, 1]], corners[:, [1, 4, 2]], corners[:, [2, 5, 0]]])
+        cells = mesh.triangles[near & (mesh.gear == gear)]
+        sides = np.concatenate([cells[:, [i, n + i, (i + 1) % n]] for i in range(n)])
         lines = _broken(1e3 * mesh.points[sides])
         axes.plot(*lines.T, color=colour, lw=0.35, alpha=0.7)
         count = Counter(int(side[1]) for side in sides)

@@ -124,7 +124,8 @@ def _draw_gears(job: Job, meshing: Pair) -> None:
         from gearbench.geometry import mesh_pair
 
         elastic = job.case.simulation.model == "reduced"
-        mesh = mesh_pair(job.case.rig, job.case.simulation.element_size) if elastic else None
+        simulation = job.case.simulation
+        mesh = mesh_pair(job.case.rig, simulation.element_size, simulation.element) if elastic else None
         draw_pair(path, job.case.rig, meshing, mesh)
 
     job.picture("gears.png", draw)

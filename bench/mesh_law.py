@@ -53,6 +53,7 @@ def mesh_law(rig: Rig, simulation: Simulation, load_max_nm: float) -> MeshLaw:
         "material": sound.material,
         "centre": meshing.centre_distance,
         "element_size": simulation.element_size,
+        "element": simulation.element,
         "load": load,
         "source": _source(),
     }

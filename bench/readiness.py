@@ -9,6 +9,7 @@ from gearbench.geometry import Profile, body, pair
 from gearbench.geometry.element_size import flank_size
 from gearbench.geometry.iso1328 import drawn_gear
 from gearbench.geometry.micro import check_micro, check_play
+from gearbench.geometry.sector import refuse_crack
 from gearbench.rig import Case, Gear, Rig
 
 
@@ -42,6 +43,8 @@ def check_model(case: Case) -> None:
         flank_size(gear.module, simulation.element_size)
     reduced = simulation.model == "reduced"
     if reduced:
+        for name, gear in (("rig.driver", rig.driver), ("rig.driven", rig.driven)):
+            refuse_crack(gear, simulation.element, name, "simulation.element")
         refuse_effects(rig, "reduced finite-element model", represented=ELASTIC_KEYS)
     elif is_nonlinear(case):
         refuse_unknown(rig)

@@ -18,6 +18,7 @@ from gearbench.fem.machine import Machine, contact_rows, make_machine, mass_matr
 from gearbench.fem.static import position, static_cycle
 from gearbench.fem.transient import frequency_error, make_scheme
 from gearbench.geometry import Body, Pair, body
+from gearbench.geometry.sector import refuse_crack
 from gearbench.rig import Case, Rig, Simulation
 
 Array = NDArray[np.float64]
@@ -42,19 +43,21 @@ def elastic_rig(
 ) -> ElasticRig:
     """Mesh, condense and tabulate, each from disk where it has been done before. Raises GeometryError."""
     say = progress or (lambda note: None)
+    for name, gear in (("rig.driver", rig.driver), ("rig.driven", rig.driven)):
+        refuse_crack(gear, simulation.element, name, "simulation.element")
     meshing = elastic_pair(rig)
     density = rig.material.density
     bodies = (
         body(meshing.driver, rig.driver, density, "rig.driver"),
         body(meshing.driven, rig.driven, density, "rig.driven"),
     )
-    size, modes = simulation.element_size, simulation.modes
+    size, modes, element = simulation.element_size, simulation.modes, simulation.element
     say("condensing the driver")
-    driver = stored_gear(rig.driver, rig.material, size, modes)
+    driver = stored_gear(rig.driver, rig.material, size, modes, element)
     say("condensing the driven gear")
-    driven = stored_gear(rig.driven, rig.material, size, modes)
+    driven = stored_gear(rig.driven, rig.material, size, modes, element)
     say("solving contact lines")
-    law = stored_law(rig, (driver, driven), size, modes)
+    law = stored_law(rig, (driver, driven), size, modes, element)
     return ElasticRig(rig, meshing, (driver, driven), bodies, law)
 
 

@@ -13,8 +13,9 @@ from gearbench.fem.elasticity import assemble, plane_moduli
 from gearbench.fem.flank import flank_trace
 from gearbench.fem.flexibility import REACH, flank_kernels, kernel_samples
 from gearbench.fem.ring import make_ring, ring_modes, rotation
-from gearbench.geometry.mesh import sector_mesh
+from gearbench.geometry.mesh import SectorMesh
 from gearbench.geometry.profile import profile
+from gearbench.geometry.sector import Element, meshed_sector, refuse_crack
 from gearbench.rig import Gear, Material
 
 __all__ = ["REACH", "CondensedGear", "condense", "flank_kernels", "kernel_samples", "rounded"]
@@ -61,26 +62,36 @@ def rounded(gear: Gear) -> Gear:
     return gear.model_copy(update={"tip_edge_radius": max(gear.tip_edge_radius, EDGE_RADIUS_LEAST)})
 
 
-def condense(gear: Gear, material: Material, element_size: float | None = None, modes: int = 8) -> CondensedGear:
+def condense(
+    gear: Gear,
+    material: Material,
+    element_size: float | None = None,
+    modes: int = 8,
+    element: Element = "triangle",
+) -> CondensedGear:
     """Mesh one sector of the gear and condense the whole gear to hub and flanks.
 
     element_size [m] on the flanks (None: module / 12). A crack in the mesh of one tooth is condensed on its own and
-    kept beside; the modes stay those of the sound gear. Raises GeometryError for an impossible gear.
+    kept beside; the modes stay those of the sound gear. Raises GeometryError for an impossible gear, and for a crack
+    among quadrilaterals.
     """
+    refuse_crack(gear, element)
     gear = rounded(gear)
     shape = profile(gear)
-    mesh = sector_mesh(shape, gear, element_size or gear.module / 12)
+    mesh = meshed_sector(shape, gear, element_size or gear.module / 12, element)
     moduli = plane_moduli(material)
-    stiffness, mass = assemble(mesh.points, mesh.triangles, moduli)
+    stiffness, mass = assemble(mesh.points, mesh.cells, moduli)
     ring = make_ring(mesh, gear.teeth, stiffness, mass)
     s, last = kernel_samples(shape, gear.module / 7)
     front, back = flank_kernels(ring, mesh, shape, moduli, s)
-    cracked = gear.crack is not None and gear.crack.meshed
     areal = material.density * gear.face_width
     found = ring_modes(ring, areal, gear.face_width, modes)
     traces = [flank_trace(shape, mesh.points, mesh.boundary_edges, s, side) for side in (0, 1)]
     rigid = _rigid_shapes(mesh.points, gear.teeth)
     n = len(s)
+    crack = None
+    if gear.crack is not None and gear.crack.meshed and isinstance(mesh, SectorMesh):
+        crack = condense_crack(gear, shape, ring, mesh, moduli, s, element_size)
     return CondensedGear(
         teeth=gear.teeth,
         face_width=gear.face_width,
@@ -93,7 +104,7 @@ def condense(gear: Gear, material: Material, element_size: float | None = None, 
         mode_back=np.array([(traces[1] @ m.shape.T).T for m in found]).reshape(-1, gear.teeth, n),
         mode_hub=np.array([[areal * np.sum(r * (mass @ m.shape.T).T) for r in rigid] for m in found]).reshape(-1, 3),
         unknowns=gear.teeth * (stiffness.shape[0] - len(ring.low) - len(ring.hub)),
-        crack=condense_crack(gear, shape, ring, mesh, moduli, s, element_size) if cracked else None,
+        crack=crack,
     )
 
 

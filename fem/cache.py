@@ -21,6 +21,7 @@ from gearbench.fem.body import CondensedGear, condense, rounded
 from gearbench.fem.compiled import cache_folder
 from gearbench.fem.crack import CrackedTooth
 from gearbench.fem.law import Curve, Law, elastic_pair, make_law
+from gearbench.geometry.sector import Element
 from gearbench.rig import Gear, Material, Rig, sound_gear
 from gearbench.rig.value import Value
 
@@ -75,10 +76,16 @@ def cached(key: str, make: Callable[[], Arrays]) -> Arrays:
     return arrays
 
 
-def stored_gear(gear: Gear, material: Material, element_size: float | None = None, modes: int = 8) -> CondensedGear:
+def stored_gear(
+    gear: Gear,
+    material: Material,
+    element_size: float | None = None,
+    modes: int = 8,
+    element: Element = "triangle",
+) -> CondensedGear:
     """`condense(...)`, from disk where it has been done before."""
-    key = _gear_key(gear, material, element_size, modes)
-    arrays = cached(key, lambda: _arrays(condense(gear, material, element_size, modes)))
+    key = _gear_key(gear, material, element_size, modes, element)
+    arrays = cached(key, lambda: _arrays(condense(gear, material, element_size, modes, element)))
     scalars = {"teeth": int, "last": int, "unknowns": int, "face_width": float}
     values: dict[str, Any] = {name: scalars[name](v) if name in scalars else v for name, v in arrays.items()}
     extra = values.pop("extra", None)
@@ -88,12 +95,16 @@ def stored_gear(gear: Gear, material: Material, element_size: float | None = Non
 
 
 def stored_law(
-    rig: Rig, gears: tuple[CondensedGear, CondensedGear], element_size: float | None = None, modes: int = 8
+    rig: Rig,
+    gears: tuple[CondensedGear, CondensedGear],
+    element_size: float | None = None,
+    modes: int = 8,
+    element: Element = "triangle",
 ) -> Law:
     """`make_law(...)` of a rig's pair, its load-approach curves from disk where they have been solved before."""
     meshing = elastic_pair(rig)
     # A crack adds to the flexibility beside the curves of sound teeth.
-    parts = [_gear_key(sound_gear(g), rig.material, element_size, modes) for g in (rig.driver, rig.driven)]
+    parts = [_gear_key(sound_gear(g), rig.material, element_size, modes, element) for g in (rig.driver, rig.driven)]
     key = key_for("law", {"driver": parts[0], "driven": parts[1], "centre": meshing.centre_distance})
     made: list[Law] = []
     real = (rig.driver, rig.driven)
@@ -121,10 +132,13 @@ def _arrays(gear: CondensedGear) -> Arrays:
     return arrays if gear.crack is None else arrays | {"extra": gear.crack.extra}
 
 
-def _gear_key(gear: Gear, material: Material, element_size: float | None, modes: int) -> str:
+def _gear_key(
+    gear: Gear, material: Material, element_size: float | None, modes: int, element: Element = "triangle"
+) -> str:
     """Cache entry of a condensed gear; totals of mass and inertia, tooth errors and the number of a cracked tooth do
     not enter the condensation."""
     bare = sound_gear(rounded(gear)).model_copy(update={"mass": None, "inertia": None, "bore_radius": 0.0})
     if gear.crack is not None and gear.crack.meshed:
         bare = bare.model_copy(update={"crack": gear.crack.model_copy(update={"tooth": 0})})
-    return key_for("gear", {"gear": bare, "material": material, "element_size": element_size, "modes": modes})
+    mesh: dict[str, float | str | None] = {"element_size": element_size, "element": element}
+    return key_for("gear", {"gear": bare, "material": material, "modes": modes, **mesh})

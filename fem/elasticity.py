@@ -1,4 +1,4 @@
-"""Plane elasticity of one tooth sector: stiffness and mass, assembled by scikit-fem on curved P2 triangles."""
+"""Plane elasticity of one tooth sector: stiffness and mass, assembled by scikit-fem on curved second-order elements."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
-from skfem import Basis, BilinearForm, ElementTriP2, ElementVector, MeshTri2
+from skfem import Basis, BilinearForm, ElementQuad2, ElementTriP2, ElementVector, MeshQuad2, MeshTri2
 from skfem.helpers import dot
 from skfem.models.elasticity import linear_elasticity
 
@@ -38,13 +38,21 @@ def plane_moduli(material: Material) -> PlaneModuli:
     return PlaneModuli(e / (1 - nu**2), nu / (1 - nu))
 
 
-def assemble(points: Array, triangles: NDArray[np.int64], moduli: PlaneModuli) -> tuple[csr_matrix, csr_matrix]:
-    """Stiffness and mass (unit thickness, unit density) on P2 triangles; unknown 2 n + c is component c of node n.
+# Degree that the quadrature integrates, by the nodes of an element: the products of two shape functions are of degree 4
+# and, of biquadratic ones, of 4 in each direction.
+DEGREE = {6: 6, 9: 9}
 
-    points: (n, 2) [m]; triangles: (m, 6), corners then mid-side nodes of edges 01, 12, 20.
+
+def assemble(points: Array, cells: NDArray[np.int64], moduli: PlaneModuli) -> tuple[csr_matrix, csr_matrix]:
+    """Stiffness and mass (unit thickness, unit density); unknown 2 n + c is component c of node n.
+
+    points: (n, 2) [m]; cells: quadratic triangles (m, 6), corners then mid-side nodes of edges 01, 12, 20, or
+    biquadratic quadrilaterals (m, 9), corners, mid-side nodes of edges 01, 12, 23, 30 and the centre.
     """
-    mesh = MeshTri2(points.T.copy(), triangles.T.copy())
-    basis = Basis(mesh, ElementVector(ElementTriP2()), intorder=6)
+    size = cells.shape[1]
+    mesh_type, element = (MeshTri2, ElementTriP2()) if size == 6 else (MeshQuad2, ElementQuad2())
+    mesh = mesh_type(points.T.copy(), cells.T.copy())
+    basis = Basis(mesh, ElementVector(element), intorder=DEGREE[size])
     lame, shear = moduli.lame
 
     @BilinearForm
@@ -55,8 +63,8 @@ def assemble(points: Array, triangles: NDArray[np.int64], moduli: PlaneModuli) -
     mass = inertia.assemble(basis)
     # By the elements' own numbers: the two faces of a crack have nodes in the same places.
     order = np.full(2 * len(points), -1)
-    for node, component in np.ndindex(6, 2):
-        order[2 * triangles[:, node] + component] = basis.element_dofs[2 * node + component]
+    for node, component in np.ndindex(size, 2):
+        order[2 * cells[:, node] + component] = basis.element_dofs[2 * node + component]
     if (order < 0).any():
-        raise ValueError("the mesh holds a node that belongs to no triangle")
+        raise ValueError("the mesh holds a node that belongs to no element")
     return stiffness.tocsr()[order][:, order], mass.tocsr()[order][:, order]

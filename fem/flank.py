@@ -37,7 +37,7 @@ class BoundaryQuadrature:
 
 
 def boundary_quadrature(
-    shape: Profile, points: Array, triangles: Indices, edges: Indices, order: int = 8, sides: Sequence[int] = (0,)
+    shape: Profile, points: Array, cells: Indices, edges: Indices, order: int = 8, sides: Sequence[int] = (0,)
 ) -> BoundaryQuadrature:
     """Gauss quadrature of `order` points on curved boundary edges (k, 3): corner, corner, middle node.
 
@@ -50,8 +50,9 @@ def boundary_quadrature(
     tangent = np.einsum("qa,kac->kqc", _slope(xi), points[edges])
     length = np.hypot(tangent[..., 0], tangent[..., 1])
     normal = np.stack([tangent[..., 1], -tangent[..., 0]], axis=-1) / length[..., None]
-    owner = {int(mid): n for n, tri in enumerate(triangles) for mid in tri[3:]}
-    centre = points[triangles[[owner[int(m)] for m in edges[:, 2]]][:, :3]].mean(axis=1)
+    corners = 3 if cells.shape[1] == 6 else 4
+    owner = {int(mid): n for n, cell in enumerate(cells) for mid in cell[corners : 2 * corners]}
+    centre = points[cells[[owner[int(m)] for m in edges[:, 2]]][:, :corners]].mean(axis=1)
     outward = np.sign(np.sum((points[edges[:, 2]] - centre) * normal[:, order // 2], axis=1))
     normal *= outward[:, None, None]
     for side in sides:

@@ -20,8 +20,8 @@ from gearbench.fem.elasticity import PlaneModuli
 from gearbench.fem.flamant import LineLoad
 from gearbench.fem.flank import MIRROR, BoundaryQuadrature, boundary_quadrature, flank_trace
 from gearbench.fem.ring import Ring, ring_response, rotation
-from gearbench.geometry.mesh import SectorMesh
 from gearbench.geometry.profile import Profile
+from gearbench.geometry.sector import Sector
 
 Array = NDArray[np.float64]
 
@@ -83,10 +83,10 @@ def regular_motion(points: Array, loads: list[LineLoad], moduli: PlaneModuli) ->
     return np.array([-load.displacement(points, moduli.modulus, moduli.poisson).ravel() for load in loads]).T
 
 
-def flank_kernels(ring: Ring, mesh: SectorMesh, shape: Profile, moduli: PlaneModuli, s: Array) -> tuple[Array, Array]:
+def flank_kernels(ring: Ring, mesh: Sector, shape: Profile, moduli: PlaneModuli, s: Array) -> tuple[Array, Array]:
     """Kernels (front, back) of `CondensedGear`."""
     teeth = ring.teeth
-    quadrature = boundary_quadrature(shape, mesh.points, mesh.triangles, mesh.boundary_edges)
+    quadrature = boundary_quadrature(shape, mesh.points, mesh.cells, mesh.boundary_edges)
     at, normal = shape.points(s), shape.normals(s)
     loads = flank_loads(shape, s)
 

@@ -5,24 +5,22 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import pi
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.geometry.error import GeometryError
 from gearbench.geometry.files import written_whole
-from gearbench.geometry.mesh import GearMesh, full_mesh, sector_mesh
+from gearbench.geometry.mesh import GearMesh, full_mesh
 from gearbench.geometry.pair import Pair, pair
 from gearbench.geometry.profile import Profile
-from gearbench.geometry.quads import QuadGearMesh, full_quads, quad_sector_mesh
+from gearbench.geometry.quads import QuadGearMesh, QuadSectorMesh, full_quads
+from gearbench.geometry.sector import Element, meshed_sector
 from gearbench.geometry.sweep import DEFAULT_LAYERS, SolidMesh, joined, swept
 from gearbench.rig import Gear, Rig
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
-
-Element = Literal["triangle", "quadrilateral"]
 
 # meshio's names of the formats by suffix; gmsh's format 2.2 in ASCII is what every reader understands.
 _FORMATS = {".msh": "gmsh22", ".vtu": "vtu"}
@@ -70,9 +68,8 @@ def mesh_gear(
     tooth: Profile, gear: Gear, element_size: float | None = None, element: Element = "triangle"
 ) -> GearMesh | QuadGearMesh:
     """The full gear's mesh; `element_size` as in `sector_mesh`."""
-    if element == "quadrilateral":
-        return full_quads(quad_sector_mesh(tooth, gear, element_size))
-    return full_mesh(sector_mesh(tooth, gear, element_size))
+    sector = meshed_sector(tooth, gear, element_size, element)
+    return full_quads(sector) if isinstance(sector, QuadSectorMesh) else full_mesh(sector)
 
 
 def mesh_pair(rig: Rig, element_size: float | None = None, element: Element = "triangle") -> PlaneMesh:

@@ -63,6 +63,11 @@ class SectorMesh:
     boundary_edges: Index
     mirror: Index
 
+    @property
+    def cells(self) -> Index:
+        """The elements, whatever their kind."""
+        return self.triangles
+
 
 @dataclass(frozen=True)
 class GearMesh:

@@ -93,6 +93,9 @@ class Simulation(Value):
         0.02, ge=0.0, le=0.5, doc="lumped model: width of the switches of k(t) in mesh periods; 0: sharp"
     )
     element_size: float | None = quantity(None, "um", gt=0.0, doc="flank element size; absent: module / 12")
+    element: Literal["triangle", "quadrilateral"] = quantity(
+        "triangle", doc="elements of the condensed gears; stress is always found on triangles, cracks need them"
+    )
     modes: int = quantity(8, ge=0, le=60, doc="fixed-hub modes kept per gear (reduced model)")
     spectral_radius: float = quantity(
         0.9, ge=0.0, le=1.0, doc="generalised-alpha spectral radius at infinite frequency (reduced model)"

@@ -69,6 +69,17 @@ def test_a_crack_that_runs_out_of_its_tooth_is_refused() -> None:
         check_case(case_with(f"rig.driver.crack={{{keys}}}"))
 
 
+def test_a_crack_among_quadrilaterals_is_refused_by_all() -> None:
+    keys = "tooth = 0, length_mm = 0.5, direction_deg = 60.0"
+    case = case_with(f"rig.driven.crack={{{keys}}}", 'simulation.element="quadrilateral"')
+    said = []
+    for solve in (lambda: check_case(case), lambda: static(case, positions=2), lambda: simulate(case)):
+        with pytest.raises(GeometryError, match=r'rig\.driven\.crack .* simulation\.element = "quadrilateral"') as caught:
+            solve()
+        said.append(str(caught.value))
+    assert len(set(said)) == 1
+
+
 def test_grade_outside_the_standard_is_refused() -> None:
     gear: dict[str, Any] = {"module_mm": 0.4, "hub_radius_mm": 5, "thinning_um": 10, "bore_radius_mm": 0}
     both = [f"rig.{side}.{key}={value}" for side in ("driver", "driven") for key, value in gear.items()]

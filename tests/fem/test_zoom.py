@@ -50,7 +50,7 @@ def test_nothing_is_divided_without_need() -> None:
 def test_curved_edges_stay_curved() -> None:
     triangles, points = square()
     points[4, 1] = -0.1e-3  # the lower edge bulges as a parabola
-    cells, found = divided(triangles, points, lambda at: np.full(len(at), 0.2e-3))
+    _, found = divided(triangles, points, lambda at: np.full(len(at), 0.2e-3))
     x, y = 1e3 * found.T
     below = y < -1e-6
     assert below.sum() >= 7
