@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from gearbench.bench.stress_fields import Contact, PairFields
 from gearbench.cases import case_path
 from gearbench.cli import run_command_line
 from gearbench.failure import InputError
-from gearbench.figures_stress import plot_root_stress, tooth_history
+from gearbench.figures_stress import limits, plot_fields, plot_root_stress, rounded_up, tooth_history
 from gearbench.lumped.iso6336_root import root_stress
 from gearbench.rig import Case, read_case
 from gearbench.stress_output import field_files, field_phases
@@ -115,3 +116,44 @@ def test_picture_of_root_stress(tmp_path: Path, result: xr.Dataset) -> None:
     for label in ("Tension in the tooth root at 50 N m", "driven gear, finite elements", "driver, ISO 6336-3 sigma_F0"):
         assert label in text
     assert "driven gear, ISO" not in text
+
+
+@pytest.mark.parametrize(
+    ("value", "limit"), [(1.0, 1.0), (1.01, 1.25), (686.0, 800.0), (0.31, 0.4), (9e4, 1e5), (0.0, 1e-3), (-2.0, 1e-3)]
+)
+def test_limits_of_colours_read_well(value: float, limit: float) -> None:
+    assert rounded_up(value) == pytest.approx(limit, rel=1e-12)
+
+
+@pytest.fixture
+def fields() -> PairFields:
+    """A square of two triangles around a contact, stress growing with x to 1.7 MPa, and 90 MPa at the contact."""
+    x, y = (values.ravel() for values in np.meshgrid([-1e-3, 0.0, 1e-3], [-1e-3, 0.0, 1e-3]))
+    xx = np.where(np.hypot(x, y) < 1e-6, 90e6, 1.7e9 * x)
+    zero = np.zeros(9)
+    return PairFields(
+        points=np.column_stack([x, y]),
+        triangles=np.array([[0, 2, 8, 1, 5, 4], [0, 8, 6, 4, 7, 3]]),
+        gear=np.zeros(2, dtype=np.int64),
+        tooth=np.zeros(2, dtype=np.int64),
+        displacement=np.zeros((9, 2)),
+        stress=np.column_stack([xx, zero, zero]),
+        out_of_plane=zero,
+        contacts=(Contact(np.zeros(2), 2e-4),),
+        phase=0.25,
+        torque=12.0,
+        dte=1e-6,
+    )
+
+
+def test_colours_reach_to_the_stress_beside_the_contact(fields: PairFields) -> None:
+    assert limits(fields, 1e-3) == pytest.approx((2.0, 2.0))
+
+
+def test_picture_of_fields_without_pyvista(tmp_path: Path, fields: PairFields) -> None:
+    plot_fields(fields, 1e-3, tmp_path / "fields.svg")
+    text = (tmp_path / "fields.svg").read_text(encoding="utf-8")
+    for words in ("mesh phase 0.25, driver torque 12 N m", "von Mises stress [MPa]", "largest principal stress [MPa]"):
+        assert words in text
+    for tick in ("0.8", "1.2", "-0.4"):  # fifths of the limits, and one below zero
+        assert f">{tick}</text>" in text.replace("\N{MINUS SIGN}", "-")
