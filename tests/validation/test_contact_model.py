@@ -5,7 +5,6 @@ The moments are stored; where `ccx` is installed one model is written and solved
 
 from __future__ import annotations
 
-import json
 import re
 import shutil
 import subprocess
@@ -14,51 +13,40 @@ from typing import Any
 
 import numpy as np
 import pytest
+from shared.contact_models import RUNS, case_of, model_of, stiff_limit
 
-from gearbench.bench.calculix import contact_model
 from gearbench.bench.static import static
-from gearbench.cases import case_path
-from gearbench.geometry.calculix import PENALTIES, write_deck
-from gearbench.rig import Case, read_case
+from gearbench.geometry.calculix import write_deck
 
-STORED = json.loads((Path(__file__).parent / "contact_model.json").read_text(encoding="utf-8"))["runs"]
-
-
-def stiff_limit(moments: list[float]) -> float:
-    """Moment [N m] without the softness of the penalty, in whose reciprocal it is linear."""
-    soft, stiff = (1 / penalty for penalty in PENALTIES)
-    return 1e-3 * (moments[1] + (moments[1] - moments[0]) * stiff / (soft - stiff))
-
-
-def case_of(run: dict[str, Any]) -> Case:
-    return read_case(case_path(run["case"]), run["settings"])
+# The smallest one; about a minute.
+SOLVED = next(run for run in RUNS if run["name"].startswith("z20-21"))
 
 
 @pytest.mark.validation
-@pytest.mark.parametrize("run", STORED, ids=[run["name"] for run in STORED])
+@pytest.mark.parametrize("run", RUNS, ids=[run["name"] for run in RUNS])
 def test_stored_moments_are_ours(run: dict[str, Any]) -> None:
-    model = contact_model(case_of(run), run["phase"], dte=1e-6 * run["dte_um"])
+    model = model_of(run)
     limit = 5e-3 if run["on_line"] else 1e-2
     assert model.on_line == run["on_line"]
     assert model.torques[0] == pytest.approx(stiff_limit(run["driver"]), rel=limit)
     assert model.torques[1] == pytest.approx(stiff_limit(run["driven"]), rel=limit)
     # The model's torque is that of `static` at the same mesh phase and transmission error.
-    positions = 20
+    positions = 100
     cycle = static(case_of(run), dte=[1e-6 * run["dte_um"]], positions=positions)
     at = round(run["phase"] * positions) % positions
+    assert cycle["phase"].values[at] == pytest.approx(run["phase"] % 1.0, abs=1e-12)
     assert cycle["torque"].values[0, at] == pytest.approx(model.torques[0], rel=1e-6)
 
 
 @pytest.mark.validation
 @pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (ccx) is not installed")
 def test_calculix_finds_the_expected_moment(tmp_path: Path) -> None:
-    run = STORED[0]
-    model = contact_model(case_of(run), run["phase"], dte=1e-6 * run["dte_um"])
+    model = model_of(SOLVED)
     write_deck(tmp_path / "pair.inp", model.deck)
     subprocess.run(["ccx", "pair"], cwd=tmp_path, capture_output=True, check=True)
     text = (tmp_path / "pair.dat").read_text()
     for name, expected in zip(("DRIVER", "DRIVEN"), model.torques, strict=True):
         found = re.findall(rf"set MOMENT_{name} and time\s+\S+\s+(\S+)", text)
         assert len(found) >= 2
-        assert stiff_limit([float(found[0]), float(found[-1])]) == pytest.approx(expected, rel=5e-3)
+        assert stiff_limit([float(found[0]), float(found[-1])]) == pytest.approx(expected, rel=1e-2)
         assert np.sign(float(found[-1])) == 1
