@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from gearbench.mesh_report import DEFAULT_LAYERS, check_mesh_options, mesh_report, report_line
+from gearbench.mesh_report import DEFAULT_LAYERS, check_crack, check_mesh_options, mesh_report, report_line
 from gearbench.options import CaseArgument, JsonOption, SetOption, load_case, print_json
 from gearbench.progress import Progress
 
@@ -29,8 +29,9 @@ def mesh(
         Literal["both", "driver", "driven"], typer.Option("--gear", help="one gear in its own frame, or both")
     ] = "both",
     element: Annotated[
-        Literal["triangle", "quadrilateral"], typer.Option("--element", help="kind of the plane elements")
-    ] = "triangle",
+        Literal["triangle", "quadrilateral"] | None,
+        typer.Option("--element", help="kind of the plane elements; absent: the case's simulation.element"),
+    ] = None,
     dimension: Annotated[
         int, typer.Option("--dimension", help="2, or 3: swept over the face width to wedges or hexahedra")
     ] = 2,
@@ -56,9 +57,12 @@ def mesh(
         _contact(loaded, case, out, phase or 0.0, torque_nm, dte_um, as_json)
         return
     if out.suffix in (".dxf", ".step"):
+        check_crack(loaded.rig, gear, out)
         _draw(loaded.rig, out, gear, as_json)
         return
-    summary = _write_elements(loaded, out, gear, element, layers or DEFAULT_LAYERS if dimension == 3 else None)
+    check_crack(loaded.rig, gear, out, element, loaded.simulation.element)
+    kind = element or loaded.simulation.element
+    summary = _write_elements(loaded, out, gear, kind, layers or DEFAULT_LAYERS if dimension == 3 else None)
     if as_json:
         print_json(summary)
     else:
@@ -83,7 +87,8 @@ def _write_elements(
             plane = mesh_pair(rig, size, element)
         else:
             tooth, body = getattr(pair(rig), gear), getattr(rig, gear)
-            plane = gear_plane(mesh_gear(tooth, body, size, element), ("driver", "driven").index(gear))
+            number: Literal[0, 1] = 0 if gear == "driver" else 1
+            plane = gear_plane(mesh_gear(tooth, body, size, element, number), number)
         widths = rig.driver.face_width, rig.driven.face_width
         solid = None if layers is None else sweep_plane(plane, widths, layers)
         progress.step("writing")

@@ -16,7 +16,15 @@ from numpy.typing import NDArray
 
 from gearbench.geometry.crack import Slit, slit
 from gearbench.geometry.error import GeometryError
-from gearbench.geometry.grading import DEFAULT, Chain, _graded_outline, _march, _nodes, _outline, half_boundary
+from gearbench.geometry.grading import (
+    DEFAULT,
+    Chain,
+    graded_outline,
+    half_boundary,
+    outline_nodes,
+    size_samples,
+    spaced_nodes,
+)
 from gearbench.geometry.mesh import gmsh_session
 from gearbench.geometry.outline import Segment
 from gearbench.geometry.profile import Profile
@@ -72,16 +80,16 @@ def _sides(tooth: Profile, gear: Gear, cut: Slit, size: float) -> tuple[tuple[Ch
     """The sides of the whole sector counter-clockwise (outline, upper cut, hub, lower cut), and distances of the
     crack's corner nodes from its start."""
     beside = half_boundary(tooth, gear.hub_radius, size)
-    pieces, cloud = _graded_outline(tooth, size, DEFAULT)
+    pieces, cloud = graded_outline(tooth, size, DEFAULT)
     finest = min(size, max(cut.length / TIP, min(FINEST * tooth.module, cut.length / 8)))
     there = np.linspace(0.0, cut.length, 4 * TIP)
     sizes = np.minimum(size, finest + cloud.growth * (cut.length - there))
-    samples = _march(cut.length, lambda t: np.interp(t, there, sizes))
-    along, _ = _nodes(*samples, 2)
+    samples = size_samples(cut.length, lambda t: np.interp(t, there, sizes))
+    along, _ = spaced_nodes(*samples, 2)
     steps = np.linalg.norm(np.diff(beside.cut.corners, axis=0), axis=1)
     cloud = cloud.and_at(beside.cut.mids, steps)
-    upper = _outline(_split(pieces, cut), cloud.and_at(cut.points(there), sizes))
-    lower = _flipped(_outline(pieces, cloud.and_at(cut.points(there) * FLIP, sizes)))
+    upper = outline_nodes(_split(pieces, cut), cloud.and_at(cut.points(there), sizes))
+    lower = _flipped(outline_nodes(pieces, cloud.and_at(cut.points(there) * FLIP, sizes)))
     high, hub = beside.cut, beside.hub
     turn = -2 * pi / tooth.teeth
     matrix = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])

@@ -5,22 +5,28 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import pi
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gearbench.geometry.cracked_gear import CrackedGearMesh, cracked_mesh
 from gearbench.geometry.error import GeometryError
 from gearbench.geometry.files import written_whole
 from gearbench.geometry.mesh import GearMesh, full_mesh
 from gearbench.geometry.pair import Pair, pair
 from gearbench.geometry.profile import Profile
 from gearbench.geometry.quads import QuadGearMesh, QuadSectorMesh, full_quads
-from gearbench.geometry.sector import Element, meshed_sector
+from gearbench.geometry.sector import Element, meshed_sector, refuse_crack
 from gearbench.geometry.sweep import DEFAULT_LAYERS, SolidMesh, joined, swept
 from gearbench.rig import Gear, Rig
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
+
+# Direction in which the case numbers the teeth of driver and driven gear; 1: counter-clockwise.
+ORDER = (-1, 1)
+FullMesh = GearMesh | QuadGearMesh | CrackedGearMesh
 
 # meshio's names of the formats by suffix; gmsh's format 2.2 in ASCII is what every reader understands.
 _FORMATS = {".msh": "gmsh22", ".vtu": "vtu"}
@@ -29,7 +35,7 @@ _FORMATS = {".msh": "gmsh22", ".vtu": "vtu"}
 @dataclass(frozen=True)
 class PlaneMesh:
     """Points (n, 2) [m], quadratic triangles (m, 6) or quadrilaterals (m, 9), and for each of them the number of its
-    gear (0, 1) and tooth."""
+    gear (0, 1) and tooth, as the case numbers them: in order of meshing, the driver's clockwise."""
 
     points: Array
     triangles: Index
@@ -42,17 +48,20 @@ class PlaneMesh:
         return {6: "triangle6", 9: "quad9"}[self.triangles.shape[1]]
 
 
-def gear_plane(mesh: GearMesh | QuadGearMesh, number: int = 0, angle: float = 0.0, centre: float = 0.0) -> PlaneMesh:
+def gear_plane(mesh: FullMesh, number: int = 0, angle: float = 0.0, centre: float = 0.0) -> PlaneMesh:
     """A full gear turned by `angle` [rad] and moved to x = `centre` [m], as gear `number`."""
     cosine, sine = np.cos(angle), np.sin(angle)
     x, y = mesh.points.T
     points = np.column_stack((centre + cosine * x - sine * y, sine * x + cosine * y))
     count = len(mesh.cells)
-    tooth = np.repeat(np.arange(mesh.teeth), count // mesh.teeth)
-    return PlaneMesh(points, mesh.cells, np.full(count, number), tooth)
+    if isinstance(mesh, CrackedGearMesh):
+        sector = mesh.sector
+    else:
+        sector = np.repeat(np.arange(mesh.teeth), count // mesh.teeth)
+    return PlaneMesh(points, mesh.cells, np.full(count, number), ORDER[number] * sector % mesh.teeth)
 
 
-def pair_plane(meshing: Pair, driver: GearMesh | QuadGearMesh, driven: GearMesh | QuadGearMesh) -> PlaneMesh:
+def pair_plane(meshing: Pair, driver: FullMesh, driven: FullMesh) -> PlaneMesh:
     """Both gears in the world frame at mesh phase 0: both teeth 0 touch at the pitch point, unloaded."""
     one = gear_plane(driver, 0, meshing.driver_angle)
     two = gear_plane(driven, 1, pi + meshing.driven_angle, meshing.centre_distance)
@@ -65,9 +74,18 @@ def pair_plane(meshing: Pair, driver: GearMesh | QuadGearMesh, driven: GearMesh 
 
 
 def mesh_gear(
-    tooth: Profile, gear: Gear, element_size: float | None = None, element: Element = "triangle"
-) -> GearMesh | QuadGearMesh:
-    """The full gear's mesh; `element_size` as in `sector_mesh`."""
+    tooth: Profile,
+    gear: Gear,
+    element_size: float | None = None,
+    element: Element = "triangle",
+    number: Literal[0, 1] = 0,
+) -> FullMesh:
+    """The full mesh of the driver (`number` 0) or the driven gear (1), a crack that has a length open in its tooth;
+    `element_size` as in `sector_mesh`. Raises GeometryError."""
+    name = ("rig.driver", "rig.driven")[number]
+    if gear.crack is not None and gear.crack.meshed:
+        refuse_crack(gear, element, name)
+        return cracked_mesh(tooth, gear, element_size, order=ORDER[number], name=name)
     sector = meshed_sector(tooth, gear, element_size, element)
     return full_quads(sector) if isinstance(sector, QuadSectorMesh) else full_mesh(sector)
 
@@ -77,7 +95,8 @@ def mesh_pair(rig: Rig, element_size: float | None = None, element: Element = "t
     meshing = pair(rig)
     driver = mesh_gear(meshing.driver, rig.driver, element_size, element)
     same = meshing.driver == meshing.driven and rig.driver.hub_radius == rig.driven.hub_radius
-    driven = driver if same else mesh_gear(meshing.driven, rig.driven, element_size, element)
+    same = same and rig.driver.crack is None and rig.driven.crack is None
+    driven = driver if same else mesh_gear(meshing.driven, rig.driven, element_size, element, 1)
     return pair_plane(meshing, driver, driven)
 
 

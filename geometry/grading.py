@@ -80,7 +80,7 @@ class Cloud:
         return Cloud(np.concatenate((self.points, points)), np.concatenate((self.sizes, sizes)), self.growth)
 
 
-def _nodes(t: Array, size: Array, at_least: int = 1, *, even: bool = False) -> tuple[Array, Array]:
+def spaced_nodes(t: Array, size: Array, at_least: int = 1, *, even: bool = False) -> tuple[Array, Array]:
     """Corners and mid-sides on [0, t[-1]], spaced as `size` (n,) at the rising samples `t` (n,) asks for; `even`: an
     even number of edges."""
     density = 1 / size
@@ -92,7 +92,7 @@ def _nodes(t: Array, size: Array, at_least: int = 1, *, even: bool = False) -> t
     return corners, 0.5 * (corners[1:] + corners[:-1])
 
 
-def _march(length: float, size: Callable[[Array], Array]) -> tuple[Array, Array]:
+def size_samples(length: float, size: Callable[[Array], Array]) -> tuple[Array, Array]:
     """Rising samples of [0, length], a quarter of the size there apart, and the sizes."""
     t, found = [0.0], [float(size(np.zeros(1))[0])]
     while t[-1] < length:
@@ -151,8 +151,8 @@ class _Rays:
 
     def axis(self, hub_radius: float, tip_radius: float) -> Chain:
         """Nodes of the tooth's axis, from the hub outwards."""
-        reach = _march(tip_radius - hub_radius, lambda t: self.size(hub_radius + t, 0.0))
-        corners, mids = (hub_radius + part for part in _nodes(*reach, even=self.even))
+        reach = size_samples(tip_radius - hub_radius, lambda t: self.size(hub_radius + t, 0.0))
+        corners, mids = (hub_radius + part for part in spaced_nodes(*reach, even=self.even))
         return Chain(corners[:, None] * radial(0.0), mids[:, None] * radial(0.0))
 
 
@@ -164,19 +164,20 @@ def half_boundary(tooth: Profile, hub_radius: float, element_size: float, gradin
     """
     half = pi / tooth.teeth
     rim = tooth.root_radius - hub_radius
-    pieces, cloud = _graded_outline(tooth, element_size, grading)
+    pieces, cloud = graded_outline(tooth, element_size, grading)
     rays = _Rays(cloud, half, max(element_size, min(COARSE * element_size, rim / 6)), grading.even)
-    depth, along = _march(rim, lambda t: rays.size(tooth.root_radius - t, half))
+    depth, along = size_samples(rim, lambda t: rays.size(tooth.root_radius - t, half))
     wanted = float(np.sum(0.5 * (1 / along[1:] + 1 / along[:-1]) * np.diff(depth)))
     if wanted < grading.cut_edges:
         # A thin rim: refine what lies beside it too, or the triangles there would be flat.
         along = along * (wanted / grading.cut_edges)
         cloud = cloud.and_at((tooth.root_radius - depth)[:, None] * radial(half), along)
         rays = replace(rays, cloud=cloud)
-    corners, mids = (tooth.root_radius - part for part in _nodes(depth, along, grading.cut_edges, even=grading.even))
+    spaced = spaced_nodes(depth, along, grading.cut_edges, even=grading.even)
+    corners, mids = (tooth.root_radius - part for part in spaced)
     cut = Chain(corners[:, None] * radial(half), mids[:, None] * radial(half))
     axis = rays.axis(hub_radius, tooth.tip_radius)
-    return HalfBoundary(_outline(pieces, cloud, grading.even), cut, _hub(cloud, hub_radius, rays, grading), axis)
+    return HalfBoundary(outline_nodes(pieces, cloud, grading.even), cut, _hub(cloud, hub_radius, rays, grading), axis)
 
 
 def refined_boundary(
@@ -184,17 +185,17 @@ def refined_boundary(
 ) -> HalfBoundary:
     """Half a sector that shares cut and hub circle with the sectors `beside` it, but has elements of `element_size` on
     its outline and of `sizes` (n,) at the points `at` (n, 2)."""
-    pieces, cloud = _graded_outline(tooth, element_size, grading)
+    pieces, cloud = graded_outline(tooth, element_size, grading)
     lengths = [np.linalg.norm(np.diff(chain.corners, axis=0), axis=1) for chain in (beside.cut, beside.hub)]
     cloud = cloud.and_at(at, sizes)
     for chain, length in zip((beside.cut, beside.hub), lengths, strict=True):
         cloud = cloud.and_at(chain.mids, length)
     rays = _Rays(cloud, pi / tooth.teeth, max(float(length.max()) for length in lengths), grading.even)
     axis = rays.axis(float(np.hypot(*beside.hub.corners[-1])), tooth.tip_radius)
-    return HalfBoundary(_outline(pieces, cloud, grading.even), beside.cut, beside.hub, axis)
+    return HalfBoundary(outline_nodes(pieces, cloud, grading.even), beside.cut, beside.hub, axis)
 
 
-def _graded_outline(tooth: Profile, element_size: float, grading: Grading) -> tuple[list[Segment], Cloud]:
+def graded_outline(tooth: Profile, element_size: float, grading: Grading) -> tuple[list[Segment], Cloud]:
     """The outline's pieces and the sizes on them."""
     finest = tip_size(tooth, element_size) if grading.fine_tips else element_size
     pieces = _pieces(tooth, element_size, finest)
@@ -205,12 +206,12 @@ def _size_on(piece: Segment, cloud: Cloud, t: Array) -> Array:
     return cloud.at(piece.points(t))
 
 
-def _outline(pieces: list[Segment], cloud: Cloud, even: bool = False) -> Chain:
+def outline_nodes(pieces: list[Segment], cloud: Cloud, even: bool = False) -> Chain:
     """Nodes of the outline; every joint of two pieces is a corner."""
     corners, mids = [], []
     for piece in pieces:
-        reach = _march(piece.length, partial(_size_on, piece, cloud))
-        nodes, between = _nodes(*reach, 2 if piece.name == "tip edge" else 1, even=even)
+        reach = size_samples(piece.length, partial(_size_on, piece, cloud))
+        nodes, between = spaced_nodes(*reach, 2 if piece.name == "tip edge" else 1, even=even)
         corners.append(piece.points(nodes)[:-1])
         mids.append(piece.points(between))
     last = pieces[-1]
@@ -225,5 +226,5 @@ def _hub(cloud: Cloud, radius: float, rays: _Rays, grading: Grading) -> Chain:
     def size(t: Array) -> Array:
         return np.minimum(min(rays.coarsest, grading.bend * radius), cloud.at(radius * radial(half - t / radius)))
 
-    corners, mids = (half - part / radius for part in _nodes(*_march(radius * half, size), even=rays.even))
+    corners, mids = (half - part / radius for part in spaced_nodes(*size_samples(radius * half, size), even=rays.even))
     return Chain(radius * radial(corners), radius * radial(mids))

@@ -191,6 +191,38 @@ def test_mesh_writes_one_gear_and_both(tmp_path: Path, capsys: pytest.CaptureFix
     assert pair.points[:, 0].max() == pytest.approx(0.124 + 0.064, abs=1e-5)
 
 
+CRACK = "rig.driven.crack={tooth=3, length_mm=0.8, direction_deg=60}"
+
+
+def test_mesh_shows_a_crack(tmp_path: Path) -> None:
+    path = tmp_path / "gear.vtu"
+    settings = ["--set", "simulation.element_size_um=800", "--set", CRACK]
+    assert run_command_line(["mesh", "paper_fe", "--out", str(path), "--gear", "driven", *settings]) == 0
+    places, count = np.unique(np.round(meshio.read(path).points, 11), axis=0, return_counts=True)
+    slit = places[count > 1]
+    assert 0.72e-3 < np.linalg.norm(np.ptp(slit, axis=0)) < 0.8e-3
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--out", "pair.inp"], ["rig.driven.crack"]),
+        (["--out", "pair.dxf"], ["rig.driven.crack", "pair.dxf"]),
+        (["--out", "gear.step", "--gear", "driven"], ["rig.driven.crack", "gear.step"]),
+        (["--out", "pair.vtu", "--element", "quadrilateral"], ["rig.driven.crack", "--element"]),
+        (["--out", "pair.vtu", "--set", 'simulation.element="quadrilateral"'], ["rig.driven.crack", "simulation.ele"]),
+    ],
+)
+def test_mesh_refuses_a_crack_that_it_cannot_show(
+    options: list[str], words: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert run_command_line(["mesh", "paper_fe", "--set", CRACK, *options]) == 2
+    said = capsys.readouterr().err
+    assert all(word in said for word in words) and said.count("\n") == 1
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize(
     ("given", "spelt"),
     [
