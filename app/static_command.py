@@ -114,6 +114,11 @@ def _check_stress(
     for option, wanted in (("--fields", bool(fields)), ("--root-figure", root_figure is not None)):
         if wanted and not elastic:
             raise InputError(f"{option} needs finite elements, not the lumped model: --model reduced")
+    if root_figure is not None:
+        from gearbench.bench.stress_root import why_not
+
+        if reason := why_not(case.rig):
+            raise InputError(f"--root-figure cannot be drawn: {reason}")
     files = field_files(out, field_phases(fields), others)
     if files:
         from gearbench.bench.stress_fields import refuse_cracks
@@ -135,11 +140,8 @@ def _stress_files(
 ) -> list[Path]:
     """Write fields and the picture of root stress where asked for; the fields' files."""
     if root_figure is not None:
-        from gearbench.failure import InputError
         from gearbench.figures_stress import plot_root_stress
 
-        if "root_stress_note" in result.attrs:
-            raise InputError(f"--root-figure cannot be drawn: {result.attrs['root_stress_note']}")
         (largest,) = sorted(root_tables(case, result), key=lambda one: float(one["torque_nm"]))[-1:]
         iso = {name: gear["sigma_f0_mpa"] for name, gear in largest["gears"].items() if gear["sigma_f0_mpa"]}
         plot_root_stress(result, root_figure, iso)

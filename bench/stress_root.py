@@ -14,7 +14,7 @@ from gearbench.fem.cache import cached, key_for
 from gearbench.fem.fields import elastic_gear
 from gearbench.fem.loaded import PairLoad, pair_loads
 from gearbench.fem.root import RootKernel, peak, root_kernel, root_stress
-from gearbench.rig import Gear, Material, sound_gear
+from gearbench.rig import Gear, Material, Rig, sound_gear
 
 Array = NDArray[np.float64]
 
@@ -36,9 +36,9 @@ def stored_root(gear: Gear, material: Material, element_size: float | None = Non
     return RootKernel(**found | {"last": int(found["last"]), "width": float(found["width"])})
 
 
-def why_not(elastic: ElasticRig) -> str:
+def why_not(rig: Rig) -> str:
     """Why a rig has no root stress; empty if it has."""
-    gears = elastic.rig.driver, elastic.rig.driven
+    gears = rig.driver, rig.driven
     if any(gear.crack is not None for gear in gears):
         return CRACK
     return SHARP if any(gear.rack_tip_radius == 0.0 for gear in gears) else ""
@@ -53,7 +53,7 @@ def with_root_stress(elastic: ElasticRig, result: xr.Dataset, element_size: floa
     root_stress_angle_NAME (tangent to tooth axis), root_stress_phase_NAME (since the tooth's contact at the pitch
     point); root_stress_outer_NAME (load,): the mean torque on one tooth alone, at the outer point of single contact.
     """
-    if reason := why_not(elastic):
+    if reason := why_not(elastic.rig):
         return result.assign_attrs(root_stress_note=reason)
     rig = elastic.rig
     kernels = [stored_root(gear, rig.material, _fine(gear, element_size)) for gear in (rig.driver, rig.driven)]

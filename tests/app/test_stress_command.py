@@ -52,6 +52,11 @@ def test_files_are_named_after_the_result(tmp_path: Path) -> None:
         ("quick_fe", ["--fields", "0", "--figure", "{folder}/static_phase0.000.png"], "would replace"),
         ("quick_fe", ["--root-figure", "{folder}/a.png", "--figure", "{folder}/a.png"], "which it would replace"),
         ("quick_fe", ["--fields", "0", "--set", "rig.driver.crack={tooth=1, stiffness_loss=0.1}"], "rig.driver.crack"),
+        (
+            "quick_fe",
+            ["--root-figure", "{folder}/root.png", "--set", "rig.driver.crack={tooth=1, stiffness_loss=0.1}"],
+            "--root-figure cannot be drawn",
+        ),
     ],
 )
 def test_refused_before_any_work(
