@@ -35,14 +35,13 @@ EXCITED = 0.05  # of the largest torque line
 class Blocks:
     """Blocks of one condition: `used` (B,) bins in which anything but noise is heard, `of_bin` (B,) their blocks,
     `count` (blocks,) bins of each; `floor` (rows + 1, B) variances [N^2], the mesh last; `rows` those that the record
-    has channels for; `separates` whether flanks part."""
+    has channels for."""
 
     used: NDArray[np.int64]
     of_bin: NDArray[np.int64]
     count: Array
     floor: Array
     rows: NDArray[np.int64]
-    separates: bool = False
 
 
 def kinds_of(condition: Condition) -> NDArray[np.int64]:
@@ -97,7 +96,6 @@ def cut(machine: Machine, condition: Condition, level: Array, relative: Array, s
         count=counted[heard],
         floor=floor[:, used],
         rows=present,
-        separates=separates,
     )
 
 

@@ -12,7 +12,6 @@ from gearbench.diagnosis.apply import Estimate, Unknowns, apply_effect, recalibr
 from gearbench.diagnosis.decision import PLACE_OF_ROW, Decision, decide, named
 from gearbench.diagnosis.fit import Fit, Problem
 from gearbench.diagnosis.intake import Measurement
-from gearbench.diagnosis.parting import BACKLASH, with_backlash
 from gearbench.diagnosis.problem import problem_of
 from gearbench.diagnosis.replays import replays
 from gearbench.diagnosis.search import Search, Tried, missing_by_row, search
@@ -59,20 +58,14 @@ def find_cause(
 
     `without` leaves effects out of the library. Raises DiagnosisError for measurements that cannot be used.
     """
-    whole = problem_of(measurements, nominal)
-    problem = whole.steady
+    problem = problem_of(measurements, nominal)
     found = search(problem, without, report)
-    if problem is not whole and BACKLASH not in without:
-        report(BACKLASH)
-        found = with_backlash(whole, found)
     best = named(found)
-    partial = problem is not whole and best is not None and best.hypothesis.effect == BACKLASH
-    fit = best.fit if best and best.fit and not partial else found.base
+    fit = best.fit if best and best.fit else found.base
     silent = missing_by_row(problem, fit)
     report("steadiness")
-    band, steady = problem.conditions[0].band, {condition.name for condition in problem.conditions}
-    kept = [measured for measured in measurements if measured.name in steady]
-    unsteady = unsteadiness(problem.machine, kept, problem.where, fit.p, band)
+    band = problem.conditions[0].band
+    unsteady = unsteadiness(problem.machine, measurements, problem.where, fit.p, band)
     decision = decide(found, silent, unsteady)
     plain = recalibrated(nominal, _unknowns(problem, found.base))
     effects, updated = _effects(problem, nominal, decision)

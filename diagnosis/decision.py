@@ -52,16 +52,18 @@ def decide(found: Search, silent: Array, unsteady: Array, limits: Limits = LIMIT
 
 
 def named(found: Search, limits: Limits = LIMITS) -> Tried | None:
-    """The best effect of the library whose evidence clears its limit and whose size the background does not have."""
-    cleared = [
+    """The best effect of the library whose evidence clears its limit and whose size the background does not have; none
+    if another effect of that size, which does not clear its own limit, has much more evidence."""
+    large = [
         one
         for one in found.tried
-        if one.hypothesis.effect
-        and one.fit is not None
-        and one.size > limits.size
-        and one.gain > limits.of(one.hypothesis.effect)
+        if one.hypothesis.effect and one.fit is not None and one.size > limits.size and one.gain > 0.0
     ]
-    return max(cleared, key=lambda one: one.gain, default=None)
+    cleared = [one for one in large if one.gain > limits.of(one.hypothesis.effect)]
+    best = max(cleared, key=lambda one: one.gain, default=None)
+    if best is None or best.gain < limits.rival * max(one.gain for one in large):
+        return None
+    return best
 
 
 def _unknown(place: str, because: str) -> Decision:

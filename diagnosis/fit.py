@@ -42,15 +42,6 @@ class Problem:
     where: Layout
     blocks: tuple[Blocks, ...]
 
-    @property
-    def steady(self) -> Problem:
-        """The same for the records in which flanks stay together; for all if they part in every one."""
-        kept = [number for number, blocks in enumerate(self.blocks) if not blocks.separates]
-        if not kept:
-            return self
-        conditions = tuple(self.conditions[number] for number in kept)
-        return replace(self, conditions=conditions, blocks=tuple(self.blocks[number] for number in kept))
-
 
 @dataclass(frozen=True)
 class Fit:

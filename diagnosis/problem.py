@@ -23,9 +23,8 @@ Array = NDArray[np.float64]
 # Errors that a sound rig's rows and mesh have because the model is simpler than the rig, as parts of the mesh force.
 ROW_FLOOR = 0.03
 MESH_FLOOR = 0.08
-# Flanks count as separating when the force between them is below this part of its level, for this part of the time.
-UNLOADED = 0.02
-SEPARATED = 0.02
+# Part of the time beyond which flanks count as separating.
+SEPARATED = 0.03
 OFF_COMB = 1.02  # how far beyond the highest excited line bins are used
 
 
@@ -38,9 +37,10 @@ def problem_of(measurements: Sequence[Measurement], nominal: Case) -> Problem:
     where = unknowns(made, conditions)
     blocks = []
     for condition in conditions:
+        level, separates = _levels(made, condition, where)
         relative = np.full((len(ROWS) + 1, condition.bins), ROW_FLOOR)
         relative[-1] = MESH_FLOOR
-        blocks.append(cut(made, condition, _levels(made, condition, where), relative, _separates(condition)))
+        blocks.append(cut(made, condition, level, relative, separates))
     return Problem(made, conditions, where, tuple(blocks))
 
 
@@ -57,18 +57,12 @@ def excited_band(measured: Measurement) -> float:
     return float(min(OFF_COMB * loud[-1] * spacing, measured.sampling_rate / 2.2))
 
 
-def _separates(condition: Condition) -> bool:
-    """Whether flanks part now and then, by the measured force: the nominal law would take a late angle for a gap."""
-    force = np.fft.irfft(condition.force_full, condition.samples) * condition.samples
-    return bool((force < UNLOADED * condition.force_level).mean() > SEPARATED)
-
-
-def _levels(made: Machine, condition: Condition, where: Layout) -> Array:
-    """The mesh force (rows + 1, K) [N] as each row and the nominal mesh law have it."""
+def _levels(made: Machine, condition: Condition, where: Layout) -> tuple[Array, bool]:
+    """The mesh force (rows + 1, K) [N] as each row and the nominal mesh law have it, and whether flanks separate."""
     nothing = np.zeros(where.size)
     spectra = corrected(condition, where, nothing)
     state = mesh(made, condition, where, nothing, spectra)
     found = assemble(made, condition, where, nothing, spectra, state)
     forces = carried(made, condition, where, nothing, state.force)
     rows = found.left + found.share * forces[[0, 1, 2, 1]]
-    return np.vstack([np.abs(rows), np.abs(found.force)[None]])
+    return np.vstack([np.abs(rows), np.abs(found.force)[None]]), bool((~state.touching).mean() > SEPARATED)

@@ -39,8 +39,7 @@ class Mesh:
     """The mesh of one condition under given unknowns, over time (N,).
 
     Deflection [m], force without damping [N], its tangent [N/m], damping coefficient [N s/m], rate of the DTE [m/s],
-    logarithm of the law's force over its level, relative growth of the tangent [1/m] by the law's curvature, the whole
-    force [N] and the touching flags; `stiffening` is the mean logarithm of the stiffness's factor.
+    the whole force [N] and the touching flags; `stiffening` is the mean logarithm of the stiffness's factor.
     """
 
     delta: Array
@@ -48,8 +47,6 @@ class Mesh:
     tangent: Array
     viscosity: Array
     rate: Array
-    level: Array
-    hardening: Array
     force: Array
     touching: NDArray[np.bool_]
     stiffening: float
@@ -130,17 +127,17 @@ def mesh(machine: Machine, condition: Condition, where: Layout, p: Array, spectr
     delta = delta + (weight * pitch_excess(condition, where, p)).sum(axis=-1)
     force, slope = law.evaluate(delta, condition.phase)
     curve = p[where["curvature"]][0]
-    level = np.log(np.maximum(np.abs(force) / condition.force_level, 1e-3))
-    factor = factor * np.exp(curve * level)
-    elastic, tangent = factor * force, (1 + curve) * factor * slope
+    if curve:
+        level = np.maximum(np.abs(force), 1e-3 * condition.force_level) / condition.force_level
+        factor = factor * level**curve
+    elastic, tangent = factor * force, factor * slope
     touching = force != 0.0
     ratio = machine.mesh_ratio * np.exp(p[where["mesh-ratio"]][0])
     viscosity = 2 * ratio * np.sqrt(np.maximum(tangent, 0.0) * machine.mesh_mass)
     quadratic = p[where["dissipation"]][0] * np.abs(rate)
     total = elastic + (viscosity + quadratic) * rate * touching
     stiffening = float(np.log(np.maximum(modulated, 1e-3)).mean())
-    hardening = curve * slope / np.maximum(np.abs(force), 1e-3 * condition.force_level)
-    return Mesh(delta, elastic, tangent, viscosity, rate, level, hardening, total, touching, stiffening)
+    return Mesh(delta, elastic, tangent, viscosity, rate, total, touching, stiffening)
 
 
 def radial_impedance(
@@ -237,7 +234,8 @@ def assemble(
         if channel not in spectra:
             continue
         out[row] = sign * support(machine, condition, where, p, side, spectra[channel]) - middle
-    out += filters(condition, where, p) * np.stack([share[0] * first, middle, last, middle])
+    filters = _filters(condition, where, p)
+    out += filters * np.stack([share[0] * first, middle, last, middle])
     return Residuals(out, share, _transform(condition, state.force), state.stiffening)
 
 
@@ -273,8 +271,7 @@ def ripple_lines(condition: Condition, where: Layout) -> list[tuple[int, int, co
     return found
 
 
-def filters(condition: Condition, where: Layout, p: Array) -> Complex:
-    """Smooth complex gains (4, K) of the rows, which take this part of the mesh force away."""
+def _filters(condition: Condition, where: Layout, p: Array) -> Complex:
     count = len(KNOTS)
     basis = condition.hats_full[:, : condition.bins]
     return np.stack([(v[:count] + 1j * v[count:]) @ basis for v in (p[where[f"filter-{row}"]] for row in ROWS)])

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from gearbench.diagnosis.fit import Fit, Problem, refit, score
 from gearbench.diagnosis.hypotheses import Hypothesis, free_forms, library, predicted_gains, starts
 from gearbench.diagnosis.parameters import Layout
-from gearbench.diagnosis.rows import closing, corrected
 from gearbench.diagnosis.unknowns import ROWS
 
 Array = NDArray[np.float64]
@@ -23,9 +22,6 @@ MOST_TEETH = 2  # of these, single cracked teeth
 FROM_BEGINNING = ("friction",)  # always refitted, as it trades with the mesh's shape
 STEPS_BASE, STEPS = 16, 12
 RADIAL_TRIALS = (-0.6, -0.2, 0.2, 0.7)  # logarithms of stiffness over the prior's
-LARGE = 2.0  # size from which an effect is more than background
-CLEAR = 2.0  # nats between optima that matter
-MOST_AGAIN = 2  # refits of each kind from a better background
 COARSE = (4.0,)  # lambda of the first rounds
 
 
@@ -64,7 +60,7 @@ def search(problem: Problem, without: Sequence[str] = (), report: Report = lambd
     sd = where.prior({group for effect in effects for group in effect.groups})
     free = refit(problem, sd, begin, most=STEPS, coarse=COARSE)
     again = refit(problem, where.prior(), free.p, free.factors, most=STEPS_BASE)
-    base = _likelier(base, again)
+    base = again if again.cost < base.cost else base
     hypotheses = effects + free_forms()
     gains = predicted_gains(base, where, hypotheses)
     gains = np.maximum(gains, [min(gain, 1.0) for gain in predicted_gains(free, where, hypotheses)])
@@ -92,32 +88,18 @@ def search(problem: Problem, without: Sequence[str] = (), report: Report = lambd
 
 
 def begin_of(problem: Problem) -> Array:
-    """Where to begin (P,): the offset where the law presses as hard as measured, the radial supports, whose resonances
-    may lie anywhere in the band, by trial."""
+    """Where to begin (P,): the radial supports, whose resonances may lie anywhere in the band, by trial."""
     where, sd = problem.where, problem.where.prior()
-    plain = np.zeros(where.size)
-    plain[where["offset"]] = _offset(problem)
     even = [np.full((len(b.rows) + 1, len(b.count)), COARSE[0]) for b in problem.blocks]
-    best, least = plain, np.inf
+    best, least = np.zeros(where.size), np.inf
     for first in RADIAL_TRIALS:
         for second in RADIAL_TRIALS:
-            trial = plain.copy()
+            trial = np.zeros(where.size)
             trial[where["radial"]] = (first, second, 0.0, 0.0)
             cost = score(problem, trial, sd, even, rounds=0)[0]
             if cost < least:
                 best, least = trial, cost
     return best
-
-
-def _offset(problem: Problem) -> float:
-    """Excess [m] by which the nominal law's mean force becomes the measured one, mean over the conditions."""
-    machine, lacking = problem.machine, []
-    force = machine.scale * machine.law.force.mean(axis=0)
-    for condition in problem.conditions:
-        needed = float(np.interp(condition.force_level, force, machine.law.approach))
-        spectra = corrected(condition, problem.where, np.zeros(problem.where.size))
-        lacking.append(needed - float(closing(machine, spectra)[0].real))
-    return float(np.mean(lacking))
 
 
 def _calm(free: Fit, sd: Array) -> Array:
@@ -142,6 +124,14 @@ def _start(problem: Problem, fits: tuple[Fit, Fit], hypothesis: Hypothesis) -> t
     return (np.clip(p, low, high), factors), costs[0] - costs[best] if best else -np.inf
 
 
+def relief(where: Layout, hypothesis: Hypothesis, fit: Fit) -> float:
+    """What widening its own prior can add to the evidence at most: the background, taken to where the fit is, would
+    pay this for the effect. Whatever a refit gains beyond has come from a better way down, open to the background."""
+    at = _own(where, hypothesis)
+    narrow = where.prior()[at]
+    return 0.5 * float((fit.p[at] ** 2 * (narrow**-2.0 - fit.sd[at] ** -2.0)).sum())
+
+
 def relative_size(where: Layout, hypothesis: Hypothesis, fit: Fit) -> float:
     """Rms of what a hypothesis makes wide, in standard deviations of the background, each unknown by how much of its
     prior variance the records have taken away: what they do not show has no size."""
@@ -157,43 +147,21 @@ def _own(where: Layout, hypothesis: Hypothesis) -> NDArray[np.int64]:
 
 
 def _level(problem: Problem, base: Fit, tried: list[Tried]) -> tuple[Fit, list[Tried]]:
-    """The background fitted again from refits that may have found a way that it had missed, the strongest effects
-    again from the background's better way, and the gains of all over the background."""
-    refits = sorted((one for one in tried if one.fit is not None), key=lambda one: -one.gain)
-    # A refit that gained without a large effect of its own has found a better background.
-    better = [one for one in refits if one.size < LARGE and one.gain > base.log_evidence + CLEAR]
-    for one in [*refits[:1], *(one for one in better[:MOST_AGAIN] if one is not refits[0])]:
-        base = _likelier(base, _again(problem, base.sd, one.fit, base))
-    strong = [one for one in refits if one.size >= LARGE and one.gain > base.log_evidence - CLEAR][:MOST_AGAIN]
-    found = {one.hypothesis.name: one for one in tried}
-    for one in strong:
-        found[one.hypothesis.name] = _retried(problem, one, base)
-    if strong:
-        first = max((found[one.hypothesis.name] for one in strong), key=lambda one: one.gain)
-        base = _likelier(base, _again(problem, base.sd, first.fit, base))
-    gains = [one.gain - base.log_evidence if one.fit else one.gain for one in found.values()]
-    return base, [replace(one, gain=gain) for one, gain in zip(found.values(), gains, strict=True)]
+    """The background fitted again from the best refit, which may have found a way that it had missed, and the gains
+    over it of all that was tried."""
+    refits = [one for one in tried if one.fit is not None]
+    if refits:
+        best = max(refits, key=lambda one: one.gain)
+        assert best.fit is not None
+        again = refit(problem, base.sd, best.fit.p, best.fit.factors, most=STEPS)
+        base = again if again.cost < base.cost else base
+    return base, [replace(one, gain=_gain(problem, one, base)) for one in tried]
 
 
-def _likelier(one: Fit, other: Fit) -> Fit:
-    return other if other.log_evidence > one.log_evidence else one
-
-
-def _again(problem: Problem, sd: Array, found: Fit | None, otherwise: Fit) -> Fit:
-    start = found or otherwise
-    return refit(problem, sd, start.p, start.factors, most=STEPS)
-
-
-def _retried(problem: Problem, one: Tried, base: Fit) -> Tried:
-    """A hypothesis refitted from the background's fit and its own wide unknowns, if that is better."""
-    assert one.fit is not None
-    start, at = base.p.copy(), _own(problem.where, one.hypothesis)
-    start[at] = one.fit.p[at]
-    fit = refit(problem, one.fit.sd, start, base.factors, most=STEPS)
-    gain = fit.log_evidence - float(np.log(one.hypothesis.choices))
-    if gain <= one.gain:
-        return one
-    return Tried(one.hypothesis, gain, fit, relative_size(problem.where, one.hypothesis, fit))
+def _gain(problem: Problem, one: Tried, base: Fit) -> float:
+    if one.fit is None:
+        return one.gain
+    return min(one.gain - base.log_evidence, relief(problem.where, one.hypothesis, one.fit))
 
 
 def _promising(hypotheses: Sequence[Hypothesis], gains: Array) -> set[int]:

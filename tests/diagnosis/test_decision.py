@@ -17,6 +17,7 @@ HAND = replace(
     LIMITS,
     effect=5.0,
     size=2.0,
+    rival=0.5,
     own={"pitch-error": 30.0},
     free=10.0,
     competitor_factor=1.5,
@@ -78,11 +79,17 @@ def test_no_effect_without_enough_of_it(tried: tuple[Tried, ...]) -> None:
 
 
 def test_an_effect_below_its_own_limit_gives_way_to_one_above() -> None:
-    found = decided(effect("pitch-error", 29.0), effect("friction", 6.0))
+    found = decided(effect("pitch-error", 29.0), effect("friction", 15.0))
     assert found.winner is not None and found.winner.hypothesis.effect == "friction"
     assert decided(effect("pitch-error", 29.0)).probability["none"] > 0.5
     found = decided(effect("pitch-error", 31.0), effect("friction", 6.0))
     assert found.winner is not None and found.winner.hypothesis.effect == "pitch-error"
+
+
+def test_a_large_rival_without_clearance_silences_a_weak_effect() -> None:
+    assert decided(effect("pitch-error", 29.0), effect("friction", 14.0)).verdict == "none"
+    small = effect("pitch-error", 29.0, size=1.9)
+    assert decided(small, effect("friction", 14.0)).verdict == "effect"
 
 
 def test_more_evidence_makes_an_effect_more_probable_and_none_less() -> None:
