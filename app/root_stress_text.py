@@ -17,16 +17,20 @@ def root_stress_data(rig: Rig, torque: float) -> dict[str, Any]:
 
     meshing = pair(rig)
     force = torque / meshing.driver.base_radius
+    cracked = [f"rig.{name}.crack" for name in ("driver", "driven") if getattr(rig, name).crack is not None]
+    sentence = "the teeth are taken as sound, and finite elements give no root stress"
+    notes = [f"{' and '.join(cracked)}: {sentence}"] if cracked else []
     try:
         found = {"driver": root_stress(rig, meshing, "driver", force)}
         found["driven"] = root_stress(rig, meshing, "driven", force)
     except LumpedError as error:
-        return {"torque_nm": torque, "gears": {}, "notes": [str(error)]}
+        return {"torque_nm": torque, "gears": {}, "notes": [str(error), *notes]}
     gears = {
         name: {"sigma_f0_mpa": value.stress / 1e6, "y_f": value.form, "y_s": value.correction}
         for name, value in found.items()
     }
-    return {"torque_nm": torque, "gears": gears, "notes": [note for value in found.values() for note in value.notes]}
+    notes = [note for value in found.values() for note in value.notes] + notes
+    return {"torque_nm": torque, "gears": gears, "notes": notes}
 
 
 def root_stress_lines(data: dict[str, Any]) -> list[str]:

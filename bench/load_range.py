@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import inf
+
 from gearbench.bench.errors import BenchError
 from gearbench.fem.curve import EDGE_SEPARATION, LOAD_RANGE
 from gearbench.geometry import Pair
@@ -14,9 +16,10 @@ def check_torque(meshing: Pair, torque: float, key: str) -> None:
         raise BenchError(f"{key} = {torque:g} is more than the modelled flanks can carry: at most {most:.4g}")
 
 
-def check_dte(meshing: Pair, dte: float, key: str) -> None:
-    """Raise BenchError for a transmission error [m] beyond the reach of contact off the line of action."""
-    most = EDGE_SEPARATION * meshing.driver.module
+def check_dte(meshing: Pair, dte: float, key: str, most: float = inf) -> None:
+    """Raise BenchError for a transmission error [m] beyond the reach of contact off the line of action, or beyond
+    `most` [m]."""
+    most = min(most, EDGE_SEPARATION * meshing.driver.module)
     if not dte <= most:
         raise BenchError(
             f"{key} = {dte * 1e6:g} presses the flanks further than they are modelled: at most {most * 1e6:.4g}"

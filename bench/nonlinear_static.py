@@ -7,8 +7,10 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from gearbench.bench.effects import refuse_unknown
+from gearbench.bench.load_range import check_dte
 from gearbench.bench.mesh_law import mesh_law
-from gearbench.bench.static import Loads, static_dataset
+from gearbench.bench.static import Loads, load_key, static_dataset
+from gearbench.fem.curve import LOAD_RANGE
 from gearbench.geometry import Pair, pair
 from gearbench.lumped.mesh_law import MeshLaw
 from gearbench.lumped.mesh_tables import EXCESS, GAIN, Motion, tables
@@ -19,6 +21,7 @@ from gearbench.rig.neutral import sound_gear
 Array = NDArray[np.float64]
 
 BISECTIONS = 60
+STIFFEST = 20e9  # stiffness of the stiffest imaginable teeth per face width [N/m^2]
 
 
 def deflection(law: MeshLaw, force: Array, phase: Array) -> Array:
@@ -41,8 +44,12 @@ def static_nonlinear(case: Case, loads: Loads, phase: Array) -> xr.Dataset:
     meshing = pair(case.rig)
     radius = meshing.driver.base_radius
     unit, values = loads
-    # Torque that the stiffest imaginable teeth need for a given deflection: the law goes on beyond its table.
-    most = float(values.max()) if unit == "N m" else float(values.max()) * 1e9 * meshing.face_width * radius * 20
+    most = float(values.max())
+    if unit == "m":
+        if case.simulation.mesh_stiffness == "finite-element":
+            check_dte(meshing, most, load_key(unit)[0], LOAD_RANGE[1] / STIFFEST)
+        # The torque that this deflection needs at most.
+        most *= STIFFEST * meshing.face_width * radius
     law = mesh_law(case.rig, case.simulation, most)
     model = nonlinear_model(case.rig, meshing, law)
     table = tables(model, Motion(cycles=1.0, entries=len(phase), step=1.0))[:-1]

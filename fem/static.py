@@ -104,6 +104,7 @@ def static_cycle(
     guess = 0.0
     unloaded = np.array([unloaded_dte(law, float(phase)) for phase in phases])
     for i, load in enumerate(loads):
+        named = f"torque_nm = {load:g}" if kind == "torque" else f"dte_um = {1e6 * load:g}"
         for j, phase in enumerate(phases):
             if kind == "torque":
                 guess = solve_torque(law, float(phase), float(load), guess)
@@ -111,8 +112,8 @@ def static_cycle(
                 guess = float(load)
             n, sides, teeth, _, force, _, a, b, slope, _, ok = _at(law, float(phase), guess)
             if not ok:
-                raise ContactError(f"no static equilibrium at mesh phase {phase:g} and load {load:g}")
-            _check_flanks(law, float(phase), guess, f"{load:g} {'N m' if kind == 'torque' else 'm'}")
+                raise ContactError(f"no static equilibrium at mesh phase {phase:g} with {named}")
+            _check_flanks(law, float(phase), guess, named)
             te[i, j], t1[i, j], t2[i, j] = guess, a, b
             tangent[i, j] = slope / law.driver.rb**2
             total = max(float(force[:n].sum()), 1e-300)
@@ -155,12 +156,13 @@ def unloaded_dte(law: Law, phase: float, x: Array = STILL, y: Array = STILL) -> 
 
 
 def _check_flanks(law: Law, phase: float, dte: float, load: str) -> None:
-    """Raise ContactError where a pair overlaps beyond its modelled flanks."""
+    """Raise ContactError where a pair overlaps beyond its modelled flanks; `load`: its key and value."""
     theta1 = phase * law.driver.pitch + dte / law.driver.rb
     if off_flanks(law, theta1, phase * law.driven.pitch, law.centre, 0.0):
+        errors = f", or the errors that move the flanks by up to {1e6 * law.play:.4g} um" if law.play > 0.0 else ""
         raise ContactError(
-            f"a load of {load} presses the teeth together by {1e6 * dte:.4g} um at mesh phase {phase:g}, where contact"
-            " leaves the modelled flanks: lower it"
+            f"{load} takes contact off the modelled flanks at mesh phase {phase:g}, where the transmission error is"
+            f" {1e6 * dte:.4g} um: lower it{errors}"
         )
 
 

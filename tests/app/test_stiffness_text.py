@@ -71,6 +71,15 @@ def test_root_stress_of_both_gears(case: Case) -> None:
     assert f"{found.stress / 1e6:.1f} MPa" in line
 
 
+def test_a_cracked_tooth_is_said_to_be_taken_as_sound() -> None:
+    keys = "tooth = 3, length_mm = 0.8, direction_deg = 60"
+    data = root_stress_data(read_case(case_path("paper_lumped"), [f"rig.driven.crack={{{keys}}}"]).rig, 50.0)
+    sound = root_stress_data(read_case(case_path("paper_lumped")).rig, 50.0)
+    assert data["gears"] == sound["gears"]
+    assert root_stress_lines(data)[-1].startswith("  note: rig.driven.crack: the teeth are taken as sound")
+    assert not any("crack" in line for line in root_stress_lines(sound))
+
+
 def test_root_stress_is_left_out_where_two_pairs_always_carry() -> None:
     changes = [f"rig.{gear}.{key}" for gear in ("driver", "driven") for key in ("addendum=1.35", "dedendum=1.6")]
     changes += [f"rig.{gear}.rack_tip_radius=0.2" for gear in ("driver", "driven")]

@@ -143,3 +143,13 @@ def test_static_loads_are_refused_before_any_work(
     assert run_command_line(["static", "quick_fe", "--out", str(out), option, value]) == 2
     err = capsys.readouterr().err.strip().splitlines()
     assert sentence in err[-1] and not list(tmp_path.iterdir())
+
+
+def test_the_lumped_model_refuses_a_dte_beyond_its_table_in_the_same_words(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["static", "quick_fe", "--model", "lumped", "--set", 'simulation.mesh_stiffness="finite-element"']
+    assert run_command_line([*words, "--out", str(tmp_path / "static.nc"), "--dte-um", "5000"]) == 2
+    err = capsys.readouterr().err.strip().splitlines()
+    assert "dte_um = 5000 presses the flanks further than they are modelled: at most 100" in err[-1]
+    assert not list(tmp_path.iterdir())

@@ -189,5 +189,8 @@ def test_a_given_dte_that_closes_nothing_has_no_stiffness(unequal: Any) -> None:
 
 @pytest.mark.parametrize("dte", [4e-4, 1e-3])
 def test_contact_that_leaves_the_flanks_is_refused(unequal: Any, dte: float) -> None:
-    with pytest.raises(ContactError, match="leaves the modelled flanks"):
+    sentence = rf"^dte_um = {1e6 * dte:g} takes contact off the modelled flanks at mesh phase .* um: lower it"
+    with pytest.raises(ContactError, match=sentence + "$"):
         static_cycle(unequal.law, np.linspace(0, 0.9, 10), dte=[dte])
+    with pytest.raises(ContactError, match=sentence + r", or the errors that move the flanks by up to 5 um$"):
+        static_cycle(real(unequal, {"wear": 5e-6}), np.linspace(0, 0.9, 10), dte=[dte])
