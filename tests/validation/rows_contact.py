@@ -1,4 +1,4 @@
-"""Contact: a Hertz cylinder pair, the moment balance of each gear, and the stored CalculiX pairs."""
+"""Contact: a Hertz cylinder pair, and the stored CalculiX pairs."""
 
 from __future__ import annotations
 
