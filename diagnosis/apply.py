@@ -42,7 +42,7 @@ class Unknowns:
     where: Layout
     p: Array
     std: Array
-    torque_mean: float  # over the conditions [N m]
+    torque_mean: Mapping[str, float]  # by condition [N m]
 
     def of(self, key: str) -> Array:
         """Values of a block."""
@@ -224,7 +224,8 @@ def _ripple(rig: Rig, hypothesis: Hypothesis, found: Unknowns) -> Applied:
         # A cos(o theta + phase) = A cos(phase) cos - A sin(phase) sin.
         phases.append(atan2(-sine, cosine))
         std = float(np.sqrt(2 / (1 / stds[chosen] ** 2).sum()))
-        mean = found.torque_mean
+        torques = np.array([found.torque_mean[names[i].rsplit(":", 2)[0]] for i in chosen])
+        mean = float(np.average(torques, weights=stds[chosen] ** -2.0))
         out.append(Estimate(f"order_{order}.relative_amplitude", amplitudes[-1] / mean, std / mean, "1"))
     ripple = Ripple(orders=RIPPLE_ORDERS, amplitude=tuple(amplitudes), phase=tuple(phases))
     return _change(rig, "drive", ripple=ripple), out

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.diagnosis.apply import Estimate, Unknowns, apply_effect, recalibrated
+from gearbench.diagnosis.calibration import stated
 from gearbench.diagnosis.decision import PLACE_OF_ROW, Decision, decide, named
 from gearbench.diagnosis.fit import Fit, Problem
 from gearbench.diagnosis.intake import Measurement
@@ -89,8 +90,8 @@ def find_cause(
 
 
 def _unknowns(problem: Problem, fit: Fit) -> Unknowns:
-    mean = float(np.mean([condition.torque_mean for condition in problem.conditions]))
-    return Unknowns(problem.machine, problem.where, fit.p, fit.std, mean)
+    means = {condition.name: condition.torque_mean for condition in problem.conditions}
+    return Unknowns(problem.machine, problem.where, fit.p, fit.std, means)
 
 
 def with_hypothesis(problem: Problem, nominal: Case, tried: Tried) -> tuple[Case, tuple[Estimate, ...]]:
@@ -111,10 +112,11 @@ def _effects(problem: Problem, nominal: Case, decision: Decision) -> tuple[tuple
     if decision.winner is None:
         return (), None
     updated, estimates = with_hypothesis(problem, nominal, decision.winner)
-    parameters = {e.name: Parameter(value=e.value, std=e.std, unit=e.unit) for e in estimates}
-    effect = Effect(
-        name=decision.winner.hypothesis.effect, probability=decision.probability["effect"], parameters=parameters
-    )
+    name = decision.winner.hypothesis.effect
+    parameters = {
+        e.name: Parameter(value=e.value, std=stated(name, e.name, e.value, e.std), unit=e.unit) for e in estimates
+    }
+    effect = Effect(name=name, probability=decision.probability["effect"], parameters=parameters)
     return (effect,), updated
 
 

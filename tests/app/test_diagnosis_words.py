@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gearbench.diagnosis.hypotheses import LIBRARY, PLACES
+from gearbench.diagnosis.hypotheses import LIBRARY
 from gearbench.diagnosis.signals import CHANNELS
-from gearbench.diagnosis.verdict import Effect, Gap, Probabilities, Range, Verdict
+from gearbench.diagnosis.verdict import PLACES, Effect, Gap, Probabilities, Range, Verdict
 from gearbench.diagnosis_words import CHANNELS as CHANNEL_WORDS
 from gearbench.diagnosis_words import (
     EFFECTS,

@@ -52,7 +52,7 @@ class Bench:
         return p
 
     def found(self, p: np.ndarray) -> Unknowns:
-        return Unknowns(self.machine, self.where, p, np.full(p.size, 1e-3), 100.0)
+        return Unknowns(self.machine, self.where, p, np.full(p.size, 1e-3), {"base": 100.0})
 
     def prepared(self, case: Case) -> Condition:
         """What sensors on that rig would show, prepared under the nominal one."""

@@ -37,7 +37,7 @@ def test_torque_ripple_from_records_to_the_rig_that_has_it() -> None:
     parameters = found.effects[0].parameters
     for order, amplitude in ((6, 1.5), (12, 0.8)):
         one = parameters[f"order_{order}.relative_amplitude"]
-        assert one.std < 0.001 and abs(one.value - amplitude / 100) < 4 * one.std
+        assert one.std < 0.003 and abs(one.value - amplitude / 100) < 0.0005
 
     assert found.with_effect is not None
     ripple = found.with_effect.rig.drive.ripple
