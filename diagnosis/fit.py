@@ -13,11 +13,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import cho_solve, solve_triangular
 
 from gearbench.diagnosis.blocks import Blocks, missing, of_level, square_of, whitened
 from gearbench.diagnosis.columns import rows_and_columns, stiffening_slope
 from gearbench.diagnosis.condition import Condition
+from gearbench.diagnosis.errors import DiagnosisError
 from gearbench.diagnosis.machine import Machine
 from gearbench.diagnosis.parameters import Layout
 from gearbench.diagnosis.rows import rows
@@ -30,6 +31,7 @@ ROUNDS = 12  # of expectation-maximisation between two steps
 HALVINGS = 4
 LONGEST = 12.0  # prior standard deviations that one step may move an unknown
 COARSE_STEPS = 6
+ROUNDING = (0.0, 1e-14, 1e-12, 1e-10, 1e-8)  # of the largest entry
 ENOUGH = 1.0  # change of the cost that no longer matters
 
 
@@ -65,7 +67,9 @@ class Fit:
     @property
     def std(self) -> Array:
         """Posterior standard deviations (P,)."""
-        return np.sqrt(np.diag(np.linalg.inv(self.precision)))
+        root = root_of(self.precision * self.sd[:, None] * self.sd[None, :])
+        inverse = solve_triangular(root, np.eye(len(self.sd)), lower=True)
+        return np.asarray(self.sd * np.sqrt((inverse**2).sum(axis=0)))
 
 
 def score(
@@ -166,7 +170,7 @@ def refit(
     information, gradient = _normal(problem, p, lambdas)
     precision = information + np.diag(1 / sd**2)
     scaled = precision * sd[:, None] * sd[None, :]
-    evidence = -cost - 0.5 * float(np.linalg.slogdet(scaled)[1])
+    evidence = -cost - float(np.log(np.diag(root_of(scaled))).sum())
     pull = information @ p - gradient
     return Fit(p, sd, precision, information, pull, tuple(lambdas), cost, evidence, steps + taken)
 
@@ -198,4 +202,16 @@ def _descend(
 def _solve(information: Array, sd: Array, right: Array) -> Array:
     """(information + diag sd^-2)^-1 right, scaled by the prior against the units' different sizes."""
     scaled = information * sd[:, None] * sd[None, :] + np.eye(len(sd))
-    return np.asarray(sd * cho_solve(cho_factor(scaled), sd * right))
+    return np.asarray(sd * cho_solve((root_of(scaled), True), sd * right))
+
+
+def root_of(scaled: Array) -> Array:
+    """Lower Cholesky factor (P, P) of a precision in units of the prior. Where the data tell 1e16 times more of one
+    unknown than the prior, rounding outweighs the prior's ones: then as little is added as makes it definite."""
+    largest = float(np.diag(scaled).max())
+    for part in ROUNDING:
+        try:
+            return np.asarray(np.linalg.cholesky(scaled + part * largest * np.eye(len(scaled))))
+        except np.linalg.LinAlgError:
+            continue
+    raise DiagnosisError("the records leave no finite weight to the unknowns: look for channels of a wrong unit")

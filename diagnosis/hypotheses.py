@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.diagnosis.fit import Fit
+from gearbench.diagnosis.fit import Fit, root_of
 from gearbench.diagnosis.parameters import Layout
 from gearbench.diagnosis.unknowns import DELAYED, ROWS
 
@@ -106,7 +106,7 @@ def starts(hypothesis: Hypothesis, where: Layout) -> tuple[Array, ...]:
 def predicted_evidence(fit: Fit, sd: Array) -> float:
     """Log evidence under other priors `sd` (P,), by the quadratic that the fit found for the data alone."""
     scaled = fit.information * sd[:, None] * sd[None, :] + np.eye(len(sd))
-    factor = np.linalg.cholesky(scaled)
+    factor = root_of(scaled)
     half = np.linalg.solve(factor, sd * fit.pull)
     return 0.5 * float(half @ half) - float(np.log(np.diag(factor)).sum())
 

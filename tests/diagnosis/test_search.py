@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gearbench.diagnosis.fit import Fit
+from gearbench.diagnosis.fit import Fit, root_of
 from gearbench.diagnosis.hypotheses import Hypothesis
 from gearbench.diagnosis.parameters import NUISANCE, block, layout
 from gearbench.diagnosis.search import relative_size, relief
@@ -42,3 +42,14 @@ def test_size_counts_what_the_records_tell() -> None:
     columns[[0, 1, 2], [0, 1, 2]] = (1.0, 1.0, 50.0)  # of the lobe only its first part shows
     fit = fit_of(columns, np.array([0.0, 0.0, 30.0, 0.0]), LOBE.prior(WHERE))
     assert relative_size(WHERE, LOBE, fit) == pytest.approx(0.6 / 0.1, rel=0.01)
+
+
+def test_a_precision_that_rounding_spoils_still_has_a_root() -> None:
+    column = np.array([1.0, 1.0, 1.0])
+    spoiled = 1e17 * np.outer(column, column) + np.eye(3)
+    with pytest.raises(np.linalg.LinAlgError):
+        np.linalg.cholesky(spoiled)
+    root = root_of(spoiled)
+    assert np.allclose(root @ root.T, spoiled, rtol=1e-6)
+    well = np.diag([4.0, 9.0])
+    assert np.array_equal(root_of(well), np.diag([2.0, 3.0]))
