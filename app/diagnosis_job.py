@@ -152,7 +152,7 @@ def _verdict(taken: Taken, finding: Any, shares: Sequence[Share], shrunk: Sequen
     from gearbench.diagnosis.advice import advice_of
     from gearbench.diagnosis.verdict import Probabilities, Verdict
 
-    advice = advice_of(taken.measurements, taken.held_out, finding.invisible)
+    advice = advice_of(taken.measurements, taken.held_out)
     return Verdict(
         verdict=finding.verdict,
         probability=Probabilities(**finding.probability),

@@ -10,11 +10,8 @@ from gearbench.diagnosis.intake import Measurement
 APART = 1.1
 
 
-def advice_of(
-    measurements: Sequence[Measurement], held_out: Measurement | None, invisible: Sequence[str] = ()
-) -> tuple[str, ...]:
-    """Sentences about what these records lack, and of which effects (`invisible`) they would show no trace; none if
-    they hold all that diagnosis can use."""
+def advice_of(measurements: Sequence[Measurement], held_out: Measurement | None) -> tuple[str, ...]:
+    """Sentences about what these records lack; none if they hold all that diagnosis can use."""
     everything = [*measurements, *([held_out] if held_out else [])]
     found = []
     for channel, words in (
@@ -39,9 +36,6 @@ def advice_of(
         found.append("Add a record at another mean torque: effects of load and of position then come apart.")
     if max(speeds) < APART * min(speeds):
         found.append("Add a record at another speed: effects of time and of rotation then come apart.")
-    if invisible:
-        named = ", ".join(invisible)
-        found.append(f"Measure more before ruling out {named}: of usual size, these records would not show it.")
     if held_out is None:
         found.append("Add a record with other phases, to be held out: only it tells how far the gap really shrinks.")
     return tuple(found)

@@ -16,7 +16,7 @@ from gearbench.diagnosis.intake import Measurement
 from gearbench.diagnosis.problem import problem_of
 from gearbench.diagnosis.replays import replays
 from gearbench.diagnosis.search import Search, Tried, missing_by_row, search
-from gearbench.diagnosis.separable import representatives, separability
+from gearbench.diagnosis.separable import alike, representatives
 from gearbench.diagnosis.signals import measured_channels, simulated_channels
 from gearbench.diagnosis.steadiness import unsteadiness
 from gearbench.diagnosis.verdict import Candidate, Effect, Parameter, Share
@@ -42,7 +42,6 @@ class Finding:
     because: str
     add: Callable[[Case], Case] | None = None
     indistinguishable: tuple[tuple[str, ...], ...] = ()
-    invisible: tuple[str, ...] = ()
     evidence: dict[str, float] = field(default_factory=dict)
     audits: dict[str, tuple[float, ...]] = field(default_factory=dict)
 
@@ -70,7 +69,6 @@ def find_cause(
     decision = decide(found, silent, unsteady)
     plain = recalibrated(nominal, _unknowns(problem, found.base))
     effects, updated = _effects(problem, nominal, decision)
-    apart = separability(fit, problem.where, representatives(problem, without))
     return Finding(
         verdict=decision.verdict,
         probability=decision.probability,
@@ -82,8 +80,7 @@ def find_cause(
         with_effect=updated,
         because=decision.because,
         add=_adding(problem, decision.winner),
-        indistinguishable=apart.classes,
-        invisible=apart.invisible,
+        indistinguishable=alike(fit, problem.where, representatives(problem, without)),
         evidence={one.hypothesis.name: one.gain for one in found.tried},
         audits={"silent": tuple(silent), "unsteady": tuple(unsteady)},
     )

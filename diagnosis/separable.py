@@ -1,4 +1,4 @@
-"""What the records cannot tell apart: effects whose traces other effects explain as well, and effects without a trace.
+"""What the records cannot tell apart: effects whose traces other effects explain as well.
 
 From the information matrix of a fit alone: if an effect of its usual size were in the rig, by how much would the
 evidence of each hypothesis rise? Nothing is simulated, and what was measured decides only through the weights.
@@ -7,7 +7,6 @@ evidence of each hypothesis rise? Nothing is simulated, and what was measured de
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,15 +19,6 @@ from gearbench.diagnosis.parameters import Layout
 Array = NDArray[np.float64]
 
 APART = 3.0  # nats by which the right effect should come out ahead of another
-
-
-@dataclass(frozen=True)
-class Separability:
-    """`classes`: effects that these records cannot tell apart, in groups; `invisible`: effects of usual size that they
-    would not show."""
-
-    classes: tuple[tuple[str, ...], ...]
-    invisible: tuple[str, ...]
 
 
 def representatives(problem: Problem, without: Sequence[str] = ()) -> tuple[Hypothesis, ...]:
@@ -64,19 +54,22 @@ def _posterior(information: Array, sd: Array) -> tuple[Array, float]:
     return covariance, -0.5 * float(np.linalg.slogdet(scaled)[1])
 
 
-def separability(fit: Fit, where: Layout, hypotheses: Sequence[Hypothesis], limits: Limits = LIMITS) -> Separability:
-    """Classes of effects that cannot be told apart, and effects that would not show, under the weights of a fit."""
+def alike(
+    fit: Fit, where: Layout, hypotheses: Sequence[Hypothesis], limits: Limits = LIMITS
+) -> tuple[tuple[str, ...], ...]:
+    """Effects that these records cannot tell apart, in groups, under the weights of a fit.
+
+    An effect without weight is in no group: bins in which nothing is heard have none, and silence there tells.
+    """
     gains = expected_gains(fit, where, hypotheses)
     effects = [h.effect for h in hypotheses]
     needed = np.array([limits.of(effect) for effect in effects])
-    seen = np.diag(gains) > needed
     names = tuple(dict.fromkeys(effects))
-    invisible = tuple(name for name in names if not any(seen[i] for i, e in enumerate(effects) if e == name))
-    alike: dict[str, set[str]] = {name: {name} for name in names}
-    for truth in np.flatnonzero(seen):
+    groups: dict[str, set[str]] = {name: {name} for name in names}
+    for truth in np.flatnonzero(np.diag(gains) > needed):
         for other in np.flatnonzero(gains[truth] > np.maximum(gains[truth, truth] - APART, needed)):
-            joined = alike[effects[truth]] | alike[effects[other]]
+            joined = groups[effects[truth]] | groups[effects[other]]
             for name in joined:
-                alike[name] = joined
-    groups = dict.fromkeys(tuple(name for name in names if name in alike[first]) for first in names)
-    return Separability(tuple(group for group in groups if len(group) > 1), invisible)
+                groups[name] = joined
+    ordered = dict.fromkeys(tuple(name for name in names if name in groups[first]) for first in names)
+    return tuple(group for group in ordered if len(group) > 1)
