@@ -152,7 +152,7 @@ def _verdict(taken: Taken, finding: Any, shares: Sequence[Share], shrunk: Sequen
     from gearbench.diagnosis.advice import advice_of
     from gearbench.diagnosis.verdict import Probabilities, Verdict
 
-    advice = advice_of(taken.measurements, taken.held_out)
+    advice = (*finding.advice, *advice_of(taken.measurements, taken.held_out))
     return Verdict(
         verdict=finding.verdict,
         probability=Probabilities(**finding.probability),
@@ -163,5 +163,5 @@ def _verdict(taken: Taken, finding: Any, shares: Sequence[Share], shrunk: Sequen
         gap=tuple(shrunk),
         held_out=taken.held_out.name if taken.held_out else None,
         indistinguishable=tuple(tuple(group) for group in finding.indistinguishable),
-        advice=advice,
+        advice=tuple(dict.fromkeys(advice)),
     )

@@ -42,6 +42,7 @@ class Finding:
     because: str
     add: Callable[[Case], Case] | None = None
     indistinguishable: tuple[tuple[str, ...], ...] = ()
+    advice: tuple[str, ...] = ()
     evidence: dict[str, float] = field(default_factory=dict)
     audits: dict[str, tuple[float, ...]] = field(default_factory=dict)
 

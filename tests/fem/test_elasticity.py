@@ -74,7 +74,7 @@ def test_plane_moduli_follow_from_hookes_law_in_three_dimensions(state: Any) -> 
 
 def test_a_node_outside_the_mesh_is_refused(coarse: Any) -> None:
     points = np.vstack([coarse.sector.points, [1.0, 1.0]])
-    with pytest.raises(ValueError, match="belongs to no triangle"):
+    with pytest.raises(ValueError, match="belongs to no element"):
         assemble(points, coarse.sector.triangles, coarse.moduli)
 
 

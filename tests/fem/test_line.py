@@ -19,7 +19,7 @@ def rigid_body(tooth: Tooth) -> Kernel:
     """A kernel of nothing: what is left is the half-plane."""
     table = np.zeros((1, POINTS, POINTS))
     modes = np.zeros((0, 20, POINTS))
-    return Kernel(table, table, tooth.s_end, tooth.s_tip, 6.0, 0, WIDTH, modes, modes)
+    return Kernel(table, table, tooth.s_end, tooth.s_tip, 6.0, 0, WIDTH, modes, modes, np.zeros((0, 0, 2, 2, 0, 0)), -1)
 
 
 def solve(twins: Any, xi: float, force: float) -> tuple[float, float, np.ndarray, np.ndarray]:
