@@ -11,20 +11,20 @@ from typing import Annotated
 import typer
 
 from gearbench import __version__
-from gearbench.cases_command import cases
-from gearbench.challenge_command import challenge
-from gearbench.check_command import check
-from gearbench.compare_command import compare
-from gearbench.diagnose_command import diagnose
-from gearbench.failure import INTERRUPTED, guarded, show_warning
-from gearbench.identify_command import identify
-from gearbench.mesh_command import mesh
-from gearbench.options import expand_lists
-from gearbench.run_command import run
-from gearbench.schema_command import schema
-from gearbench.simulate_command import simulate
-from gearbench.static_command import static
-from gearbench.validate_command import validate
+from gearbench.commands.cases import cases
+from gearbench.commands.challenge import challenge
+from gearbench.commands.check import check
+from gearbench.commands.compare import compare
+from gearbench.commands.diagnose import diagnose
+from gearbench.commands.identify import identify
+from gearbench.commands.mesh import mesh
+from gearbench.commands.run import run
+from gearbench.commands.schema import schema
+from gearbench.commands.simulate import simulate
+from gearbench.commands.static import static
+from gearbench.commands.validate import validate
+from gearbench.shell.failure import INTERRUPTED, guarded, show_warning
+from gearbench.shell.options import expand_lists
 
 app = typer.Typer(
     name="gearbench",

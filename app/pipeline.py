@@ -9,11 +9,11 @@ from math import pi
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from gearbench.output import Output
-from gearbench.progress import Progress
-from gearbench.summary import run_numbers
-from gearbench.summary_text import honest_warning, summary_text
-from gearbench.zones import contact_span, fewest_pairs, zone_label
+from gearbench.geometry.pair.zones import contact_span, fewest_pairs, zone_label
+from gearbench.shell.output import Output
+from gearbench.shell.progress import Progress
+from gearbench.words.summary import run_numbers
+from gearbench.words.summary_text import honest_warning, summary_text
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -75,7 +75,7 @@ class Job:
 def run_experiment(job: Job) -> dict[str, Any]:
     """All products of one experiment; the numbers of its summary."""
     from gearbench.bench import simulate
-    from gearbench.bench.results import identify_case, linearised_modes, reference_results
+    from gearbench.bench.results.responses import identify_case, linearised_modes, reference_results
     from gearbench.bench.static import static
     from gearbench.geometry import pair
     from gearbench.identification import read_frf, write_frf
@@ -118,7 +118,7 @@ def _support_corner(case: Case) -> float | None:
 
 
 def _draw_gears(job: Job, meshing: Pair) -> None:
-    from gearbench.figures_gear import draw_pair
+    from gearbench.figures.gear import draw_pair
 
     def draw(path: Path) -> None:
         from gearbench.geometry import mesh_pair
@@ -141,8 +141,8 @@ def _draw_results(
     zones: list[tuple[float, float]],
     label: str,
 ) -> None:
-    from gearbench.figures_frf import draw_itf, draw_natural_frequencies
-    from gearbench.figures_record import draw_record, draw_stiffness
+    from gearbench.figures.frf import draw_itf, draw_natural_frequencies
+    from gearbench.figures.record import draw_record, draw_stiffness
 
     job.picture("stiffness.png", lambda path: draw_stiffness(path, statics, zones, label))
     job.picture("record.png", lambda path: draw_record(path, record))
@@ -153,7 +153,7 @@ def _draw_results(
 
 
 def _write_summary(job: Job, numbers: dict[str, Any]) -> None:
-    from gearbench.options import json_text
+    from gearbench.shell.options import json_text
 
     job.output.write_text(job.name("summary.json"), json_text(numbers) + "\n")
     job.output.write_text(job.name("summary.md"), summary_text(numbers))

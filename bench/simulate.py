@@ -8,16 +8,16 @@ from importlib import import_module
 import xarray as xr
 
 from gearbench.bench.errors import BenchError
-from gearbench.bench.readiness import check_gears
-from gearbench.bench.schedule import ProgressReport
+from gearbench.bench.plan.schedule import ProgressReport
+from gearbench.bench.refusals.readiness import check_gears
 from gearbench.rig import Case
 
 Simulator = Callable[[Case, ProgressReport | None], xr.Dataset]
 
 # Each model: module and function. Imported on use: one brings in Numba, the other the mesher.
 SIMULATORS: dict[str, tuple[str, str]] = {
-    "lumped": ("gearbench.bench.lumped_experiment", "simulate_lumped"),
-    "reduced": ("gearbench.bench.reduced_experiment", "simulate_reduced"),
+    "lumped": ("gearbench.bench.linear.experiment", "simulate_lumped"),
+    "reduced": ("gearbench.bench.elastic.experiment", "simulate_reduced"),
 }
 
 

@@ -10,8 +10,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from gearbench.bench.errors import BenchError
-from gearbench.bench.readiness import check_gears
-from gearbench.bench.schedule import ProgressReport
+from gearbench.bench.plan.schedule import ProgressReport
+from gearbench.bench.refusals.readiness import check_gears
 from gearbench.rig import Case
 
 Array = NDArray[np.float64]
@@ -24,8 +24,8 @@ StaticSolver = Callable[[Case, Loads, Array, ProgressReport | None], xr.Dataset]
 
 # Each model: module and function. Imported on use: one brings in Numba and the mesher.
 SOLVERS: dict[str, tuple[str, str]] = {
-    "lumped": ("gearbench.bench.lumped_static", "static_lumped"),
-    "reduced": ("gearbench.bench.reduced_static", "static_reduced"),
+    "lumped": ("gearbench.bench.linear.static", "static_lumped"),
+    "reduced": ("gearbench.bench.elastic.static", "static_reduced"),
 }
 
 

@@ -12,12 +12,12 @@ from collections.abc import Callable
 
 import numpy as np
 
-from gearbench.bench.reduced_rig import elastic_rig, machine_for
+from gearbench.bench.elastic.rig import elastic_rig, machine_for
 from gearbench.cases import case_path
-from gearbench.fem.body import condense
-from gearbench.fem.law import make_law
-from gearbench.fem.static import static_cycle
-from gearbench.fem.transient import advance, initial_state, make_scheme
+from gearbench.fem.contact.law import make_law
+from gearbench.fem.contact.static import static_cycle
+from gearbench.fem.gear.body import condense
+from gearbench.fem.motion.transient import advance, initial_state, make_scheme
 from gearbench.rig import read_case
 
 

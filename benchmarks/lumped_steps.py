@@ -10,13 +10,13 @@ from __future__ import annotations
 import sys
 import time
 
-from gearbench.bench.excitation import torque_realisation
-from gearbench.bench.lumped_run import tables_for
-from gearbench.bench.schedule import schedule
+from gearbench.bench.linear.run import tables_for
+from gearbench.bench.plan.excitation import torque_realisation
+from gearbench.bench.plan.schedule import schedule
 from gearbench.cases import case_path
 from gearbench.geometry import pair
 from gearbench.lumped import lumped_model
-from gearbench.lumped.runge_kutta import integrate
+from gearbench.lumped.linear.runge_kutta import integrate
 from gearbench.rig import read_case
 
 SUBSTEPS = 4

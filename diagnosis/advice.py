@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from gearbench.diagnosis.intake import Measurement
+from gearbench.diagnosis.intake.measurements import Measurement
 
 # Mean torques or speeds further apart than this ratio are two.
 APART = 1.1

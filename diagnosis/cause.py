@@ -8,17 +8,17 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.diagnosis.apply import Estimate, Unknowns, apply_effect, recalibrated
-from gearbench.diagnosis.calibration import stated
-from gearbench.diagnosis.decision import PLACE_OF_ROW, Decision, decide, named
-from gearbench.diagnosis.fit import Fit, Problem
-from gearbench.diagnosis.intake import Measurement
-from gearbench.diagnosis.problem import problem_of
-from gearbench.diagnosis.replays import replays
-from gearbench.diagnosis.search import Search, Tried, missing_by_row, search
-from gearbench.diagnosis.separable import alike, representatives
-from gearbench.diagnosis.signals import measured_channels, simulated_channels
-from gearbench.diagnosis.steadiness import unsteadiness
+from gearbench.diagnosis.evidence.apply import Estimate, Unknowns, apply_effect, recalibrated
+from gearbench.diagnosis.evidence.calibration import stated
+from gearbench.diagnosis.evidence.decision import PLACE_OF_ROW, Decision, decide, named
+from gearbench.diagnosis.evidence.fit import Fit, Problem
+from gearbench.diagnosis.evidence.problem import problem_of
+from gearbench.diagnosis.evidence.search import Search, Tried, missing_by_row, search
+from gearbench.diagnosis.evidence.separable import alike, representatives
+from gearbench.diagnosis.forces.steadiness import unsteadiness
+from gearbench.diagnosis.intake.measurements import Measurement
+from gearbench.diagnosis.intake.signals import measured_channels, simulated_channels
+from gearbench.diagnosis.replay.replays import replays
 from gearbench.diagnosis.verdict import Candidate, Effect, Parameter, Share
 from gearbench.rig import Case
 

@@ -1,13 +1,13 @@
 """Gear geometry: exact profile, pair kinematics, bodies, data sheet, mesh and export."""
 
-from gearbench.geometry.body import Body, body, gear_area, sector_area
-from gearbench.geometry.datasheet import Datum, data_sheet
 from gearbench.geometry.error import GeometryError
-from gearbench.geometry.export import PlaneMesh, mesh_pair, write_mesh
-from gearbench.geometry.mesh import GearMesh, MeshingUnavailable, SectorMesh, full_mesh, sector_mesh
-from gearbench.geometry.pair import Pair, inverse_involute, pair
-from gearbench.geometry.profile import Profile, profile
-from gearbench.geometry.quality import Quality, quality
+from gearbench.geometry.export.meshes import PlaneMesh, mesh_pair, write_mesh
+from gearbench.geometry.mesh.quality import Quality, quality
+from gearbench.geometry.mesh.sector_mesh import GearMesh, MeshingUnavailable, SectorMesh, full_mesh, sector_mesh
+from gearbench.geometry.pair.datasheet import Datum, data_sheet
+from gearbench.geometry.pair.kinematics import Pair, inverse_involute, pair
+from gearbench.geometry.tooth.body import Body, body, gear_area, sector_area
+from gearbench.geometry.tooth.profile import Profile, profile
 
 __all__ = [
     "Body",

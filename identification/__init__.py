@@ -1,14 +1,16 @@
 """Frequency-domain identification: multisines, DTE, periodically time-varying frequency responses and their truth."""
 
-from gearbench.identification.exact import exact_frf, frozen_frf
-from gearbench.identification.frf import FrfError, htf, itf, make_frf, read_frf, validate_frf, write_frf
-from gearbench.identification.harmonic_balance import harmonic_balance_itf
+from gearbench.identification.excitation.multisine import MultisineError, MultisineSignal, random_phase_multisine
 from gearbench.identification.identify import IdentificationSettings, identify
-from gearbench.identification.local_solve import LpmError
-from gearbench.identification.modes import frozen_modes, itf_modes
-from gearbench.identification.monodromy import exact_itf, floquet_multipliers
-from gearbench.identification.multisine import MultisineError, MultisineSignal, random_phase_multisine
-from gearbench.identification.periodic import (
+from gearbench.identification.lpm.local_solve import LpmError
+from gearbench.identification.response.exact import exact_frf, frozen_frf
+from gearbench.identification.response.frf import FrfError, htf, itf, make_frf, read_frf, validate_frf, write_frf
+from gearbench.identification.response.modes import frozen_modes, itf_modes
+from gearbench.identification.spectra.joint import SpectraError
+from gearbench.identification.spectra.transmission_error import AngleOnlyWarning, TransmissionError, dte, force
+from gearbench.identification.truth.harmonic_balance import harmonic_balance_itf
+from gearbench.identification.truth.monodromy import exact_itf, floquet_multipliers
+from gearbench.identification.truth.periodic import (
     PeriodicSystem,
     PeriodicSystemError,
     frozen_itf,
@@ -16,8 +18,6 @@ from gearbench.identification.periodic import (
     itf_from_htf,
     truncation_error,
 )
-from gearbench.identification.spectra import SpectraError
-from gearbench.identification.transmission_error import AngleOnlyWarning, TransmissionError, dte, force
 
 __all__ = [
     "AngleOnlyWarning",

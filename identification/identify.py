@@ -11,16 +11,16 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from gearbench.identification.accuracy import MISSING, Accuracy, RecordRule, expected_accuracy, record_rule
-from gearbench.identification.frf import make_frf
-from gearbench.identification.local_solve import LpmError
-from gearbench.identification.lpm import LpmResult, local_polynomial
-from gearbench.identification.modes import itf_modes
-from gearbench.identification.periodic import itf_from_htf
-from gearbench.identification.record_spectra import record_spectra
-from gearbench.identification.regression import Window
-from gearbench.identification.selection import LADDER, choose_window
-from gearbench.identification.spectra import Spectra
+from gearbench.identification.lpm.accuracy import MISSING, Accuracy, RecordRule, expected_accuracy, record_rule
+from gearbench.identification.lpm.estimate import LpmResult, local_polynomial
+from gearbench.identification.lpm.local_solve import LpmError
+from gearbench.identification.lpm.regression import Window
+from gearbench.identification.lpm.selection import LADDER, choose_window
+from gearbench.identification.response.frf import make_frf
+from gearbench.identification.response.modes import itf_modes
+from gearbench.identification.spectra.joint import Spectra
+from gearbench.identification.spectra.records import record_spectra
+from gearbench.identification.truth.periodic import itf_from_htf
 
 Progress = Callable[[float, str], None]
 

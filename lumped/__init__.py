@@ -1,10 +1,12 @@
 """The lumped model: mesh stiffness, equations of motion, Runge-Kutta integration.
 
-`gearbench.lumped.runge_kutta` loads Numba and is therefore imported by its own name only.
+`gearbench.lumped.linear.runge_kutta` loads Numba and is therefore imported by its own name only.
 """
 
 from gearbench.lumped.errors import LumpedError
-from gearbench.lumped.mesh_stiffness import (
+from gearbench.lumped.linear.model import Lumped, equivalent_mass, lumped_model, periodic_matrices
+from gearbench.lumped.linear.time_step import choose_substeps, largest_step
+from gearbench.lumped.stiffness.mesh_stiffness import (
     MeshStiffness,
     PairStiffness,
     TabulatedStiffness,
@@ -13,9 +15,7 @@ from gearbench.lumped.mesh_stiffness import (
     rectangular_stiffness,
     tabulated_stiffness,
 )
-from gearbench.lumped.model import Lumped, equivalent_mass, lumped_model, periodic_matrices
-from gearbench.lumped.potential_energy import ToothCompliance, pair_stiffness, tooth_compliance
-from gearbench.lumped.time_step import choose_substeps, largest_step
+from gearbench.lumped.stiffness.potential_energy import ToothCompliance, pair_stiffness, tooth_compliance
 
 __all__ = [
     "Lumped",

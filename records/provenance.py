@@ -46,7 +46,7 @@ def source_digest() -> str:
     for package in SOURCE_PACKAGES:
         spec = find_spec(package)
         for folder in (spec.submodule_search_locations or []) if spec else []:
-            for source in sorted(Path(folder).glob("*.py")):
+            for source in sorted(Path(folder).rglob("*.py")):
                 digest.update(f"{package}/{source.name}\0".encode())
                 digest.update(source.read_bytes())
                 digest.update(b"\0")

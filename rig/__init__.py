@@ -1,6 +1,6 @@
 """What is tested: gears, rig, experiment and case, as immutable SI values."""
 
-from gearbench.rig.case import Case, CaseError, dump_case, read_case
+from gearbench.rig.casefile.case import Case, CaseError, dump_case, read_case
 from gearbench.rig.drive import Coupling, Drive, Ripple
 from gearbench.rig.experiment import Condition, Experiment, Identification, Multisine, Simulation
 from gearbench.rig.gear import Crack, Gear

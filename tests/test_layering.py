@@ -18,14 +18,28 @@ MAY_IMPORT: dict[str, set[str]] = {
     "rig": set(),
     "records": set(),
     "cases": set(),
+    "kernels": set(),
     "geometry": {"rig"},
-    "fem": {"rig", "geometry"},
-    "lumped": {"rig", "geometry"},
+    "fem": {"rig", "geometry", "kernels"},
+    "lumped": {"rig", "geometry", "kernels"},
     "identification": {"records"},
-    "bench": {"rig", "records", "geometry", "fem", "lumped", "identification", "cases"},
+    "bench": {"rig", "records", "kernels", "geometry", "fem", "lumped", "identification", "cases"},
     "diagnosis": {"rig", "records", "geometry", "fem", "lumped", "identification", "bench", "cases"},
     # The truth that diagnosis is tested on: neither knows the other.
-    "challenge": {"rig", "records", "geometry", "fem", "lumped", "bench", "cases"},
+    "challenge": {"rig", "records", "kernels", "geometry", "fem", "lumped", "bench", "cases"},
+}
+# Rooms of a package from the lowest to the highest: a file imports from its own room and from lower ones. A package that
+# is not named here has no rooms.
+ROOMS: dict[str, tuple[str, ...]] = {
+    "rig": ("casefile",),
+    "geometry": ("tooth", "pair", "mesh", "export"),
+    "fem": ("gear", "contact", "motion", "stress"),
+    "lumped": ("stiffness", "linear", "nonlinear"),
+    "identification": ("excitation", "spectra", "lpm", "truth", "response"),
+    "bench": ("plan", "record", "refusals", "elastic", "nonlinear", "linear", "stress", "export", "results"),
+    "diagnosis": ("intake", "forces", "replay", "evidence"),
+    "challenge": ("truth", "making", "scoring"),
+    "app": ("shell", "words", "figures", "report", "commands"),
 }
 APP = "app"
 PACKAGES = sorted({marker.parent.name for marker in ROOT.glob("*/__init__.py")} - {"tests"})
@@ -72,6 +86,51 @@ def test_package_imports_only_lower_layers(package: str) -> None:
     assert [bad for path in sources(package) for bad in violations(package, path)] == []
 
 
+def climbing(package: str, path: Path) -> list[str]:
+    """Imports of a file in a room from a room above its own."""
+    rooms, inside = ROOMS[package], path.relative_to(ROOT / package).parts
+    if len(inside) == 1:
+        return []
+    depth = 1 if package == APP else 2
+    names = [(line, name.split(".")) for line, name in imported(path)]
+    ours = [(line, parts) for line, parts in names if parts[0] == "gearbench" and (depth == 1 or package in parts[1:2])]
+    above = rooms[rooms.index(inside[0]) + 1 :]
+    return [
+        f"{path.relative_to(ROOT)}:{line} imports {'.'.join(parts)}"
+        for line, parts in ours
+        if len(parts) > depth and parts[depth] in above
+    ]
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_every_room_has_a_level(package: str) -> None:
+    rooms = {marker.parent.name for marker in (ROOT / package).glob("*/__init__.py")}
+    assert rooms == set(ROOMS.get(package, ()))
+
+
+@pytest.mark.parametrize("package", sorted(ROOMS))
+def test_rooms_import_only_lower_rooms(package: str) -> None:
+    assert [bad for path in sources(package) for bad in climbing(package, path)] == []
+
+
+@pytest.mark.parametrize(
+    ("package", "line"),
+    [
+        ("fem", "from gearbench.fem.contact.law import Law"),
+        ("fem", "module = 'gearbench.fem.motion.transient'"),
+        ("app", "from gearbench.figures.frf import draw"),
+    ],
+)
+def test_an_import_that_climbs_is_seen(
+    package: str, line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(globals(), "ROOT", tmp_path)
+    path = tmp_path / package / ROOMS[package][0] / "file.py"
+    path.parent.mkdir(parents=True)
+    path.write_text(f"from gearbench.{package}.{ROOMS[package][0]}.other import thing\n{line}\n", encoding="utf-8")
+    assert len(climbing(package, path)) == 1
+
+
 @pytest.mark.parametrize(
     "line",
     [
@@ -92,7 +151,8 @@ def test_a_violation_is_seen(line: str, tmp_path: Path, monkeypatch: pytest.Monk
 
 
 def test_imports_are_absolute_and_namespaced() -> None:
-    ours = {*PACKAGES, *MAY_IMPORT, *(path.stem for path in sources(APP) if not path.stem.startswith("__"))}
+    roots = {path.stem for path in (ROOT / APP).glob("*.py") if not path.stem.startswith("__")}
+    ours = {*PACKAGES, *MAY_IMPORT, *ROOMS[APP], *roots}
     bad = [
         f"{path.relative_to(ROOT)}:{line} imports {name}"
         for path in sources(*PACKAGES, "tests", "benchmarks")
@@ -109,7 +169,7 @@ def test_only_the_mesher_knows_gmsh() -> None:
         for _, name in imported(path)
         if name.split(".")[0] == "gmsh"
     }
-    assert files <= {"geometry/mesh.py"}
+    assert files <= {"geometry/mesh/sector_mesh.py"}
 
 
 @pytest.mark.parametrize("package", ["", ".rig", ".records", ".identification"])

@@ -19,8 +19,8 @@ from rich.markup import render
 
 from gearbench.cases import case_files, case_path
 from gearbench.cli import app, run_command_line
-from gearbench.options import expand_lists
 from gearbench.rig import read_case
+from gearbench.shell.options import expand_lists
 
 
 def test_check_prints_the_data_sheet(capsys: pytest.CaptureFixture[str]) -> None:

@@ -9,14 +9,14 @@ import pytest
 import xarray as xr
 from matplotlib.figure import Figure
 
-from gearbench import figures_frf
 from gearbench.cases import case_path
-from gearbench.figures_frf import draw_itf, draw_natural_frequencies
-from gearbench.figures_gear import draw_pair
-from gearbench.figures_record import draw_record
+from gearbench.figures import frf as figures_frf
+from gearbench.figures.frf import draw_itf, draw_natural_frequencies
+from gearbench.figures.gear import draw_pair
+from gearbench.figures.record import draw_record
 from gearbench.geometry import pair
 from gearbench.rig import read_case
-from gearbench.summary_text import headline, honest_warning
+from gearbench.words.summary_text import headline, honest_warning
 
 
 def frf(rows: int = 40, phases: int = 32, scale: float = 1.0) -> xr.Dataset:

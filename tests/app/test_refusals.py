@@ -9,14 +9,14 @@ import pytest
 import xarray as xr
 
 from gearbench.bench import BenchError
+from gearbench.bench.plan.workers import realisations
 from gearbench.bench.static import static
-from gearbench.bench.workers import realisations
 from gearbench.cases import case_path
 from gearbench.cli import run_command_line
 from gearbench.identification import SpectraError, identify
 from gearbench.records import make_record
 from gearbench.rig import read_case
-from gearbench.summary_text import headline
+from gearbench.words.summary_text import headline
 
 
 @pytest.mark.parametrize(

@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from gearbench.bench.stress_fields import Contact, PairFields
+from gearbench.bench.stress.fields import Contact, PairFields
 from gearbench.cases import case_path
 from gearbench.cli import run_command_line
-from gearbench.failure import InputError
-from gearbench.figures_stress import limits, plot_fields, plot_root_stress, rounded_up, tooth_history
-from gearbench.lumped.iso6336_root import root_stress
+from gearbench.commands.stress_output import field_files, field_phases
+from gearbench.figures.stress import limits, plot_fields, plot_root_stress, rounded_up, tooth_history
+from gearbench.lumped.stiffness.iso6336_root import root_stress
 from gearbench.rig import Case, read_case
-from gearbench.stress_output import field_files, field_phases
-from gearbench.stress_text import root_lines, root_tables
+from gearbench.shell.failure import InputError
+from gearbench.words.stress import root_lines, root_tables
 
 
 @pytest.mark.parametrize(

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gearbench.bench.calculix import ContactModel, contact_model
 from gearbench.bench.errors import BenchError
+from gearbench.bench.export.calculix import ContactModel, contact_model
 from gearbench.cases import case_path
-from gearbench.geometry.calculix import deck_text, plane_strain_constants
-from gearbench.geometry.quality import quality
+from gearbench.geometry.export.calculix import deck_text, plane_strain_constants
+from gearbench.geometry.mesh.quality import quality
 from gearbench.rig import Case, Material, read_case
 
 SMALL = [

@@ -9,11 +9,11 @@ import pytest
 import xarray as xr
 
 from gearbench.bench import BenchError
-from gearbench.bench.effects import cycles_to_repeat
-from gearbench.bench.schedule import schedule
+from gearbench.bench.plan.schedule import schedule
+from gearbench.bench.refusals.effects import cycles_to_repeat
 from gearbench.bench.simulate import simulate
 from gearbench.bench.static import static
-from gearbench.figures_static import plot_static
+from gearbench.figures.static import plot_static
 from gearbench.geometry import GeometryError
 from gearbench.rig import Case, read_case
 

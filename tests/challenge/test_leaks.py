@@ -14,13 +14,13 @@ import numpy as np
 import pytest
 from shared.truth_plants import STIFFNESS, short_case
 
-from gearbench.challenge import make as making
 from gearbench.challenge.answers import Answer, read_answers
-from gearbench.challenge.effects import EFFECTS, FOREIGN
 from gearbench.challenge.errors import ChallengeError
-from gearbench.challenge.make import make_challenge
-from gearbench.challenge.nominal import nominal_text
-from gearbench.challenge.plan import Mix
+from gearbench.challenge.making import cases as making
+from gearbench.challenge.making.cases import make_challenge
+from gearbench.challenge.making.nominal import nominal_text
+from gearbench.challenge.making.plan import Mix
+from gearbench.challenge.truth.effects import EFFECTS, FOREIGN
 from gearbench.records import read_record
 from gearbench.rig import read_case
 

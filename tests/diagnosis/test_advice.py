@@ -6,7 +6,7 @@ import numpy as np
 from shared.measured import SAMPLES, channels, nominal, record
 
 from gearbench.diagnosis.advice import advice_of
-from gearbench.diagnosis.intake import Measurement, measurement
+from gearbench.diagnosis.intake.measurements import Measurement, measurement
 
 
 def taken(name: str, **changes: float) -> Measurement:

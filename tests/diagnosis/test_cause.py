@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from gearbench.bench import simulate
-from gearbench.bench.replay import replay
+from gearbench.bench.nonlinear.replay import replay
 from gearbench.cases import case_files
 from gearbench.diagnosis.cause import find_cause
-from gearbench.diagnosis.intake import measurement
+from gearbench.diagnosis.intake.measurements import measurement
 from gearbench.rig import read_case
 
 RIPPLE = {"orders": "[6, 12]", "amplitude_nm": "[1.5, 0.8]", "phase_deg": "[30, -60]"}

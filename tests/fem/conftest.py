@@ -11,13 +11,13 @@ import pytest
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
-from gearbench.fem.body import CondensedGear, condense
-from gearbench.fem.elasticity import PlaneModuli, assemble, plane_moduli
-from gearbench.fem.law import Law, elastic_pair, make_law
-from gearbench.fem.ring import Ring, make_ring
-from gearbench.geometry.mesh import GearMesh, SectorMesh, full_mesh, sector_mesh
-from gearbench.geometry.pair import Pair
-from gearbench.geometry.profile import Profile, profile
+from gearbench.fem.contact.law import Law, elastic_pair, make_law
+from gearbench.fem.gear.body import CondensedGear, condense
+from gearbench.fem.gear.elasticity import PlaneModuli, assemble, plane_moduli
+from gearbench.fem.gear.ring import Ring, make_ring
+from gearbench.geometry.mesh.sector_mesh import GearMesh, SectorMesh, full_mesh, sector_mesh
+from gearbench.geometry.pair.kinematics import Pair
+from gearbench.geometry.tooth.profile import Profile, profile
 from gearbench.rig import Gear, Material, Rig, Support, Supports
 
 STEEL = Material()

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gearbench.fem.body import condense
-from gearbench.fem.kinematics import Contact, pair_contact, teeth_of
-from gearbench.fem.law import elastic_pair, make_law
-from gearbench.fem.static import static_cycle
-from gearbench.geometry.pair import Pair, pair
+from gearbench.fem.contact.kinematics import Contact, pair_contact, teeth_of
+from gearbench.fem.contact.law import elastic_pair, make_law
+from gearbench.fem.contact.static import static_cycle
+from gearbench.fem.gear.body import condense
+from gearbench.geometry.pair.kinematics import Pair, pair
 
 # Phases after the mate's tip edge has passed the end of its involute: the corner faces the arc.
 ON_ARC = np.array([10.2e-3, 11.2e-3, 12.2e-3])

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from shared.gears import likely_pair
 
-from gearbench.fem.kinematics import APART, Contact, pair_contact, teeth_of
+from gearbench.fem.contact.kinematics import APART, Contact, pair_contact, teeth_of
 from gearbench.geometry import GeometryError
-from gearbench.geometry.pair import Pair, pair
+from gearbench.geometry.pair.kinematics import Pair, pair
 from gearbench.rig import Rig
 
 Array = NDArray[np.float64]

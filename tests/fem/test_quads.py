@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_matrix
 
-from gearbench.fem.body import condense
-from gearbench.fem.cache import stored_gear
-from gearbench.fem.elasticity import PlaneModuli, assemble
-from gearbench.fem.law import elastic_pair, make_law
-from gearbench.fem.static import static_cycle
+from gearbench.fem.contact.cache import stored_gear
+from gearbench.fem.contact.law import elastic_pair, make_law
+from gearbench.fem.contact.static import static_cycle
+from gearbench.fem.gear.body import condense
+from gearbench.fem.gear.elasticity import PlaneModuli, assemble
 from gearbench.geometry import GeometryError
-from gearbench.geometry.body import sector_area
-from gearbench.geometry.profile import profile
-from gearbench.geometry.quads import QuadSectorMesh, quad_sector_mesh
-from gearbench.geometry.sector import Element
+from gearbench.geometry.mesh.quads import QuadSectorMesh, quad_sector_mesh
+from gearbench.geometry.mesh.sector import Element
+from gearbench.geometry.tooth.body import sector_area
+from gearbench.geometry.tooth.profile import profile
 from gearbench.rig import Crack, Gear, Material, Rig
 
 STEEL = Material()

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gearbench.fem.law import Law, make_law
-from gearbench.fem.static import ContactError, solve_torque, static_cycle, unloaded_dte
+from gearbench.fem.contact.law import Law, make_law
+from gearbench.fem.contact.static import ContactError, solve_torque, static_cycle, unloaded_dte
 from gearbench.rig import Gear
 
 LIGHT = 0.2  # N m: presses the flanks by 0.03 um

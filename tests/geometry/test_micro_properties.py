@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from shared.gears import likely_gear
 
 from gearbench.geometry import GeometryError, Profile, profile
-from gearbench.geometry.micro import check_micro, excess, profile_excess, relief, teeth_alike
+from gearbench.geometry.tooth.micro import check_micro, excess, profile_excess, relief, teeth_alike
 from gearbench.rig import Gear
 
 SETTLED: dict[str, Any] = {

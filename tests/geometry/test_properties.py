@@ -28,7 +28,7 @@ from gearbench.geometry import (
     sector_area,
     sector_mesh,
 )
-from gearbench.geometry.measure import over_pins, span
+from gearbench.geometry.tooth.measure import over_pins, span
 from gearbench.rig import Gear, Rig
 
 SETTLED = {

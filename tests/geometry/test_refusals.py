@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from gearbench.geometry import GeometryError, body, data_sheet, pair, profile
-from gearbench.geometry.interference import fillet_clearance, with_tip
+from gearbench.geometry.pair.interference import fillet_clearance, with_tip
 from gearbench.rig import Gear, Rig
 
 MakeGear = Callable[..., Gear]

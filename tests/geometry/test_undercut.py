@@ -13,7 +13,7 @@ from shared.rack import build, rack_half_angle
 from shared.rolling import outline, overlap
 
 from gearbench.geometry import GeometryError, Profile, pair, profile
-from gearbench.geometry.interference import with_tip
+from gearbench.geometry.pair.interference import with_tip
 from gearbench.rig import Gear, Rig
 
 MakeGear = Callable[..., Gear]

@@ -8,13 +8,13 @@ import xarray as xr
 from shared.ptv import periodic_filter
 
 from gearbench.identification import IdentificationSettings, LpmError, SpectraError, TransmissionError, identify, itf
-from gearbench.identification.frf import htf
-from gearbench.identification.modes import itf_modes
-from gearbench.identification.monodromy import exact_itf
-from gearbench.identification.periodic import truncation_error
-from gearbench.identification.record_spectra import record_spectra
-from gearbench.identification.reference import ReferenceRig, reference_record
-from gearbench.identification.spectra import joint_periods
+from gearbench.identification.response.frf import htf
+from gearbench.identification.response.modes import itf_modes
+from gearbench.identification.spectra.joint import joint_periods
+from gearbench.identification.spectra.records import record_spectra
+from gearbench.identification.truth.monodromy import exact_itf
+from gearbench.identification.truth.periodic import truncation_error
+from gearbench.identification.truth.reference import ReferenceRig, reference_record
 from gearbench.records.record import make_record
 
 # A faster mesh needs fewer branches: 16 reach 512 Hz to each side.

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from shared.ptv import periodic_filter, spectra_of
 
-from gearbench.identification.covariance import CrossCovariance, diagonal_variance
-from gearbench.identification.gram import grams
-from gearbench.identification.local_solve import solve_window
-from gearbench.identification.lpm import LpmResult, local_polynomial, needed_rows, plan_centres
-from gearbench.identification.periodic import itf_from_htf
-from gearbench.identification.regression import Window, prepare
+from gearbench.identification.lpm.covariance import CrossCovariance, diagonal_variance
+from gearbench.identification.lpm.estimate import LpmResult, local_polynomial, needed_rows, plan_centres
+from gearbench.identification.lpm.gram import grams
+from gearbench.identification.lpm.local_solve import solve_window
+from gearbench.identification.lpm.regression import Window, prepare
+from gearbench.identification.truth.periodic import itf_from_htf
 
 RUNS = 150
 NOISE = 0.3

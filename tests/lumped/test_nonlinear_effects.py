@@ -12,9 +12,9 @@ from shared.effect_rig import FORCE, GEARS, MASSES, make_model, make_rig, run, s
 from shared.hat_mesh import ALPHA, BACKLASH, BENDING, RADII, hat, hat_law, stiffness
 
 from gearbench.geometry import pair
-from gearbench.lumped.mesh_tables import BACK, EXCESS, GAIN, Motion, tables
-from gearbench.lumped.nonlinear import nonlinear_model
-from gearbench.lumped.nonlinear_step import integrate
+from gearbench.lumped.nonlinear.model import nonlinear_model
+from gearbench.lumped.nonlinear.step import integrate
+from gearbench.lumped.nonlinear.tables import BACK, EXCESS, GAIN, Motion, tables
 from gearbench.rig import (
     Coupling,
     Crack,

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from shared.effect_rig import FORCE, GEARS, MASSES, make_model, make_rig, run, steady_dte
 from shared.hat_mesh import ALPHA, BASE_PITCH, PHASES, PITCH_ROLL, RADII, hat, hat_law
 
-from gearbench.lumped.mesh_tables import Motion, tables
-from gearbench.lumped.nonlinear import NonLinear
-from gearbench.lumped.nonlinear_step import integrate
+from gearbench.lumped.nonlinear.model import NonLinear
+from gearbench.lumped.nonlinear.step import integrate
+from gearbench.lumped.nonlinear.tables import Motion, tables
 from gearbench.rig import Friction, Load, Rig
 
 Array = NDArray[np.float64]

@@ -6,9 +6,9 @@ import json
 from pathlib import Path
 from typing import Any
 
-from gearbench.bench.calculix import ContactModel, contact_model
+from gearbench.bench.export.calculix import ContactModel, contact_model
 from gearbench.cases import case_path
-from gearbench.geometry.calculix import PENALTIES
+from gearbench.geometry.export.calculix import PENALTIES
 from gearbench.rig import Case, read_case
 
 FILE = Path(__file__).parents[1] / "validation" / "contact_model.json"

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from shared.hat_mesh import ALPHA, RADII, hat_law
 
 from gearbench.lumped import equivalent_mass
-from gearbench.lumped.mesh_law import MeshLaw
-from gearbench.lumped.mesh_tables import EXCESS, GAIN, Motion, tables
-from gearbench.lumped.nonlinear import NonLinear
-from gearbench.lumped.nonlinear_step import integrate
+from gearbench.lumped.nonlinear.law import MeshLaw
+from gearbench.lumped.nonlinear.model import NonLinear
+from gearbench.lumped.nonlinear.step import integrate
+from gearbench.lumped.nonlinear.tables import EXCESS, GAIN, Motion, tables
 from gearbench.rig import Damping, Gear, Rig, Support, Supports
 
 Array = NDArray[np.float64]

@@ -11,7 +11,7 @@ from math import pi, tan
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gearbench.lumped.mesh_law import MeshLaw, approach_grid
+from gearbench.lumped.nonlinear.law import MeshLaw, approach_grid
 
 Array = NDArray[np.float64]
 

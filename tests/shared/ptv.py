@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gearbench.identification.spectra import Spectra
+from gearbench.identification.spectra.joint import Spectra
 
 
 @dataclass(frozen=True)

@@ -8,11 +8,11 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from gearbench.fem.body import condense
-from gearbench.fem.fields import elastic_gear
-from gearbench.fem.law import Law, elastic_pair, make_law
-from gearbench.fem.loaded import pair_loads
-from gearbench.fem.root import RootKernel, peak, root_kernel, root_stress
+from gearbench.fem.contact.law import Law, elastic_pair, make_law
+from gearbench.fem.gear.body import condense
+from gearbench.fem.stress.fields import elastic_gear
+from gearbench.fem.stress.loaded import pair_loads
+from gearbench.fem.stress.root import RootKernel, peak, root_kernel, root_stress
 from gearbench.rig import Gear, Material, Rig, Support, Supports
 
 FOLDER = Path(__file__).parents[1] / "validation" / "calculix"

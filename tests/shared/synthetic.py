@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from gearbench.diagnosis.intake import Measurement
+from gearbench.diagnosis.intake.measurements import Measurement
 
 Array = NDArray[np.float64]
 

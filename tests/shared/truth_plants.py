@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from gearbench.challenge.levels import Levels, background
-from gearbench.challenge.plant import Plant, Teeth
-from gearbench.challenge.structure import draw_structure
-from gearbench.challenge.truth import Bench, build_plant, conditions_of, make_bench
+from gearbench.challenge.truth.levels import Levels, background
+from gearbench.challenge.truth.plant import Plant, Teeth
+from gearbench.challenge.truth.rigs import Bench, build_plant, conditions_of, make_bench
+from gearbench.challenge.truth.structure import draw_structure
 from gearbench.rig import Case, read_case
 
 CASES = Path(__file__).resolve().parents[2] / "cases"

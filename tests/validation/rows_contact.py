@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from gearbench.fem.body import condense
-from gearbench.fem.law import Law, elastic_pair, make_law
-from gearbench.fem.static import static_cycle
+from gearbench.fem.contact.law import Law, elastic_pair, make_law
+from gearbench.fem.contact.static import static_cycle
+from gearbench.fem.gear.body import condense
 from gearbench.rig import Gear, Material, Rig, Support, Supports
-from gearbench.validation import Check, NotRun
+from gearbench.shell.validation import Check, NotRun
 
 STORED = Path(__file__).parent / "calculix" / "reference.json"
 
@@ -58,7 +58,7 @@ def against_calculix(corner: bool) -> float:
 
 def hertz() -> float:
     """Half-width and peak pressure of two parallel cylinders, against Hertz (Johnson 1985, eqs. 4.43, 4.45)."""
-    from gearbench.fem.line import cell_edges, complementarity, log_integral
+    from gearbench.fem.contact.line import cell_edges, complementarity, log_integral
 
     modulus, width, r1, r2 = 206e9, 0.02, 0.012, 0.03
     radius, effective = r1 * r2 / (r1 + r2), modulus / 2

@@ -14,15 +14,15 @@ from typing import Any
 
 from gearbench.bench.simulate import simulate
 from gearbench.cases import case_path
-from gearbench.challenge.make import make_challenge
-from gearbench.challenge.plan import parse_mix
-from gearbench.challenge.score import score
-from gearbench.challenge.scoring import score_folder
-from gearbench.challenge_command import diagnose_case, read
-from gearbench.diagnosis_job import Diagnosis, diagnose, take_in
+from gearbench.challenge.making.cases import make_challenge
+from gearbench.challenge.making.plan import parse_mix
+from gearbench.challenge.scoring.judge import score_folder
+from gearbench.challenge.scoring.score import score
+from gearbench.commands.challenge import diagnose_case, read
+from gearbench.commands.diagnosis_job import Diagnosis, diagnose, take_in
 from gearbench.records import write_record
 from gearbench.rig import Friction, read_case
-from gearbench.validation import Check, Got
+from gearbench.shell.validation import Check, Got
 
 HIDDEN = 0.06  # coefficient of friction
 SEED = 20

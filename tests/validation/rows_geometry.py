@@ -11,7 +11,7 @@ from shared.rack import GEARS, build, rack_half_angle
 
 from gearbench.geometry import pair
 from gearbench.rig import Gear, Rig, Support, Supports
-from gearbench.validation import Check
+from gearbench.shell.validation import Check
 
 
 def profile_against_rack() -> float:

@@ -15,8 +15,8 @@ from gearbench.identification import (
     identify,
     itf,
 )
-from gearbench.identification.reference import ReferenceRig, reference_record
-from gearbench.validation import Check, NotRun
+from gearbench.identification.truth.reference import ReferenceRig, reference_record
+from gearbench.shell.validation import Check, NotRun
 
 BAND = (700.0, 2500.0)
 FREQUENCIES = np.arange(BAND[0], BAND[1] + 1, 4.0)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.geometry import Pair, pair
-from gearbench.lumped.iso6336 import (
+from gearbench.lumped.stiffness.iso6336 import (
     basic_rack_factor,
     contact_ratio,
     flexibility,
@@ -20,10 +20,10 @@ from gearbench.lumped.iso6336 import (
     single_stiffness,
     virtual_teeth,
 )
-from gearbench.lumped.potential_energy import foundation_polynomials, hertz_compliance, tooth_compliance
-from gearbench.lumped.weber_banaschek import pair_stiffness
+from gearbench.lumped.stiffness.potential_energy import foundation_polynomials, hertz_compliance, tooth_compliance
+from gearbench.lumped.stiffness.weber_banaschek import pair_stiffness
 from gearbench.rig import Gear, Material, Rig, Support, Supports
-from gearbench.validation import Check, NotRun
+from gearbench.shell.validation import Check, NotRun
 
 Array = NDArray[np.float64]
 DEGREE = pi / 180

@@ -10,18 +10,18 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from gearbench.bench.excitation import torque_realisation
-from gearbench.bench.lumped_run import tables_for
-from gearbench.bench.reduced_rig import elastic_rig
-from gearbench.bench.schedule import schedule
+from gearbench.bench.elastic.rig import elastic_rig
+from gearbench.bench.linear.run import tables_for
+from gearbench.bench.plan.excitation import torque_realisation
+from gearbench.bench.plan.schedule import schedule
 from gearbench.cases import case_path
-from gearbench.fem.cache import stored_gear
-from gearbench.fem.static import static_cycle
+from gearbench.fem.contact.cache import stored_gear
+from gearbench.fem.contact.static import static_cycle
 from gearbench.geometry import pair
 from gearbench.lumped import lumped_model
-from gearbench.lumped.runge_kutta import integrate
+from gearbench.lumped.linear.runge_kutta import integrate
 from gearbench.rig import read_case
-from gearbench.validation import Check
+from gearbench.shell.validation import Check
 
 LUMPED_STEPS = 100 * 4 * 2**17 * 4
 

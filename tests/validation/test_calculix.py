@@ -14,10 +14,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearbench.fem.body import condense
-from gearbench.fem.law import Law, make_law
-from gearbench.fem.static import static_cycle
-from gearbench.geometry.pair import pair
+from gearbench.fem.contact.law import Law, make_law
+from gearbench.fem.contact.static import static_cycle
+from gearbench.fem.gear.body import condense
+from gearbench.geometry.pair.kinematics import pair
 from gearbench.rig import Gear, Material, Rig, Support, Supports
 
 pytestmark = pytest.mark.validation

@@ -16,7 +16,7 @@ import pytest
 from shared.contact_models import RUNS, case_of, model_of, stiff_limit
 
 from gearbench.bench.static import static
-from gearbench.geometry.calculix import write_deck
+from gearbench.geometry.export.calculix import write_deck
 
 # The smallest one; about a minute.
 SOLVED = next(run for run in RUNS if run["name"].startswith("z20-21"))

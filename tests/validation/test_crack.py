@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gearbench.fem.body import condense
-from gearbench.fem.elasticity import plane_moduli
-from gearbench.fem.patch import patch_compliance
-from gearbench.geometry.profile import profile
+from gearbench.fem.gear.body import condense
+from gearbench.fem.gear.elasticity import plane_moduli
+from gearbench.fem.gear.patch import patch_compliance
+from gearbench.geometry.tooth.profile import profile
 from gearbench.rig import Crack, Gear, Material
 
 pytestmark = pytest.mark.validation

@@ -20,7 +20,7 @@ from make_reference import calculix_version
 from numpy.typing import NDArray
 from planar_mesh import Outline, PlanarMesh, Spot, circle, outline, second_order, size_field, straightened, triangulate
 
-from gearbench.geometry.profile import Profile, profile
+from gearbench.geometry.tooth.profile import Profile, profile
 from gearbench.rig import Gear
 
 Array = NDArray[np.float64]

@@ -10,8 +10,8 @@ from deck import Touch
 from numpy.typing import NDArray
 from planar_mesh import PlanarMesh, Spot, rotation
 
-from gearbench.geometry.pair import Pair, pair
-from gearbench.geometry.profile import Profile
+from gearbench.geometry.pair.kinematics import Pair, pair
+from gearbench.geometry.tooth.profile import Profile
 from gearbench.rig import Gear, Material, Rig, Support, Supports
 
 Array = NDArray[np.float64]

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from gearbench.geometry.profile import Profile, radial
+from gearbench.geometry.tooth.profile import Profile, radial
 
 Array = NDArray[np.float64]
 GROWTH = 0.22  # of element size per distance

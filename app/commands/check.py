@@ -1,0 +1,62 @@
+"""`check CASE`: the data sheet of a case."""
+
+from __future__ import annotations
+
+from math import isnan
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from gearbench.commands.simulate import experiments
+from gearbench.shell.options import CaseArgument, JsonOption, SetOption, load_case, print_json
+from gearbench.words.combs import comb_data, comb_lines, comb_reports
+
+
+def check(
+    case: CaseArgument,
+    diameter: Annotated[
+        list[float] | None,
+        typer.Option("--diameter-mm", help="give the tooth thickness at this diameter too (may be repeated)"),
+    ] = None,
+    settings: SetOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Print the data sheet of a case: diameters, contact ratio, sliding, backlash, gauges, masses; or what is wrong.
+
+    What mesh, static and simulate would refuse is refused here, but for what only a solution can show.
+    For a comb multisine also its residue and which kinds of response then share lines.
+    """
+    loaded = load_case(case, settings)
+    from gearbench.bench.elastic.crack import crack_lines
+    from gearbench.bench.refusals.readiness import check_case
+    from gearbench.geometry import data_sheet
+
+    rows = data_sheet(loaded.rig, [1e-3 * number for number in diameter or []])
+    check_case(loaded)
+    names = [condition.name for condition in loaded.conditions] or [""]
+    under = [experiment for experiment, _ in experiments(loaded, Path("record.nc"))]
+    combs = comb_reports(list(zip(names, under, strict=True)))
+    if as_json:
+        data = {row.name: {"value": row.value, "unit": row.unit} for row in rows}
+        print_json({"case": loaded.name, "data": data, "combs": [comb_data(comb) for comb in combs]})
+        return
+    typer.echo(f"{loaded.name}\n")
+    shared = [row for row in rows if not row.name.startswith(("driver ", "driven "))]
+    for row in shared:
+        typer.echo(f"  {row.name:<46} {_figure(row.value):>12}  {row.unit}".rstrip())
+    typer.echo(f"\n  {'':<46} {'driver':>12} {'driven':>12}")
+    driven = {row.name.removeprefix("driven "): row.value for row in rows if row.name.startswith("driven ")}
+    for row in rows:
+        name = row.name.removeprefix("driver ")
+        if name != row.name:
+            both = f"{_figure(row.value):>12} {_figure(driven[name]):>12}"
+            typer.echo(f"  {name:<46} {both}  {row.unit}".rstrip())
+    for line in crack_lines(loaded.rig, loaded.simulation.element_size, loaded.simulation.modes):
+        typer.echo(f"\n  {line}")
+    for comb in combs:
+        typer.echo("\n  " + "\n  ".join(comb_lines(comb)))
+
+
+def _figure(value: float) -> str:
+    return "-" if isnan(value) else f"{value:.6g}"

@@ -1,0 +1,72 @@
+"""`identify RECORD... --out FILE`: the time-varying frequency response behind records."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from gearbench.shell.failure import InputError
+from gearbench.shell.options import JsonOption, check_out, print_json
+from gearbench.shell.progress import Progress
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def identify(
+    records: Annotated[list[Path], typer.Argument(metavar="RECORD...", help="records: realisations of one condition")],
+    out: Annotated[Path, typer.Option("--out", help="frequency response to write (NetCDF-4)")],
+    method: Annotated[Literal["lpm"], typer.Option("--method", help="estimator")] = "lpm",
+    band_hz: Annotated[
+        tuple[float, float] | None, typer.Option("--band-hz", help="identified band; absent: the excited one")
+    ] = None,
+    harmonics: Annotated[
+        int | None, typer.Option("--harmonics", help="branches L on each side; absent: chosen by predicted error")
+    ] = None,
+    order: Annotated[
+        int | None, typer.Option("--order", help="polynomial order R; absent: chosen by predicted error")
+    ] = None,
+    window: Annotated[
+        int | None, typer.Option("--window", help="half-width n of the local window in lines; absent: chosen")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Identify the time-varying frequency response from force to DTE out of records."""
+    from gearbench.identification import IdentificationSettings, write_frf
+    from gearbench.identification import identify as estimate
+    from gearbench.records import read_record
+
+    check_out(out, records)
+    seen = {path.resolve() for path in records}
+    if len(seen) < len(records):
+        raise InputError(f"RECORD is given {len(records)} times but names {len(seen)} file(s): each one counts once")
+    settings = IdentificationSettings(method=method, harmonics=harmonics, order=order, window=window, band=band_hz)
+    with Progress("identify") as progress:
+        progress.step("reading")
+        loaded = [read_record(path) for path in records]
+        progress.step("local polynomial method")
+        found = estimate(loaded, settings, progress=progress)
+        write_frf(found, out)
+    summary = frf_summary(found, out)
+    if as_json:
+        print_json(summary)
+        return
+    low, high = summary["first_mode_hz"]
+    typer.echo(
+        f"{out}: first mode {low:.4g}-{high:.4g} Hz; {summary['unknowns']} unknowns, {summary['equations']} equations"
+        f" a window; expected error of the ITF {summary['expected_error']:.1%}"
+    )
+    for warning in summary["warnings"]:
+        typer.echo(f"warning: {warning}")
+
+
+def frf_summary(found: xr.Dataset, path: Path) -> dict[str, Any]:
+    """What a frequency response says about itself."""
+    from gearbench.bench.results.measures import mode_range
+
+    keys = ("harmonics", "order", "window", "unknowns", "equations", "condition_number", "expected_error")
+    numbers = {key: found.attrs[key] for key in keys if key in found.attrs}
+    warnings = [line for line in str(found.attrs.get("warnings", "")).splitlines() if line]
+    return {"file": str(path), "first_mode_hz": mode_range(found), **numbers, "warnings": warnings}

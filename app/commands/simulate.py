@@ -1,0 +1,78 @@
+"""`simulate CASE --out FILE`: the record of a case's experiment."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from gearbench.shell.options import CaseArgument, JsonOption, SetOption, check_out, load_case, print_json
+from gearbench.shell.progress import Progress
+
+if TYPE_CHECKING:
+    from gearbench.rig import Case
+
+
+def simulate(
+    case: CaseArgument,
+    out: Annotated[Path, typer.Option("--out", help="record to write (NetCDF-4); NAME-CONDITION.nc with conditions")],
+    model: Annotated[
+        Literal["lumped", "reduced"] | None,
+        typer.Option("--model", help="absent: the case's simulation.model"),
+    ] = None,
+    settings: SetOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Carry out the experiment of a case on a model and write the record.
+
+    A case with condition tables has one record for each: `--out DIR/record.nc` writes
+    DIR/record-NAME.nc, NAME being the name of the condition.
+    """
+    loaded = load_case(case, settings)
+    check_out(out, [case])
+    from gearbench.bench import simulate as carry_out
+    from gearbench.bench.refusals.readiness import check_timing
+    from gearbench.records import write_record
+
+    chosen = {"model": model or loaded.simulation.model}
+    check_timing(loaded.model_copy(update={"simulation": loaded.simulation.model_copy(update=chosen)}))
+    summaries = []
+    with Progress(f"simulate {loaded.name}") as progress:
+        for experiment, path in experiments(loaded, out):
+            progress.step(path.name)
+            record = carry_out(experiment, model, progress)
+            write_record(record, path)
+            summaries.append(record_summary(record, path))
+    if as_json:
+        print_json(summaries if loaded.conditions else summaries[0])
+        return
+    for summary in summaries:
+        typer.echo(
+            f"{summary['file']}: {summary['realisations']} x {summary['duration_s']:g} s at"
+            f" {summary['sampling_rate_hz']:g} Hz, DTE {summary['dte_peak_to_peak_um']:.4g} um peak to peak"
+        )
+
+
+def experiments(case: Case, out: Path) -> list[tuple[Case, Path]]:
+    """The case under each of its conditions (or as it is, without any) and the record that belongs to it."""
+    if not case.conditions:
+        return [(case, out)]
+    names = [(condition, out.with_name(f"{out.stem}-{condition.name}{out.suffix}")) for condition in case.conditions]
+    return [(case.under(condition), path) for condition, path in names]
+
+
+def record_summary(record: Any, path: Path) -> dict[str, Any]:
+    """Size of a record and of its transmission error."""
+    rate = float(record.attrs["sampling_rate"])
+    return {
+        "file": str(path),
+        "model": record.attrs.get("model", ""),
+        "realisations": int(record.sizes["realisation"]),
+        "duration_s": record.sizes["time"] / rate,
+        "sampling_rate_hz": rate,
+        "dte_peak_to_peak_um": float(record["dte"].max() - record["dte"].min()) * 1e6,
+        "torque_rms_nm": float(record["torque_driver"].std()),
+        "settling_residual": record.attrs.get("settling_residual"),
+        "warnings": record.attrs.get("warnings", ""),
+    }

@@ -1,0 +1,184 @@
+"""`static CASE --out FILE`: transmission error, stiffness and load sharing over the mesh cycle."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from gearbench.commands.stress_output import field_files, field_phases, write_all
+from gearbench.shell.options import CaseArgument, JsonOption, SetOption, check_out, check_picture, load_case, print_json
+from gearbench.shell.progress import Progress
+from gearbench.words.stress import root_lines, root_tables
+
+if TYPE_CHECKING:
+    from gearbench.rig import Case
+
+
+def static(
+    case: CaseArgument,
+    out: Annotated[Path, typer.Option("--out", help="result to write (NetCDF-4)")],
+    torque_nm: Annotated[
+        list[float] | None, typer.Option("--torque-nm", help="driver torques [N m]; absent: the case's mean")
+    ] = None,
+    dte_um: Annotated[
+        list[float] | None, typer.Option("--dte-um", help="transmission errors in um, instead of torques")
+    ] = None,
+    positions: Annotated[int, typer.Option("--positions", help="mesh phases over one cycle")] = 64,
+    cycles: Annotated[int, typer.Option("--cycles", help="mesh cycles, where teeth differ from one another")] = 1,
+    figure: Annotated[
+        Path | None, typer.Option("--figure", help="picture of the result as well (.png, .svg, .pdf)")
+    ] = None,
+    stiffness_figure: Annotated[
+        Path | None, typer.Option("--stiffness-figure", help="picture of the mesh stiffness by every method as well")
+    ] = None,
+    fields: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--fields",
+            metavar="PHASE",
+            help="mesh phases at which stress and displacement under the largest load are written beside --out as .vtu"
+            " and .png",
+        ),
+    ] = None,
+    root_figure: Annotated[
+        Path | None, typer.Option("--root-figure", help="picture of the root stress over the mesh cycle as well")
+    ] = None,
+    model: Annotated[
+        Literal["lumped", "reduced"] | None,
+        typer.Option("--model", help="absent: the case's simulation.model"),
+    ] = None,
+    settings: SetOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Static response of the pair over one mesh cycle, hub centres held."""
+    loaded = load_case(case, settings)
+    check_out(out, [case])
+    pictures = {"--figure": figure, "--stiffness-figure": stiffness_figure, "--root-figure": root_figure}
+    others: list[Path | str] = [case, out]
+    for option, picture in pictures.items():
+        if picture is not None:
+            check_picture(picture, others, option)
+            others.append(picture)
+    elastic = (model or loaded.simulation.model) == "reduced"
+    files = _check_stress(loaded, elastic, out, fields or [], root_figure, others)
+    from gearbench.bench.static import static as solve
+    from gearbench.records.storage import write_atomically
+
+    with Progress(f"static {loaded.name}") as progress:
+        progress.step("mesh cycle")
+        result = solve(
+            loaded,
+            model,
+            torque=torque_nm or (),
+            dte=[1e-6 * value for value in dte_um or ()],
+            positions=positions,
+            cycles=cycles,
+            progress=progress,
+        )
+        if elastic:
+            progress.step("root stress")
+            result = _with_root_stress(loaded, result)
+        write_atomically(out, lambda path: result.to_netcdf(path, engine="h5netcdf"))
+        if figure is not None:
+            progress.step("figure")
+            from gearbench.figures.static import plot_static
+
+            plot_static(result, figure)
+        written = _stress_files(loaded, result, files, root_figure, progress)
+    from gearbench.commands.static_methods import draw_largest, methods_data, methods_lines, stiffness_tables
+
+    tables = stiffness_tables(loaded, result)
+    if stiffness_figure is not None:
+        draw_largest(tables, stiffness_figure)
+    roots = root_tables(loaded, result)
+    summary = static_summary(result, out) | methods_data(loaded, tables)
+    summary |= {"root_stress": roots, "field_files": [str(path) for path in written]}
+    if as_json:
+        print_json(summary)
+        return
+    lines = [*_lines(summary), *methods_lines(loaded, tables)]
+    if roots:
+        lines += root_lines(max(roots, key=lambda one: float(one["torque_nm"])))
+    for line in [*lines, str(out), *map(str, written)]:
+        typer.echo(line)
+
+
+def _check_stress(
+    case: Case, elastic: bool, out: Path, fields: list[str], root_figure: Path | None, others: list[Path | str]
+) -> list[tuple[float, Path, Path]]:
+    """The files of `--fields`; refuses what has no stress, before any work is done."""
+    from gearbench.shell.failure import InputError
+
+    for option, wanted in (("--fields", bool(fields)), ("--root-figure", root_figure is not None)):
+        if wanted and not elastic:
+            raise InputError(f"{option} needs finite elements, not the lumped model: --model reduced")
+    if root_figure is not None:
+        from gearbench.bench.stress.root import why_not
+
+        if reason := why_not(case.rig):
+            raise InputError(f"--root-figure cannot be drawn: {reason}")
+    files = field_files(out, field_phases(fields), others)
+    if files:
+        from gearbench.bench.stress.fields import refuse_cracks
+
+        refuse_cracks(case.rig)
+    return files
+
+
+def _with_root_stress(case: Case, result: Any) -> Any:
+    """The static result with the stress of the tooth roots."""
+    from gearbench.bench.elastic.rig import elastic_rig
+    from gearbench.bench.stress.root import with_root_stress
+
+    return with_root_stress(elastic_rig(case.rig, case.simulation), result, case.simulation.element_size)
+
+
+def _stress_files(
+    case: Case, result: Any, files: list[tuple[float, Path, Path]], root_figure: Path | None, progress: Progress
+) -> list[Path]:
+    """Write fields and the picture of root stress where asked for; the fields' files."""
+    if root_figure is not None:
+        from gearbench.figures.stress import plot_root_stress
+
+        (largest,) = sorted(root_tables(case, result), key=lambda one: float(one["torque_nm"]))[-1:]
+        iso = {name: gear["sigma_f0_mpa"] for name, gear in largest["gears"].items() if gear["sigma_f0_mpa"]}
+        plot_root_stress(result, root_figure, iso)
+    return write_all(case, result, files, progress) if files else []
+
+
+def _lines(summary: dict[str, Any]) -> list[str]:
+    """A line for each load."""
+    return [
+        f"{row['load']:g} {summary['unit']}: TE {row['te_mean_um']:.4g} um mean,"
+        f" {row['te_peak_to_peak_um']:.4g} um peak to peak; tangent stiffness"
+        f" {row['stiffness_least_n_per_um']:.4g} .. {row['stiffness_most_n_per_um']:.4g} N/um"
+        for row in summary["loads"]
+    ]
+
+
+def static_summary(result: Any, path: Path) -> dict[str, Any]:
+    """A row for each load: mean and peak-to-peak TE, range of the tangent stiffness."""
+    unit = result["load"].attrs["units"]
+    scale = 1e6 if unit == "m" else 1.0
+    rows = []
+    for number, load in enumerate(result["load"].values):
+        te = result["transmission_error"].values[number] * 1e6
+        stiffness = result["stiffness_tangent"].values[number] / 1e6
+        rows.append(
+            {
+                "load": float(load) * scale,
+                "te_mean_um": float(te.mean()),
+                "te_peak_to_peak_um": float(te.max() - te.min()),
+                "torque_mean_nm": float(result["torque"].values[number].mean()),
+                "stiffness_least_n_per_um": float(stiffness.min()),
+                "stiffness_most_n_per_um": float(stiffness.max()),
+            }
+        )
+    return {
+        "file": str(path),
+        "model": result.attrs["model"],
+        "unit": "um" if unit == "m" else unit,
+        "loads": rows,
+    }

@@ -1,0 +1,108 @@
+"""Pictures of two sets of results side by side, one a quantity."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.figures.frf import draw_itf
+from gearbench.figures.plotting import BLUE, ORANGE, figure, save
+from gearbench.words.summary_text import ENOUGH
+
+if TYPE_CHECKING:
+    from gearbench.bench.results.compare import Results
+    from gearbench.shell.output import Output
+
+Array = NDArray[np.float64]
+
+_FINE = 512  # phases of a curve
+_FLAT = 5.0  # ratio of two curves' sizes from which each gets a scale of its own
+
+
+def draw_comparison(output: Output, one: Results, two: Results) -> list[str]:
+    """All pictures that both results allow; the names of the files written."""
+    from gearbench.bench.results.compare import on_phases
+    from gearbench.bench.results.measures import synchronous_mean
+
+    pairs: dict[str, tuple[str, str, list[tuple[str, Array]]]] = {}
+    for result in (one, two):
+        if result.static is not None:
+            phase, static = result.static["phase"].values, result.static
+            for name, key, title, unit, scale in (
+                ("stiffness", "stiffness_tangent", "Tangent mesh stiffness", "k [N/um]", 1e-6),
+                ("static_te", "transmission_error", "Static transmission error", "TE [um]", 1e6),
+            ):
+                curve = on_phases(phase, scale * static[key].values[0], _FINE, result.shift)
+                load = f"{static['load'].values[0]:g} {static['load'].attrs['units']}"
+                pairs.setdefault(name, (title, unit, []))[2].append((f"{result.name}, {load}", curve))
+        if result.record is not None:
+            phase, mean = synchronous_mean(result.record)
+            curve = on_phases(phase, 1e6 * mean, _FINE, result.shift)
+            title = "DTE of the record, mean over its mesh periods"
+            pairs.setdefault("dte", (title, "DTE [um]", []))[2].append((_name(result), curve))
+        if result.frf is not None and result.frf.sizes.get("mode", 0):
+            curve = on_phases(
+                result.frf["phase"].values, result.frf["natural_frequency"].values[0], _FINE, result.shift
+            )
+            entry = pairs.setdefault("natural_frequency", ("First natural frequency", "frequency [Hz]", []))
+            entry[2].append((_name(result), curve))
+    written = []
+    for name, (title, unit, curves) in pairs.items():
+        if len(curves) == 2:
+            written.append(f"{name}.png")
+            output.write(written[-1], partial(_draw_curves, title=title, unit=unit, curves=curves))
+    if one.frf is not None and two.frf is not None:
+        written.append("itf.png")
+        panels = {f"{letter}: {_name(result)}": _shifted(result) for letter, result in (("a", one), ("b", two))}
+        low = max(float(frf["frequency"].min()) for frf in panels.values())
+        high = min(float(frf["frequency"].max()) for frf in panels.values())
+        common = {name: frf.sel(frequency=slice(low, high)) for name, frf in panels.items()}
+        warning = " ".join(note for letter, result in (("a", one), ("b", two)) if (note := _short(letter, result)))
+        output.write(written[-1], lambda path: draw_itf(path, common, warning))
+    return written
+
+
+def _name(result: Results) -> str:
+    held = result.record if result.record is not None else result.frf
+    model = held.attrs.get("model", "") if held is not None else ""
+    return f"{result.name}, {model} model" if model else result.name
+
+
+def _short(letter: str, result: Results) -> str:
+    """The expected error of a response whose record cannot support it in full."""
+    about = result.frf.attrs if result.frf is not None else {}
+    if about.get("expected_error", 0.0) <= ENOUGH:
+        return ""
+    return (
+        f"{letter}: its record cannot support the ITF in full, expected error {about['expected_error']:.0%} rms and"
+        " several times that at the switches."
+    )
+
+
+def _draw_curves(path: Path, title: str, unit: str, curves: list[tuple[str, Array]]) -> None:
+    """Two curves in one panel, or in two where one would be flat beside the other."""
+    phase = np.arange(_FINE) / _FINE
+    sizes = [float(np.nanmax(np.abs(curve))) for _, curve in curves]
+    panels = 2 if max(sizes) > _FLAT * min(sizes) else 1
+    with figure(panels, 1, (8.0, 4.4 + 1.6 * (panels - 1)), sharex=True, squeeze=False) as (drawing, axes):
+        for number, (colour, (name, curve)) in enumerate(zip((BLUE, ORANGE), curves, strict=True)):
+            panel = axes[number % panels, 0]
+            panel.plot(phase, curve, color=colour, label=f"{'ab'[number]}: {name}")
+            panel.set_ylabel(unit)
+            panel.margins(y=0.25)
+            panel.legend(loc="upper center", ncols=2)
+        axes[-1, 0].set_xlim(0, 1)
+        axes[-1, 0].set_xlabel("mesh phase [cycles]; 0: contact at the pitch point")
+        axes[0, 0].set_title(title if panels == 1 else f"{title} (mind the two scales)")
+        save(drawing, path)
+
+
+def _shifted(result: Results) -> Any:
+    """The frequency response with its phases moved by the results' shift, in rising order."""
+    assert result.frf is not None
+    frf = result.frf
+    return frf.assign_coords(phase=(frf["phase"] + result.shift) % 1.0).sortby("phase")

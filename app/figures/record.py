@@ -1,0 +1,71 @@
+"""Pictures of what goes in and what comes out over time: stiffness, torque, transmission error."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from gearbench.figures.plotting import BLUE, GREEN, GREY, ORANGE, figure, save, shade
+from gearbench.geometry.pair.zones import Span
+
+Array = NDArray[np.float64]
+
+_MOST_POINTS = 20_000
+
+
+def draw_stiffness(path: Path, static: xr.Dataset, zones: Sequence[Span], label: str) -> None:
+    """Mesh stiffness over the mesh cycle, secant and tangent, for each static load."""
+    phase = static["phase"].values
+    unit = static["load"].attrs["units"]
+    with figure(size=(8.0, 4.4)) as (drawing, axes):
+        shade(axes, zones, label)
+        colours = (BLUE, ORANGE, GREEN, GREY)
+        for number, load in enumerate(static["load"].values):
+            colour = colours[number % len(colours)]
+            tangent = static["stiffness_tangent"].values[number]
+            secant = static["stiffness_secant"].values[number]
+            axes.plot(*_closed(phase, tangent / 1e6), color=colour, label=f"tangent dF/d dte at {load:g} {unit}")
+            if np.abs(secant - tangent).max() > 1e-6 * tangent.max():
+                text = f"secant F/dte at {load:g} {unit}"
+                axes.plot(*_closed(phase, secant / 1e6), color=colour, ls="--", label=text)
+        axes.set_xlim(0, 1)
+        axes.set_ylim(bottom=0)
+        axes.set_xlabel("mesh phase [cycles]; 0: contact at the pitch point")
+        axes.set_ylabel("mesh stiffness k [N/um]")
+        axes.set_title(f"Mesh stiffness over one mesh period, {static.attrs.get('model', '')} model")
+        axes.legend(loc="lower right")
+        save(drawing, path)
+
+
+def draw_record(path: Path, record: xr.Dataset, realisation: int = 0) -> None:
+    """Driver torque and DTE of one realisation against time, and a few milliseconds of both."""
+    time, torque, dte = (np.asarray(v) for v in _signals(record, realisation))
+    samples = min(time.size, max(200, int(0.03 * float(record.attrs["sampling_rate"]))))
+    step = max(1, time.size // _MOST_POINTS)
+    count = record.sizes["realisation"]
+    with figure(2, 2, (11.0, 5.6), sharex="col", sharey="row") as (drawing, axes):
+        for row, (values, colour, label) in enumerate(
+            ((torque, ORANGE, "driver torque [N m]"), (dte * 1e6, BLUE, "DTE [um]"))
+        ):
+            axes[row, 0].plot(time[::step], values[::step], color=colour, lw=0.5)
+            axes[row, 1].plot(1e3 * time[:samples], values[:samples], color=colour, lw=1.0)
+            axes[row, 0].set_ylabel(label)
+        axes[1, 0].set_xlabel("time [s]")
+        axes[1, 1].set_xlabel("time [ms]")
+        axes[0, 0].set_title(f"Record, realisation {realisation + 1} of {count}")
+        axes[0, 1].set_title(f"Its first {1e3 * samples / float(record.attrs['sampling_rate']):.0f} ms")
+        save(drawing, path)
+
+
+def _signals(record: xr.Dataset, realisation: int) -> tuple[Array, Array, Array]:
+    row = record.isel(realisation=realisation)
+    return record["time"].values, row["torque_driver"].values, row["dte"].values
+
+
+def _closed(phase: Array, values: Array) -> tuple[Array, Array]:
+    """One period with its end, phase 1, which equals its beginning."""
+    return np.append(phase, phase[0] + 1.0), np.append(values, values[0])

@@ -1,0 +1,49 @@
+"""Pictures of a static analysis: transmission error over the mesh cycle, and over cycle and load (Harris map)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gearbench.figures.plotting import BLUE, GREY, ORANGE, figure, save
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+MOST_CURVES = 12
+
+
+def plot_static(result: xr.Dataset, path: Path) -> None:
+    """Transmission error at every load over mesh phase, without load where known, and its swing over the load."""
+    te = 1e6 * result["transmission_error"].values
+    loads, unit = result["load"].values, result["load"].attrs["units"]
+    with figure(1, 2, size=(11.0, 4.5), width_ratios=(3, 2)) as (drawing, (left, right)):
+        _curves(left, result, te, loads, unit)
+        order = np.argsort(loads)
+        scale = 1e6 if unit == "m" else 1.0
+        name = "DTE [um]" if unit == "m" else f"driver torque [{unit}]"
+        if unit == "m":
+            swing, label = np.ptp(result["torque"].values, axis=1), "torque, peak to peak [N m]"
+        else:
+            swing, label = np.ptp(te, axis=1), "TE, peak to peak [um]"
+        right.plot(scale * loads[order], swing[order], "o-", color=BLUE, ms=4)
+        right.set(title="Swing over the load", xlabel=name, ylabel=label, ylim=(0, None))
+        save(drawing, path)
+
+
+def _curves(axes: Any, result: xr.Dataset, te: np.ndarray, loads: np.ndarray, unit: str) -> None:
+    """One curve a load, light to dark."""
+    phase = result["phase"].values
+    drawn = np.unique(np.linspace(0, len(loads) - 1, min(MOST_CURVES, len(loads))).round().astype(int))
+    for number, i in enumerate(drawn):
+        strength = 0.35 + 0.65 * (number + 1) / len(drawn)
+        text = f"{loads[i] * 1e6:.4g} um" if unit == "m" else f"{loads[i]:.4g} {unit}"
+        axes.plot(phase, te[i], color=BLUE, alpha=strength, lw=1.2)
+        axes.annotate(text, (phase[-1], te[i, -1]), xytext=(3, 0), textcoords="offset points", fontsize=7, color=GREY)
+    if "transmission_error_unloaded" in result:
+        without = 1e6 * result["transmission_error_unloaded"].values
+        axes.plot(phase, without, color=ORANGE, lw=1.2, label="without load")
+        axes.legend(loc="best")
+    axes.set(title="Static transmission error", xlabel="mesh phase [cycles]", ylabel="TE [um]")

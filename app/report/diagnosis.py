@@ -1,0 +1,202 @@
+"""The one-page report of a diagnosis: what is the cause, how sure, where, how far, what next, from what."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from gearbench.figures.plotting import BLUE, GREEN, ORANGE
+from gearbench.report.html import bar, folded, items, page, picture, table, text
+from gearbench.words.diagnosis import (
+    PLACES,
+    SHORT_CHANNELS,
+    SHOWN_UNITS,
+    band_in_words,
+    confidence,
+    effects_in_words,
+    headline,
+    interval,
+    number,
+    percent,
+    whole_band,
+    with_std,
+)
+
+if TYPE_CHECKING:
+    from gearbench.diagnosis.verdict import Gap, Verdict
+
+# Hypotheses of the table; the others are counted.
+CANDIDATES = 10
+
+
+@dataclass(frozen=True)
+class Source:
+    """One record: its name, file, SHA-256, what it was used for and what was said about it at intake."""
+
+    name: str
+    file: str
+    digest: str
+    used: str
+    warnings: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Report:
+    """All that the page shows. `pictures`: name -> (draws an SVG or PNG file, caption); `about`: provenance."""
+
+    title: str
+    verdict: Verdict
+    sources: tuple[Source, ...]
+    pictures: Mapping[str, tuple[Callable[[Path], None], str]]
+    about: tuple[tuple[str, str], ...]
+
+
+def report_page(report: Report) -> str:
+    """The page as one HTML text."""
+    verdict = report.verdict
+    body = [
+        text(f"gearbench diagnosis · {report.title}", style="mark"),
+        text(headline(verdict), "h1"),
+        text(confidence(verdict), style="lead"),
+        _probability(verdict),
+        *_parameters(verdict),
+        *_how_far(report),
+        *_candidates(verdict),
+        *_where(report),
+        *_limits(report),
+        *_provenance(report),
+    ]
+    return page(f"{report.title}: {headline(verdict)}", body)
+
+
+def _probability(verdict: Verdict) -> str:
+    parts = (
+        ("effect of the library", verdict.probability.effect, BLUE),
+        ("no effect", verdict.probability.none, GREEN),
+        ("something else", verdict.probability.unknown, ORANGE),
+    )
+    return bar([(name, value, percent(value), colour) for name, value, colour in parts])
+
+
+def _parameters(verdict: Verdict) -> list[str]:
+    rows = [
+        (effects_in_words([effect.name]), percent(effect.probability), name.replace("_", " "), *_value(parameter))
+        for effect in verdict.effects
+        for name, parameter in effect.parameters.items()
+    ]
+    if not rows:
+        return []
+    return [
+        text("What is found", "h2"),
+        table(("effect", "probability", "parameter", "value ± std", "unit"), rows, numbers=(1, 3)),
+    ]
+
+
+def _value(parameter: object) -> tuple[str, str]:
+    value, std, unit = (getattr(parameter, name) for name in ("value", "std", "unit"))
+    scale, shown = SHOWN_UNITS.get(unit, (1.0, unit))
+    return with_std(scale * value, scale * std), shown
+
+
+def _how_far(report: Report) -> list[str]:
+    gaps = report.verdict.gap
+    if not gaps:
+        return []
+    record = gaps[0].record
+    where = (
+        f"Rms of measured minus simulated on record {record}, which was held out of the search"
+        if report.verdict.held_out
+        else f"Rms of measured minus simulated on record {record}. No record was held out, so this gap is that of the"
+        " fit itself and flatters it"
+    )
+    main = [gap for gap in gaps if gap in whole_band(gaps) or gap.channel == gaps[0].channel]
+    rest = len(gaps) - len(main)
+    return [
+        text("How far the gap shrinks", "h2"),
+        text(f"{where}; in brackets where nine of ten repetitions would fall."),
+        *_pictures(report, ("gap", "traces")),
+        _gap_table(main),
+        folded("All channels and bands", _gap_table(gaps)) if rest else "",
+    ]
+
+
+def _gap_table(gaps: Sequence[Gap]) -> str:
+    rows = []
+    for before, gap in zip((None, *gaps), gaps, strict=False):
+        unit = SHOWN_UNITS.get(gap.unit, (1.0, gap.unit))[1]
+        again = before is not None and before.channel == gap.channel
+        name = "" if again else f"{SHORT_CHANNELS.get(gap.channel, gap.channel)} [{unit}]"
+        stages = (gap.nominal, gap.recalibrated, gap.with_effect, gap.floor)
+        rows.append((name, band_in_words(gap.band_hz), *(interval(stage, gap.unit) for stage in stages)))
+    head = ("channel", "band", "nominal rig", "recalibrated", "with the effect", "noise floor")
+    return table(head, rows, numbers=(2, 3, 4, 5))
+
+
+def _candidates(verdict: Verdict) -> list[str]:
+    if not verdict.candidates:
+        return []
+    ranked = sorted(verdict.candidates, key=lambda one: -one.log_evidence)
+    best = ranked[0].log_evidence
+    chosen = {effect.name for effect in verdict.effects}
+    judged = any(one.held_out is not None for one in ranked)
+    rows, bold = [], None
+    for place, one in enumerate(ranked[:CANDIDATES]):
+        if set(one.effects) == chosen and (chosen or verdict.verdict == "none") and bold is None:
+            bold = place
+        held_out = () if not judged else ("–" if one.held_out is None else number(one.held_out),)
+        rows.append((effects_in_words(one.effects), number(one.log_evidence - best), *held_out))
+    more = len(ranked) - len(rows)
+    return [
+        text("Which causes were weighed", "h2"),
+        text(
+            "Log evidence below that of the best: how much less likely the records are under this cause, its parameters"
+            " averaged over (natural logarithm; -3 is one in twenty). In bold: the verdict."
+        ),
+        table(("cause", "log evidence", *(("gap on held-out",) if judged else ())), rows, numbers=(1, 2), best=bold),
+        text(f"{more} less likely ones are left out.", style="small") if more else "",
+    ]
+
+
+def _where(report: Report) -> list[str]:
+    if not report.verdict.where:
+        return []
+    place = report.verdict.place
+    words = f"The missing force acts {PLACES[place]}. " if place != "none" else "No place stands out. "
+    return [
+        text("Where the gap is", "h2"),
+        text(
+            f"{words}Below, the gap of the nominal rig is divided in several ways; each adds up to 100 %. Where a floor"
+            " exceeds its bar the size of the gap needs no cause, and only its pattern tells one."
+        ),
+        *_pictures(report, ("where",)),
+    ]
+
+
+def _limits(report: Report) -> list[str]:
+    verdict = report.verdict
+    same = [f"{' / '.join(effects_in_words([name]) for name in group)}" for group in verdict.indistinguishable]
+    losses = [f"{source.name}: {warning}" for source in report.sources for warning in source.warnings]
+    return [
+        text("What these records cannot tell", "h2"),
+        text("Not to be told apart:" if same else "Every cause that was weighed can be told from the others."),
+        items(same),
+        text("Said about the records:") if losses else "",
+        items(losses),
+        *([text("What to measure next", "h2"), items(verdict.advice)] if verdict.advice else []),
+    ]
+
+
+def _provenance(report: Report) -> list[str]:
+    rows = [(source.name, source.used, source.file, source.digest[:16]) for source in report.sources]
+    return [
+        text("From what this was made", "h2"),
+        table(("record", "used for", "file", "SHA-256"), rows, code=(2, 3)),
+        table(("", ""), report.about, code=(1,)),
+    ]
+
+
+def _pictures(report: Report, names: Sequence[str]) -> list[str]:
+    held = [(name, *report.pictures[name]) for name in names if name in report.pictures]
+    return [picture(draw, name, caption) for name, draw, caption in held]

@@ -1,0 +1,106 @@
+"""Arguments and options that several commands share."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from gearbench.rig import Case
+
+PICTURES = (".png", ".svg", ".pdf")
+
+CaseArgument = Annotated[
+    str, typer.Argument(metavar="CASE", help="case file, or the name of a shipped case (see `cases`)")
+]
+SetOption = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help="replace a key of the case: rig.driver.teeth=30"),
+]
+JsonOption = Annotated[bool, typer.Option("--json", help="print the summary as JSON")]
+
+
+def check_out(out: Path, inputs: Sequence[Path | str] = ()) -> None:
+    """Refuse an output file that would replace an input or a file of another kind, before any work is done."""
+    from gearbench.shell.failure import InputError
+
+    if not out.parent.is_dir():
+        raise InputError(f"--out {out} cannot be written: the folder {out.parent} must exist")
+    if out.suffix != ".nc":
+        raise InputError(f"--out {out} must end in .nc: the result is a NetCDF-4 file")
+    if any(out.resolve() == Path(path).resolve() for path in inputs):
+        raise InputError(f"--out {out} is one of the inputs, which it would replace: choose another name")
+
+
+def check_picture(path: Path, inputs: Sequence[Path | str] = (), option: str = "--figure") -> None:
+    """Refuse a picture that cannot be written, or that would replace an input, before any work is done."""
+    from gearbench.shell.failure import InputError
+
+    if not path.parent.is_dir():
+        raise InputError(f"{option} {path} cannot be written: the folder {path.parent} must exist")
+    if path.suffix not in PICTURES:
+        raise InputError(f"{option} {path} must end in {' or '.join(PICTURES)}")
+    if any(path.resolve() == Path(one).resolve() for one in inputs):
+        raise InputError(f"{option} {path} is one of the other files, which it would replace: choose another name")
+
+
+def load_case(name: str, settings: Sequence[str] | None) -> Case:
+    """The case in a file or, where there is no such file, the shipped case of that name."""
+    from gearbench.cases import case_files
+    from gearbench.rig import CaseError, read_case
+
+    path = Path(name)
+    if not path.exists():
+        shipped = case_files()
+        if name not in shipped:
+            raise CaseError(f"case file {name} does not exist, and the shipped cases are {', '.join(shipped)}")
+        path = shipped[name]
+    return read_case(path, settings or ())
+
+
+def print_json(summary: Any) -> None:
+    """A summary to stdout as JSON."""
+    typer.echo(json_text(summary))
+
+
+def json_text(summary: Any) -> str:
+    """JSON; numbers that are not finite become null."""
+    return json.dumps(_finite(summary), indent=2, allow_nan=False)
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {str(key): _finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(item) for item in value]
+    if isinstance(value, float) and not abs(value) < float("inf"):
+        return None
+    return value
+
+
+def expand_lists(arguments: Sequence[str], options: Sequence[str]) -> list[str]:
+    """Spell `--option 1 2 3` as `--option 1 --option 2 --option 3` for the given options."""
+    expanded: list[str] = []
+    current = ""
+    for argument in arguments:
+        if argument.startswith("--"):
+            current = argument if argument in options else ""
+            expanded.append(argument)
+        elif current and _is_number(argument) and expanded[-1] != current:
+            expanded += [current, argument]
+        else:
+            expanded.append(argument)
+            current = current if _is_number(argument) else ""
+    return expanded
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

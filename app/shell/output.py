@@ -1,0 +1,109 @@
+"""The folder that a run writes into: whose it is, what is in it already, and how files get there whole."""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import json
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from gearbench.shell.failure import InputError
+
+_MARK = "run.json"
+
+
+@dataclass(frozen=True)
+class Output:
+    """A claimed output folder. Products are written under their final name only when complete."""
+
+    folder: Path
+
+    def has(self, name: str) -> bool:
+        """Whether an earlier run of the same case and sources left this product."""
+        return (self.folder / name).is_file()
+
+    def path(self, name: str) -> Path:
+        """Where a product belongs."""
+        return self.folder / name
+
+    def write(self, name: str, write: Callable[[Path], None]) -> Path:
+        """Let `write` fill a temporary file of the same suffix and rename it to `name`."""
+        target = self.folder / name
+        temporary = self.folder / f".{target.stem}.{os.getpid()}{target.suffix}"
+        try:
+            write(temporary)
+            os.replace(temporary, target)
+        finally:
+            temporary.unlink(missing_ok=True)
+        mark = self.mark()
+        if name not in mark.get("files", []):
+            self.set_mark(mark | {"files": [*mark.get("files", []), name]})
+        return target
+
+    def write_text(self, name: str, text: str) -> Path:
+        """Write a text product."""
+
+        def write(path: Path) -> None:
+            path.write_text(text, encoding="utf-8")
+
+        return self.write(name, write)
+
+    def mark(self) -> dict[str, Any]:
+        """What the folder says about itself: command, identity and files of the run; empty when nothing."""
+        try:
+            mark = json.loads(self.path(_MARK).read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return {}
+        return mark if isinstance(mark, dict) else {}
+
+    def set_mark(self, mark: dict[str, Any]) -> None:
+        """Replace that in one step."""
+        temporary = self.path(f".{_MARK}.{os.getpid()}")
+        temporary.write_text(json.dumps(mark, indent=2) + "\n", encoding="utf-8")
+        os.replace(temporary, self.path(_MARK))
+
+
+def fingerprint(*parts: str) -> str:
+    """One digest of all that decides a run: the case, the sources, the options."""
+    return hashlib.sha256("\0".join(parts).encode()).hexdigest()
+
+
+@contextmanager
+def claimed(folder: Path, command: str, identity: str, force: bool = False) -> Iterator[Output]:
+    """Claim a folder for one command with that identity, and hold it until the end.
+
+    A new or empty folder is taken. One that the same command with the same identity left is resumed. Anything
+    else is refused with InputError, unless `force`: then the files that the former run wrote are removed, and
+    nothing else. Two runs into one folder at the same time are refused too.
+    """
+    if folder.exists() and not folder.is_dir():
+        raise InputError(f"--out {folder} is a file; it must be a folder")
+    folder.mkdir(parents=True, exist_ok=True)
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            raise InputError(f"another run is writing into {folder}") from error
+        output = Output(folder)
+        _take(output, command, identity, force)
+        yield output
+    finally:
+        os.close(handle)
+
+
+def _take(output: Output, command: str, identity: str, force: bool) -> None:
+    mark = output.mark()
+    if mark.get("identity") == identity and mark.get("command") == command:
+        return
+    if any(output.folder.iterdir()) and not force:
+        what = "a run of another case, other options or other sources" if mark else "files of another origin"
+        raise InputError(f"{output.folder} holds {what}: choose another --out, or add --force")
+    for name in mark.get("files", []):
+        (output.folder / Path(name).name).unlink(missing_ok=True)
+    output.set_mark({"command": command, "identity": identity, "files": []})

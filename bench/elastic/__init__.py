@@ -1,0 +1,1 @@
+"""Experiments and statics on the reduced finite-element model."""

@@ -1,0 +1,130 @@
+"""A rig made ready for the reduced finite-element model: gears condensed, contact tabulated, step chosen."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import ceil, pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.bench.errors import BenchError
+from gearbench.bench.plan.schedule import Schedule
+from gearbench.fem.contact.cache import stored_gear, stored_law
+from gearbench.fem.contact.law import Law, elastic_pair
+from gearbench.fem.contact.static import position, static_cycle
+from gearbench.fem.gear.body import CondensedGear
+from gearbench.fem.motion.machine import Machine, contact_rows, make_machine, mass_matrix
+from gearbench.fem.motion.transient import frequency_error, make_scheme
+from gearbench.geometry import Body, Pair, body
+from gearbench.geometry.mesh.sector import refuse_crack
+from gearbench.rig import Case, Rig, Simulation
+
+Array = NDArray[np.float64]
+
+FREQUENCY_ERROR = 5e-4  # of the highest identified mode (physics, section 4)
+STEPS_PER_MESH_PERIOD = 200
+
+
+@dataclass(frozen=True)
+class ElasticRig:
+    """Pair, condensed gears and contact law of a rig; `bodies` hold the gears' total masses and inertias."""
+
+    rig: Rig
+    pair: Pair
+    gears: tuple[CondensedGear, CondensedGear]
+    bodies: tuple[Body, Body]
+    law: Law
+
+
+def elastic_rig(
+    rig: Rig, simulation: Simulation, progress: Callable[[str], None] | None = None
+) -> ElasticRig:
+    """Mesh, condense and tabulate, each from disk where it has been done before. Raises GeometryError."""
+    say = progress or (lambda note: None)
+    for name, gear in (("rig.driver", rig.driver), ("rig.driven", rig.driven)):
+        refuse_crack(gear, simulation.element, name, "simulation.element")
+    meshing = elastic_pair(rig)
+    density = rig.material.density
+    bodies = (
+        body(meshing.driver, rig.driver, density, "rig.driver"),
+        body(meshing.driven, rig.driven, density, "rig.driven"),
+    )
+    size, modes, element = simulation.element_size, simulation.modes, simulation.element
+    say("condensing the driver")
+    driver = stored_gear(rig.driver, rig.material, size, modes, element)
+    say("condensing the driven gear")
+    driven = stored_gear(rig.driven, rig.material, size, modes, element)
+    say("solving contact lines")
+    law = stored_law(rig, (driver, driven), size, modes, element)
+    return ElasticRig(rig, meshing, (driver, driven), bodies, law)
+
+
+def machine_for(elastic: ElasticRig, mesh_frequency: float) -> Machine:
+    """Equations of motion at a mesh frequency [Hz]."""
+    return make_machine(elastic.rig, elastic.pair, elastic.law, elastic.gears, elastic.bodies, mesh_frequency)
+
+
+def natural_frequencies(machine: Machine, torque: float, phase: float) -> Array:
+    """Frequencies [Hz] of the rig's oscillatory eigenvalues, linearised about static equilibrium.
+
+    The supports' damping is part of them: it may be so strong that their motions do not oscillate.
+    """
+    law = machine.law
+    dte = static_cycle(law, np.array([phase]), torque=[torque]).transmission_error[0, 0]
+    theta1 = phase * law.driver.pitch + dte / law.driver.rb
+    theta2 = phase * law.driven.pitch
+    n, sides, teeth, found, _, active, _, _, _, flex, _ = position(
+        law, theta1, theta2, 0.0, 0.0, 0.0, 0.0, np.zeros(8)
+    )
+    rows = contact_rows(machine, sides, teeth, found, n)[active[:n]]
+    # Modes are unknowns of their own here, so the pairs keep only the residual's flexibility.
+    modal = rows[:, machine.rotations + 2 :]
+    squares = machine.stiffness[machine.rotations + 2 :]
+    residual = flex[np.ix_(active[:n], active[:n])] - (modal / squares) @ modal.T
+    stiffness = np.diag(machine.stiffness) + rows.T @ np.linalg.solve(residual, rows)
+    mass = mass_matrix(machine, theta1, theta2)
+    size = len(mass)
+    system = np.block(
+        [
+            [np.zeros((size, size)), np.eye(size)],
+            [-np.linalg.solve(mass, stiffness), -np.linalg.solve(mass, np.diag(machine.damping))],
+        ]
+    )
+    values = np.linalg.eigvals(system)
+    return np.sort(np.abs(values[values.imag > 1e-6 * np.abs(values)])) / (2 * pi)
+
+
+def choose_substeps(machine: Machine, case: Case, plan: Schedule) -> int:
+    """Steps per sample that keep the highest mode within the identified band to FREQUENCY_ERROR.
+
+    Raises BenchError where the case asks for fewer.
+    """
+    band = case.identification.band or (
+        case.experiment.multisine.band
+        if case.experiment.multisine
+        else (0.0, case.experiment.sampling_rate / 2)
+    )
+    modes = np.concatenate(
+        [natural_frequencies(machine, case.experiment.torque_mean, phase) for phase in (0.0, 0.25, 0.5)]
+    )
+    inside = modes[modes <= band[1]]
+    highest = float(inside.max()) if len(inside) else band[1]
+    least = ceil(STEPS_PER_MESH_PERIOD / (plan.mesh_period * plan.sampling_rate))
+
+    def error(substeps: int) -> float:
+        step = 1.0 / (plan.sampling_rate * substeps)
+        return frequency_error(highest, make_scheme(step, case.simulation.spectral_radius))
+
+    needed = least
+    while error(needed) > FREQUENCY_ERROR:
+        needed = ceil(needed * 1.1)
+    asked = case.simulation.substeps
+    if asked and asked < needed:
+        raise BenchError(
+            f"simulation.substeps = {asked} is too few: a frequency error of at most"
+            f" {FREQUENCY_ERROR:.2%} at {highest:.0f} Hz and {STEPS_PER_MESH_PERIOD} steps a mesh period need"
+            f" {needed} (0 chooses them)"
+        )
+    return asked or needed

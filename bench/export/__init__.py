@@ -1,0 +1,1 @@
+"""Cases as models for other programs."""

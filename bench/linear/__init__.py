@@ -1,0 +1,1 @@
+"""Experiments and statics on the linear lumped model."""

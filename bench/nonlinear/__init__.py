@@ -1,0 +1,1 @@
+"""Experiments, statics and replays on the non-linear lumped model."""

@@ -1,0 +1,203 @@
+"""The mesh law of the non-linear lumped model: solved statically on the condensed gears, or from k(phase)."""
+
+from __future__ import annotations
+
+import hashlib
+from functools import lru_cache
+from math import ceil, log, pi
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.bench.elastic.rig import ElasticRig, elastic_rig
+from gearbench.bench.errors import BenchError
+from gearbench.fem.contact.cache import cached, key_for
+from gearbench.fem.contact.law import EDGE_SEPARATION, LOAD_RANGE, PAIRS, Law, newton_step
+from gearbench.fem.contact.static import position, static_cycle
+from gearbench.geometry import Pair, pair
+from gearbench.geometry.tooth.profile import involute
+from gearbench.kernels.compiled import compiled
+from gearbench.lumped import mesh_stiffness
+from gearbench.lumped.nonlinear.law import MeshLaw, approach_grid
+from gearbench.lumped.stiffness.potential_energy import hertz_compliance, tooth_compliance
+from gearbench.rig import Gear, Rig, Simulation
+from gearbench.rig.neutral import sound_gear
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+PHASES = 512
+NODES = 49
+LOAD_STEP = 2**0.5  # tables are solved up to the next power of this [N m], so that similar loads share them
+REFERENCE = 0.3  # of the largest load: where the shares of the pairs are taken
+OFFSETS = 4  # pairs looked at on either side of the one at the pitch point
+
+
+def mesh_law(rig: Rig, simulation: Simulation, load_max_nm: float) -> MeshLaw:
+    """Law of the rig's sound, error-free gears up to at least the driver torque `load_max_nm` [N m].
+
+    With simulation.mesh_stiffness = "finite-element" from static contact of the condensed gears, tip-edge contact
+    included, from disk where it has been solved before; else linear in the deflection, with the stiffness k(phase)
+    that the case asks for. Raises GeometryError, ContactError, LumpedError or BenchError.
+    """
+    sound = rig.model_copy(update={"driver": sound_gear(rig.driver), "driven": sound_gear(rig.driven)})
+    if simulation.mesh_stiffness != "finite-element":
+        return linear_law(sound, simulation)
+    meshing = pair(sound)
+    load = _table_load(sound, meshing, load_max_nm)
+    values: dict[str, Any] = {
+        "driver": _bare(sound.driver),
+        "driven": _bare(sound.driven),
+        "material": sound.material,
+        "centre": meshing.centre_distance,
+        "element_size": simulation.element_size,
+        "element": simulation.element,
+        "load": load,
+        "source": _source(),
+    }
+    arrays = cached(key_for("mesh-law", values), lambda: _solve(elastic_rig(sound, simulation), load))
+    return _assemble(sound, meshing, arrays["approach"], arrays["force"], arrays["share"])
+
+
+def linear_law(rig: Rig, simulation: Simulation) -> MeshLaw:
+    """Law linear in the deflection, F = k(phase) delta; every pair within its path of contact shares alike, weighted
+    with its own stiffness by the potential energy method."""
+    meshing = pair(rig)
+    phase = np.arange(PHASES) / PHASES
+    k = mesh_stiffness(rig, meshing, simulation).at(phase, finest=2.0 / PHASES)
+    approach = approach_grid(1e-4, 3)
+    one, two, hertz, inside = _compliances(rig, meshing, _travel(meshing, phase))
+    share = np.where(inside, 1.0 / (one + two + hertz), 0.0)
+    share /= share.sum(axis=1, keepdims=True)
+    return _assemble(rig, meshing, approach, k[:, None] * approach, share)
+
+
+def _bare(gear: Gear) -> Gear:
+    """Without what the static law does not depend on."""
+    return gear.model_copy(update={"mass": None, "inertia": None, "bore_radius": 0.0})
+
+
+def _table_load(rig: Rig, meshing: Pair, load_max: float) -> float:
+    """Driver torque [N m] up to which the table is solved: the next step, within what the flanks can carry."""
+    if not (np.isfinite(load_max) and load_max > 0):
+        raise BenchError(f"the largest load of a mesh law must be positive and finite, not {load_max:g} N m")
+    width = min(rig.driver.face_width, rig.driven.face_width)
+    most = LOAD_RANGE[1] * width * meshing.driver.base_radius
+    if load_max > most:
+        raise BenchError(
+            f"a driver torque of {load_max:.4g} N m is more than the modelled flanks can carry: at most {most:.4g} N m"
+            " for this pair"
+        )
+    return float(min(LOAD_STEP ** ceil(log(load_max) / log(LOAD_STEP) - 1e-9), most))
+
+
+@lru_cache(maxsize=1)
+def _source() -> str:
+    """Hash of this file: tables that another state of it has solved are not taken from disk."""
+    return hashlib.sha256(Path(__file__).read_bytes()).hexdigest()
+
+
+@compiled
+def _force_table(law: Law, phases: Array, dte: Array, force: Array) -> int:
+    """Fill force (phases, dte) [N]; returns the number of positions that did not converge."""
+    failed = 0
+    for i in range(len(phases)):
+        guess = np.zeros(PAIRS)
+        for j in range(len(dte)):
+            theta1 = phases[i] * law.driver.pitch + dte[j] / law.driver.rb
+            result = position(law, theta1, phases[i] * law.driven.pitch, 0.0, 0.0, 0.0, 0.0, guess)
+            force[i, j] = result[6] / law.driver.rb
+            failed += 0 if result[10] else 1
+    return failed
+
+
+@compiled
+def _tangent_shares(law: Law, phases: Array, dte: Array, first: int, share: Array) -> None:
+    """Fill share (phases, offsets): part of each working pair in the tangent stiffness at the given deflections."""
+    for i in range(len(phases)):
+        theta1 = phases[i] * law.driver.pitch + dte[i] / law.driver.rb
+        n, sides, teeth, _, _, active, _, _, _, flex, _ = position(
+            law, theta1, phases[i] * law.driven.pitch, 0.0, 0.0, 0.0, 0.0, np.zeros(PAIRS)
+        )
+        stiff = newton_step(np.ones(n), flex, active)
+        total = 0.0
+        for p in range(n):
+            column = teeth[p] - first
+            if sides[p] == 0 and active[p] and 0 <= column < share.shape[1]:
+                share[i, column] = stiff[p, 0]
+                total += stiff[p, 0]
+        for column in range(share.shape[1]):
+            share[i, column] /= total
+
+
+def _solve(elastic: ElasticRig, load: float) -> dict[str, Array]:
+    """Arrays approach, force and share of the elastic pair."""
+    law, phase = elastic.law, np.arange(PHASES) / PHASES
+    coarse = phase[:: PHASES // 64]
+    deepest = float(static_cycle(law, coarse, torque=[load]).transmission_error.max())
+    deepest = min(1.02 * deepest, EDGE_SEPARATION * elastic.pair.driver.module)
+    approach = approach_grid(deepest, NODES)
+    force = np.zeros((PHASES, NODES))
+    failed = _force_table(law, phase, approach[1:], force[:, 1:])
+    if failed:
+        raise BenchError(f"{failed} of {force.size} positions of the mesh law found no static equilibrium")
+    # The deflection that carries the reference load, between the nodes of the table.
+    reference = REFERENCE * load / elastic.pair.driver.base_radius
+    dte = np.array([np.interp(reference, row, approach) for row in force])
+    share = np.zeros((PHASES, 2 * OFFSETS + 1))
+    _tangent_shares(law, phase, dte, -OFFSETS, share)
+    return {"approach": approach, "force": force, "share": share}
+
+
+def _travel(meshing: Pair, phase: Array) -> Array:
+    """Distance (phases, offsets) [m] of each pair's contact behind the pitch point, along the line of action."""
+    return (phase[:, None] - np.arange(-OFFSETS, OFFSETS + 1)) * meshing.base_pitch
+
+
+def _compliances(rig: Rig, meshing: Pair, travel: Array) -> tuple[Array, Array, float, NDArray[np.bool_]]:
+    """Compliance [m/N] of driver and driven tooth with the body below it, of their contact, and where they touch."""
+    start, stop = meshing.active_driver
+    wanted = meshing.rho_pitch[0] + travel
+    rho = np.clip(wanted, start, stop)
+    width = meshing.face_width
+    flat = rho.ravel()
+    one = tooth_compliance(meshing.driver, rig.driver.hub_radius, width, rig.material, flat)
+    two = tooth_compliance(meshing.driven, rig.driven.hub_radius, width, rig.material, meshing.line_of_action - flat)
+    inside = (wanted >= start) & (wanted <= stop)
+    return (
+        one.total.reshape(rho.shape),
+        two.total.reshape(rho.shape),
+        hertz_compliance(rig.material, width),
+        inside,
+    )
+
+
+def _assemble(rig: Rig, meshing: Pair, approach: Array, force: Array, share: Array) -> MeshLaw:
+    """The law with roll lengths, bending parts, backlash and mirror phase; columns that no pair uses left out.
+
+    The bending part is that of tooth and body below it by the potential energy method, in the sum of both and their
+    contact: finite elements do not separate bending from the rest of a pair's flexibility.
+    """
+    phase = np.arange(len(force)) / len(force)
+    travel = _travel(meshing, phase)
+    one, two, hertz, _ = _compliances(rig, meshing, travel)
+    total = one + two + hertz
+    used = np.flatnonzero(share.any(axis=0))
+    # One more on either side: a pair passes from one column to the next where the cycle ends.
+    keep = slice(max(int(used[0]) - 1, 0), int(used[-1]) + 2)
+    rolled = involute(meshing.working_pressure_angle)
+    thickness = (meshing.driven.psi_b - rolled) * meshing.driven.teeth / pi  # of the driven tooth, in pitches
+    return MeshLaw(
+        approach=approach,
+        force=force,
+        offsets=np.arange(-OFFSETS, OFFSETS + 1)[keep],
+        share=share[:, keep],
+        rho1=(meshing.rho_pitch[0] + travel)[:, keep],
+        rho2=(meshing.rho_pitch[1] - travel)[:, keep],
+        bending=np.stack([one / total, two / total], axis=-1)[:, keep],
+        backlash=max(meshing.backlash_normal, 0.0),
+        base_pitch=meshing.base_pitch,
+        mirror=(1.0 - thickness) % 1.0,
+    )

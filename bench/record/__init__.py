@@ -1,0 +1,1 @@
+"""What a record says of its rig, and what sensors make of motions."""

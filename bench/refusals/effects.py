@@ -1,0 +1,81 @@
+"""Which model a rig needs: effects that only some of them represent."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from math import lcm
+
+from gearbench.bench.errors import BenchError
+from gearbench.geometry.tooth.iso1328 import drawn_gear
+from gearbench.geometry.tooth.micro import teeth_alike
+from gearbench.rig import Case, Gear, Rig
+from gearbench.rig.neutral import FLANK_FIELDS, effects_in
+from gearbench.rig.value import key_of
+
+# Keys of a gear that move its flanks: what finite elements represent, but for what changes stiffness.
+FLANK_KEYS = frozenset(f"rig.{side}.{key_of(Gear, name)}" for side in ("driver", "driven") for name in FLANK_FIELDS)
+
+# What finite elements represent: the flanks, and a crack that is in the mesh.
+ELASTIC_KEYS = FLANK_KEYS | {f"rig.{side}.crack.length_mm" for side in ("driver", "driven")}
+
+# What the non-linear lumped model represents; a key counts with all keys below it.
+LUMPED = tuple(
+    f"rig.{key}"
+    for key in (
+        *(f"{side}.{name}" for side in ("driver", "driven") for name in ("pitch_error_um", "runout_um", "crack")),
+        "support.driver.exponent",
+        "support.driven.exponent",
+        "drive.coupling",
+        "drive.ripple",
+        "friction.coefficient",
+        "mesh.",
+        "sensors.",
+    )
+)
+
+
+def is_nonlinear(case: Case) -> bool:
+    """Whether the lumped model of a case is the non-linear one: it has effects, or a mesh law from finite elements."""
+    return case.simulation.mesh_stiffness == "finite-element" or bool(effects_in(case.rig))
+
+
+def refuse_effects(rig: Rig, model: str, tables: tuple[str, ...] = ("rig",), represented: Collection[str] = ()) -> None:
+    """Raise BenchError for the first effect, in the given tables of a case, that a model cannot represent."""
+    for key in effects_in(rig):
+        if any(key.startswith(table) for table in tables) and key not in represented:
+            if _is_crack(key, "crack"):
+                raise BenchError(
+                    f"the {model} does not represent {key}.stiffness_loss: give the crack itself, length_mm and"
+                    ' direction_deg in its place, or set simulation.model = "lumped"'
+                )
+            raise BenchError(
+                f"the {model} does not represent {key}: leave it at its neutral value, or set simulation.model ="
+                ' "lumped", which has it'
+            )
+
+
+def _is_crack(key: str, field: str) -> bool:
+    return key in (f"rig.driver.{field}", f"rig.driven.{field}")
+
+
+def cycles_to_repeat(rig: Rig) -> int:
+    """Mesh cycles after which the same teeth with the same errors meet again: 1 where all are alike, the teeth of the
+    gear whose teeth differ, or, where those of both do, the hunting period."""
+    gears = (drawn_gear(rig.driver, "rig.driver"), drawn_gear(rig.driven, "rig.driven"))
+    return lcm(*(1 if teeth_alike(gear) and not _cracked(gear) else gear.teeth for gear in gears))
+
+
+def _cracked(gear: Gear) -> bool:
+    return gear.crack is not None and gear.crack.meshed
+
+
+def refuse_unknown(rig: Rig) -> None:
+    """Raise BenchError for the first effect that the non-linear lumped model does not represent either."""
+    for key in effects_in(rig):
+        if _is_crack(key, "crack.length_mm"):
+            raise BenchError(
+                f"the lumped model does not represent {key}: give the crack's stiffness_loss in its place (`check`"
+                ' prints it), or set simulation.model = "reduced"'
+            )
+        if not key.startswith(LUMPED):
+            raise BenchError(f"the lumped model does not represent {key}: leave it at its neutral value")

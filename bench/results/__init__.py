@@ -1,0 +1,1 @@
+"""Results of runs: frequency responses, single numbers, comparisons."""

@@ -1,0 +1,209 @@
+"""Fields of a pair at a chosen mesh phase: displacement and stress of both gears, in the world's frame."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import pi
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.bench.elastic.rig import ElasticRig
+from gearbench.bench.errors import BenchError
+from gearbench.fem.contact.static import static_cycle
+from gearbench.fem.stress.fields import ElasticGear, GearField, elastic_gear, gear_field, loaded_sectors
+from gearbench.fem.stress.loaded import Pressed, joined, pair_loads, pressed_teeth
+from gearbench.fem.stress.pressure import Strips
+from gearbench.fem.stress.recovery import principal, rotated, turn_stress, von_mises
+from gearbench.fem.stress.zoom import divided
+from gearbench.geometry.export.files import written_whole
+from gearbench.rig import Rig
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+REACH = 2  # sectors shown on either side of the loaded teeth
+FINEST = 0.2  # of the half-width of contact: elements there
+GROWTH = 0.35  # of element size per distance from there
+
+
+@dataclass(frozen=True)
+class Contact:
+    """Middle (2,) [m] of a contact and its half-width [m]."""
+
+    middle: Array
+    half_width: float
+
+
+@dataclass(frozen=True)
+class PairFields:
+    """Both gears at a mesh phase, in the frame of the rig: driver's centre at the origin, driven gear's at +x.
+
+    points (n, 2) [m]: of the undeformed gears, the driver turned by its DTE; triangles (m, 6), gear (m,) 0 or 1, tooth
+    (m,); displacement (n, 2) [m]: elastic, relative to the hubs; stress (n, 3) [Pa]: xx, yy, xy; out_of_plane (n,)
+    [Pa]; contacts; phase [cycles], torque [N m] and dte [m].
+    """
+
+    points: Array
+    triangles: Indices
+    gear: Indices
+    tooth: Indices
+    displacement: Array
+    stress: Array
+    out_of_plane: Array
+    contacts: tuple[Contact, ...]
+    phase: float
+    torque: float
+    dte: float
+
+    @property
+    def von_mises(self) -> Array:
+        """Von Mises stress (n,) [Pa]."""
+        return von_mises(self.stress, self.out_of_plane)
+
+    @property
+    def principal(self) -> Array:
+        """Principal stresses in the plane (n, 2) [Pa], the larger one first."""
+        return principal(self.stress)
+
+
+def refuse_cracks(rig: Rig) -> None:
+    """Fields are those of a sound gear's sectors. Raises BenchError."""
+    for side in ("driver", "driven"):
+        if getattr(rig, side).crack is not None:
+            raise BenchError(f"stress fields do not represent rig.{side}.crack: leave it out")
+
+
+def stress_gears(elastic: ElasticRig, element_size: float | None = None) -> tuple[ElasticGear, ElasticGear]:
+    """Both gears of the rig, ready for `pair_fields`."""
+    rig = elastic.rig
+    driver = elastic_gear(rig.driver, rig.material, element_size)
+    return driver, driver if rig.driven == rig.driver else elastic_gear(rig.driven, rig.material, element_size)
+
+
+def field_dte(elastic: ElasticRig, phase: float, load: float, unit: str) -> float:
+    """DTE [m] at a mesh phase under a load, a driver torque [N m] or itself a DTE [m]. Raises ContactError."""
+    torque, dte = ([load], None) if unit == "N m" else (None, [load])
+    return float(static_cycle(elastic.law, np.array([phase]), torque=torque, dte=dte).transmission_error[0, 0])
+
+
+def pair_fields(
+    elastic: ElasticRig, gears: tuple[ElasticGear, ElasticGear], phase: float, dte: float, reach: int | None = REACH
+) -> PairFields:
+    """Fields at a mesh phase [cycles] and the DTE [m] of the static solution there.
+
+    reach: sectors on either side of the loaded ones, None: the whole gears. Raises BenchError where nothing touches.
+    """
+    law, meshing = elastic.law, elastic.pair
+    pairs = pair_loads(law, phase, dte)
+    if not pairs:
+        raise BenchError(f"no stress at mesh phase {phase:g}: a DTE of {1e6 * dte:.4g} um closes no tooth pair")
+    theta = phase * law.driver.pitch + dte / law.driver.rb, -phase * law.driven.pitch
+    angles = law.driver.zero + theta[0], pi + law.driven.zero + theta[1]
+    parts = []
+    for number, pressed in enumerate(pressed_teeth(law, (meshing.driver, meshing.driven), pairs)):
+        gear, teeth = gears[number], gears[number].shape.teeth
+        sectors = loaded_sectors([p.sector for p in pressed], teeth, reach)
+        field = gear_field(gear, joined(teeth, pressed), sectors)
+        at = np.array([number * law.centre, 0.0])
+        parts.append(_placed(field, pressed, number, angles[number], at))
+    strain = elastic.rig.material.poisson if elastic.rig.material.state == "plane-strain" else 0.0
+    first = len(parts[0].points)
+    joint = {
+        name: np.concatenate([getattr(p, name) for p in parts])
+        for name in ("points", "gear", "tooth", "displacement", "stress")
+    }
+    return PairFields(
+        triangles=np.concatenate([parts[0].triangles, first + parts[1].triangles]),
+        out_of_plane=strain * (joint["stress"][:, 0] + joint["stress"][:, 1]),
+        contacts=parts[0].contacts,
+        phase=phase,
+        torque=float(sum((1 - 2 * p.side) * p.force * p.contact.lever1 for p in pairs)),
+        dte=dte,
+        **joint,
+    )
+
+
+@dataclass(frozen=True)
+class _Part:
+    """One gear's share of `PairFields`."""
+
+    points: Array
+    triangles: Indices
+    gear: Indices
+    tooth: Indices
+    displacement: Array
+    stress: Array
+    contacts: tuple[Contact, ...]
+
+
+def _placed(field: GearField, pressed: Sequence[Pressed], number: int, angle: float, centre: Array) -> _Part:
+    """Regular and half-plane part together, elements divided near the contacts, turned into the world."""
+    teeth, mesh = field.gear.shape.teeth, field.gear.mesh
+    points, triangles, tooth, moved, stress, contacts = [], [], [], [], [], []
+    count = 0
+    for sector, u, regular in zip(field.sectors, field.displacement, field.stress, strict=True):
+        own = [_spot(p.strips) for p in pressed if p.sector == sector]
+        cells, values = divided(mesh.triangles, np.hstack([mesh.points, u, regular]), _size(own))
+        strips, turn = field.strips_in(sector), angle + 2 * pi * sector / teeth
+        x = values[:, :2]
+        points.append(centre + rotated(x, turn))
+        moved.append(rotated(values[:, 2:4] + strips.displacement(x, field.gear.moduli), turn))
+        stress.append(turn_stress(values[:, 4:] + strips.stress(x), turn))
+        triangles.append(count + cells)
+        tooth.append(np.full(len(cells), (-sector if number == 0 else sector) % teeth))
+        contacts += [Contact(centre + rotated(one.middle, turn), one.half_width) for one in own]
+        count += len(x)
+    cells = np.concatenate(triangles)
+    return _Part(
+        np.concatenate(points),
+        cells,
+        np.full(len(cells), number),
+        np.concatenate(tooth),
+        np.concatenate(moved),
+        np.concatenate(stress),
+        tuple(contacts),
+    )
+
+
+def _spot(strips: Strips) -> Contact:
+    """Middle of the pressure, and half of the width of its strips."""
+    force = strips.half * strips.mean
+    return Contact(force @ strips.middle / force.sum(), float(strips.half.sum()))
+
+
+def _size(contacts: Sequence[Contact]) -> Callable[[Array], Array]:
+    """Largest element at points (n, 2) [m] of a tooth with the given contacts."""
+
+    def size(points: Array) -> Array:
+        out = np.full(len(points), np.inf)
+        for one in contacts:
+            away = np.maximum(np.hypot(*(points - one.middle).T) - one.half_width, 0.0)
+            out = np.minimum(out, FINEST * one.half_width + GROWTH * away)
+        return out
+
+    return size
+
+
+def write_fields(path: Path, fields: PairFields) -> Path:
+    """Write a .vtu file for ParaView: m and Pa; `stress` in the order xx, yy, zz, xy, yz, xz."""
+    import meshio
+
+    zero = np.zeros(len(fields.points))
+    xx, yy, xy = fields.stress.T
+    largest, least = fields.principal.T
+    content = meshio.Mesh(
+        np.column_stack([fields.points, zero]),
+        [("triangle6", fields.triangles)],
+        point_data={
+            "displacement": np.column_stack([fields.displacement, zero]).astype(np.float32),
+            "stress": np.column_stack([xx, yy, fields.out_of_plane, xy, zero, zero]).astype(np.float32),
+            "von_mises": fields.von_mises.astype(np.float32),
+            "principal_1": largest.astype(np.float32),
+            "principal_2": least.astype(np.float32),
+        },
+        cell_data={"gear": [fields.gear.astype(np.int32)], "tooth": [fields.tooth.astype(np.int32)]},
+    )
+    return written_whole(path, lambda name: meshio.write(str(name), content, file_format="vtu"))

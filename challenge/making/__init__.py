@@ -1,0 +1,1 @@
+"""Cases of a challenge: plan, nominal rig, folders of records."""

@@ -1,0 +1,1 @@
+"""What a diagnosis makes of a challenge, judged against the answers."""

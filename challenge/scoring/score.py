@@ -1,0 +1,210 @@
+"""The score of a diagnosis on a challenge: rates with binomial intervals, calibration, errors, shrinkage, reach."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from math import log
+from typing import Any
+
+import numpy as np
+
+from gearbench.challenge.scoring.intervals import COVERAGE, Rate, brier, middle, reliability
+from gearbench.challenge.scoring.outcomes import TRUE_VERDICT, VERDICTS, Outcome, named_effects
+from gearbench.challenge.scoring.reach import reach_table
+from gearbench.challenge.truth.effects import EFFECTS, SEVERITY
+
+EFFECT_RESULTS = ("right", "class", "part", "wrong", "missed", "refused", "failed")
+CONTROL_RESULTS = ("right", "named", "flagged", "failed")
+FOREIGN_RESULTS = ("refused", "blamed", "missed", "failed")
+THIRDS = ("light", "medium", "severe")
+
+Table = dict[str, Any]
+
+
+def score(outcomes: Sequence[Outcome]) -> Table:
+    """All figures of a challenge as plain numbers, ready for JSON."""
+    effects = [o for o in outcomes if o.answer.kind == "effect"]
+    controls = [o for o in outcomes if o.answer.kind == "none"]
+    foreign = [o for o in outcomes if o.answer.kind == "foreign"]
+    table: Table = {
+        "cases": {"effect": len(effects), "none": len(controls), "foreign": len(foreign)},
+        "coverage": COVERAGE,
+        "effect": {**_rates(effects, EFFECT_RESULTS), "place_right": _place(effects).plain()},
+        "none": {**_rates(controls, CONTROL_RESULTS), "place_right": _place(controls).plain()},
+        "foreign": {
+            **_rates(foreign, FOREIGN_RESULTS),
+            "place_right": _place(foreign).plain(),
+            "refused_at_right_place": _rate(foreign, lambda o: o.result == "refused" and o.place_right).plain(),
+        },
+        "by_effect": {name: _effect_rows(name, group) for name, group in grouped([*effects, *foreign]).items()},
+        "by_severity": _by_third([o for o in effects if len(o.answer.effects) == 1]),
+        "confusion": _confusion(outcomes),
+        "calibration": _calibration(outcomes),
+        "parameters": parameter_errors(effects),
+        "shrinkage": shrinkage(effects),
+    }
+    table["reach"] = reach_table(table)
+    return table
+
+
+def grouped(outcomes: Sequence[Outcome]) -> dict[str, list[Outcome]]:
+    """Outcomes by what was at work: the library's effects first, in their order."""
+    groups: dict[str, list[Outcome]] = {}
+    for outcome in sorted(outcomes, key=lambda o: _rank("+".join(o.answer.effects))):
+        groups.setdefault("+".join(outcome.answer.effects), []).append(outcome)
+    return groups
+
+
+def _rank(name: str) -> tuple[int, str]:
+    names = list(EFFECTS)
+    return (names.index(name), "") if name in names else (len(names), name)
+
+
+def _rate(outcomes: Sequence[Outcome], holds: Callable[[Outcome], bool]) -> Rate:
+    return Rate(sum(holds(outcome) for outcome in outcomes), len(outcomes))
+
+
+def _place(outcomes: Sequence[Outcome]) -> Rate:
+    return _rate(outcomes, lambda o: o.place_right)
+
+
+def _rates(outcomes: Sequence[Outcome], results: Sequence[str]) -> Table:
+    counts = Counter(outcome.result for outcome in outcomes)
+    return {result: Rate(counts[result], len(outcomes)).plain() for result in results}
+
+
+def _effect_rows(name: str, outcomes: Sequence[Outcome]) -> Table:
+    results = EFFECT_RESULTS if outcomes[0].answer.kind == "effect" else FOREIGN_RESULTS
+    rows: Table = {**_rates(outcomes, results), "place_right": _place(outcomes).plain()}
+    if name in EFFECTS:
+        rows["by_severity"] = _by_third(outcomes)
+    return rows
+
+
+def third_of(severity: float) -> str:
+    """Third of the range of severities, in equal parts of its logarithm."""
+    low, high = (log(value) for value in SEVERITY)
+    part = (log(severity) - low) / (high - low)
+    return THIRDS[min(max(int(3 * part), 0), 2)]
+
+
+def _by_third(outcomes: Sequence[Outcome]) -> Table:
+    known = [o for o in outcomes if o.answer.severity]
+    groups = {name: [o for o in known if third_of(next(iter(o.answer.severity.values()))) == name] for name in THIRDS}
+    good = ("right", "wrong", "missed", "refused", "blamed")
+    return {name: {**_rates(group, good), "place_right": _place(group).plain()} for name, group in groups.items()}
+
+
+def _confusion(outcomes: Sequence[Outcome]) -> Table:
+    """How often which truth was given which name."""
+    table: dict[str, dict[str, int]] = {}
+    for outcome in outcomes:
+        true = "+".join(outcome.answer.effects) or "none"
+        said = "failed"
+        if outcome.verdict is not None:
+            said = "+".join(sorted(named_effects(outcome.verdict))) or str(outcome.verdict["verdict"])
+        row = table.setdefault(true, {})
+        row[said] = row.get(said, 0) + 1
+    return table
+
+
+def _calibration(outcomes: Sequence[Outcome]) -> Table:
+    """Brier score over effect, none and unknown, and how often a stated probability came true: of the verdict
+    (whether it is the right one of the three) and of the named effect."""
+    given = [o for o in outcomes if o.verdict is not None]
+    stated = [[float(o.verdict["probability"][key]) for key in VERDICTS] for o in given if o.verdict is not None]
+    truth = [VERDICTS.index(TRUE_VERDICT[o.answer.kind]) for o in given]
+    said = [VERDICTS.index(o.verdict["verdict"]) for o in given if o.verdict is not None]
+    named: list[tuple[float, bool]] = []
+    for outcome in given:
+        assert outcome.verdict is not None
+        for effect in outcome.verdict.get("effects", ()):
+            true = outcome.answer.kind == "effect" and effect["name"] in outcome.answer.effects
+            named.append((float(effect["probability"]), true))
+    chosen = [p[i] for p, i in zip(stated, said, strict=True)]
+    return {
+        "brier": brier(stated, truth),
+        "verdict": reliability(chosen, [a == b for a, b in zip(said, truth, strict=True)]),
+        "effect": reliability([p for p, _ in named], [hit for _, hit in named]),
+    }
+
+
+def parameter_errors(outcomes: Sequence[Outcome]) -> list[Table]:
+    """Errors of the parameters of rightly named effects that the verdict gives in the answer's unit: per effect and
+    name the number, bias, rms and median magnitude, the last also relative, and how often the truth lies within the
+    stated 90 % interval."""
+    found: dict[tuple[str, str, str], list[tuple[float, float, float]]] = {}
+    for outcome in outcomes:
+        if outcome.result != "right" or outcome.verdict is None:
+            continue
+        for effect in outcome.verdict["effects"]:
+            true = outcome.answer.parameters.get(effect["name"], {})
+            for name, given in effect.get("parameters", {}).items():
+                if name in true and true[name]["unit"] == given["unit"]:
+                    key = (effect["name"], name, str(given["unit"]))
+                    found.setdefault(key, []).append((given["value"], given["std"], true[name]["value"]))
+    rows = []
+    for (effect_name, name, unit), values in found.items():
+        value, std, true_value = np.array(values, dtype=float).T
+        error = value - true_value
+        relative = np.abs(error[true_value != 0] / true_value[true_value != 0])
+        rows.append(
+            {
+                "effect": effect_name,
+                "parameter": name,
+                "unit": unit,
+                "cases": len(values),
+                "bias": float(error.mean()),
+                "rms": float(np.sqrt(np.mean(error**2))),
+                "median": float(np.median(np.abs(error))),
+                "median_relative": float(np.median(relative)) if relative.size else None,
+                "within": Rate(int((np.abs(error) <= 1.645 * std).sum()), len(values)).plain(),
+            }
+        )
+    return rows
+
+
+def shrinkage(outcomes: Sequence[Outcome]) -> Table:
+    """How far the held-out gap shrinks on cases with an effect.
+
+    `oracle`: the verdict's held-out gap over that of its candidate with the true effects, where both are listed.
+    `with_effect`, `recalibrated`, `floor`: each over the nominal gap, the geometric mean over channels and bands of
+    the held-out record, one number a case.
+    """
+    ratios = [ratio for o in outcomes if (ratio := _oracle_ratio(o)) is not None]
+    parts: dict[str, list[float]] = {"recalibrated": [], "with_effect": [], "floor": []}
+    for outcome in outcomes:
+        for key, values in parts.items():
+            part = _gap_part(outcome.verdict, key)
+            if part is not None:
+                values.append(part)
+    within = Rate(sum(ratio <= 1.5 for ratio in ratios), len(ratios))
+    return {
+        "oracle": middle(ratios).plain(),
+        "oracle_within_1.5": within.plain(),
+        "oracle_not_listed": len(outcomes) - len(ratios),
+        **{key: middle(values).plain() for key, values in parts.items()},
+    }
+
+
+def _oracle_ratio(outcome: Outcome) -> float | None:
+    if outcome.verdict is None:
+        return None
+    candidates = outcome.verdict.get("candidates", ())
+    listed = {frozenset(candidate["effects"]): candidate.get("held_out") for candidate in candidates}
+    oracle = listed.get(frozenset(outcome.answer.effects))
+    chosen = listed.get(frozenset(named_effects(outcome.verdict)))
+    return float(chosen) / float(oracle) if chosen is not None and oracle else None
+
+
+def _gap_part(verdict: Mapping[str, Any] | None, key: str) -> float | None:
+    """Geometric mean of gap[key] / nominal over the rows of the held-out record."""
+    if verdict is None:
+        return None
+    logs = []
+    for row in verdict.get("gap", ()):
+        given, nominal = row.get(key), row["nominal"]
+        if row["record"] == verdict.get("held_out") and given and given[0] > 0 and nominal[0] > 0:
+            logs.append(log(given[0] / nominal[0]))
+    return float(np.exp(np.mean(logs))) if logs else None

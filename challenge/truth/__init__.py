@@ -1,0 +1,1 @@
+"""Truth rigs: their structure, levels of effects, equations of motion and measurement."""

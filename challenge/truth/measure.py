@@ -1,0 +1,183 @@
+"""A truth rig on the test bench: settle, run, and write down what its sensors see."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from math import ceil, pi
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+from scipy.fft import irfft, rfft, rfftfreq
+from scipy.interpolate import CubicSpline
+
+from gearbench.bench.plan.excitation import torque_realisation
+from gearbench.bench.plan.schedule import Schedule, schedule
+from gearbench.bench.record.attributes import rig_attributes
+from gearbench.challenge.truth.levels import DELAYED, Foreign, Levels
+from gearbench.challenge.truth.motion import integrate
+from gearbench.challenge.truth.plant import DEGREES, OUTPUTS, STATES, Plant
+from gearbench.challenge.truth.rigs import Bench, build_plant
+from gearbench.challenge.truth.structure import Structure
+from gearbench.geometry import body
+from gearbench.records import make_record
+from gearbench.rig import Condition
+
+Array = NDArray[np.float64]
+
+SETTLING = 0.5  # excitation periods before the record begins
+OVERSAMPLED = 4  # values per sample that delays are interpolated in
+MARGIN = 4  # samples integrated beyond both ends of the record
+STEP = 0.6  # largest product of step and fastest angular frequency
+DAMPED_STEP = 1.5  # of step and fastest rate of decay; RK4 is stable up to 2.8
+IMPACT = 0.4, 4.0  # closing rate [m/s] and deflection, in references, of an impact
+
+
+@dataclass(frozen=True)
+class Run:
+    """What the integrator handed out: `seen` (n, OUTPUTS) at `time` (n,) [s], OVERSAMPLED values a sample."""
+
+    time: Array
+    seen: Array
+    command: Array  # (samples a period,) [N m] recorded torque before noise
+
+
+def fastest(plant: Plant) -> float:
+    """An upper estimate of the fastest angular frequency [rad/s]."""
+    mesh = 2.0 * plant.teeth.stiffness.max()
+    rows = [
+        plant.coupling[0] / plant.inertia[0],
+        (plant.coupling[0] + mesh * plant.base_driver**2) / plant.inertia[1],
+        (plant.shaft[0] + mesh * plant.base_driven**2) / plant.inertia[2],
+        *((plant.support[i] + mesh) / plant.mass[i // 2] for i in range(4)),
+    ]
+    return float(np.sqrt(max(rows)))
+
+
+def fastest_decay(plant: Plant) -> float:
+    """An upper estimate of the mesh's fastest rate of decay [1/s], in an impact."""
+    teeth = plant.teeth
+    damping = teeth.damping * max(1.0, 1.0 - teeth.damping_load + teeth.damping_load * IMPACT[1])
+    damping += teeth.damping_quadratic * IMPACT[0]
+    mobility = plant.base_driver**2 / plant.inertia[1] + plant.base_driven**2 / plant.inertia[2]
+    return float(damping * 2.0 * teeth.stiffness.max() * (mobility + (1.0 / plant.mass).sum()))
+
+
+def steps_per_sample(plant: Plant, rate: float) -> int:
+    """Integration steps per sample at `rate` [Hz]: a multiple of OVERSAMPLED."""
+    needed = max(fastest(plant) / STEP, fastest_decay(plant) / DAMPED_STEP) / rate
+    return OVERSAMPLED * max(2, ceil(needed / OVERSAMPLED))
+
+
+def filtered(values: Array, foreign: Foreign, period: float) -> Array:
+    """One period of a signal behind the torque filter."""
+    ratio = rfftfreq(values.size, period / values.size) / foreign.filter_frequency
+    if foreign.filter_order == 1:
+        gain = 1.0 / (1.0 + 1j * ratio)
+    else:
+        gain = 1.0 / (1.0 - ratio**2 + 1j * np.sqrt(2.0) * ratio)
+    return np.asarray(irfft(rfft(values) * gain, values.size))
+
+
+def start_state(plant: Plant, torque: Array, step: float, first: int) -> Array:
+    """Equilibrium under the mean torque, and the rigid turning of the whole train under the rest of it.
+
+    Without the latter the load would begin with a turning that only the governor damps, slowly.
+    """
+    state = np.zeros(STATES)
+    mean = float(torque.mean())
+    force = mean / plant.base_driver
+    lift = np.array([-plant.sine, -plant.cosine, plant.sine, plant.cosine]) * force / plant.support
+    state[4:8] = lift
+    ratio = plant.base_driver / plant.base_driven
+    inertia = plant.inertia[2] + plant.inertia[3] + (plant.inertia[0] + plant.inertia[1]) / ratio**2
+    points = torque.size
+    spectrum = rfft(torque - mean) / ratio
+    omega = 2 * pi * rfftfreq(points, 0.5 * step)
+    turning = spectrum / (plant.governor[0] - inertia * omega**2 + 1j * omega * plant.governor[1])
+    at = 2 * pi * ((2 * first) % points) * np.arange(turning.size) / points
+    waves = 2.0 / points * turning * np.exp(1j * at)
+    driven, speed = float(waves.real.sum()), float((1j * omega * waves).real.sum())
+    state[2], state[3] = driven + mean / ratio / plant.shaft[0], driven
+    near = plant.teeth.stiffness.max() * 1.4
+    across = (lift[1] - lift[3]) * plant.cosine + (lift[0] - lift[2]) * plant.sine
+    state[1] = (force / near - across + plant.base_driven * state[2]) / plant.base_driver
+    state[2 * DEGREES] = mean / plant.coupling[0]
+    state[0] = state[1] + state[2 * DEGREES]
+    state[DEGREES + 2] = state[DEGREES + 3] = speed
+    state[DEGREES] = state[DEGREES + 1] = speed / ratio
+    return state
+
+
+def run_condition(bench: Bench, rig: Structure, levels: Levels, condition: Condition, finer: int = 1) -> Run:
+    """Integrate one condition; `finer` multiplies the number of steps."""
+    experiment, plan = condition.experiment, schedule(condition.experiment, bench.nominal.rig)
+    plant = build_plant(bench, rig, levels, experiment)
+    substeps = finer * steps_per_sample(plant, plan.sampling_rate)
+    step = 1.0 / (plan.sampling_rate * substeps)
+    period = plan.samples_per_period / plan.sampling_rate
+    torque = torque_realisation(experiment, 0, bench.nominal.rig).sample(2 * substeps * plan.samples_per_period)
+    command = torque[:: 2 * substeps].copy()
+    if levels.foreign.filter_frequency:
+        behind = filtered(torque, levels.foreign, period)
+        torque, command = (behind, command) if levels.foreign.filter_acting else (torque, behind[:: 2 * substeps])
+    settling = int(SETTLING * plan.samples_per_period) * substeps
+    begin = -MARGIN * substeps
+    state = start_state(plant, torque, step, begin - settling)
+    state, _ = integrate(plant, torque, state, step=step, first=begin - settling, outputs=1, stride=settling)
+    stride = substeps // OVERSAMPLED
+    count = OVERSAMPLED * (experiment.periods * plan.samples_per_period + 2 * MARGIN)
+    _, seen = integrate(plant, torque, state, step=step, first=begin, outputs=count, stride=stride)
+    time = np.asarray((begin + stride * np.arange(count)) * step, dtype=np.float64)
+    return Run(time, seen, np.ascontiguousarray(command))
+
+
+def measure(
+    bench: Bench, rig: Structure, levels: Levels, condition: Condition, name: str, rng: np.random.Generator
+) -> xr.Dataset:
+    """The record of one condition: delayed and noisy channels, attributes of the nominal rig, provenance of the
+    challenge `name` and nothing else."""
+    experiment, plan = condition.experiment, schedule(condition.experiment, bench.nominal.rig)
+    run = run_condition(bench, rig, levels, condition)
+    channels = _channels(run, plan, levels, experiment.periods)
+    sensors = bench.nominal.rig.sensors
+    noise = {"angle": sensors.noise_angle, "y": sensors.noise_displacement, "torque": sensors.noise_torque}
+    noisy = {
+        key: (values + noise[key.split("_")[0]] * rng.standard_normal(values.size))[None]
+        for key, values in channels.items()
+    }
+    return make_record(noisy, _attributes(bench, condition, plan, name))
+
+
+def _channels(run: Run, plan: Schedule, levels: Levels, periods: int) -> dict[str, Array]:
+    samples = periods * plan.samples_per_period
+    time = np.arange(samples) / plan.sampling_rate
+    exact = slice(MARGIN * OVERSAMPLED, (MARGIN + samples) * OVERSAMPLED, OVERSAMPLED)
+    delay = dict(zip(DELAYED, levels.delay, strict=True))
+    speed = {"angle_driver": plan.speed_driver, "angle_driven": plan.speed_driven}
+    channels = {"torque_driver": np.tile(run.command, periods)}
+    for name in ("torque_driven", *DELAYED):
+        values, late = run.seen[:, OUTPUTS.index(name)], delay.get(name, 0.0)
+        seen = CubicSpline(run.time, values)(time - late) if late else values[exact]
+        channels[name] = seen + speed.get(name, 0.0) * (time - late)
+    return channels
+
+
+def _attributes(bench: Bench, condition: Condition, plan: Schedule, name: str) -> dict[str, object]:
+    rig, meshing, experiment = bench.nominal.rig, bench.meshing, condition.experiment
+    bodies = (
+        body(meshing.driver, rig.driver, rig.material.density, "rig.driver"),
+        body(meshing.driven, rig.driven, rig.material.density, "rig.driven"),
+    )
+    return {
+        **rig_attributes(rig, meshing, bodies),
+        "sampling_rate": plan.sampling_rate,
+        "samples_per_period": plan.samples_per_period,
+        "periods": experiment.periods,
+        "mesh_period": plan.mesh_period,
+        "mesh_phase_origin": "geometry",
+        "torque_mean": experiment.torque_mean,
+        "condition": condition.name,
+        "provenance": json.dumps({"challenge": name}),
+    }

@@ -1,0 +1,1 @@
+"""Hypotheses, their evidence, and the decision between them."""

@@ -1,0 +1,146 @@
+"""The nominal rig as the diagnosis sees it: constants of its equations of motion and how well they are known."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import cos, lcm, sin, tan
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.bench.nonlinear.mesh_law import mesh_law
+from gearbench.geometry import body, pair
+from gearbench.lumped.linear.model import equivalent_mass
+from gearbench.lumped.nonlinear.law import MeshLaw
+from gearbench.rig import Case, Support
+
+Array = NDArray[np.float64]
+
+# Relative standard deviations of what a case states without one.
+DEFAULT_SD = {
+    "support_stiffness": 0.1,
+    "support_damping": 0.3,
+    "mass": 0.03,
+    "inertia": 0.02,
+    "mesh_scale": 0.06,
+    "mesh_ratio": 0.4,
+}
+
+
+@dataclass(frozen=True)
+class Machine:
+    """Constants of the nominal rig, SI. Pairs are (driver, driven); `sd_*` are relative standard deviations."""
+
+    teeth: tuple[int, int]
+    base_radius: tuple[float, float]
+    support_factor: float  # g: cos(working pressure angle), or 1 along the line of action
+    cross_factor: float  # share of the friction force along the support: sin(working pressure angle), or 0
+    transverse_factor: float  # share of a radial motion along the line of action, sin(working pressure angle)
+    mass: tuple[float, float]
+    inertia: tuple[float, float]  # of the gears alone [kg m^2]
+    rotor: float  # inertia beyond the drive's coupling [kg m^2]
+    compliance: float  # of the coupling [rad/(N m)]; 0: rigid
+    coupling_damping: float  # [N m s/rad]
+    stiffness: tuple[float, float]
+    damping: tuple[float, float]
+    exponent: tuple[float, float]
+    reference: tuple[float, float]  # deflection at which secant and stated support stiffness agree [m]
+    mesh_mass: float
+    mesh_ratio: float
+    scale: float
+    friction: float
+    transition: float  # sliding speed at which friction has changed its direction [m/s]
+    law: MeshLaw
+    sd_stiffness: tuple[float, float]
+    sd_damping: tuple[float, float]
+    sd_mass: tuple[float, float]
+    sd_inertia: tuple[float, float]
+    sd_rotor: float
+    sd_scale: float
+    sd_mesh_ratio: float
+    noise: tuple[float, float, float]  # rms per sample of angle [rad], displacement [m], torque [N m]
+
+    @property
+    def hunting(self) -> int:
+        """Teeth that pass until the same two meet again."""
+        return lcm(*self.teeth)
+
+
+def machine(nominal: Case, load: float, mean: float) -> Machine:
+    """The machine of a nominal case whose mesh force law must reach `load` [N m] on the driver.
+
+    `mean` [N m] is a typical mean torque: a support that the case takes for linear is judged about its deflection
+    there.
+    """
+    rig = nominal.rig
+    meshing = pair(rig)
+    density = rig.material.density
+    bodies = (
+        body(meshing.driver, rig.driver, density, "rig.driver"),
+        body(meshing.driven, rig.driven, density, "rig.driven"),
+    )
+    supports = (rig.support.driver, rig.support.driven)
+    coupling = rig.drive.coupling
+    rotor = coupling.inertia if coupling else 0.0
+    stiff = coupling.stiffness if coupling else None
+    tangential = rig.support.direction == "tangential"
+    radii = (meshing.driver.base_radius, meshing.driven.base_radius)
+    alpha = meshing.working_pressure_angle
+    inertias = (bodies[0].inertia, bodies[1].inertia)
+    known = _Known(nominal)
+    return Machine(
+        teeth=(rig.driver.teeth, rig.driven.teeth),
+        base_radius=radii,
+        support_factor=cos(alpha) if tangential else 1.0,
+        cross_factor=sin(alpha) if tangential else 0.0,
+        transverse_factor=sin(alpha) if tangential else tan(alpha),
+        mass=(bodies[0].mass, bodies[1].mass),
+        inertia=inertias,
+        rotor=rotor,
+        compliance=1.0 / stiff if stiff else 0.0,
+        coupling_damping=coupling.damping if coupling and stiff else 0.0,
+        stiffness=(supports[0].stiffness, supports[1].stiffness),
+        damping=(supports[0].damping, supports[1].damping),
+        exponent=(supports[0].exponent, supports[1].exponent),
+        reference=_references(supports, mean / radii[0] * (cos(alpha) if tangential else 1.0)),
+        mesh_mass=equivalent_mass(radii, (inertias[0] + rotor, inertias[1]), rig.load.boundary),
+        mesh_ratio=rig.damping.mesh_ratio,
+        scale=rig.mesh.stiffness_scale,
+        friction=rig.friction.coefficient,
+        transition=rig.friction.transition_speed,
+        law=mesh_law(rig, nominal.simulation, load),
+        sd_stiffness=known.both("rig.support.{}.stiffness", [s.stiffness for s in supports], "support_stiffness"),
+        sd_damping=known.both("rig.support.{}.damping", [s.damping for s in supports], "support_damping"),
+        sd_mass=known.both("rig.{}.mass", [b.mass for b in bodies], "mass"),
+        sd_inertia=known.both("rig.{}.inertia", list(inertias), "inertia"),
+        sd_rotor=known.one("rig.drive.coupling.inertia", rotor, "inertia"),
+        sd_scale=known.one("rig.mesh.stiffness_scale", rig.mesh.stiffness_scale, "mesh_scale"),
+        sd_mesh_ratio=known.one("rig.damping.mesh_ratio", rig.damping.mesh_ratio, "mesh_ratio"),
+        noise=(rig.sensors.noise_angle, rig.sensors.noise_displacement, rig.sensors.noise_torque),
+    )
+
+
+def _references(supports: tuple[Support, Support], force: float) -> tuple[float, float]:
+    """Deflections [m] at which the secant stiffness is the stated one; under `force` [N] if the case says linear."""
+    first, second = (s.reference_deflection if s.exponent else force / s.stiffness for s in supports)
+    return first, second
+
+
+@dataclass(frozen=True)
+class _Known:
+    """Relative standard deviations of a case's numbers: its own, else the documented defaults."""
+
+    case: Case
+
+    def one(self, path: str, value: float, default: str) -> float:
+        stated = self.case.uncertainty.get(path)
+        if stated is None or value == 0.0:
+            return DEFAULT_SD[default]
+        return stated / abs(value)
+
+    def both(self, path: str, values: list[float], default: str) -> tuple[float, float]:
+        first, second = (
+            self.one(path.format(side), value, default)
+            for side, value in zip(("driver", "driven"), values, strict=True)
+        )
+        return first, second

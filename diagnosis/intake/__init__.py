@@ -1,0 +1,1 @@
+"""Records become measurements, checked against the nominal rig."""

@@ -1,0 +1,1 @@
+"""Rigs simulated under the records' own torque: recalibration, gap, gap budget."""

@@ -1,0 +1,1 @@
+"""Where teeth touch: kinematics, kernels, contact lines, the contact law of a pair, statics with it."""

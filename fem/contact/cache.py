@@ -1,0 +1,144 @@
+"""Condensed gears and contact curves on disk, under a hash of all that they depend on, our sources included."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import tempfile
+import zipfile
+from collections.abc import Callable, Mapping
+from dataclasses import fields
+from functools import lru_cache
+from importlib.metadata import version
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gearbench.fem.contact.law import Curve, Law, elastic_pair, make_law
+from gearbench.fem.gear.body import CondensedGear, condense, rounded
+from gearbench.fem.gear.crack import CrackedTooth
+from gearbench.geometry.mesh.sector import Element
+from gearbench.kernels.compiled import cache_folder
+from gearbench.rig import Gear, Material, Rig, sound_gear
+from gearbench.rig.value import Value
+
+Arrays = Mapping[str, Any]  # of numpy arrays
+
+SOURCES = ("gearbench.geometry", "gearbench.fem")
+LIBRARIES = ("numpy", "scipy", "scikit-fem", "gmsh")
+
+
+@lru_cache(maxsize=1)
+def code_digest() -> str:
+    """Hash of the sources and library versions that a condensed gear depends on."""
+    digest = hashlib.sha256()
+    for package in SOURCES:
+        spec = find_spec(package)
+        for folder in (spec.submodule_search_locations or []) if spec else []:
+            for source in sorted(Path(folder).rglob("*.py")):
+                digest.update(source.read_bytes())
+    for library in LIBRARIES:
+        digest.update(f"{library} {version(library)}".encode())
+    return digest.hexdigest()
+
+
+def key_for(kind: str, values: Mapping[str, Value | float | int | str | None]) -> str:
+    """Name of a cache entry: hash of the code and of the values it is made from."""
+    plain = {k: v.model_dump(mode="json") if isinstance(v, Value) else v for k, v in values.items()}
+    text = json.dumps([kind, code_digest(), plain], sort_keys=True)
+    return f"{kind}-{hashlib.sha256(text.encode()).hexdigest()[:32]}"
+
+
+def cached(key: str, make: Callable[[], Arrays]) -> Arrays:
+    """Arrays stored under `key`, made and stored where absent; a damaged entry is made again.
+
+    A cache that cannot be written costs time, never the result.
+    """
+    path = cache_folder() / f"{key}.npz"
+    try:
+        with np.load(path, allow_pickle=False) as stored:
+            return {name: stored[name] for name in stored.files}
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile):
+        arrays = make()
+    temporary = None
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.NamedTemporaryFile(dir=path.parent, suffix=".tmp", delete=False) as handle:
+            temporary = handle.name
+            np.savez(handle, **arrays)
+        os.replace(temporary, path)
+    except OSError:
+        if temporary and os.path.exists(temporary):
+            os.unlink(temporary)
+    return arrays
+
+
+def stored_gear(
+    gear: Gear,
+    material: Material,
+    element_size: float | None = None,
+    modes: int = 8,
+    element: Element = "triangle",
+) -> CondensedGear:
+    """`condense(...)`, from disk where it has been done before."""
+    key = _gear_key(gear, material, element_size, modes, element)
+    arrays = cached(key, lambda: _arrays(condense(gear, material, element_size, modes, element)))
+    scalars = {"teeth": int, "last": int, "unknowns": int, "face_width": float}
+    values: dict[str, Any] = {name: scalars[name](v) if name in scalars else v for name, v in arrays.items()}
+    extra = values.pop("extra", None)
+    if extra is not None and gear.crack is not None:
+        values["crack"] = CrackedTooth(gear.crack.tooth, extra)
+    return CondensedGear(**values)
+
+
+def stored_law(
+    rig: Rig,
+    gears: tuple[CondensedGear, CondensedGear],
+    element_size: float | None = None,
+    modes: int = 8,
+    element: Element = "triangle",
+) -> Law:
+    """`make_law(...)` of a rig's pair, its load-approach curves from disk where they have been solved before."""
+    meshing = elastic_pair(rig)
+    # A crack adds to the flexibility beside the curves of sound teeth.
+    parts = [_gear_key(sound_gear(g), rig.material, element_size, modes, element) for g in (rig.driver, rig.driven)]
+    key = key_for("law", {"driver": parts[0], "driven": parts[1], "centre": meshing.centre_distance})
+    made: list[Law] = []
+    real = (rig.driver, rig.driven)
+
+    def make() -> Arrays:
+        made.append(make_law(meshing, *gears, rig.material, gears=real))
+        curves = made[0].curves.driver, made[0].curves.driven
+        return {f"{name}{i}": np.asarray(v) for i, c in enumerate(curves) for name, v in c._asdict().items()}
+
+    arrays = cached(key, make)
+    if made:
+        return made[0]
+
+    def curve(number: int) -> Curve:
+        values: list[Any] = [arrays[f"{name}{number}"] for name in Curve._fields]
+        plain: list[Any] = [float(v) if v.ndim == 0 else v for v in values]
+        return Curve(*plain)
+
+    return make_law(meshing, *gears, rig.material, curves=(curve(0), curve(1)), gears=real)
+
+
+def _arrays(gear: CondensedGear) -> Arrays:
+    """What is stored of a condensed gear."""
+    arrays = {f.name: np.asarray(getattr(gear, f.name)) for f in fields(gear) if f.name != "crack"}
+    return arrays if gear.crack is None else arrays | {"extra": gear.crack.extra}
+
+
+def _gear_key(
+    gear: Gear, material: Material, element_size: float | None, modes: int, element: Element = "triangle"
+) -> str:
+    """Cache entry of a condensed gear; totals of mass and inertia, tooth errors and the number of a cracked tooth do
+    not enter the condensation."""
+    bare = sound_gear(rounded(gear)).model_copy(update={"mass": None, "inertia": None, "bore_radius": 0.0})
+    if gear.crack is not None and gear.crack.meshed:
+        bare = bare.model_copy(update={"crack": gear.crack.model_copy(update={"tooth": 0})})
+    mesh: dict[str, float | str | None] = {"element_size": element_size, "element": element}
+    return key_for("gear", {"gear": bare, "material": material, "modes": modes, **mesh})

@@ -1,0 +1,226 @@
+"""One tooth pair's contact line: boundary elements with complementarity, and the load-approach curve it gives.
+
+The pressure is piecewise constant on cells along the slave's boundary. Its displacement is the half-plane's response
+to that pressure (exact integrals of the logarithm) plus the smooth kernels of both gears, so neither the mesh nor the
+position of the cells enters the result.
+"""
+
+from __future__ import annotations
+
+from math import acos, atan2, cos, hypot, log, pi, sin, sqrt, tan
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.fem.contact.kernel import Kernel, grid_position, table_at
+from gearbench.fem.contact.kinematics import Tooth, edge_contact
+from gearbench.kernels.compiled import compiled
+from gearbench.kernels.small import eliminate
+
+Array = NDArray[np.float64]
+
+CELLS = 32
+CELLS_EDGE = 64
+REFITS = 4
+OUT_OF_REACH = 1.0  # [m]
+
+
+@compiled
+def boundary_point(tooth: Tooth, s: float):
+    """Point (x, y) of the working boundary at arc length s, in the tooth's frame (tooth centre at polar angle 0)."""
+    if s <= tooth.s_end:
+        rho = sqrt(2 * tooth.rb * max(s, 0.0))
+        phi = tooth.psi - rho / tooth.rb
+        return tooth.rb * cos(phi) - rho * sin(phi), tooth.rb * sin(phi) + rho * cos(phi)
+    phi = tooth.psi - tooth.rho_end / tooth.rb - (s - tooth.s_end) / max(tooth.edge_radius, 1e-12)
+    x = tooth.edge_r * cos(tooth.edge_angle) - tooth.edge_radius * sin(phi)
+    return x, tooth.edge_r * sin(tooth.edge_angle) + tooth.edge_radius * cos(phi)
+
+
+@compiled
+def gap_to_master(slave: Tooth, master: Tooth, c: float, a: float, s: float):
+    """Gap of the slave's boundary point s to the master's involute (up to the master's rotation) and its foot."""
+    x, y = boundary_point(slave, s)
+    vx = a - (x * cos(c) - y * sin(c))
+    vy = -(x * sin(c) + y * cos(c))
+    v = hypot(vx, vy)
+    if v <= master.rb:
+        # Inside the base circle there is no involute to touch; no load that gears carry reaches that far.
+        return OUT_OF_REACH, 0.0
+    alpha = acos(master.rb / v)
+    return master.rb * (atan2(vy, vx) + tan(alpha) - alpha), sqrt(v * v - master.rb**2)
+
+
+@compiled
+def touching_point(slave: Tooth, master: Tooth, xi: float, a: float):
+    """Slave angle, arc length and gap reference of the point that touches when the slave's roll length is xi."""
+    phi = -acos((slave.rb + master.rb) / a)
+    c = xi / slave.rb + phi - slave.psi
+    if xi < slave.corner:
+        s = slave.s_form
+    elif xi <= slave.rho_end:
+        s = xi * xi / (2 * slave.rb)
+    else:
+        _, _, _, _, moved = edge_contact(slave, master, c, 0.0, a, 0.0)
+        s = min(slave.s_end + slave.edge_radius * max(moved, 0.0), slave.s_tip)
+    reference, _ = gap_to_master(slave, master, c, a, s)
+    return c, s, reference
+
+
+@compiled
+def window(slave: Tooth, master: Tooth, xi: float, a: float, force: float, compliance: float):
+    """First guess of the loaded stretch of the slave's boundary, and whether it reaches the tip edge or a corner.
+
+    compliance: 4/(pi E* b) [m/N], so that the Hertz half-width is sqrt(compliance R force).
+    """
+    _, s0, _ = touching_point(slave, master, xi, a)
+    rho_s = min(max(xi, slave.corner), slave.rho_end)
+    rho_m = max(a * sin(acos((slave.rb + master.rb) / a)) - max(xi, slave.corner), 1e-4)
+    half = sqrt(compliance * force * rho_s * rho_m / (rho_s + rho_m))
+    low = s0 - 1.25 * half
+    high = s0 + 1.25 * half
+    edge = high > slave.s_end
+    if edge:
+        narrow = sqrt(compliance * force * max(slave.edge_radius, 1e-6))
+        low = min(s0, slave.s_end) - 2.0 * half
+        high = min(s0 + 2.5 * narrow, slave.s_tip) if s0 > slave.s_end else min(slave.s_end + 2.5 * narrow, slave.s_tip)
+    if slave.corner >= 0.0 and low < slave.s_form:
+        # Cut short by the corner, the loaded stretch reaches further to the other side.
+        high = min(s0 + 2.5 * half, slave.s_tip)
+        edge = True
+    return max(low, slave.s_form), high, edge
+
+
+@compiled
+def cell_edges(low: float, high: float, n: int) -> Array:
+    """Cells that shrink towards both ends, where the pressure changes fastest."""
+    out = np.empty(n + 1)
+    for i in range(n + 1):
+        x = -cos(pi * i / n)
+        out[i] = low + (high - low) * 0.5 * (1 + 0.5 * x + 0.5 * (-1 + 2 * i / n))
+    return out
+
+
+@compiled
+def log_integral(a: float, b: float) -> float:
+    """Integral of ln|t| from a to b."""
+    out = b - a
+    fa = a * log(abs(a)) if a != 0.0 else 0.0
+    fb = b * log(abs(b)) if b != 0.0 else 0.0
+    return fb - fa - out
+
+
+@compiled
+def flexibility_matrix(
+    k_slave: Kernel, k_master: Kernel, edges: Array, centres: Array, feet: Array, s0: float, half_plane: float
+) -> Array:
+    """Approach at cell centres per force on each cell [m/N]; half_plane: 2/(pi E* b).
+
+    The force has one direction, the common normal at the touching point s0. On the tip edge the slave's own normal
+    turns away from it, so there the structure answers as at the end of the involute, corrected by how the
+    flexibility at s0 differs from the one at that end.
+    """
+    n = len(centres)
+    a = np.empty((n, n))
+    xs = np.empty(n)
+    xm = np.empty(n)
+    own_s = k_slave.front[k_slave.reach]
+    own_m = k_master.front[k_master.reach]
+    for i in range(n):
+        xs[i] = grid_position(k_slave, min(centres[i], k_slave.s_end))
+        xm[i] = grid_position(k_master, feet[i])
+    turned = 0.0
+    if s0 > k_slave.s_end:
+        x0, x1 = grid_position(k_slave, s0), grid_position(k_slave, k_slave.s_end)
+        turned = table_at(own_s, x0, x0) - table_at(own_s, x1, x1)
+    for j in range(n):
+        width = edges[j + 1] - edges[j]
+        for i in range(n):
+            singular = log_integral(edges[j] - centres[i], edges[j + 1] - centres[i]) / width
+            a[i, j] = table_at(own_s, xs[j], xs[i]) + turned + table_at(own_m, xm[j], xm[i]) - half_plane * singular
+    return a
+
+
+@compiled
+def complementarity(a: Array, h: Array, force: float):
+    """Cell forces >= 0 with sum `force` and common approach u: u <= h + A q, equal where q > 0. Returns q, u, du/dF."""
+    n = len(h)
+    active = np.ones(n, np.bool_)
+    q = np.zeros(n)
+    u = 0.0
+    slope = 0.0
+    for _ in range(60):
+        idx = np.nonzero(active)[0]
+        m = len(idx)
+        # Unknowns: the loaded cells' forces and the approach; right-hand sides: the gaps, and one unit of force.
+        system = np.zeros((m + 1, m + 3))
+        for p in range(m):
+            for r in range(m):
+                system[p, r] = a[idx[p], idx[r]]
+            system[p, m] = -1.0
+            system[m, p] = 1.0
+            system[p, m + 1] = -h[idx[p]]
+        system[m, m + 1] = force
+        system[m, m + 2] = 1.0
+        solution = eliminate(system)
+        u = solution[m, 0]
+        slope = solution[m, 1]
+        q[:] = 0.0
+        changed = False
+        for p in range(m):
+            q[idx[p]] = solution[p, 0]
+            if solution[p, 0] < 0.0:
+                active[idx[p]] = False
+                q[idx[p]] = 0.0
+                changed = True
+        if not changed:
+            for i in range(n):
+                if not active[i]:
+                    over = u - h[i]
+                    for p in range(m):
+                        over -= a[i, idx[p]] * q[idx[p]]
+                    if over > 1e-9 * abs(u):
+                        active[i] = True
+                        changed = True
+            if not changed:
+                break
+    return q, u, slope
+
+
+@compiled
+def line_contact(
+    slave: Tooth, master: Tooth, k_slave: Kernel, k_master: Kernel, half_plane: float, a: float, xi: float, force: float
+):
+    """Elastic approach of one pair under a force, neighbours unloaded.
+
+    half_plane: 2/(pi E* b) [m/N]; a: centre distance; xi: roll length of the contact on the slave (beyond rho_end on
+    its tip edge, short of `corner` on its undercut corner). Returns approach [m], its slope [m/N], cell edges [m] and
+    cell forces [N].
+    """
+    c, s0, reference = touching_point(slave, master, xi, a)
+    low, high, edge = window(slave, master, xi, a, force, 2 * half_plane)
+    n = CELLS_EDGE if edge else CELLS
+    rounds = REFITS if edge else 1
+    edges = cell_edges(low, high, n)
+    q = np.zeros(n)
+    u = 0.0
+    slope = 0.0
+    for turn in range(rounds):
+        edges = cell_edges(low, high, n)
+        centres = 0.5 * (edges[1:] + edges[:-1])
+        h = np.empty(n)
+        feet = np.empty(n)
+        for i in range(n):
+            h[i], foot = gap_to_master(slave, master, c, a, centres[i])
+            feet[i] = foot * foot / (2 * master.rb)
+            h[i] -= reference
+        matrix = flexibility_matrix(k_slave, k_master, edges, centres, feet, s0, half_plane)
+        q, u, slope = complementarity(matrix, h, force)
+        if turn == rounds - 1:
+            break
+        loaded = np.nonzero(q > 0.0)[0]
+        first, last = loaded[0], loaded[-1]
+        span = edges[last + 1] - edges[first]
+        low = max(edges[first] - (0.02 if first > 0 else 0.4) * span, slave.s_form)
+        high = min(edges[last + 1] + (0.02 if last < n - 1 else 0.4) * span, slave.s_tip)
+    return u, slope, edges, q

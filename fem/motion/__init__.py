@@ -1,0 +1,1 @@
+"""The reduced rig in motion: equations of motion and their time integration."""

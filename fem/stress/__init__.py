@@ -1,0 +1,1 @@
+"""Stress inside loaded gears and in their fillets."""

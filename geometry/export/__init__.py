@@ -1,0 +1,1 @@
+"""Gears and meshes as files for other programs."""

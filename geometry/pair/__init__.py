@@ -1,0 +1,1 @@
+"""Two gears: kinematics, interference, data sheet, zones of contact."""

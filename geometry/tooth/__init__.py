@@ -1,0 +1,1 @@
+"""One gear: profile, fillet, flank deviations, cracks, and what may be."""

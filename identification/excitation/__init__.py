@@ -1,0 +1,1 @@
+"""What a rig is excited with: multisines and residue combs."""

@@ -1,0 +1,1 @@
+"""The local polynomial method for periodically time-varying systems."""

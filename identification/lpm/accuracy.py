@@ -1,0 +1,119 @@
+"""What an identification can be expected to err by: the record-length rule, truncation, and variance.
+
+These are estimates from the identification itself, reported beside every result and never used to smooth it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gearbench.identification.lpm.estimate import LpmResult
+from gearbench.identification.spectra.joint import Complexes, Floats, Spectra
+
+# E T_joint >= RULE (2L+1)(R+1) / B_3dB, T_joint of distinct excitation.
+RULE = 3.0
+# L f_mesh >= (highest - lowest natural frequency) + BANDWIDTHS half-power bandwidths.
+BANDWIDTHS = 1.5
+# Missing branches beyond this part of the ITF matter.
+MISSING = 0.03
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """Expected relative rms error of the ITF and what it is made of (all relative to the ITF's rms).
+
+    `variance`: from the residuals; `truncation`: branches beyond L, extrapolated from the decay of the
+    identified ones and no more than what the residual leaves room for; `expected`: both together; `bound`:
+    with the whole residual taken as missing response.
+    """
+
+    variance: float
+    truncation: float
+    expected: float
+    bound: float
+
+
+@dataclass(frozen=True)
+class RecordRule:
+    """Record length that the rule asks for: `duration` [s] there is, `needed` [s], `harmonics_needed` branches."""
+
+    duration: float
+    needed: float
+    bandwidth: float
+    harmonics: int
+    harmonics_needed: int
+
+    @property
+    def factor(self) -> float:
+        """How many times too short the record is (below 1: long enough)."""
+        return self.needed / self.duration
+
+
+def expected_accuracy(result: LpmResult, noise: float | None) -> Accuracy:
+    """Expected error of an identified ITF.
+
+    `noise`: rms of the measurement noise over the rms response if it is known from repeated periods, else
+    None.
+    """
+    power = np.sum(np.abs(result.htf) ** 2, axis=0).sum()
+    spread = float(result.itf_covariance[0].real.sum())
+    signal = max(power - spread, 0.1 * power)
+    variance = np.sqrt(spread / signal)
+    missing = np.sqrt(max(result.residual**2 - (noise or 0.0) ** 2, 0.0))
+    truncation = min(tail(result.htf, result.htf_variance), missing)
+    return Accuracy(
+        float(variance),
+        float(truncation),
+        float(np.hypot(variance, truncation)),
+        float(np.hypot(variance, missing)),
+    )
+
+
+def tail(htf: Complexes, variance: Floats) -> float:
+    """Part (relative rms) of an HTF (2L+1, frequency) beyond +-L, from a power law through its outer half.
+
+    Infinite when there are too few branches to extrapolate from or they do not decay.
+    """
+    limit = htf.shape[0] // 2
+    if limit < 4:
+        return np.inf
+    power = np.sum(np.abs(htf) ** 2 - variance, axis=1)
+    total = power.sum()
+    both = power[limit + 1 :] + power[limit - 1 :: -1]  # l = 1..L
+    order = np.arange(1, limit + 1)
+    # Means over the third and the last quarter: single branches may vanish, and noise is already subtracted.
+    inner, outer = order > limit / 2, order > 3 * limit / 4
+    inner &= ~outer
+    first, second = both[inner].mean(), both[outer].mean()
+    if total <= 0 or first <= 0:
+        return np.inf
+    # Where noise hides the last branches, they are taken to be as large as its uncertainty.
+    outside = np.abs(np.arange(-limit, limit + 1)) > 3 * limit / 4
+    second = max(second, float(np.sqrt(np.sum(variance[outside] ** 2)) / np.count_nonzero(outer)))
+    if second <= 0:
+        return 0.0
+    slope = np.log(first / second) / np.log(order[outer].mean() / order[inner].mean())
+    if slope <= 1.05:
+        return np.inf
+    return float(np.sqrt(second * order[outer].mean() ** slope * limit ** (1 - slope) / (slope - 1) / total))
+
+
+def record_rule(
+    spectra: Spectra, harmonics: int, order: int, natural: Floats, damping: Floats, truncation: float
+) -> RecordRule | None:
+    """The rule for natural frequencies [Hz] and damping ratios (mode, phase); None where no mode was found.
+
+    `truncation`: expected part of the ITF beyond +-L. Where it matters, the branches that count are those that the
+    first mode's travel asks for, if they are more than the L used.
+    """
+    if not natural.size or not np.isfinite(natural[0]).any():
+        return None
+    low, high = np.nanpercentile(natural[0], [2.0, 98.0])
+    bandwidth = float(np.nanmedian(2 * damping[0] * natural[0]))
+    mesh_frequency = spectra.mesh_lines * spectra.spacing
+    wanted = int(np.ceil((high - low + BANDWIDTHS * bandwidth) / mesh_frequency))
+    branches = 2 * (max(harmonics, wanted) if truncation > MISSING else harmonics) + 1
+    duration = spectra.realisations * spectra.duration / spectra.repeats
+    return RecordRule(duration, RULE * branches * (order + 1) / bandwidth, bandwidth, harmonics, wanted)

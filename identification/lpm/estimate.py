@@ -1,0 +1,234 @@
+"""Local polynomial method (LPM) for linear periodically time-varying systems.
+
+    Y(k) = sum_l Gs_l(k) U(k - l d) + T(k) + V(k),   G_l(k) = Gs_l(k + l d),
+
+with Gs_l and T polynomials of order R in windows of 2n+1 lines (Pintelon and Schoukens, System
+Identification, 2nd ed., 7.2; Lataire and Louarroudi for the periodic case). One window serves the few rows
+in its middle third. Only rows m >= 0 are solved: G is real in time, Gs_l(-m) = conj Gs_{-l}(m).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.identification.lpm.covariance import CrossCovariance, diagonal_variance
+from gearbench.identification.lpm.gram import grams
+from gearbench.identification.lpm.local_solve import LocalFit, LpmError, solve_window
+from gearbench.identification.lpm.regression import Regression, Window, prepare
+from gearbench.identification.spectra.joint import Complexes, Floats, Spectra
+
+Lines = NDArray[np.int64]
+
+# One window in so many tells its condition number.
+CONDITION_EVERY = 32
+# Work [floating-point operations] spent on variances before they are sampled, and before cross terms are left out.
+VARIANCE_WORK = 2e10
+CROSS_WORK = 1e11
+
+
+@dataclass(frozen=True)
+class LpmResult:
+    """Identified branches on the output lines.
+
+    `lines` (F,); `htf`, `htf_variance` (2L+1, F), l = -L..L [m/N]; `itf_covariance` (Q+1, F): sums over l
+    of E[dG_l conj(dG_{l+q})], q = 0 first, which give the ITF's variance at any phase; `residual`: rms of
+    the residual over that of the response in the windows (degrees of freedom accounted for); `condition`:
+    largest estimated condition number; `unknowns`, `equations`, `freedom`: of an inner window, transients
+    included; `windows`: how many; `variance_sampled`: windows per computed variance; `cross_terms`:
+    "exact", "none" (no windows overlap), "omitted".
+    """
+
+    lines: Lines
+    htf: Complexes
+    htf_variance: Floats
+    itf_covariance: Complexes
+    residual: float
+    condition: float
+    unknowns: int
+    equations: int
+    windows: int
+    variance_sampled: int
+    cross_terms: str
+
+    @property
+    def harmonics(self) -> int:
+        """Branches on each side, L."""
+        return self.htf.shape[0] // 2
+
+    def itf_variance(self, phases: int) -> Floats:
+        """E|error|^2 of the ITF (F, phases) on uniform phases, from the residuals."""
+        shifts = np.arange(1, self.itf_covariance.shape[0])
+        turn = np.exp(-2j * np.pi * np.outer(shifts, np.arange(phases) / phases))
+        total = self.itf_covariance[0].real[:, None] + 2 * (self.itf_covariance[1:].T @ turn).real
+        return np.maximum(total, 0.0)
+
+
+def local_polynomial(
+    spectra: Spectra,
+    lines: Lines,
+    window: Window,
+    *,
+    progress: Callable[[float, str], None] | None = None,
+) -> LpmResult:
+    """Identify the branches -L..L on the output `lines` (rising, multiples of their common step).
+
+    Raises LpmError, with the numbers, if a window has fewer equations than unknowns, if sidebands leave the
+    lines that the spectra hold, or if the inputs are numerically dependent.
+    """
+    require_lines(spectra, lines, window)
+    regression = prepare(spectra, transient=window.transient, reach=window.harmonics * spectra.mesh_lines)
+    rows = needed_rows(lines, window.harmonics, spectra.mesh_lines)
+    centres = plan_centres(rows, window, regression.last_row(window.harmonics))
+    require_equations(regression, [centre for centre, _ in centres], window)
+    return _Sweep(regression, window, lines, centres).run(progress)
+
+
+def require_lines(spectra: Spectra, lines: Lines, window: Window) -> None:
+    """Raise LpmError if output lines plus sidebands and half a window leave the spectra."""
+    reach = window.harmonics * spectra.mesh_lines
+    room = spectra.highest - max(window.half_width, int(lines[-1]))
+    if reach > room:
+        raise LpmError(
+            f"harmonics = {window.harmonics} puts sidebands of {lines[-1] * spectra.spacing:g} Hz at"
+            f" {(lines[-1] + reach) * spectra.spacing:g} Hz, beyond the highest usable frequency"
+            f" {spectra.highest * spectra.spacing:g} Hz; at most {max(room, 0) // spectra.mesh_lines} fit"
+        )
+
+
+def require_equations(regression: Regression, centres: list[int], window: Window) -> None:
+    """Raise LpmError with the numbers if a window has no equation to spare over its unknowns."""
+    for centre in centres:
+        unknowns = int(regression.columns(centre, window).sum())
+        equations = regression.equations(centre, window)
+        if equations > unknowns:
+            continue
+        experiments = regression.experiments
+        factor = (unknowns + 1) / max(equations, 1)
+        transient = f" and {experiments * (window.order + 1)} of transients" if window.transient else ""
+        raise LpmError(
+            f"under-determined: L = {window.harmonics} branches a side of order R = {window.order} are"
+            f" {unknowns} unknowns{transient}, but windows of n = {window.half_width} with {experiments}"
+            f" realisation(s) leave {equations} equations (around line {centre}); sufficient would be about"
+            f" window n = {int(np.ceil(window.half_width * factor)) + 1}, or"
+            f" {int(np.ceil(experiments * factor))} realisations, or L ="
+            f" {max(0, int((window.harmonics + 0.5) / factor - 1))}"
+        )
+
+
+def needed_rows(lines: Lines, harmonics: int, mesh_lines: int) -> Lines:
+    """Rows |k + l d|, rising, that the branches on the output lines k are read from."""
+    sidebands = np.arange(-harmonics, harmonics + 1) * mesh_lines
+    return np.unique(np.abs(lines[:, None] + sidebands[None, :]))
+
+
+def plan_centres(rows: Lines, window: Window, highest: int) -> list[tuple[int, Lines]]:
+    """Window centres and the rows each one serves: those in its middle third, more at the top edge.
+
+    `highest`: last row that says anything; a window beyond it would be short of equations.
+    """
+    inner = window.half_width // 3
+    highest = max(highest, int(rows[-1]))
+    plan = []
+    start = 0
+    while start < rows.size:
+        stop = int(np.searchsorted(rows, rows[start] + 2 * inner, side="right"))
+        centre = (int(rows[start]) + int(rows[stop - 1])) // 2
+        plan.append((min(centre, highest - window.half_width), rows[start:stop]))
+        start = stop
+    return plan
+
+
+class _Sweep:
+    """One pass over all windows; collects branches and variances on the output lines."""
+
+    def __init__(self, regression: Regression, window: Window, lines: Lines, centres: list[tuple[int, Lines]]) -> None:
+        self.regression, self.window, self.lines, self.centres = regression, window, lines, centres
+        self.place = np.full(int(lines[-1]) + 1, -1)
+        self.place[lines] = np.arange(lines.size)
+        self.htf = np.zeros((window.branches, lines.size), dtype=complex)
+        self.variance = np.zeros((window.branches, lines.size))
+        unknowns, rows = window.unknowns, sum(r.size for _, r in centres)
+        work = len(centres) * 4 / 3 * unknowns**3
+        self.sampled = max(1, int(np.ceil(work / VARIANCE_WORK)))
+        overlap = 2 * window.half_width + 2 * (window.half_width // 3)
+        shifts = min(overlap // regression.mesh_lines, 2 * window.harmonics)
+        cross_work = rows * 8.0 * regression.experiments * window.width * unknowns * window.branches
+        self.cross: CrossCovariance | None = None
+        self.cross_terms = "none" if not shifts else "omitted"
+        if shifts and self.sampled == 1 and cross_work <= CROSS_WORK:
+            self.cross_terms = "exact"
+            self.cross = CrossCovariance(regression, window, self.place, shifts)
+        self.residual = self.power = 0.0
+        self.condition = 0.0
+
+    def run(self, progress: Callable[[float, str], None] | None) -> LpmResult:
+        """Solve every window."""
+        last: Floats | None = None
+        lines = [centre for centre, _ in self.centres]
+        for done, (index, gram) in enumerate(grams(self.regression, lines, self.window)):
+            centre, rows = self.centres[index]
+            want = done % self.sampled == 0 or last is None
+            # Condition numbers: of the edges, where branches fade out, and of some windows in between.
+            judged = index in (0, len(self.centres) - 1) or done % CONDITION_EVERY == 0
+            fit = solve_window(self.regression, centre, self.window, gram, want_factor=want, want_condition=judged)
+            if judged:
+                self.condition = max(self.condition, fit.condition)
+            if want:
+                last = diagonal_variance(fit, self.window)
+            assert last is not None
+            noise = self._account(fit, centre)
+            self._read(fit, centre, rows, noise * last)
+            if self.cross is not None:
+                self.cross.add(fit, centre, rows, noise)
+            if progress is not None and done % 16 == 0:
+                progress(done / len(self.centres), f"window {done + 1} of {len(self.centres)}")
+        return self._result()
+
+    def _account(self, fit: LocalFit, centre: int) -> float:
+        """Residual variance of the window; adds to the overall ratio of residual to response."""
+        noise = fit.residual / fit.freedom
+        data = self.regression.data(centre, self.window)
+        self.residual += noise
+        self.power += float(np.sum(np.abs(data) ** 2)) / max(int(np.count_nonzero(data)), 1)
+        return noise
+
+    def _read(self, fit: LocalFit, centre: int, rows: Lines, variance: Floats) -> None:
+        """Put Gs_j(m) and its mirror Gs_j(-m) = conj Gs_{-j}(m) where they belong: G_l(k), l = -j, k = m + j d."""
+        window, d = self.window, self.regression.mesh_lines
+        basis = window.basis()
+        j = np.arange(-window.harmonics, window.harmonics + 1)
+        for m in rows:
+            weight = basis[m - centre + window.half_width]
+            value = weight @ fit.coefficients
+            spread = np.einsum("p,psj,s->j", weight, variance, weight)
+            for sign in (1, -1):
+                line = sign * (m + j * d)
+                inside = (line > 0) & (line < self.place.size)
+                column = np.where(inside, self.place[np.where(inside, line, 0)], -1)
+                hit = column >= 0
+                branch = window.harmonics - sign * j[hit]
+                self.htf[branch, column[hit]] = value[hit] if sign > 0 else value[hit].conj()
+                self.variance[branch, column[hit]] = spread[hit]
+
+    def _result(self) -> LpmResult:
+        diagonal = self.variance.sum(axis=0)[None, :].astype(complex)
+        cross = self.cross.sums if self.cross is not None else diagonal[:0]
+        middle = self.centres[len(self.centres) // 2][0]
+        transient = self.regression.experiments * (self.window.order + 1) if self.window.transient else 0
+        return LpmResult(
+            self.lines,
+            self.htf,
+            self.variance,
+            np.concatenate([diagonal, cross]),
+            float(np.sqrt(self.residual / self.power)) if self.power else 0.0,
+            self.condition,
+            int(self.regression.columns(middle, self.window).sum()) + transient,
+            self.regression.equations(middle, self.window) + transient,
+            len(self.centres),
+            self.sampled,
+            self.cross_terms,
+        )

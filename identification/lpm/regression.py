@@ -1,0 +1,277 @@
+"""The local regression of a periodically time-varying system, without ever writing it down.
+
+Row m of the regression reads Y(m) = sum_j Gs_j(m) U(m + j d) + T(m), j = -l. Lines that differ by a multiple of d form
+a residue class; inside one, row m's regressors are 2L+1 successive elements: products with the regression are small
+matrix-vector products on views.
+
+Lines of residue class 0 carry the operating response, the same in each experiment. An orthogonal rotation of the
+experiments gathers it in the first one, whose class-0 rows are then dropped: the same as one free unknown a line. With
+a single experiment that means leaving class 0 out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.polynomial import legendre
+from numpy.typing import NDArray
+
+from gearbench.identification.spectra.joint import Complexes, Floats, Spectra
+
+# A line counts as excited if its rms force over the experiments exceeds this part of the largest one's.
+EXCITATION_FLOOR = 1e-3
+
+
+@dataclass(frozen=True)
+class Window:
+    """Shape of the local model: branches -L..L, polynomial order R, half-width n lines, estimated transient."""
+
+    harmonics: int
+    order: int
+    half_width: int
+    transient: bool
+
+    @property
+    def width(self) -> int:
+        """Rows per experiment, 2n+1."""
+        return 2 * self.half_width + 1
+
+    @property
+    def branches(self) -> int:
+        """2L+1."""
+        return 2 * self.harmonics + 1
+
+    @property
+    def unknowns(self) -> int:
+        """Polynomial coefficients of the branches, (R+1)(2L+1); those of transients are projected out."""
+        return (self.order + 1) * self.branches
+
+    def basis(self) -> Floats:
+        """Legendre polynomials (2n+1, R+1) over the window."""
+        r = np.arange(-self.half_width, self.half_width + 1) / max(self.half_width, 1)
+        return np.asarray(legendre.legvander(r, self.order), dtype=float)
+
+
+@dataclass(frozen=True)
+class Regression:
+    """Force and DTE of all experiments, sorted by residue class; made by `prepare`.
+
+    `force`, `dte` (d, E, Q): line k is at [k mod d, :, k // d + origin]; `excited` (d, Q). `same_phase`:
+    all records begin at the same mesh phase, so the operating response has been rotated into experiment 0;
+    otherwise, where transients are estimated, class 0 is left out of every experiment. `start_phase` (E,)
+    [cycles] of the records before they were shifted.
+    """
+
+    force: Complexes
+    dte: Complexes
+    excited: NDArray[np.bool_]
+    origin: int
+    highest: int
+    same_phase: bool
+    start_phase: Floats
+    _transients: dict[tuple[int, Window], Complexes] = field(default_factory=dict, repr=False)
+    _views: dict[int, tuple[Complexes, NDArray[np.bool_]]] = field(default_factory=dict, repr=False)
+
+    @property
+    def mesh_lines(self) -> int:
+        """Lines between mesh harmonics, d."""
+        return self.force.shape[0]
+
+    @property
+    def experiments(self) -> int:
+        """Number of experiments E."""
+        return self.force.shape[1]
+
+    @property
+    def operating_rows_lost(self) -> int:
+        """Experiments whose row is dropped on a line of class 0."""
+        return 1 if self.same_phase else self.experiments
+
+    def input_power(self) -> float:
+        """Mean of |U|^2 over experiments and excited lines [N^2]."""
+        return float(np.sum(np.abs(self.force) ** 2) / (self.experiments * np.count_nonzero(self.excited)))
+
+    def last_row(self, harmonics: int) -> int:
+        """Highest line whose response any excited line reaches through `harmonics` branches."""
+        residue, position = np.nonzero(self.excited)
+        return min(
+            int(((position - self.origin) * self.mesh_lines + residue).max()) + harmonics * self.mesh_lines,
+            self.highest,
+        )
+
+    def runs(self, centre: int, window: Window) -> list[tuple[int, NDArray[np.int64], int]]:
+        """The window's rows by residue class: class, indices of its rows in the window, position of the first.
+
+        Rows of one class follow each other at successive positions.
+        """
+        lines = np.arange(centre - window.half_width, centre + window.half_width + 1)
+        d = self.mesh_lines
+        return [
+            (int(first % d), np.arange(index, window.width, d), int(first // d) + self.origin)
+            for index, first in enumerate(lines[: min(d, window.width)])
+        ]
+
+    def inputs(self, residue: int, first: int, count: int, window: Window) -> Complexes:
+        """Regressors (count, E, 2L+1) of successive rows of one residue class; a view."""
+        reach = window.harmonics
+        force, _ = self._sliding(reach)
+        return force[residue, :, first - reach : first - reach + count].transpose(1, 0, 2)
+
+    def excitation(self, residue: int, first: int, count: int, window: Window) -> NDArray[np.bool_]:
+        """Which regressors (count, 2L+1) of successive rows of one residue class are excited; a view."""
+        reach = window.harmonics
+        _, excited = self._sliding(reach)
+        return excited[residue, first - reach : first - reach + count]
+
+    def _sliding(self, reach: int) -> tuple[Complexes, NDArray[np.bool_]]:
+        """All runs of 2L+1 successive elements of `force` and `excited`, as views."""
+        if reach not in self._views:
+            width = 2 * reach + 1
+            force = sliding_window_view(self.force, width, axis=2)
+            self._views[reach] = force, sliding_window_view(self.excited, width, axis=1)
+        return self._views[reach]
+
+    def data(self, centre: int, window: Window) -> Complexes:
+        """Y (E, 2n+1) of a window, transients projected out; without transients rows that no input excites are 0."""
+        data = np.empty((self.experiments, window.width), dtype=complex)
+        for residue, rows, first in self.runs(centre, window):
+            data[:, rows] = self.dte[residue][:, first : first + rows.size]
+            if not window.transient:
+                data[:, rows] *= self.excitation(residue, first, rows.size, window).any(axis=1)
+        return self.project(data, centre, window)
+
+    def project(self, data: Complexes, centre: int, window: Window) -> Complexes:
+        """`data` (E, 2n+1) without its part in the space of the transients' polynomials."""
+        if not window.transient:
+            return data
+        basis = self.transient_basis(centre, window)
+        data = data * (np.abs(basis).sum(axis=2) > 0)
+        return data - np.einsum("erp,ep->er", basis, np.einsum("erp,er->ep", basis.conj(), data))
+
+    def transient_basis(self, centre: int, window: Window) -> Complexes:
+        """Orthonormal polynomials (E, 2n+1, R+1) of the transients; 0 on rows that are left out."""
+        key = (centre % self.mesh_lines, window)
+        if key not in self._transients:
+            r = np.arange(-window.half_width, window.half_width + 1)
+            turn = np.exp(-2j * np.pi * np.outer(self.start_phase, r) / self.mesh_lines)
+            columns = window.basis() * turn[:, :, None]
+            operating = (centre + r) % self.mesh_lines == 0
+            columns[: self.operating_rows_lost, operating] = 0.0
+            left, strength, _ = np.linalg.svd(columns, full_matrices=False)
+            # Fewer rows than coefficients (all but a few left out): keep only the directions that exist.
+            self._transients[key] = left * (strength > 1e-10 * strength.max())[:, None, :]
+        return self._transients[key]
+
+    def apply(self, coefficients: Complexes, centre: int, window: Window) -> Complexes:
+        """Model output (E, 2n+1) of the coefficients (R+1, 2L+1), transients projected out."""
+        local = window.basis() @ coefficients
+        output = np.empty((self.experiments, window.width), dtype=complex)
+        for residue, rows, first in self.runs(centre, window):
+            inputs = self.inputs(residue, first, rows.size, window)
+            output[:, rows] = (inputs @ local[rows, :, None])[:, :, 0].T
+        return self.project(output, centre, window)
+
+    def adjoint(self, data: Complexes, centre: int, window: Window) -> Complexes:
+        """Product (R+1, 2L+1) of the regression's conjugate transpose with (projected) data (E, 2n+1)."""
+        local = np.empty((window.width, window.branches), dtype=complex)
+        for residue, rows, first in self.runs(centre, window):
+            inputs = self.inputs(residue, first, rows.size, window)
+            local[rows] = (data[:, rows].T.conj()[:, None, :] @ inputs)[:, 0]
+        return np.asarray(window.basis().T @ local.conj(), dtype=complex)
+
+    def matrix(self, centre: int, window: Window, *, projected: bool = True) -> Complexes:
+        """The regression written down: (E, 2n+1, R+1, 2L+1); transients projected out unless told otherwise."""
+        inputs = np.empty((self.experiments, window.width, window.branches), dtype=complex)
+        for residue, rows, first in self.runs(centre, window):
+            inputs[:, rows] = self.inputs(residue, first, rows.size, window).transpose(1, 0, 2)
+        full = np.empty((self.experiments, window.width, window.order + 1, window.branches), dtype=complex)
+        np.multiply(inputs[:, :, None, :], window.basis()[None, :, :, None], out=full)
+        if window.transient and projected:
+            basis = self.transient_basis(centre, window)
+            full *= (np.abs(basis).sum(axis=2) > 0)[:, :, None, None]
+            full -= np.einsum("erp,epsj->ersj", basis, np.einsum("erp,ersj->epsj", basis.conj(), full))
+        return full
+
+    def columns(self, centre: int, window: Window) -> NDArray[np.bool_]:
+        """Which coefficients (R+1, 2L+1) the window can know: order p needs p+1 rows that excite the branch."""
+        count = np.zeros(window.branches, dtype=int)
+        for residue, rows, first in self.runs(centre, window):
+            if residue or self.experiments > self.operating_rows_lost:
+                count += self.excitation(residue, first, rows.size, window).sum(axis=0)
+        return np.arange(window.order + 1)[:, None] < count[None, :]
+
+    def equations(self, centre: int, window: Window) -> int:
+        """Complex equations of the window that are left once operating response and transients are taken out."""
+        total = 0
+        for residue, rows, first in self.runs(centre, window):
+            used = rows.size
+            if not window.transient:
+                used = int(self.excitation(residue, first, rows.size, window).any(axis=1).sum())
+            total += used * (self.experiments - (self.operating_rows_lost if residue == 0 else 0))
+        if window.transient:
+            basis = self.transient_basis(centre, window)
+            total -= int(np.count_nonzero(np.abs(basis).sum(axis=1) > 0))
+        return total
+
+    def transient_products(self, centre: int, window: Window) -> Complexes:
+        """Q^H A (E (R+1), unknowns): what the projection takes from the Gram matrix is its own Gram matrix."""
+        basis, order = window.basis(), window.order + 1
+        transient = self.transient_basis(centre, window).conj()
+        result = np.zeros((self.experiments, order, order, window.branches), dtype=complex)
+        for residue, rows, first in self.runs(centre, window):
+            inputs = self.inputs(residue, first, rows.size, window)
+            for own, row in enumerate(rows):
+                weight = transient[:, row, :, None] * basis[row]
+                result += weight[..., None] * inputs[own][:, None, None, :]
+        return result.reshape(-1, window.unknowns)
+
+
+def prepare(spectra: Spectra, *, transient: bool, reach: int) -> Regression:
+    """Sort the spectra by residue class; `reach` lines beyond the highest one are padded with zeros.
+
+    Each record is shifted in time to mesh phase 0 at its start, so that branches refer to the mesh phase.
+    """
+    d, highest = spectra.mesh_lines, spectra.highest
+    phase = spectra.start_phase % 1.0
+    same = bool(np.abs(spectra.relative()).max() < 1e-9) or not transient
+    force, dte = (_two_sided(s, phase, d) for s in (spectra.force, spectra.dte))
+    if spectra.realisations > 1 and same:
+        force, dte = _rotate(force), _rotate(dte)
+    lost = 1 if same else spectra.realisations
+    operating = np.arange(-highest, highest + 1) % d == 0
+    force[:lost, operating] = 0.0
+    dte[:lost, operating] = 0.0
+    strength = np.sqrt(np.mean(np.abs(force) ** 2, axis=0))
+    # Line 0 holds what means differ by between records, which may be any size.
+    excited = strength > EXCITATION_FLOOR * np.delete(strength, highest).max()
+    force[:, ~excited] = 0.0
+    origin = -((-highest - reach) // d)
+    count = (highest + reach) // d + 1 + origin
+    arrays = [np.zeros((d, spectra.realisations, count), dtype=complex) for _ in range(2)]
+    mask = np.zeros((d, count), dtype=bool)
+    for c in range(d):
+        lines = np.arange(-highest, highest + 1)
+        chosen = lines[lines % d == c]
+        place = chosen // d + origin
+        for array, source in zip(arrays, (force, dte), strict=True):
+            array[c][:, place] = source[:, chosen + highest]
+        mask[c, place] = excited[chosen + highest]
+    return Regression(arrays[0], arrays[1], mask, origin, highest, same, phase)
+
+
+def _two_sided(one_sided: Complexes, phase: Floats, mesh_lines: int) -> Complexes:
+    """Lines -K..K (E, 2K+1), delayed so that the record begins at mesh phase 0."""
+    full = np.concatenate([one_sided[:, :0:-1].conj(), one_sided], axis=1)
+    lines = np.arange(full.shape[1]) - (one_sided.shape[1] - 1)
+    return full * np.exp(-2j * np.pi * np.outer(phase, lines) / mesh_lines)
+
+
+def _rotate(values: Complexes) -> Complexes:
+    """Householder reflection of the experiments that turns their mean into experiment 0."""
+    count = values.shape[0]
+    direction = np.full(count, 1.0 / np.sqrt(count))
+    direction[0] -= 1.0
+    direction /= np.linalg.norm(direction)
+    return values - 2.0 * np.outer(direction, direction @ values)

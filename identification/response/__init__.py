@@ -1,0 +1,1 @@
+"""Time-varying frequency responses: the dataset, and modes against mesh phase."""

@@ -1,0 +1,1 @@
+"""From records to spectra of force and transmission error."""

@@ -1,0 +1,1 @@
+"""Periodic systems whose exact response is known."""

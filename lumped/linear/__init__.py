@@ -1,0 +1,1 @@
+"""The linear periodic model with three degrees of freedom."""

@@ -1,0 +1,1 @@
+"""The non-linear model with one mesh spring and the effects of real rigs."""

@@ -1,0 +1,1 @@
+"""Mesh stiffness by analytic methods and standards."""

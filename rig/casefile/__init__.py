@@ -1,0 +1,1 @@
+"""Case files: TOML in and out, schema, reference."""

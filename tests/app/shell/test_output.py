@@ -1,0 +1,81 @@
+"""Output folders: taken, resumed, refused; files are whole or absent."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from gearbench.shell.failure import InputError
+from gearbench.shell.output import claimed, fingerprint
+
+
+def test_resumes_the_same_and_refuses_another(tmp_path: Path) -> None:
+    folder = tmp_path / "deep" / "out"
+    with claimed(folder, "run", "a") as output:
+        assert not output.has("record.nc")
+        output.write_text("record.nc", "first")
+    with claimed(folder, "run", "a") as output:
+        assert output.has("record.nc")
+    for command, identity in (("run", "b"), ("compare", "a")):
+        with pytest.raises(InputError, match="another case"), claimed(folder, command, identity):
+            pass
+    assert (folder / "record.nc").read_text() == "first"
+
+
+def test_force_removes_what_the_former_run_wrote_and_nothing_else(tmp_path: Path) -> None:
+    with claimed(tmp_path, "run", "a") as output:
+        output.write_text("record.nc", "first")
+        output.write_text("summary.md", "first")
+    (tmp_path / "notes.txt").write_text("the user's own")
+    with claimed(tmp_path, "run", "b", force=True) as output:
+        assert not output.has("record.nc")
+        output.write_text("record.nc", "second")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["notes.txt", "record.nc", "run.json"]
+
+
+def test_a_folder_of_the_users_own_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "thesis.tex").write_text("x")
+    with pytest.raises(InputError, match="another origin"), claimed(tmp_path, "run", "a"):
+        pass
+    assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
+    with pytest.raises(InputError, match="is a file"), claimed(tmp_path / "thesis.tex", "run", "a"):
+        pass
+
+
+def test_a_mark_cannot_point_outside_the_folder(tmp_path: Path) -> None:
+    precious = tmp_path / "precious.txt"
+    precious.write_text("keep")
+    folder = tmp_path / "out"
+    folder.mkdir()
+    (folder / "run.json").write_text('{"command": "run", "identity": "x", "files": ["../precious.txt"]}')
+    with claimed(folder, "run", "a", force=True):
+        pass
+    assert precious.read_text() == "keep"
+
+
+def test_two_runs_at_once_are_refused(tmp_path: Path) -> None:
+    refused = pytest.raises(InputError, match="another run")
+    with claimed(tmp_path, "run", "a"), refused, claimed(tmp_path, "run", "a"):
+        pass
+    with claimed(tmp_path, "run", "a"):
+        pass
+
+
+def test_a_broken_write_leaves_the_old_file(tmp_path: Path) -> None:
+    with claimed(tmp_path, "run", "a") as output:
+        output.write_text("summary.md", "old")
+
+        def fail(path: Path) -> None:
+            path.write_text("half")
+            raise RuntimeError("disk")
+
+        with pytest.raises(RuntimeError):
+            output.write("summary.md", fail)
+        assert sorted(path.name for path in tmp_path.iterdir()) == ["run.json", "summary.md"]
+        assert (tmp_path / "summary.md").read_text() == "old"
+
+
+def test_fingerprints_keep_their_parts_apart() -> None:
+    assert fingerprint("ab", "c") != fingerprint("a", "bc")
+    assert fingerprint("ab", "c") == fingerprint("ab", "c")

@@ -1,0 +1,121 @@
+"""Numbers and sentences of a diagnosis."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gearbench.diagnosis.evidence.hypotheses import LIBRARY
+from gearbench.diagnosis.intake.signals import CHANNELS
+from gearbench.diagnosis.verdict import PLACES, Effect, Gap, Probabilities, Range, Verdict
+from gearbench.figures.diagnosis_gap import octave_bands
+from gearbench.words.diagnosis import CHANNELS as CHANNEL_WORDS
+from gearbench.words.diagnosis import (
+    EFFECTS,
+    SHORT_CHANNELS,
+    confidence,
+    effects_in_words,
+    headline,
+    length,
+    number,
+    percent,
+    whole_band,
+    with_std,
+)
+from gearbench.words.diagnosis import PLACES as PLACE_WORDS
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (0.0, "0"),
+        (1234.5, "1230"),
+        (0.098765, "0.0988"),
+        (9.996, "10.0"),
+        (2.5e-5, "2.50e-5"),
+        (3.2e7, "3.20e7"),
+        (-38.44, "-38.4"),
+    ],
+)
+def test_numbers(value: float, text: str) -> None:
+    assert number(value) == text
+
+
+@pytest.mark.parametrize(("value", "text"), [(0.00939, "0.0094"), (0.123456, "0.123"), (0.00002, "0"), (12.34, "12.3")])
+def test_lengths_end_at_a_tenth_of_a_nanometre(value: float, text: str) -> None:
+    assert length(value) == text
+
+
+@pytest.mark.parametrize(
+    ("value", "std", "text"),
+    [
+        (0.05812, 0.00123, "0.0581 ± 0.0012"),
+        (49.63, 3.41, "49.6 ± 3.4"),
+        (1234.5, 56.7, "1234 ± 57"),
+        (2.0, 0.0, "2.00"),
+        (1.02e8, 3.1e5, "(1.0200 ± 0.0031)e8"),
+        (3.1e-5, 2e-6, "(3.10 ± 0.20)e-5"),
+    ],
+)
+def test_a_value_ends_where_its_uncertainty_does(value: float, std: float, text: str) -> None:
+    assert with_std(value, std) == text
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(1.0, "100 %"), (0.9999, "> 99 %"), (0.97, "97 %"), (0.028, "2.8 %"), (1e-5, "< 0.1 %"), (0.0, "0 %")],
+)
+def test_only_certainty_is_called_certain(value: float, text: str) -> None:
+    assert percent(value) == text
+
+
+def test_every_effect_place_and_channel_has_words() -> None:
+    assert set(LIBRARY) <= set(EFFECTS) and set(PLACES) == set(PLACE_WORDS)
+    assert set(CHANNELS) <= set(CHANNEL_WORDS) == set(SHORT_CHANNELS)
+    assert effects_in_words([]) == "the nominal rig"
+    assert effects_in_words(["friction", "tooth-crack"]) == "friction between the flanks and a cracked tooth"
+
+
+def gap(channel: str, band: tuple[float, float], nominal: float, with_effect: float | None) -> Gap:
+    def about(value: float) -> Range:
+        return Range(value=value, low=value, high=value)
+
+    held = None if with_effect is None else about(with_effect)
+    return Gap(
+        record="r", channel=channel, band_hz=band, unit="m", nominal=about(nominal), recalibrated=about(nominal / 2),
+        with_effect=held, floor=None,
+    )
+
+
+def test_the_sentences_of_a_verdict() -> None:
+    whole = gap("dte", (0.0, 3000.0), 4e-6, 2.5e-7)
+    gaps = (gap("dte", (0.0, 200.0), 9e-6, 1e-6), whole, gap("dte", (0.0, 0.0), 1e-5, 0.0))
+    assert whole_band(gaps) == [whole]
+    found = Verdict(
+        verdict="effect", probability=Probabilities(effect=0.9, none=0.0, unknown=0.1), place="drive", gap=gaps,
+        effects=(Effect(name="coupling", probability=0.8), Effect(name="torque-ripple", probability=0.7)),
+    )
+    assert headline(found) == "An elastic coupling and ripple of the driving torque explain the gap."
+    assert confidence(found) == (
+        "Probability of an effect of the library: 90 %. It acts at the drive. On record r (not held out) the rms gap of"
+        " the transmission error goes from 4.00 to 0.250 um with the effect."
+    )
+    refused = Verdict(
+        verdict="unknown", probability=Probabilities(effect=0.1, none=0.0, unknown=0.9), place="none", held_out="r",
+        gap=(gap("dte", (0.0, 3000.0), 4e-6, None),),
+    )
+    assert headline(refused) == "No effect of the library explains the gap."
+    assert confidence(refused) == (
+        "Probability of something else: 90 %. On the held-out record r the rms gap of the transmission error goes from"
+        " 4.00 to 2.00 um recalibrated."
+    )
+
+
+def test_bands_of_a_sixth_of_an_octave_keep_the_energy() -> None:
+    lines = np.zeros(1025)
+    lines[[8, 64, 65, 512]] = 3.0, 4.0, 12.0, 1.0
+    centre, rms = octave_bands(lines, 2.0)
+    # Lines 64 and 65 lie within a twelfth of an octave of 128 Hz.
+    for frequency, energy in ((16.0, 3.0), (128.0, np.hypot(4.0, 12.0)), (1024.0, 1.0)):
+        assert rms[np.argmin(np.abs(centre - frequency))] == pytest.approx(energy)
+    assert (rms**2).sum() == pytest.approx((lines**2).sum())

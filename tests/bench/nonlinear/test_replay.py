@@ -1,0 +1,173 @@
+"""Replays against the simulation that made the record, and the phase, torque and delays they start from."""
+
+from __future__ import annotations
+
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from gearbench.bench import BenchError, simulate
+from gearbench.bench.nonlinear.mesh_law import mesh_law
+from gearbench.bench.nonlinear.replay import replay, resampled
+from gearbench.records import make_record, validate_record
+from gearbench.rig import (
+    Case,
+    Coupling,
+    Crack,
+    Drive,
+    Experiment,
+    Friction,
+    Gear,
+    Multisine,
+    Rig,
+    Ripple,
+    Sensors,
+    Simulation,
+    Support,
+    Supports,
+)
+
+SAMPLES, RATE = 1536, 5120.0
+CHANNELS = ("torque_driver", "torque_driven", "angle_driver", "angle_driven", "y_driver", "y_driven", "dte")
+
+
+def make_case(**rig: Any) -> Case:
+    gear = {"module": 3e-3, "face_width": 0.02, "thinning": 30e-6}
+    support = Support(stiffness=1e8, damping=3e3)
+    values: dict[str, Any] = {
+        "driver": Gear(
+            teeth=20,
+            hub_radius=15e-3,
+            inertia=4e-4,
+            mass=2.0,
+            runout=6e-6,
+            crack=Crack(tooth=4, stiffness_loss=0.4),
+            **gear,
+        ),
+        "driven": Gear(teeth=30, hub_radius=25e-3, inertia=3e-3, mass=3.0, pitch_error=(4e-6, *(0.0,) * 29), **gear),
+        "support": Supports(driver=support, driven=support),
+        "drive": Drive(
+            coupling=Coupling(inertia=2e-3, stiffness=3e4, damping=1.0),
+            ripple=Ripple(orders=(7,), amplitude=(1.0,), phase=(0.4,)),
+        ),
+        "friction": Friction(coefficient=0.05),
+        **rig,
+    }
+    experiment = Experiment(
+        mesh_frequency=200.0,
+        torque_mean=100.0,
+        sampling_rate=RATE,
+        samples_per_period=SAMPLES,
+        periods=2,
+        realisations=2,
+        seed=3,
+        settling_tolerance=1e-8,
+        settling_periods_max=50,
+        multisine=Multisine(amplitude=20.0, band=(20.0, 2000.0), crest=2.2),
+    )
+    return Case(
+        name="test", rig=Rig(**values), experiment=experiment, simulation=Simulation(model="lumped", stiffness_edge=0.1)
+    )
+
+
+@pytest.fixture(scope="module")
+def case() -> Case:
+    return make_case()
+
+
+@pytest.fixture(scope="module")
+def record(case: Case) -> xr.Dataset:
+    return simulate(case)
+
+
+def differs(found: xr.Dataset, record: xr.Dataset, start: int = 0, row: int = 0) -> float:
+    """Largest departure from one period of the record from sample `start`, over each channel's range."""
+    stop = start + found.sizes["time"]
+    worst = 0.0
+    for name in CHANNELS:
+        expected = record[name].values[row, start:stop]
+        worst = max(worst, float(np.abs(found[name].values[0] - expected).max() / max(np.ptp(expected), 1e-12)))
+    return worst
+
+
+def test_a_replay_is_one_period_of_the_simulation(case: Case, record: xr.Dataset) -> None:
+    law = mesh_law(case.rig, case.simulation, 200.0)
+    found = replay(case, record, law)
+    validate_record(found)
+    assert found.sizes["time"] == SAMPLES
+    assert found.attrs["settling_residual"] < 1e-4
+    assert differs(found, record) < 1e-5
+    assert differs(replay(case, record, law, realisation=1), record, row=1) < 1e-5
+    assert differs(replay(case, record, law, realisation=1), record, row=0) > 1e-2
+    np.testing.assert_allclose(found["mesh_phase"].values[0], record["mesh_phase"].values[0, :SAMPLES], atol=1e-9)
+
+
+def cut(record: xr.Dataset, start: int, drop: tuple[str, ...] = (), **attributes: Any) -> xr.Dataset:
+    """One period of a record from sample `start`."""
+    keep = {str(n): record[n].values[:, start : start + SAMPLES] for n in record.data_vars if n not in drop}
+    return make_record(keep, {**record.attrs, "periods": 1, **attributes})
+
+
+@pytest.mark.parametrize("drop", [(), ("mesh_phase",)])
+def test_a_record_may_begin_anywhere(case: Case, record: xr.Dataset, drop: tuple[str, ...]) -> None:
+    # Not between teeth, and not with tooth 0.
+    start = 1017
+    found = replay(case, cut(record, start, drop))
+    assert differs(found, record, start) < 1e-5
+    assert found["mesh_phase"].values[0, 0] == pytest.approx(start * 200 / RATE, rel=1e-9)
+
+
+def test_the_mean_of_the_periods_is_replayed(case: Case, record: xr.Dataset) -> None:
+    noisy = record.copy(deep=True)
+    noise = 3.0 * np.random.default_rng(0).standard_normal(SAMPLES)
+    noisy["torque_driver"].values[0] += np.concatenate([noise, -noise])
+    assert differs(replay(case, noisy), record) < 1e-5
+
+
+def test_late_sensors_show_what_they_recorded() -> None:
+    sensors = Sensors(delay_torque_driver=80e-6, delay_angle_driven=-50e-6, delay_y_driver=30e-6)
+    case = make_case(sensors=sensors)
+    seen = simulate(case)
+    assert differs(replay(case, seen), seen) < 1e-5
+    assert differs(replay(case, cut(seen, 100, ("mesh_phase",))), seen, 100) < 1e-4
+    # Without the delays the torque acts at another time.
+    assert differs(replay(make_case(), seen), seen) > 1e-3
+
+
+def test_noise_of_the_rig_is_not_replayed(case: Case, record: xr.Dataset) -> None:
+    noisy = make_case(sensors=Sensors(noise_angle=1e-5, noise_displacement=1e-6, noise_torque=1.0))
+    assert differs(replay(noisy, record), record) < 1e-5
+
+
+def test_a_torque_is_resampled_as_its_trigonometric_sum() -> None:
+    time, fine = np.arange(64) / 64, np.arange(64 * 6) / (64 * 6)
+
+    def torque(t: np.ndarray) -> np.ndarray:
+        return np.asarray(
+            5 + 3 * np.cos(2 * np.pi * 31 * t + 1) + np.sin(2 * np.pi * 2 * t) + 0.7 * np.cos(2 * np.pi * 32 * t)
+        )
+
+    np.testing.assert_allclose(resampled(torque(time), fine.size), torque(fine), atol=1e-12)
+    odd, many = np.arange(63) / 63, np.arange(63 * 4) / (63 * 4)
+    np.testing.assert_allclose(resampled(np.cos(62 * np.pi * odd), many.size), np.cos(62 * np.pi * many), atol=1e-12)
+
+
+def test_records_that_say_too_little_are_refused(case: Case, record: xr.Dataset) -> None:
+    with pytest.raises(BenchError, match="its mesh phase is unknown"):
+        replay(case, cut(record, 0, ("mesh_phase",), mesh_phase_origin="arbitrary"))
+    keep = {str(n): record[n].values[:, :1530] for n in record.data_vars}
+    with pytest.raises(BenchError, match=r"holds 59\.7\d* mesh periods, which must be a whole number"):
+        replay(case, make_record(keep, {**record.attrs, "periods": 1, "samples_per_period": 1530}))
+
+
+def test_a_replay_takes_a_fraction_of_a_second(case: Case, record: xr.Dataset) -> None:
+    law = mesh_law(case.rig, case.simulation, 200.0)
+    times = []
+    for _ in range(3):
+        start = perf_counter()
+        replay(case, record, law)
+        times.append(perf_counter() - start)
+    assert min(times) < 0.2

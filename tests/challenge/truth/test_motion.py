@@ -1,0 +1,284 @@
+"""Equations of motion of the truth rig against closed forms and balances."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from shared.truth_plants import drawn_plant, undamped
+
+from gearbench.challenge.errors import ChallengeError
+from gearbench.challenge.truth.motion import derivative, integrate
+from gearbench.challenge.truth.plant import DEGREES, OUTPUTS, STATES, Array, Plant
+
+FORCE, DTE = OUTPUTS.index("force"), OUTPUTS.index("dte")
+HUGE = 1e12
+
+
+def energy(plant: Plant, state: Array, torque: float) -> float:
+    """Kinetic and potential energy [J], the constant torques' included; backlash and all springs, no dampers."""
+    q, v, d = state[:DEGREES], state[DEGREES : 2 * DEGREES], DEGREES
+    kinetic = 0.5 * (plant.inertia @ v[:4] ** 2 + plant.mass.repeat(2) @ v[4:8] ** 2 + plant.mode_mass @ v[8:] ** 2)
+    stretch = q[4:8] - q[8:] @ plant.mode_shape
+    p = plant.support_exponent
+    potential = np.sum(plant.support * np.abs(stretch) ** (p + 2) / plant.support_reference**p / (p + 2))
+    potential += 0.5 * (plant.mode_stiffness @ q[8:] ** 2 + plant.coupling[0] * state[2 * d] ** 2)
+    potential += 0.5 * (plant.shaft[0] * (q[2] - q[3]) ** 2 + plant.governor[0] * q[3] ** 2)
+    potential += plant.load_torque * q[3] - torque * q[0]
+    # Geometric centres, driver at 0 and driven gear at the centre distance, which drops out.
+    one, two = plant.eccentricity_angle[0] + q[1], plant.eccentricity_angle[1] - q[2]
+    x = q[4] + plant.eccentricity[0] * np.cos(one) - q[6] - plant.eccentricity[1] * np.cos(two)
+    y = q[5] + plant.eccentricity[0] * np.sin(one) - q[7] - plant.eccentricity[1] * np.sin(two)
+    twist = plant.base_driver * q[1] - plant.base_driven * q[2]
+    working = twist + plant.cosine * y + plant.sine * x
+    back = -twist - plant.cosine * y + plant.sine * x - plant.teeth.backlash
+    teeth = plant.teeth
+    e = teeth.exponent
+    for closed in (working, back):
+        deflection = max(closed, 0.0)
+        potential += 4e8 * deflection ** (e + 2) / teeth.reference**e / (e + 2)
+    return float(kinetic + potential)
+
+
+def off_centre(plant: Plant) -> Plant:
+    """Centres far off their axes, across the line of action at rest, where they do not move the flanks."""
+    alpha = np.arctan2(plant.sine, plant.cosine)
+    return plant._replace(eccentricity=np.array([60e-6, 90e-6]), eccentricity_angle=np.array([-alpha, -alpha]))
+
+
+def lively_state(plant: Plant) -> Array:
+    """Gears apart in the middle of their backlash, both turning towards each other."""
+    state = np.zeros(STATES)
+    rng = np.random.default_rng(4)
+    state[1] = -0.4 * plant.teeth.backlash / plant.base_driver
+    state[4:10] = 3e-6 * rng.standard_normal(6)
+    state[DEGREES : DEGREES + 4] = [-4.0, 6.0, -2.0, 0.1]
+    state[DEGREES + 4 : 2 * DEGREES] = 0.03 * rng.standard_normal(6)
+    state[2 * DEGREES] = state[0] - state[1]
+    return state
+
+
+def test_energy_is_kept_in_contact() -> None:
+    plant = off_centre(undamped(drawn_plant()))
+    state, torque = lively_state(plant), 30.0
+    state[1] = 60e-6 / plant.base_driver  # deep in contact, turning slowly
+    state[0] = state[1] + state[2 * DEGREES]
+    state[DEGREES : DEGREES + 4] *= 0.02
+    start = energy(plant, state, torque)
+    for _ in range(10):
+        state, seen = integrate(plant, np.full(2, torque), state, step=5e-7, first=0, outputs=16, stride=1)
+        assert seen[:, FORCE].min() > 0.0
+        assert abs(energy(plant, state, torque) - start) < 1e-8 * abs(start)
+
+
+def test_energy_is_kept_through_impacts_on_both_flanks() -> None:
+    plant = off_centre(undamped(drawn_plant()))
+    plant = plant._replace(teeth=plant.teeth._replace(backlash=10e-6))
+    state, torque, step = lively_state(plant), 30.0, 5e-7
+    start = energy(plant, state, torque)
+    swing = 0.5 * plant.inertia @ state[DEGREES : DEGREES + 4] ** 2
+    both = []
+    for _ in range(40):
+        state, seen = integrate(plant, np.full(2, torque), state, step=step, first=0, outputs=500, stride=1)
+        # Contacts that begin within a step cost the method its order.
+        assert abs(energy(plant, state, torque) - start) < 1e-3 * swing
+        both.append((seen[:, FORCE].max(), seen[:, DTE].min()))
+    highest, lowest = np.max([a for a, _ in both]), np.min([b for _, b in both])
+    assert highest > 1000.0 and lowest < -1.5 * plant.teeth.backlash
+
+
+@pytest.mark.parametrize("which", ["friction", "mesh", "supports", "coupling", "shaft", "housing", "governor"])
+def test_each_damper_takes_energy(which: str) -> None:
+    plant = undamped(drawn_plant())
+    teeth = plant.teeth
+    changed = {
+        "friction": {"teeth": teeth._replace(friction=0.05)},
+        "mesh": {"teeth": teeth._replace(damping=5e-6, damping_load=0.0, damping_onset=0.0)},
+        "supports": {"support_damping": np.full(4, 3e3)},
+        "coupling": {"coupling": plant.coupling + np.array([0.0, 0.5, 0.0, 0.0])},
+        "shaft": {"shaft": plant.shaft + np.array([0.0, 50.0])},
+        "housing": {"mode_damping": np.full(2, 1e4)},
+        "governor": {"governor": plant.governor + np.array([0.0, 500.0])},
+    }[which]
+    damped = plant._replace(**changed)
+    state, torque = lively_state(plant), 30.0
+    before = energy(plant, state, torque)
+    for _ in range(30):
+        state, _ = integrate(damped, np.full(2, torque), state, step=5e-7, first=0, outputs=400, stride=1)
+        after = energy(plant, state, torque)
+        assert after < before + 2e-5
+        before = after
+    assert before < energy(plant, lively_state(plant), torque) - 1e-3
+
+
+def oscillator(damping: float = 0.0) -> tuple[Plant, float]:
+    """The driver alone on the mesh, all else immovable; and its undamped angular frequency."""
+    plant = undamped(drawn_plant())
+    teeth = plant.teeth._replace(exponent=0.0, damping=damping, damping_load=0.0, damping_onset=0.0)
+    driver = plant.inertia[1]
+    alone = plant._replace(
+        teeth=teeth,
+        inertia=np.array([HUGE, driver, HUGE, HUGE]),
+        mass=np.full(2, HUGE),
+        coupling=np.array([0.0, 0.0, 0.0, 1.0]),
+        eccentricity=np.zeros(2),
+    )
+    return alone, plant.base_driver * np.sqrt(4e8 / driver)
+
+
+def oscillator_error(damping: float, steps: int) -> float:
+    """Largest error of the dte [m] over a period and a half of the oscillator, kept in contact by its offset."""
+    plant, omega = oscillator(damping)
+    span = 1.5 * 2 * np.pi / omega
+    start, mean = 12e-6, 10e-6  # both in contact: a constant torque would hold `mean`
+    decay = 0.5 * damping * omega**2
+    damped = np.sqrt(omega**2 - decay**2)
+    state = np.zeros(STATES)
+    state[1] = start / plant.base_driver
+    # The torque acts through the coupling's elastic twist, which nothing changes.
+    soft = plant._replace(coupling=np.array([1e-6, 0.0, 0.0, 1.0]))
+    state[2 * DEGREES] = 4e8 * mean * plant.base_driver / 1e-6
+    _, seen = integrate(soft, np.zeros(2), state, step=span / steps, first=0, outputs=steps, stride=1)
+    t = np.arange(steps) * span / steps
+    shape = np.cos(damped * t) + decay / damped * np.sin(damped * t)
+    exact = mean + (start - mean) * np.exp(-decay * t) * shape
+    return float(np.abs(seen[:, DTE] - exact).max())
+
+
+@pytest.mark.parametrize("damping", [0.0, 8e-6])
+def test_one_pair_and_everything_else_rigid_is_an_oscillator_integrated_with_order_four(damping: float) -> None:
+    coarse, fine = oscillator_error(damping, 60), oscillator_error(damping, 120)
+    assert fine < 2e-9 and coarse / fine == pytest.approx(16.0, rel=0.25)
+
+
+def test_static_equilibrium() -> None:
+    plant = drawn_plant()
+    plant = undamped(plant)._replace(sensor_on_housing=1.0, eccentricity=np.zeros(2), load_torque=150.0)
+    torque = 150.0 * plant.base_driver / plant.base_driven
+    force = torque / plant.base_driver
+    pull = force * np.array([-plant.sine, -plant.cosine, plant.sine, plant.cosine])
+    p = plant.support_exponent
+    stretch = np.sign(pull) * (np.abs(pull) * plant.support_reference**p / plant.support) ** (1 / (1 + p))
+    modes = plant.mode_shape @ pull / plant.mode_stiffness
+    centres = stretch + modes @ plant.mode_shape
+    teeth = plant.teeth
+    deflection = (force * teeth.reference**teeth.exponent / 4e8) ** (1 / (1 + teeth.exponent))
+    state = np.zeros(STATES)
+    state[4:8], state[8:10] = centres, modes
+    state[2] = 150.0 / plant.shaft[0]
+    across = (centres[1] - centres[3]) * plant.cosine + (centres[0] - centres[2]) * plant.sine
+    state[1] = (deflection - across + plant.base_driven * state[2]) / plant.base_driver
+    state[2 * DEGREES] = torque / plant.coupling[0]
+    state[0] = state[1] + state[2 * DEGREES]
+    rate, seen = derivative(plant, 0.0, torque, state)
+    masses = np.concatenate((plant.inertia, plant.mass.repeat(2), plant.mode_mass))
+    scale = np.concatenate((np.full(4, torque), np.full(6, force)))
+    assert np.abs(rate[DEGREES : 2 * DEGREES] * masses / scale).max() < 1e-9
+    assert seen == pytest.approx([state[1], state[2], stretch[1], stretch[3], 150.0, force, deflection], rel=1e-9)
+
+
+def sliding_velocity(plant: Plant, state: Array, roll: float) -> float:
+    """Speed of the driver's flank over the driven one, across the line of action, from both rigid motions."""
+    alpha = np.arctan2(plant.sine, plant.cosine)
+    tangent = np.array([-np.cos(alpha), np.sin(alpha)])
+    base = plant.base_driver * np.array([np.cos(alpha), -np.sin(alpha)])
+    contact = base + roll * np.array([np.sin(alpha), np.cos(alpha)])
+    distance = (plant.base_driver + plant.base_driven) / plant.cosine
+    v = state[DEGREES:]
+    spin1, spin2 = plant.speed_driver + v[1], -(plant.speed_driven + v[2])
+    from_driven = contact - np.array([distance, 0.0])
+    one = np.array([v[4], v[5]]) + spin1 * np.array([-contact[1], contact[0]])
+    two = np.array([v[6], v[7]]) + spin2 * np.array([-from_driven[1], from_driven[0]])
+    return float(tangent @ (one - two))
+
+
+@pytest.mark.parametrize("turn", [-0.3, 0.2])
+def test_friction_takes_force_times_sliding_velocity(turn: float) -> None:
+    plant = undamped(drawn_plant())
+    sound = plant._replace(speed_driver=100.0, speed_driven=100.0 * plant.base_driver / plant.base_driven)
+    rubbing = sound._replace(teeth=sound.teeth._replace(friction=0.1, friction_shape=0, friction_speed=1e-6))
+    state = lively_state(plant)
+    angle = turn * 2 * np.pi / 20
+    state[1], state[2] = angle, (plant.base_driver * angle - 20e-6) / plant.base_driven
+    (with_it, seen), (without, _) = derivative(rubbing, 0.0, 0.0, state), derivative(sound, 0.0, 0.0, state)
+    masses = np.concatenate((plant.inertia, plant.mass.repeat(2), plant.mode_mass))
+    forces = masses * (with_it - without)[DEGREES : 2 * DEGREES]
+    velocity = state[DEGREES : 2 * DEGREES] + np.array([0, 100.0, sound.speed_driven, *[0.0] * 7])
+    slide = sliding_velocity(sound, state, plant.roll_pitch + turn * plant.base_pitch)
+    assert seen[FORCE] > 1000.0
+    assert forces @ velocity == pytest.approx(-0.1 * seen[FORCE] * abs(slide), rel=1e-6)
+    assert np.sign(slide) == np.sign(turn)
+
+
+def test_torques_on_the_rotor() -> None:
+    plant = undamped(drawn_plant())
+    size, phase = 2.0, 0.7
+    ripple = np.zeros((4, 2))
+    ripple[2] = [size * np.cos(phase), -size * np.sin(phase)]
+    driven = plant._replace(ripple=ripple, tone=np.array([0.5, 300.0, 0.2]), speed_driver=11.0)
+    state = lively_state(plant)
+    state[0] = 0.31
+    rate, _ = derivative(driven, 0.05, 7.0, state)
+    passed = plant.coupling[0] * state[2 * DEGREES]
+    angle = 11.0 * 0.05 + 0.31
+    torque = 7.0 + size * np.cos(18 * angle + phase) + 0.5 * np.cos(300.0 * 0.05 + 0.2)
+    assert rate[DEGREES] * plant.inertia[0] == pytest.approx(torque - passed, rel=1e-9)
+
+
+def test_slipping_coupling_passes_no_more_than_its_limit() -> None:
+    plant = undamped(drawn_plant())
+    spring = plant.coupling[0]
+    slipping = plant._replace(coupling=np.array([spring, 0.0, 50.0, 1e-6 * spring]))
+    state = np.zeros(STATES)
+    state[DEGREES] = 3.0
+    twists = []
+    for _ in range(50):
+        state, _ = integrate(slipping, np.full(2, 60.0), state, step=1e-6, first=0, outputs=20, stride=1)
+        twists.append(state[2 * DEGREES])
+    assert 50.0 < spring * max(twists) < 60.0
+    assert state[0] - state[1] - state[2 * DEGREES] > 1e-4
+
+
+def test_crack_and_pitch_error_belong_to_their_tooth() -> None:
+    plant = undamped(drawn_plant())
+    teeth = plant.teeth
+    broken = teeth.crack_driver.copy()
+    broken[3] = 0.5
+    late = teeth.error_driven.copy()
+    late[23] = -4e-6
+    share = np.full_like(teeth.stiffness, 0.4)
+    plant = plant._replace(
+        teeth=teeth._replace(crack_driver=broken, error_driven=late, share_driver=share, exponent=0.0),
+        eccentricity=np.zeros(2),
+    )
+
+    def force(pair: int) -> float:
+        state = np.zeros(STATES)
+        state[1] = pair * 2 * np.pi / 20
+        state[2] = (plant.base_driver * state[1] - 10e-6) / plant.base_driven
+        return float(derivative(plant, 0.0, 0.0, state)[1][FORCE])
+
+    assert [force(pair) for pair in (0, 1, 2)] == pytest.approx([4000.0] * 3, rel=1e-6)
+    assert [force(3), force(43)] == pytest.approx([4000.0 / 1.2] * 2, rel=1e-6)
+    assert force(53) == pytest.approx(4e8 * 6e-6, rel=1e-6)
+    assert force(23) == pytest.approx(4e8 * 6e-6 / 1.2, rel=1e-6)
+
+
+def test_eccentric_centres_add_material_at_the_run_out_phase() -> None:
+    plant = undamped(drawn_plant())._replace(eccentricity=np.array([5e-6, 0.0]))
+    for phase, turned, expected in ((0.4, 0.4, 5e-6), (0.4, 0.4 + np.pi, -5e-6), (0.4, 0.4 + np.pi / 2, 0.0)):
+        alpha = np.arctan2(plant.sine, plant.cosine)
+        placed = plant._replace(eccentricity_angle=np.array([np.pi / 2 - alpha - phase, 0.0]))
+        state = np.zeros(STATES)
+        state[1] = turned
+        state[2] = plant.base_driver * turned / plant.base_driven
+        assert derivative(placed, 0.0, 0.0, state)[1][DTE] == pytest.approx(expected, abs=1e-12)
+
+
+def test_integration_refuses_nonsense() -> None:
+    plant = drawn_plant()
+    with pytest.raises(ChallengeError, match="even number"):
+        integrate(plant, np.zeros(3), np.zeros(STATES), step=1e-6, first=0, outputs=1, stride=1)
+    with pytest.raises(ChallengeError, match="shape"):
+        integrate(plant, np.zeros(2), np.zeros(6), step=1e-6, first=0, outputs=1, stride=1)
+    with pytest.raises(ChallengeError, match="too long"):
+        integrate(plant, np.full(2, 100.0), np.ones(STATES), step=1e-2, first=0, outputs=400, stride=1)

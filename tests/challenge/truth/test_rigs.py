@@ -1,0 +1,87 @@
+"""From levels to the plant: phases, signs and sizes of the effects as the contracts count them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from shared.truth_plants import drawn_levels, short_bench, undamped
+
+from gearbench.challenge.truth.levels import Levels
+from gearbench.challenge.truth.motion import derivative
+from gearbench.challenge.truth.plant import DEGREES, OUTPUTS, STATES, Plant
+from gearbench.challenge.truth.rigs import build_plant, conditions_of
+from gearbench.challenge.truth.structure import draw_structure
+
+BENCH = short_bench()
+EXPERIMENT = conditions_of(BENCH.nominal)[0].experiment
+RIG = draw_structure(BENCH.nominal, "test", np.random.default_rng(2))
+LEVELS = drawn_levels(2)
+
+
+def plant_of(levels: Levels) -> Plant:
+    return build_plant(BENCH, RIG, levels, EXPERIMENT)
+
+
+@pytest.mark.parametrize("side", [0, 1])
+def test_run_out_adds_half_its_size_at_its_phase(side: int) -> None:
+    runout, phase = [0.0, 0.0], [0.0, 0.0]
+    runout[side], phase[side] = 12e-6, 0.7
+    plant = undamped(plant_of(replace(LEVELS, runout=(runout[0], runout[1]), runout_phase=(phase[0], phase[1]))))
+    for turned in (0.7, 1.9, 0.7 + np.pi):
+        state = np.zeros(STATES)
+        other = plant.base_driver / plant.base_driven
+        state[1], state[2] = (turned, turned * other) if side == 0 else (turned / other, turned)
+        dte = derivative(plant, 0.0, 0.0, state)[1][OUTPUTS.index("dte")]
+        assert dte == pytest.approx(6e-6 * np.cos(turned - 0.7), abs=1e-12)
+
+
+def test_ripple_is_a_part_of_the_mean_torque_at_its_orders() -> None:
+    size, phase = np.array([0.0, 0.01, 0.0, 0.004]), np.array([0.0, 0.5, 0.0, 2.0])
+    plant = plant_of(replace(LEVELS, ripple=size, ripple_phase=phase))
+    state = np.zeros(STATES)
+    state[0] = 0.23
+    with_it = derivative(plant, 0.0, 0.0, state)[0][DEGREES]
+    without = derivative(plant._replace(ripple=0.0 * plant.ripple), 0.0, 0.0, state)[0][DEGREES]
+    torque = 100.0 * (0.01 * np.cos(12 * 0.23 + 0.5) + 0.004 * np.cos(24 * 0.23 + 2.0))
+    assert (with_it - without) * plant.inertia[0] == pytest.approx(torque, rel=1e-9)
+
+
+def test_coupling_resonates_at_its_frequency() -> None:
+    plant = plant_of(replace(LEVELS, coupling_frequency=1300.0))
+    rotor, driver = plant.inertia[:2]
+    omega = np.sqrt(plant.coupling[0] * (1 / rotor + 1 / driver))
+    assert omega == pytest.approx(2 * np.pi * 1300.0)
+
+
+def test_bearing_has_its_stiffness_at_about_the_mean_deflection() -> None:
+    plant = plant_of(replace(LEVELS, exponent=(0.5, 0.0)))
+    assert plant.support_exponent.tolist() == [0.0, 0.5, 0.0, 0.0]
+    force = 100.0 / plant.base_driver * plant.cosine
+    assert plant.support_reference[1] == pytest.approx(force / RIG.support[1])
+
+
+def test_backlash_grows_by_the_transverse_arc_along_the_line_of_action() -> None:
+    plant, more = (plant_of(replace(LEVELS, backlash_more=b)) for b in (0.0, 50e-6))
+    assert plant.teeth.backlash == pytest.approx(BENCH.meshing.backlash_normal)
+    assert more.teeth.backlash - plant.teeth.backlash == pytest.approx(50e-6 * np.cos(np.deg2rad(20)))
+
+
+def test_crack_takes_its_part_of_the_bending_stiffness() -> None:
+    loss = np.zeros(20)
+    loss[4] = 0.35
+    teeth = plant_of(replace(LEVELS, crack=(loss, np.zeros(30)))).teeth
+    # Compliance of the cracked tooth over that of the sound one.
+    assert 1 + teeth.crack_driver[4] == pytest.approx(1 / 0.65)
+    assert np.count_nonzero(teeth.crack_driver) == 1 and not teeth.crack_driven.any()
+
+
+def test_tone_lies_off_the_lines() -> None:
+    foreign = replace(LEVELS.foreign, tone=0.02, tone_frequency=500.0, tone_offset=0.4)
+    amplitude, omega, _ = plant_of(replace(LEVELS, foreign=foreign)).tone
+    spacing = EXPERIMENT.sampling_rate / EXPERIMENT.samples_per_period
+    line = omega / (2 * np.pi * spacing)
+    assert amplitude == pytest.approx(2.0)
+    assert line - np.floor(line) == pytest.approx(0.4)
+    assert abs(line * spacing - 500.0) < spacing

@@ -1,0 +1,63 @@
+"""Which effects records cannot tell apart, against marginal likelihoods of drawn data."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gearbench.diagnosis.evidence.fit import Fit
+from gearbench.diagnosis.evidence.hypotheses import Hypothesis
+from gearbench.diagnosis.evidence.separable import alike, expected_gains
+from gearbench.diagnosis.forces.parameters import NUISANCE, block, layout
+
+SMALL = layout(
+    [
+        block("offset", NUISANCE, "m", 2, 1.0),
+        block("lobe", "eccentricity", "m", 2, 0.1, 1.0),
+        block("rub", "friction", "1", 1, 0.1, 1.0),
+        block("lag", "sensor-delay", "s", 1, 0.1, 1.0),
+    ]
+)
+LOBE = Hypothesis("eccentricity", "eccentricity", "mesh", ("eccentricity",), (), 2)
+RUB = Hypothesis("friction", "friction", "mesh", ("friction",))
+LAG = Hypothesis("sensor-delay", "sensor-delay", "sensor", ("sensor-delay",))
+
+
+def fit_of(columns: np.ndarray) -> Fit:
+    nothing, sd = np.zeros(SMALL.size), SMALL.prior()
+    information = columns.T @ columns
+    return Fit(nothing, sd, information + np.diag(1 / sd**2), information, nothing, (), 0.0, 0.0, 0)
+
+
+def log_likelihood(data: np.ndarray, columns: np.ndarray, sd: np.ndarray) -> np.ndarray:
+    """Of data (draws, n), unknowns integrated out."""
+    covariance = np.eye(len(columns)) + (columns * sd**2) @ columns.T
+    square = np.einsum("dn,dn->d", data, np.linalg.solve(covariance, data.T).T)
+    return -0.5 * square - 0.5 * np.linalg.slogdet(covariance)[1]
+
+
+@pytest.mark.parametrize("truth", [LOBE, RUB])
+def test_expected_gains_are_means_of_marginal_likelihoods(truth: Hypothesis) -> None:
+    rng = np.random.default_rng(3)
+    columns = rng.standard_normal((12, SMALL.size)) * np.array([1, 1, 3, 3, 2, 2])
+    beyond = np.sqrt(truth.prior(SMALL) ** 2 - SMALL.prior() ** 2)
+    drawn = rng.standard_normal((40_000, SMALL.size)) * beyond
+    data = drawn @ columns.T + rng.standard_normal((40_000, 12))
+    plain = log_likelihood(data, columns, SMALL.prior())
+    listed = (LOBE, RUB, LAG)
+    wanted = [
+        np.mean(log_likelihood(data, columns, h.prior(SMALL)) - plain) - np.log(h.choices) for h in listed
+    ]
+    got = expected_gains(fit_of(columns), SMALL, listed)[listed.index(truth)]
+    assert got == pytest.approx(wanted, abs=0.15, rel=0.02)
+
+
+def test_what_moves_the_rows_alike_cannot_be_told_apart() -> None:
+    columns = np.diag([1.0, 1.0, 30.0, 30.0, 30.0, 0.0])
+    columns[:, 5] = columns[:, 4] + 1e-3
+    assert alike(fit_of(columns), SMALL, (LOBE, RUB, LAG)) == (("friction", "sensor-delay"),)
+
+
+def test_what_moves_other_rows_or_none_is_told_apart() -> None:
+    assert alike(fit_of(np.diag([1.0, 1.0, 30.0, 30.0, 30.0, 30.0])), SMALL, (LOBE, RUB, LAG)) == ()
+    assert alike(fit_of(np.diag([1.0, 1.0, 30.0, 30.0, 30.0, 0.01])), SMALL, (LOBE, RUB, LAG)) == ()

@@ -1,0 +1,118 @@
+"""Scatter between periods: white noise counts for nothing, and a rig that changes from one period to the next shows
+it in the row of what has changed. The two periods are simulated in time domain, each on a rig of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from gearbench.bench import simulate
+from gearbench.bench.nonlinear.replay import replay
+from gearbench.cases import case_files
+from gearbench.diagnosis.forces.condition import prepare
+from gearbench.diagnosis.forces.covariance import BLOCK
+from gearbench.diagnosis.forces.nominal import Machine, machine
+from gearbench.diagnosis.forces.parameters import Layout
+from gearbench.diagnosis.forces.steadiness import excess_of, unsteadiness
+from gearbench.diagnosis.forces.unknowns import ROWS, unknowns
+from gearbench.diagnosis.intake.measurements import Measurement, measurement
+from gearbench.rig import Case, Ripple, read_case
+
+BAND = 3000.0
+NOISE = {"angle": 1e-6, "y": 0.05e-6, "torque": 0.02}  # what the nominal rig states
+
+
+@dataclass(frozen=True)
+class Bench:
+    nominal: Case
+    record: xr.Dataset
+    steady: Measurement
+    machine: Machine
+    where: Layout
+
+    def unsteadiness(self, later: Case | None = None, *, noise: float = 1.0, periods: int = 2) -> np.ndarray:
+        """Of one period of the nominal rig and others of another one."""
+        first = self.steady.periods
+        second = first if later is None else measurement(replay(later, self.record), "x", self.nominal).periods
+        turn = np.random.default_rng(6)
+        seen = {}
+        for channel, values in first.items():
+            both = np.stack([values[0], *(second[channel][0] for _ in range(periods - 1))])
+            seen[channel] = both + noise * NOISE[channel.split("_")[0]] * turn.standard_normal(both.shape)
+        p = np.zeros(self.where.size)
+        p[self.where["radial"]] = 30.0  # the lumped model has none
+        return unsteadiness(self.machine, [replace(self.steady, periods=seen)], self.where, p, BAND)
+
+    def changed(self, part: str, field: str, **update: object) -> Case:
+        rig = self.nominal.rig
+        value = getattr(getattr(rig, part), field).model_copy(update=update) if field else None
+        inner = getattr(rig, part).model_copy(update={field: value} if field else update)
+        return self.nominal.model_copy(update={"rig": rig.model_copy(update={part: inner})})
+
+
+@pytest.fixture(scope="module")
+def bench() -> Bench:
+    case = read_case(case_files()["gap_demo"], ["condition.0.multisine.amplitude_nm=20"])
+    nominal = case.under(case.conditions[0])
+    record = simulate(nominal)
+    made = machine(nominal, 220.0, 100.0)
+    steady = measurement(replay(nominal, record), "base", nominal)
+    where = unknowns(made, [prepare(steady, made, BAND)])
+    return Bench(nominal, record, steady, made, where)
+
+
+def test_white_noise_counts_for_nothing(bench: Bench) -> None:
+    assert bench.unsteadiness().max() < 10
+    assert bench.unsteadiness(periods=12, noise=30.0).max() < 10  # its size is read off the record
+
+
+def test_one_period_says_nothing(bench: Bench) -> None:
+    assert not bench.unsteadiness(periods=1).any()
+
+
+CHANGES: dict[str, Callable[[Bench], Case]] = {
+    "driver-support": lambda b: b.changed("support", "driver", stiffness=1.1e8),
+    "driven-support": lambda b: b.changed("support", "driven", stiffness=1.1e8),
+    "drive": lambda b: b.changed("drive", "", ripple=Ripple(orders=(7, 33), amplitude=(4.0, 6.0), phase=(0.2, 0.4))),
+    "mesh": lambda b: b.changed("mesh", "", stiffness_scale=1.1),
+    "load": lambda b: b.changed("sensors", "", delay_torque_driven=20e-6),  # the speed is prescribed there
+}
+
+
+@pytest.mark.parametrize("place", CHANGES)
+def test_a_rig_that_changes_shows_in_its_own_row(bench: Bench, place: str) -> None:
+    found = dict(zip((*ROWS, "mesh"), bench.unsteadiness(CHANGES[place](bench)), strict=True))
+    own = found.pop(place)
+    assert own > 100 and own > 10 * max(found.values())
+
+
+def test_an_error_of_the_mesh_force_is_no_rows_own() -> None:
+    """What all rows share, each with its complex part of it, is the mesh's; what one adds is that row's."""
+    turn = np.random.default_rng(5)
+
+    def noise(*shape: int) -> np.ndarray:
+        return (turn.standard_normal(shape) + 1j * turn.standard_normal(shape)) / np.sqrt(2)
+
+    bins = 50 * BLOCK
+    share = np.exp(2j * np.pi * turn.uniform(size=(4, bins)))
+    scatter = noise(2, 4, bins) - share * 20 * noise(2, 1, bins)
+    count = excess_of(scatter, share, np.ones((5, bins)))
+    # Bins of two periods times the logarithm of 20^2 + 1, within the scatter of 16 degrees of freedom.
+    assert count[-1] == pytest.approx(2 * bins * np.log(401), rel=0.05)
+    assert count[:-1].max() < 0.02 * count[-1]
+    scatter[:, 2] += 10 * noise(2, bins)
+    both = excess_of(scatter, share, np.ones((5, bins)))
+    assert both[2] == pytest.approx(2 * bins * np.log(101), rel=0.05)
+    assert both[[0, 1, 3]].max() < 0.02 * both[2]
+
+
+def test_rows_without_a_channel_are_left_out() -> None:
+    turn = np.random.default_rng(5)
+    scatter = 10 * (turn.standard_normal((2, 4, 80)) + 1j * turn.standard_normal((2, 4, 80)))
+    scatter[:, 1] = np.nan
+    found = excess_of(scatter, np.ones((4, 80), complex), np.ones((5, 80)))
+    assert found[1] == 0.0 and found[[0, 2, 3]].min() > 100

@@ -1,0 +1,219 @@
+"""The non-linear model with every effect at once against plainly written equations, and without any against the linear
+model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import cos, pi, sin, tanh
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+from shared.effect_rig import GEARS, MASSES, ZETA, make_model, make_rig, run
+from shared.hat_mesh import ALPHA, BASE_PITCH, BEND, BENDING, PHASES, PITCH_ROLL, RADII, TOP, hat, hat_law, stiffness
+
+from gearbench.lumped import Lumped, LumpedError, tabulated_stiffness
+from gearbench.lumped.linear.runge_kutta import integrate as integrate_linear
+from gearbench.lumped.linear.runge_kutta import tabulate
+from gearbench.lumped.nonlinear.step import integrate
+from gearbench.lumped.nonlinear.tables import EXCESS, GAIN, Motion, tables
+from gearbench.rig import Coupling, Crack, Drive, Friction, Load, MeshCorrection, Rig, Ripple, Support, Supports
+
+Array = NDArray[np.float64]
+
+
+def rich_rig(boundary: str) -> Rig:
+    """A rig with every effect at once."""
+    rng = np.random.default_rng(5)
+    return make_rig(
+        driver={"pitch_error": tuple(rng.normal(0, 3e-6, 20)), "runout": 12e-6, "runout_phase": 1.0},
+        driven={
+            "pitch_error": tuple(rng.normal(0, 3e-6, 30)),
+            "runout": 7e-6,
+            "runout_phase": -0.4,
+            "crack": Crack(tooth=3, stiffness_loss=0.5),
+        },
+        support=Supports(
+            driver=Support(stiffness=1e8, damping=3e3, exponent=0.35, reference_deflection=8e-6),
+            driven=Support(stiffness=1.4e8, damping=2e3, exponent=0.2),
+        ),
+        drive=Drive(
+            coupling=Coupling(inertia=2e-3, stiffness=9e3, damping=0.6),
+            ripple=Ripple(orders=(6, 13), amplitude=(3.0, 2.0), phase=(0.5, -1.1)),
+        ),
+        load=Load(boundary=boundary),
+        friction=Friction(coefficient=0.06, transition_speed=20e-3),
+        mesh=MeshCorrection(
+            stiffness_scale=1.1,
+            stiffness_cos=(0.05, 0.02),
+            stiffness_sin=(-0.03, 0.01),
+            error_mean=2e-6,
+            error_cos=(1e-6,),
+            error_sin=(-0.5e-6,),
+        ),
+    )
+
+
+def plain_equations(rig: Rig, mesh_frequency: float, torque: Callable[[float], float]) -> Callable[..., list[float]]:
+    """Right-hand side for u1, y1, y2, u2, w and their rates, written from the equations and nothing else."""
+    (r1, r2), (m1, m2), (j1, j2) = RADII, MASSES, GEARS
+    coupling, ripple, mesh, friction = rig.drive.coupling, rig.drive.ripple, rig.mesh, rig.friction
+    assert coupling is not None and ripple is not None and coupling.stiffness is not None
+    spring, shaft_damping = coupling.stiffness, coupling.damping
+    crack = rig.driven.crack
+    assert crack is not None
+    free = rig.load.boundary == "torque"
+    both = GEARS[0] + coupling.inertia
+    m_e = both * j2 / (both * r2**2 + j2 * r1**2) if free else both / r1**2
+    speed1, speed2 = 2 * pi * mesh_frequency / 20, 2 * pi * mesh_frequency / 30
+
+    def material(t: float) -> float:
+        phase = mesh_frequency * t
+        total = mesh.error_mean + mesh.error_cos[0] * cos(2 * pi * phase) + mesh.error_sin[0] * sin(2 * pi * phase)
+        for gear, speed in ((rig.driver, speed1), (rig.driven, speed2)):
+            total += gear.runout / 2 * cos(speed * t - gear.runout_phase)
+        for n in range(int(phase) - 1, int(phase) + 3):
+            total += float(hat(phase - n)) * (rig.driver.pitch_error[n % 20] + rig.driven.pitch_error[n % 30])
+        return total
+
+    def rates(t: float, q: Array) -> list[float]:
+        u1, y1, y2, u2, w, v1, vy1, vy2, v2, vw = q
+        phase = mesh_frequency * t
+        late, early = material(t + 1e-7), material(max(t - 1e-7, 0.0))
+        delta = u1 - u2 + cos(ALPHA) * (y1 - y2) + material(t)
+        closing = v1 - v2 + cos(ALPHA) * (vy1 - vy2) + (late - early) / (1e-7 + min(t, 1e-7))
+        gain = mesh.stiffness_scale * (
+            1
+            + sum(c * cos(2 * pi * (n + 1) * phase) for n, c in enumerate(mesh.stiffness_cos))
+            + sum(s * sin(2 * pi * (n + 1) * phase) for n, s in enumerate(mesh.stiffness_sin))
+        )
+        levers = [0.0, 0.0, 0.0]
+        for n in range(int(phase) - 1, int(phase) + 3):
+            share = float(hat(phase - n))
+            if n % 30 == crack.tooth:
+                grown = 1 + BENDING[1] * (1 / (1 - crack.stiffness_loss) - 1)
+                gain *= 1 - share * (1 - 1 / grown)
+            path = (phase - n) * BASE_PITCH
+            roll1, roll2 = PITCH_ROLL[0] + path, PITCH_ROLL[1] - path
+            sliding = path * (speed1 + speed2) + roll1 * v1 / r1 - roll2 * v2 / r2 + (vy1 - vy2) * sin(ALPHA)
+            slides = tanh(sliding / friction.transition_speed)
+            levers[0] += share * slides * roll1
+            levers[1] += share * slides
+            levers[2] += share * slides * roll2
+        force = 0.0
+        if delta > 0:
+            k = float(stiffness(phase)) * gain
+            tangent = k * (1 + 1.5 * BEND * (delta / TOP) ** 0.5)
+            force = k * delta * (1 + BEND * (delta / TOP) ** 0.5) + 2 * ZETA * (tangent * m_e) ** 0.5 * closing
+            force = max(force, 0.0)
+        rub = friction.coefficient * force
+        drive = torque(t) + sum(
+            a * cos(o * speed1 * t + p) for o, a, p in zip(ripple.orders, ripple.amplitude, ripple.phase, strict=True)
+        )
+        twist = spring * (w - u1) / r1 + shaft_damping * (vw - v1) / r1  # torque through the coupling
+        reaction = r2 / r1 * torque(t) - rub * (r2 / r1 * levers[0] - levers[2])
+        supports = [
+            s.stiffness * y * (abs(y) / s.reference_deflection) ** s.exponent + s.damping * v
+            for s, y, v in ((rig.support.driver, y1, vy1), (rig.support.driven, y2, vy2))
+        ]
+        across = force * cos(ALPHA) + rub * levers[1] * sin(ALPHA)
+        return [
+            v1,
+            vy1,
+            vy2,
+            v2,
+            vw,
+            r1 / j1 * (twist - r1 * force - rub * levers[0]),
+            (-across - supports[0]) / m1,
+            (across - supports[1]) / m2,
+            r2 / j2 * (r2 * force + rub * levers[2] - reaction) if free else 0.0,
+            r1 / coupling.inertia * (drive - twist),
+        ]
+
+    return rates
+
+
+@pytest.mark.parametrize("boundary", ["speed", "torque"])
+def test_a_rig_with_every_effect_follows_the_plain_equations(boundary: str) -> None:
+    rig = rich_rig(boundary)
+    model = make_model(rig)
+
+    def torque(t: Any) -> Any:
+        return 100.0 + 20 * np.sin(2 * pi * 700 * t) + 10 * np.sin(2 * pi * 1900 * t + 1)
+
+    first = tables(model, Motion(cycles=1.0, entries=2, step=1.0))[0]
+    state = model.equilibrium(float(torque(0.0)) / RADII[0], float(first[EXCESS]), float(first[GAIN]), 0.0)
+    frequency, cycles, steps = 100.0, 3.0, 19200
+    time, out = run(model, lambda t: torque(t) / RADII[0], state, mesh_frequency=frequency, cycles=cycles, steps=steps)
+    assert out[:, 5].min() > 0
+    # Whole phases are kinks of the hats: the reference does not step over them.
+    plain = plain_equations(rig, frequency, torque)
+    for n in range(int(cycles)):
+        part = slice(n * 6400, (n + 1) * 6400)
+        span = (n / frequency, (n + 1) / frequency)
+        found = solve_ivp(plain, span, state, "DOP853", dense_output=True, rtol=1e-9, atol=1e-14, max_step=2e-4)
+        error = np.abs(found.sol(time[part]).T[:, :5] - out[part, :5]).max(axis=0)
+        assert np.all(error <= 1e-6 * np.ptp(out[:, :5], axis=0)), error
+        state = found.y[:, -1]
+
+
+@pytest.mark.parametrize("boundary", ["speed", "torque"])
+def test_without_effects_it_is_the_linear_model(boundary: str) -> None:
+    model = make_model(make_rig(load=Load(boundary=boundary)), hat_law(bend=0.0))
+    steps, cycles, frequency = 4096, 4.0, 100.0
+    step = cycles / frequency / steps
+    time = np.arange(2 * steps) * step / 2
+    force = 3500 + 800 * np.sin(2 * pi * 650 * time)
+    supports = (model.rig.support.driver, model.rig.support.driven)
+    linear = Lumped(
+        mesh_mass=model.mesh_mass,
+        support_factor=cos(ALPHA),
+        masses=MASSES,
+        support_stiffness=(supports[0].stiffness, supports[1].stiffness),
+        support_damping=(supports[0].damping, supports[1].damping),
+        damping_ratio=ZETA,
+        stiffness=tabulated_stiffness(stiffness(np.arange(PHASES) / PHASES)),
+    )
+    state = linear.equilibrium(3500.0)
+    _, expected = integrate_linear(
+        tabulate(linear, cycles=int(cycles), steps=steps, step=step), force, state, samples=steps, substeps=1
+    )
+    start = np.array([*state[:3], 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    table = tables(model, Motion(cycles, 2 * steps, step))
+    _, out = integrate(model, table, force, start, step=step, substeps=1, mesh_frequency=frequency)
+    np.testing.assert_allclose(out[:, 0] - out[:, 3], expected[:, 0], rtol=1e-9)
+    np.testing.assert_allclose(out[:, 1:3], expected[:, 1:3], rtol=1e-9)
+    np.testing.assert_allclose(out[:, 5], expected[:, 3], rtol=1e-9)
+    if boundary == "torque":
+        # Nothing turns both gears the same way.
+        common = out[:, 0] * model.masses[0] + out[:, 3] * model.masses[1]
+        assert np.ptp(common) < 1e-14
+
+
+def test_runs_of_consecutive_stretches_are_one_run() -> None:
+    model = make_model(rich_rig("speed"))
+    step, steps = 1e-5, 3600
+    force = 3500 + 300 * np.sin(2 * pi * np.arange(2 * steps) / (2 * steps))
+    whole = tables(model, Motion(3.0, 2 * steps, step, 0.25))
+    state = np.array([2e-5, -3e-5, 2e-5, 0.0, 4e-5, 0, 0, 0, 0, 0])
+    how = {"step": step, "substeps": 3, "mesh_frequency": 3.0 / (steps * step)}
+    end, out = integrate(model, whole, force, state, **how)
+    middle, first = integrate(model, tables(model, Motion(1.0, 2 * steps // 3, step, 0.25)), force, state, **how)
+    table = tables(model, Motion(2.0, 4 * steps // 3, step, 1.25))
+    again, second = integrate(model, table, force, middle, first_entry=2 * steps // 3, **how)
+    np.testing.assert_allclose(np.concatenate([first, second]), out, rtol=1e-7, atol=1e-12)
+    np.testing.assert_allclose(again, end, rtol=1e-7, atol=1e-12)
+
+
+def test_tables_that_do_not_fit_and_overflow_are_refused() -> None:
+    model = make_model(make_rig())
+    table = tables(model, Motion(1.0, 100, 1e-5))
+    with pytest.raises(LumpedError, match="do not hold whole samples"):
+        integrate(model, table, np.zeros(10), np.zeros(10), step=1e-5, substeps=3, mesh_frequency=2e3)
+    with pytest.raises(LumpedError, match=r"shape \(6,\), not \(10,\)"):
+        integrate(model, table, np.zeros(10), np.zeros(6), step=1e-5, substeps=5, mesh_frequency=2e3)
+    coarse = tables(model, Motion(1.0, 20000, 1.0))
+    with pytest.raises(LumpedError, match="overflowed"):
+        integrate(model, coarse, np.full(10, 3e3), np.zeros(10), step=1.0, substeps=5, mesh_frequency=1e-4)
