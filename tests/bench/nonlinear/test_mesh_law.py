@@ -13,8 +13,8 @@ from gearbench.bench.nonlinear.mesh_law import PHASES, mesh_law
 from gearbench.fem.contact.law import Law
 from gearbench.fem.contact.static import position, static_cycle
 from gearbench.geometry import pair
+from gearbench.lumped import mesh_stiffness
 from gearbench.lumped.nonlinear.law import MeshLaw
-from gearbench.lumped.stiffness import mesh_stiffness
 from gearbench.rig import Crack, Gear, Rig, Simulation, Support, Supports
 
 Array = NDArray[np.float64]
