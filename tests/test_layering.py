@@ -28,8 +28,8 @@ MAY_IMPORT: dict[str, set[str]] = {
     # The truth that diagnosis is tested on: neither knows the other.
     "challenge": {"rig", "records", "kernels", "geometry", "fem", "lumped", "bench", "cases"},
 }
-# Rooms of a package from the lowest to the highest: a file imports from its own room and from lower ones. A package that
-# is not named here has no rooms.
+# Rooms of a package from the lowest to the highest: a file imports from its own room and from lower ones. A package
+# that is not named here has no rooms.
 ROOMS: dict[str, tuple[str, ...]] = {
     "rig": ("casefile",),
     "geometry": ("tooth", "pair", "mesh", "export"),
