@@ -143,7 +143,7 @@ def test_first_use_installs_and_later_use_does_not(checkout: Checkout, tmp_path:
 
 def test_test_runs_pytest_in_the_checkout(checkout: Checkout) -> None:
     _, out, _ = checkout.run("test", "-k", "a or b")
-    assert out == f"ran in {checkout.home}: -P -m pytest -m not validation -k a or b\n"
+    assert out == f"ran in {checkout.home}: -P -m pytest -m not validation -n auto --dist loadfile -k a or b\n"
 
 
 def test_exit_code_is_that_of_the_command(checkout: Checkout) -> None:
@@ -305,7 +305,7 @@ def test_set_up_does_not_wait_for_answers(checkout: Checkout) -> None:
 
 
 def test_mesher_asks_for_the_libraries_the_launcher_installs() -> None:
-    words = (ROOT / "geometry" / "mesh.py").read_text(encoding="utf-8").replace('"', " ").split()
+    words = (ROOT / "geometry" / "mesh" / "sector_mesh.py").read_text(encoding="utf-8").replace('"', " ").split()
     assert set(LIBRARIES) <= {word.strip(",;:.)") for word in words}
     launcher = (ROOT / "gearbench").read_text(encoding="utf-8")
     assert all(f"{soname}={package}" in launcher for soname, package in zip(SONAMES, LIBRARIES, strict=True))

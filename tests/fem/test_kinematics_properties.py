@@ -69,13 +69,13 @@ def distance(meshing: Pair, side: int, tooth: int, angles: tuple[float, float], 
     start, stop = one.s_form, one.s_tip
     best = np.inf
     for turn in range(7):
-        s = np.linspace(start, stop, 300 if turn == 0 else 41)
+        s = np.linspace(start, stop, 120 if turn == 0 else 41)
         points = flank(meshing, 0, tooth, side, angles[0], np.zeros(2), s)
 
         def apart(other: Array, points: Array = points) -> Array:
             return np.hypot(*(flank(meshing, 1, tooth, side, angles[1], centre, other) - points).T)
 
-        coarse = np.linspace(two.s_form, two.s_tip, 200)
+        coarse = np.linspace(two.s_form, two.s_tip, 80)
         all_apart = np.stack([apart(np.full(len(s), at)) for at in coarse])
         middle = coarse[np.argmin(all_apart, axis=0)]
         low = np.maximum(middle - (coarse[1] - coarse[0]), two.s_form)

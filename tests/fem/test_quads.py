@@ -69,19 +69,12 @@ def torque(rig: Rig, size: float, element: Element) -> np.ndarray:
     return static_cycle(law, PHASES, dte=[15e-6]).torque_driver[0]
 
 
-def uneven(gear: Any, rig: Any) -> Rig:
-    """Two gears that differ in teeth, shift and hub."""
+def test_torque_is_that_of_triangles(gear: Any, rig: Any) -> None:
+    """Over the whole cycle to 0.1 % on gears that differ in teeth, shift and hub; rows_static halves the mesh."""
     driver = gear(19, profile_shift=0.2, hub_radius=13e-3)
-    return rig(driver, gear(33, profile_shift=-0.1), material=Material(state="plane-strain"))  # type: ignore[no-any-return]
-
-
-@pytest.mark.parametrize("which", ["twins", "uneven"])
-def test_torque_is_that_of_triangles_and_of_the_mesh_halved(which: str, gear: Any, rig: Any) -> None:
-    """Over the whole cycle to 0.1 %; the mesh halved moves it by less."""
-    case = rig(gear(), gear()) if which == "twins" else uneven(gear, rig)
+    case = rig(driver, gear(33, profile_shift=-0.1), material=Material(state="plane-strain"))
     found = torque(case, 1 / 6, "quadrilateral")
     np.testing.assert_allclose(found, torque(case, 1 / 6, "triangle"), rtol=1e-3)
-    np.testing.assert_allclose(found, torque(case, 1 / 12, "quadrilateral"), rtol=2e-4)
 
 
 def test_modes_are_those_of_triangles(gear: Any) -> None:

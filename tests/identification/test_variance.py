@@ -19,14 +19,16 @@ NOISE = 0.3
 LINES = np.arange(170, 210, 5)
 
 
-def repeated(window: Window, experiments: int, period: int) -> tuple[list[LpmResult], np.ndarray]:
-    """Identifications of one system with one set of inputs and RUNS draws of white noise; true HTF."""
+def repeated(
+    window: Window, experiments: int, period: int, runs: int = RUNS
+) -> tuple[list[LpmResult], np.ndarray]:
+    """Identifications of one system with one set of inputs and `runs` draws of white noise; true HTF."""
     system = periodic_filter(1, period)
     rng = np.random.default_rng(1)
     force = rng.standard_normal((experiments, 1024))
     clean = system.response(force)
     results = []
-    for _ in range(RUNS):
+    for _ in range(runs):
         noisy = clean + NOISE * rng.standard_normal(clean.shape)
         results.append(local_polynomial(spectra_of(force, noisy, 1024 // period), LINES, window))
     return results, system.htf(LINES / 1024, window.harmonics)
@@ -92,7 +94,7 @@ def test_itf_variance_of_overlapping_windows_by_brute_force() -> None:
 
 
 def test_residual_tells_the_noise() -> None:
-    results, _ = repeated(Window(2, 1, 5, transient=False), 4, 64)
+    results, _ = repeated(Window(2, 1, 5, transient=False), 4, 64, runs=40)
     system = periodic_filter(1, 64)
     force = np.random.default_rng(1).standard_normal((4, 1024))
     size = np.hypot(system.response(force).std(), NOISE)

@@ -10,6 +10,7 @@ from gearbench.fem.contact.law import Law, elastic_pair, make_law
 from gearbench.fem.contact.static import static_cycle
 from gearbench.fem.gear.body import condense
 from gearbench.geometry import Pair
+from gearbench.geometry.mesh.sector import Element
 from gearbench.rig import Gear, Material, Rig, Support, Supports
 from gearbench.shell.validation import Check
 
@@ -47,12 +48,12 @@ TORQUE_PER_WIDTH = 2e3  # of both pairs [N]
 
 
 @cache
-def law(name: str, refinement: int = 1) -> Law:
-    """Contact law on the default mesh or a refined one."""
+def law(name: str, refinement: float = 1, element: Element = "triangle") -> Law:
+    """Contact law on the default mesh, a refined or a coarser one."""
     chosen = RIGS[name]
     meshing = elastic_pair(chosen)
     driver, driven = (
-        condense(g, chosen.material, g.module / (12 * refinement), 0) for g in (chosen.driver, chosen.driven)
+        condense(g, chosen.material, g.module / (12 * refinement), 0, element) for g in (chosen.driver, chosen.driven)
     )
     return make_law(meshing, driver, driven, chosen.material)
 
@@ -67,6 +68,16 @@ def mesh_halved() -> float:
     worst = 0.0
     for name in RIGS:
         te = [static_cycle(law(name, n), PHASES, torque=[torque(name)]).transmission_error for n in (1, 2)]
+        worst = max(worst, float(np.abs(te[0] / te[1] - 1).max()))
+    return worst
+
+
+def quadrilaterals() -> float:
+    """Largest change of TE from quadrilaterals at twice the default size to those at the default size."""
+    worst = 0.0
+    for name in RIGS:
+        laws = (law(name, n, "quadrilateral") for n in (0.5, 1))
+        te = [static_cycle(one, PHASES, torque=[torque(name)]).transmission_error for one in laws]
         worst = max(worst, float(np.abs(te[0] / te[1] - 1).max()))
     return worst
 
@@ -108,6 +119,7 @@ def torque_ratio() -> float:
 
 CHECKS = [
     Check("static-mesh-halved", "TE when the mesh is halved, 2 pairs", 2e-3, "", mesh_halved),
+    Check("static-quadrilaterals", "TE when quadrilaterals are halved, 2 pairs", 2e-4, "", quadrilaterals),
     Check("static-ripple", "ripple of TE over 400 positions inside a zone, 2 pairs", 1e-3, "", ripple),
     Check("static-torque-ratio", "torque ratio on the line of action against z2/z1", 1e-6, "", torque_ratio),
 ]
