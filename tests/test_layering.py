@@ -170,7 +170,7 @@ def test_only_the_mesher_knows_gmsh() -> None:
         for _, name in imported(path)
         if name.split(".")[0] == "gmsh"
     }
-    assert files <= {"geometry/mesh/sector_mesh.py"}
+    assert files <= {"geometry/mesh/filling.py"}
 
 
 @pytest.mark.parametrize("package", ["", ".rig", ".records", ".identification"])

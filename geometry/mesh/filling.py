@@ -1,27 +1,22 @@
-"""One tooth sector as curved quadratic triangles, and its repetition to a full gear. The only user of gmsh.
+"""The inside of a sector: gmsh fills a closed polygon with triangles or quadrilaterals, the middles of their sides
+follow. The only user of gmsh.
 
-gmsh fills the half sector between given straight boundary edges; order two is raised here, so that every
-boundary node, mid-side nodes included, lies on the exact profile. The other half is the mirror image.
+gmsh sees straight boundary edges; order two is raised here, so that every boundary node, mid-side nodes included, lies
+on the exact profile.
 """
 
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from itertools import pairwise
-from math import pi
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.geometry.error import GeometryError
-from gearbench.geometry.mesh.element_size import flank_size
-from gearbench.geometry.mesh.grading import Chain, HalfBoundary, half_boundary
-from gearbench.geometry.tooth.profile import Profile
-from gearbench.rig import Gear
+from gearbench.geometry.mesh.grading import DEFAULT, Chain
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -40,85 +35,6 @@ _OPTIONS = (
 
 class MeshingUnavailable(ImportError):
     """gmsh cannot be loaded; the sentence says what to install."""
-
-
-@dataclass(frozen=True)
-class SectorMesh:
-    """One tooth sector between the polar angles -pi/z and +pi/z, from the hub circle to the profile.
-
-    `points` (n, 2) [m]; `triangles` (m, 6): three corners counter-clockwise, then the middles of 0-1, 1-2,
-    2-0 (gmsh and meshio order). Node numbers: `cut_low`, `cut_high` on the radial cuts, ordered by radius
-    (corners and middles alternate), equal under a rotation by 2 pi/z; `hub` on the hub circle by polar angle,
-    ends of the cuts included; `boundary_edges` (k, 3) corner, corner, middle along tip land, flanks, fillets
-    and root land by polar angle (counter-clockwise: the material lies to the left). The mesh is symmetric:
-    `mirror[i]` is the node at (x, -y).
-    """
-
-    teeth: int
-    points: Array
-    triangles: Index
-    cut_low: Index
-    cut_high: Index
-    hub: Index
-    boundary_edges: Index
-    mirror: Index
-
-    @property
-    def cells(self) -> Index:
-        """The elements, whatever their kind."""
-        return self.triangles
-
-
-@dataclass(frozen=True)
-class GearMesh:
-    """A full gear: `points`, `triangles`, `hub`, `boundary_edges` as in SectorMesh; `node_of[k, i]` is the
-    number of sector node i in tooth k, whose axis stands at the polar angle 2 pi k/z."""
-
-    teeth: int
-    points: Array
-    triangles: Index
-    hub: Index
-    boundary_edges: Index
-    node_of: Index
-
-    @property
-    def cells(self) -> Index:
-        """The elements, whatever their kind."""
-        return self.triangles
-
-
-def sector_mesh(gear_profile: Profile, gear: Gear, element_size: float | None = None) -> SectorMesh:
-    """Mesh one tooth sector. `element_size` [m] on flanks and fillets; default module/12.
-
-    Raises GeometryError for an element size outside (module/400, module/2), and MeshingUnavailable without
-    gmsh.
-    """
-    size = flank_size(gear.module, element_size)
-    return sector_within(gear_profile.teeth, half_boundary(gear_profile, gear.hub_radius, size))
-
-
-def sector_within(teeth: int, boundary: HalfBoundary) -> SectorMesh:
-    """The sector of a gear with that many teeth whose half has the given nodes on its boundary."""
-    ring = np.concatenate([chain.corners[:-1] for chain in sides_of(boundary)])
-    corners, triangles, _ = fill(ring)
-    points, half, edges = raise_order(corners, _ccw(corners, triangles), boundary)
-    # Mirroring turns the triangles over: corners 0 and 1 change places, hence the middles of 1-2 and 2-0.
-    whole = mirrored(teeth, points, half, edges, [1, 0, 2, 3, 5, 4])
-    return SectorMesh(
-        teeth=teeth,
-        points=whole.points,
-        triangles=whole.cells,
-        cut_low=whole.cut_low,
-        cut_high=whole.cut_high,
-        hub=whole.hub,
-        boundary_edges=whole.boundary_edges,
-        mirror=whole.mirror,
-    )
-
-
-def sides_of(boundary: HalfBoundary) -> tuple[Chain, Chain, Chain, Chain]:
-    """The sides in order around the half sector."""
-    return boundary.outline, boundary.cut, boundary.hub, boundary.axis
 
 
 def _import_gmsh() -> Any:
@@ -155,45 +71,92 @@ def gmsh_session() -> Iterator[Any]:
                 gmsh.model.setCurrent(current)
 
 
-def fill(ring: Array, recombine: bool = False) -> tuple[Array, Index, Index]:
+class Branch(NamedTuple):
+    """An open polygon inside the ring along which elements have edges: from the ring's corner number `start` over the
+    `points` (m, 2)."""
+
+    start: int
+    points: Array
+
+
+def fill(ring: Array, *, recombine: bool = False, branch: Branch | None = None) -> tuple[Array, Index, Index]:
     """Triangulate inside the closed polygon `ring` (n, 2) without adding nodes to it.
 
-    Returns corners (m, 2), the first n of which are the ring, triangles (k, 3) and, where `recombine` makes as many of
-    them as it can, quadrilaterals (l, 4). Sizes inside follow the ring's.
+    Returns corners (m, 2), the first of which are the ring and then the branch's points, triangles (k, 3),
+    counter-clockwise, and, where `recombine` makes as many of them as it can, quadrilaterals (l, 4) of either sense.
+    Sizes inside follow the ring's and, more strictly, the branch's. Raises MeshingUnavailable.
     """
+    given = ring if branch is None else np.concatenate((ring, branch.points))
     scale = 1 / np.ptp(ring, axis=0).max()  # gmsh's tolerances are absolute
     with gmsh_session() as gmsh:
-        return _triangulate(gmsh, ring, scale, recombine)
+        gmsh.model.add("gearbench tooth sector")
+        try:
+            nodes = _geometry(gmsh, scale * given, len(ring), branch)
+            if branch is None:
+                gmsh.model.mesh.generate(2)
+            else:
+                gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 0)
+                gmsh.model.mesh.setSizeCallback(_sizes_from(_edges(given, len(ring), branch.start), scale))
+                gmsh.model.mesh.generate(2)
+                gmsh.model.mesh.removeSizeCallback()
+            if recombine:
+                gmsh.model.mesh.recombine()
+            corners, triangles, quads = _found(gmsh, nodes, scale)
+        finally:
+            gmsh.model.remove()
+    corners[: len(given)] = given
+    return corners, _ccw(corners, triangles), quads
 
 
-def _triangulate(gmsh: Any, ring: Array, scale: float, recombine: bool) -> tuple[Array, Index, Index]:
-    gmsh.model.add("gearbench tooth sector")
-    try:
-        geo, count = gmsh.model.geo, len(ring)
-        nodes = [geo.addPoint(x * scale, y * scale, 0.0) for x, y in ring]
-        lines = [geo.addLine(nodes[i], nodes[(i + 1) % count]) for i in range(count)]
-        geo.addPlaneSurface([geo.addCurveLoop(lines)])
-        geo.synchronize()
-        for line in lines:
-            gmsh.model.mesh.setTransfiniteCurve(line, 2)
-        gmsh.model.mesh.generate(2)
-        if recombine:
-            gmsh.model.mesh.recombine()
-        tags, flat, _ = gmsh.model.mesh.getNodes()
-        found = [gmsh.model.mesh.getElementsByType(kind)[1] for kind in (2, 3)]
-        first = [int(gmsh.model.mesh.getNodes(0, node)[0][0]) for node in nodes]
-    finally:
-        gmsh.model.remove()
-    order = {tag: i for i, tag in enumerate(first)}
+def _geometry(gmsh: Any, given: Array, count: int, branch: Branch | None) -> list[int]:
+    """Hand the polygons' points to gmsh, the first `count` of them the ring's, every edge one element long; their
+    tags."""
+    geo, mesh = gmsh.model.geo, gmsh.model.mesh
+    nodes = [geo.addPoint(x, y, 0.0) for x, y in given]
+    lines = [geo.addLine(nodes[i], nodes[(i + 1) % count]) for i in range(count)]
+    inner = [] if branch is None else [geo.addLine(a, b) for a, b in pairwise([nodes[branch.start], *nodes[count:]])]
+    surface = geo.addPlaneSurface([geo.addCurveLoop(lines)])
+    geo.synchronize()
+    if inner:
+        mesh.embed(1, inner, 2, surface)
+    for line in (*lines, *inner):
+        mesh.setTransfiniteCurve(line, 2)
+    return nodes
+
+
+def _edges(given: Array, count: int, start: int) -> Array:
+    """Ends (m, 4) of the edges of ring and branch."""
+    ring, along = given[:count], np.concatenate((given[start][None], given[count:]))
+    return np.concatenate(
+        (np.column_stack((ring, np.roll(ring, -1, axis=0))), np.column_stack((along[:-1], along[1:])))
+    )
+
+
+def _sizes_from(ends: Array, scale: float) -> Callable[[int, int, float, float, float, float], float]:
+    """gmsh's callback, in its own scale, for sizes that grow from those of given edges (m, 4)."""
+    middles = 0.5 * scale * (ends[:, :2] + ends[:, 2:])
+    lengths = scale * np.hypot(*(ends[:, 2:] - ends[:, :2]).T)
+
+    def size(dim: int, tag: int, x: float, y: float, z: float, before: float) -> float:
+        away = np.hypot(middles[:, 0] - x, middles[:, 1] - y)
+        return float(np.min(lengths + DEFAULT.growth * np.maximum(away - 0.5 * lengths, 0.0)))
+
+    return size
+
+
+def _found(gmsh: Any, nodes: Sequence[int], scale: float) -> tuple[Array, Index, Index]:
+    """Corners, the given ones first, triangles and quadrilaterals of gmsh's mesh."""
+    tags, flat, _ = gmsh.model.mesh.getNodes()
+    elements = [gmsh.model.mesh.getElementsByType(kind)[1] for kind in (2, 3)]
+    order = {int(gmsh.model.mesh.getNodes(0, node)[0][0]): i for i, node in enumerate(nodes)}
     for tag in tags:
         order.setdefault(int(tag), len(order))
     corners = np.empty((len(order), 2))
     for tag, point in zip(tags, flat.reshape(-1, 3), strict=True):
         corners[order[int(tag)]] = point[:2] / scale
-    corners[:count] = ring
     triangles, quads = (
-        np.array([order[int(tag)] for tag in elements], dtype=np.int64).reshape(-1, sides)
-        for elements, sides in zip(found, (3, 4), strict=True)
+        np.array([order[int(tag)] for tag in found], dtype=np.int64).reshape(-1, sides)
+        for found, sides in zip(elements, (3, 4), strict=True)
     )
     return corners, triangles, quads
 
@@ -210,100 +173,42 @@ def _ccw(points: Array, triangles: Index) -> Index:
     return turned
 
 
-def raise_order(corners: Array, cells: Index, boundary: HalfBoundary) -> tuple[Array, Index, list[Index]]:
-    """Mid-side nodes of cells (m, k): straight inside, the given ones on the boundary.
+def raise_order(
+    corners: Array, cells: Index, sides: Sequence[Chain], lines: Sequence[Index] = ()
+) -> tuple[Array, Index, list[Index]]:
+    """Mid-side nodes of cells (m, k): straight inside, the given ones on the `sides` around them.
 
-    Returns points, cells (m, 2 k) and, for each side of the boundary, its edges (n, 3) corner, corner, middle.
+    Returns points, cells (m, 2 k) and the edges (n, 3) corner, corner, middle of each side, then of each of the inner
+    `lines`, which are given by their corners.
     """
     k = cells.shape[1]
     edges = np.sort(cells[:, [[i, (i + 1) % k] for i in range(k)]].reshape(-1, 2), axis=1)
     unique, inverse = np.unique(edges, axis=0, return_inverse=True)
     middles = 0.5 * (corners[unique[:, 0]] + corners[unique[:, 1]])
     number = {(int(a), int(b)): i for i, (a, b) in enumerate(unique)}
-    sides, start = [], 0
-    ring = sum(len(chain.mids) for chain in sides_of(boundary))
-    for chain in sides_of(boundary):
-        nodes = (start + np.arange(len(chain.corners))) % ring
+
+    def walked(nodes: Index) -> Index:
         index = np.array([number[min(a, b), max(a, b)] for a, b in pairwise(nodes.tolist())])
-        middles[index] = chain.mids
-        sides.append(np.column_stack((nodes[:-1], nodes[1:], len(corners) + index)))
+        return np.column_stack((nodes[:-1], nodes[1:], len(corners) + index))
+
+    found, start = [], 0
+    ring = sum(len(chain.mids) for chain in sides)
+    for chain in sides:
+        found.append(walked((start + np.arange(len(chain.corners))) % ring))
+        middles[found[-1][:, 2] - len(corners)] = chain.mids
         start += len(chain.mids)
     return (
         np.concatenate((corners, middles)),
         np.column_stack((cells, len(corners) + inverse.reshape(-1, k))),
-        sides,
+        found + [walked(line) for line in lines],
     )
 
 
-def _walk(edges: Index) -> Index:
+def ring_of(sides: Sequence[Chain]) -> Array:
+    """The corners (n, 2) of the closed polygon of several sides, each starting where the one before ends."""
+    return np.concatenate([chain.corners[:-1] for chain in sides])
+
+
+def walk(edges: Index) -> Index:
     """Node numbers along a chain of edges (k, 3), middles included."""
     return np.append(edges[:, [0, 2]].ravel(), edges[-1, 1])
-
-
-class Whole(NamedTuple):
-    """Fields of a whole sector, as in SectorMesh; `cells` of any kind."""
-
-    points: Array
-    cells: Index
-    cut_low: Index
-    cut_high: Index
-    hub: Index
-    boundary_edges: Index
-    mirror: Index
-
-
-def mirrored(teeth: int, points: Array, half: Index, sides: list[Index], turned: list[int]) -> Whole:
-    """The whole sector from its counter-clockwise half; `turned` is the order of a mirrored cell's nodes."""
-    outline, cut, hub, axis = sides
-    on_axis = _walk(axis)
-    points[on_axis, 1] = 0.0
-    n = len(points)
-    image = np.full(n, -1, dtype=np.int64)
-    image[on_axis] = on_axis
-    free = np.flatnonzero(image < 0)
-    image[free] = n + np.arange(len(free))
-    angle = 2 * pi / teeth
-    low, high = image[_walk(cut)][::-1], _walk(cut)[::-1]
-    points = np.concatenate((points, points[free] * [1.0, -1.0]))
-    points[low] = points[high] @ _rotation(-angle).T
-    return Whole(
-        points=points,
-        cells=np.concatenate((half, image[half][:, turned])),
-        cut_low=low,
-        cut_high=high,
-        hub=np.concatenate((image[_walk(hub)], _walk(hub)[-2::-1])),
-        boundary_edges=np.concatenate((image[outline][::-1][:, [1, 0, 2]], outline)),
-        mirror=np.concatenate((image, free)),
-    )
-
-
-def _rotation(angle: float) -> Array:
-    """Matrix (2, 2) of a counter-clockwise rotation."""
-    return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-
-
-def full_mesh(sector: SectorMesh, teeth: int | None = None) -> GearMesh:
-    """The gear of `teeth` (default: the sector's own number) sectors, each an exact rotation; cut nodes are
-    shared."""
-    z = sector.teeth if teeth is None else teeth
-    if z != sector.teeth:
-        raise GeometryError(f"teeth = {z} cannot be made of sectors of a gear with {sector.teeth} teeth")
-    points, node_of = repeated(z, sector.points, sector.cut_low, sector.cut_high)
-    return GearMesh(
-        teeth=z,
-        points=points,
-        triangles=node_of[:, sector.triangles].reshape(-1, 6),
-        hub=np.unique(node_of[:, sector.hub]),
-        boundary_edges=node_of[:, sector.boundary_edges].reshape(-1, 3),
-        node_of=node_of,
-    )
-
-
-def repeated(teeth: int, points: Array, cut_low: Index, cut_high: Index) -> tuple[Array, Index]:
-    """A sector's nodes turned to every tooth, those of the cuts once, and their numbers (teeth, nodes)."""
-    n = len(points)
-    kept = np.setdiff1d(np.arange(n), cut_high)
-    node_of = np.empty((teeth, n), dtype=np.int64)
-    node_of[:, kept] = np.arange(teeth)[:, None] * len(kept) + np.arange(len(kept))
-    node_of[:, cut_high] = np.roll(node_of[:, cut_low], -1, axis=0)
-    return np.concatenate([points[kept] @ _rotation(2 * pi * k / teeth).T for k in range(teeth)]), node_of
