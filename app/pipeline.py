@@ -79,14 +79,17 @@ def run_experiment(job: Job) -> dict[str, Any]:
     from gearbench.bench.static import static
     from gearbench.geometry import pair
     from gearbench.identification import read_frf, write_frf
+    from gearbench.records import read_dataset, read_record, write_dataset, write_record
     from gearbench.rig import dump_case
 
     case, progress = job.case, job.progress
     meshing = pair(case.rig)
     job.output.write_text(job.name("case.toml"), dump_case(case))
     _draw_gears(job, meshing)
-    statics = job.dataset("static.nc", _read, lambda: static(case, positions=POSITIONS, progress=progress), _write)
-    record = job.dataset("record.nc", _read_record, lambda: simulate(case, progress=progress), _write_record)
+    statics = job.dataset(
+        "static.nc", read_dataset, lambda: static(case, positions=POSITIONS, progress=progress), write_dataset
+    )
+    record = job.dataset("record.nc", read_record, lambda: simulate(case, progress=progress), write_record)
     modes: dict[str, xr.Dataset] = {}
     results = {"identified": job.dataset("frf.nc", read_frf, lambda: identify_case(case, record, progress), write_frf)}
     if case.simulation.model == "lumped":
@@ -99,7 +102,7 @@ def run_experiment(job: Job) -> dict[str, Any]:
         for kind in ("exact", "frozen"):
             results[kind] = job.dataset(f"{kind}.nc", read_frf, partial(reference, kind), write_frf)
     else:
-        modes["linearised"] = job.dataset("linearised.nc", _read, lambda: linearised_modes(case), _write)
+        modes["linearised"] = job.dataset("linearised.nc", read_dataset, lambda: linearised_modes(case), write_dataset)
     span = contact_span(meshing)
     zones = fewest_pairs(span)
     numbers = run_numbers(case, statics, record, results, modes, zones)
@@ -157,25 +160,3 @@ def _write_summary(job: Job, numbers: dict[str, Any]) -> None:
 
     job.output.write_text(job.name("summary.json"), json_text(numbers) + "\n")
     job.output.write_text(job.name("summary.md"), summary_text(numbers))
-
-
-def _read(path: Path) -> xr.Dataset:
-    import xarray as xr
-
-    return xr.load_dataset(path, engine="h5netcdf", decode_cf=False)
-
-
-def _write(dataset: xr.Dataset, path: Path) -> None:
-    dataset.to_netcdf(path, engine="h5netcdf", encoding={str(name): {"_FillValue": None} for name in dataset.variables})
-
-
-def _read_record(path: Path) -> xr.Dataset:
-    from gearbench.records import read_record
-
-    return read_record(path)
-
-
-def _write_record(record: xr.Dataset, path: Path) -> None:
-    from gearbench.records import write_record
-
-    write_record(record, path)

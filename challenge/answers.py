@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from gearbench.challenge.errors import ChallengeError
-from gearbench.records.storage import write_atomically
+from gearbench.files import write_text
 
 KINDS = ("effect", "none", "foreign")
 PLACES = ("mesh", "driver-support", "driven-support", "drive", "load", "sensor", "none")
@@ -34,13 +34,9 @@ class Answer:
 
 
 def write_answers(answers: Mapping[str, Answer], path: Path) -> None:
-    """Write the answers in one step. Raises RecordError when the folder is missing."""
-    text = json.dumps({name: asdict(answer) for name, answer in answers.items()}, indent=1, allow_nan=False) + "\n"
-
-    def write(temporary: Path) -> None:
-        temporary.write_text(text, encoding="utf-8")
-
-    write_atomically(path, write)
+    """Write the answers in one step. Raises FileError."""
+    tree = {name: asdict(answer) for name, answer in answers.items()}
+    write_text(path, json.dumps(tree, indent=1, allow_nan=False) + "\n")
 
 
 def read_answers(path: Path) -> dict[str, Answer]:

@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal, NoReturn, get_args
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from gearbench.diagnosis.errors import DiagnosisError
-from gearbench.records.storage import write_atomically
+from gearbench.files import write_text
 
 SCHEMA: Literal["gearbench-verdict/1"] = "gearbench-verdict/1"
 
@@ -191,13 +191,8 @@ def verdict_json(verdict: Verdict) -> str:
 
 
 def write_verdict(verdict: Verdict, path: str | Path) -> None:
-    """Write verdict.json, replacing `path` in one step. Raises RecordError if its folder does not exist."""
-    text = verdict_json(verdict)
-    write_atomically(path, lambda temporary: _write(temporary, text))
-
-
-def _write(path: Path, text: str) -> None:
-    path.write_text(text, encoding="utf-8")
+    """Write verdict.json, replacing `path` in one step. Raises FileError."""
+    write_text(path, verdict_json(verdict))
 
 
 def read_verdict(path: str | Path) -> Verdict:

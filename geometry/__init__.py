@@ -1,9 +1,13 @@
 """Gear geometry: exact profile, pair kinematics, bodies, data sheet, mesh and export."""
 
 from gearbench.geometry.error import GeometryError
-from gearbench.geometry.export.meshes import PlaneMesh, mesh_pair, write_mesh
+from gearbench.geometry.export.meshes import write_mesh
+from gearbench.geometry.mesh.assembly import full_mesh
+from gearbench.geometry.mesh.filling import MeshingUnavailable
+from gearbench.geometry.mesh.gears import mesh_pair
 from gearbench.geometry.mesh.quality import Quality, quality
-from gearbench.geometry.mesh.sector_mesh import GearMesh, MeshingUnavailable, SectorMesh, full_mesh, sector_mesh
+from gearbench.geometry.mesh.sector_mesh import sector_mesh
+from gearbench.geometry.mesh.values import GearMesh, Mesh, PairMesh, SectorMesh
 from gearbench.geometry.pair.datasheet import Datum, data_sheet
 from gearbench.geometry.pair.kinematics import Pair, inverse_involute, pair
 from gearbench.geometry.tooth.body import Body, body, gear_area, sector_area
@@ -14,9 +18,10 @@ __all__ = [
     "Datum",
     "GearMesh",
     "GeometryError",
+    "Mesh",
     "MeshingUnavailable",
     "Pair",
-    "PlaneMesh",
+    "PairMesh",
     "Profile",
     "Quality",
     "SectorMesh",

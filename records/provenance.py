@@ -19,6 +19,8 @@ SOURCE_PACKAGES = (
         for name in (
             "rig",
             "records",
+            "files",
+            "kernels",
             "geometry",
             "fem",
             "lumped",

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import shutil
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from gearbench.files import write_whole
 from gearbench.shell.failure import InputError
 from gearbench.shell.options import JsonOption, print_json
 
@@ -47,7 +49,7 @@ def copy_case(source: Path, folder: Path) -> Path:
             raise InputError(f"{place} exists and differs: it is not replaced")
     (folder / "gears").mkdir(parents=True, exist_ok=True)
     for origin, place in pairs:
-        shutil.copyfile(origin, place)
+        write_whole(place, partial(shutil.copyfile, origin))
     return target
 
 

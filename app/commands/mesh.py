@@ -78,7 +78,8 @@ def _write_elements(
 ) -> dict[str, Any]:
     """The elements of one gear or both, swept if there are layers; a summary."""
     from gearbench.geometry import mesh_pair, pair, write_mesh
-    from gearbench.geometry.export.meshes import gear_plane, mesh_gear, sweep_plane
+    from gearbench.geometry.mesh.gears import gear_plane, mesh_gear
+    from gearbench.geometry.mesh.sweep import sweep
 
     rig, size = case.rig, case.simulation.element_size
     with Progress("mesh") as progress:
@@ -90,7 +91,7 @@ def _write_elements(
             number: Literal[0, 1] = 0 if gear == "driver" else 1
             plane = gear_plane(mesh_gear(tooth, body, size, element, number), number)
         widths = rig.driver.face_width, rig.driven.face_width
-        solid = None if layers is None else sweep_plane(plane, widths, layers)
+        solid = None if layers is None else sweep(plane, widths, layers)
         progress.step("writing")
         write_mesh(out, solid or plane)
         return {"file": str(out)} | mesh_report(plane, solid)

@@ -64,7 +64,7 @@ def static(
     elastic = (model or loaded.simulation.model) == "reduced"
     files = _check_stress(loaded, elastic, out, fields or [], root_figure, others)
     from gearbench.bench.static import static as solve
-    from gearbench.records.storage import write_atomically
+    from gearbench.records import write_dataset
 
     with Progress(f"static {loaded.name}") as progress:
         progress.step("mesh cycle")
@@ -80,7 +80,7 @@ def static(
         if elastic:
             progress.step("root stress")
             result = _with_root_stress(loaded, result)
-        write_atomically(out, lambda path: result.to_netcdf(path, engine="h5netcdf"))
+        write_dataset(result, out)
         if figure is not None:
             progress.step("figure")
             from gearbench.figures.static import plot_static

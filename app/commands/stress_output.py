@@ -57,7 +57,7 @@ def write_all(
     from gearbench.bench.stress.fields import field_dte, pair_fields, stress_gears, write_fields
     from gearbench.figures.stress import plot_fields
     from gearbench.figures.stress_scene import can_render, render_fields
-    from gearbench.geometry.export.files import written_whole
+    from gearbench.files import write_whole
 
     progress.step("stress fields")
     elastic = elastic_rig(case.rig, case.simulation)
@@ -71,7 +71,7 @@ def write_all(
         fields = pair_fields(elastic, gears, phase, field_dte(elastic, phase, load, result["load"].attrs["units"]))
         write_fields(path, fields)
         draw = render_fields if rendered else plot_fields
-        written_whole(picture, partial(draw, fields, case.rig.driver.module))
+        write_whole(picture, partial(draw, fields, case.rig.driver.module))
         written += [path, picture]
         progress((number + 1) / len(files), f"mesh phase {phase:g}")
     return written

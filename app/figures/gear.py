@@ -12,14 +12,13 @@ from numpy.typing import NDArray
 from gearbench.figures.plotting import BLUE, ORANGE, figure, save
 
 if TYPE_CHECKING:
-    from gearbench.geometry import Pair, Profile
-    from gearbench.geometry.export.meshes import PlaneMesh
+    from gearbench.geometry import Pair, PairMesh, Profile
     from gearbench.rig import Rig
 
 Array = NDArray[np.float64]
 
 
-def draw_pair(path: Path, rig: Rig, meshing: Pair, mesh: PlaneMesh | None) -> None:
+def draw_pair(path: Path, rig: Rig, meshing: Pair, mesh: PairMesh | None) -> None:
     """Both gears at mesh phase 0, and the contact enlarged, with the finite-element mesh if there is one."""
     with figure(1, 2, (11.0, 5.2)) as (drawing, (whole, near)):
         _draw_outlines(whole, rig, meshing)
@@ -37,7 +36,7 @@ def draw_pair(path: Path, rig: Rig, meshing: Pair, mesh: PlaneMesh | None) -> No
             near.set_title("Where the teeth touch")
         else:
             _draw_mesh(near, mesh, np.array([pitch, 0.0]) * 1e-3, 1.6e-3 * reach)
-            near.set_title(f"Mesh where the teeth touch ({len(mesh.triangles)} elements in all)")
+            near.set_title(f"Mesh where the teeth touch ({len(mesh.cells)} elements in all)")
         _draw_line_of_action(near, meshing)
         near.set_xlim(pitch - reach, pitch + reach)
         near.set_ylim(-reach, reach)
@@ -109,13 +108,13 @@ def _draw_line_of_action(axes: Any, meshing: Pair) -> None:
     axes.plot([1e3 * pitch], [0.0], "ko", ms=5, label="pitch point")
 
 
-def _draw_mesh(axes: Any, mesh: PlaneMesh, centre: Array, reach: float) -> None:
+def _draw_mesh(axes: Any, mesh: PairMesh, centre: Array, reach: float) -> None:
     """Sides of the elements near the contact, the boundary stronger, with its curved middles."""
-    n = 3 if mesh.kind == "triangle6" else 4
-    middle = mesh.points[mesh.triangles[:, :n]].mean(axis=1)
+    n = mesh.kind.corners
+    middle = mesh.points[mesh.corners].mean(axis=1)
     near = np.abs(middle - centre).max(axis=1) < reach
     for gear, colour, name in ((0, BLUE, "driver"), (1, ORANGE, "driven gear")):
-        cells = mesh.triangles[near & (mesh.gear == gear)]
+        cells = mesh.cells[near & (mesh.gear == gear)]
         sides = np.concatenate([cells[:, [i, n + i, (i + 1) % n]] for i in range(n)])
         lines = _broken(1e3 * mesh.points[sides])
         axes.plot(*lines.T, color=colour, lw=0.35, alpha=0.7)

@@ -10,6 +10,8 @@ from typing import Any
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
+from gearbench.files import write_whole
+
 BLUE, ORANGE, GREEN, GREY = "#0b5c9e", "#d1600a", "#2d7d46", "#6b6b6b"
 SINGLE_ZONE = "#f3e3c3"
 
@@ -42,7 +44,8 @@ def figure(
 
 def save(drawing: Figure, path: Path) -> None:
     """Write a picture in the format of the suffix, without a date: the same picture gives the same file."""
-    drawing.savefig(path, metadata={"Date": None} if path.suffix == ".svg" else {"Software": None})
+    undated = {"Date": None} if path.suffix == ".svg" else {"Software": None}
+    write_whole(path, lambda temporary: drawing.savefig(temporary, metadata=undated))
 
 
 def shade(axes: Any, spans: Sequence[tuple[float, float]], label: str) -> None:

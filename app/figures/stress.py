@@ -43,9 +43,9 @@ def limits(fields: PairFields, module: float) -> tuple[float, float]:
     """Upper limits [MPa] of the colours of von Mises and of the largest principal stress: the largest values in the
     picture half a module and more away from the contacts, whose own stress is several times that of the roots."""
     middle, half = view(fields, module)
-    shown = np.abs(fields.points - middle).max(axis=1) < half
+    shown = np.abs(fields.mesh.points - middle).max(axis=1) < half
     for one in fields.contacts:
-        shown &= np.hypot(*(fields.points - one.middle).T) > AWAY * module
+        shown &= np.hypot(*(fields.mesh.points - one.middle).T) > AWAY * module
     tops = fields.von_mises[shown].max(), fields.principal[shown, 0].max()
     return rounded_up(1e-6 * float(tops[0])), rounded_up(1e-6 * float(tops[1]))
 
@@ -60,26 +60,26 @@ def rounded_up(value: float) -> float:
 
 def plot_fields(fields: PairFields, module: float, path: Path) -> None:
     """Von Mises and largest principal stress around the contacts, and the most loaded contact close up."""
-    triangles = _quarters(fields.triangles)
+    triangles = _quarters(fields.mesh.cells)
     middle, half = view(fields, module)
     tops = limits(fields, module)
     close = max(fields.contacts, key=lambda one: one.half_width)
     values = (1e-6 * fields.von_mises, 1e-6 * fields.principal[:, 0])
     reach = CLOSE * close.half_width
-    near = np.abs(fields.points[triangles].mean(axis=1) - close.middle).max(axis=1) < 1.6 * reach
-    around = np.abs(fields.points[triangles].mean(axis=1) - middle).max(axis=1) < 1.3 * half
+    near = np.abs(fields.mesh.points[triangles].mean(axis=1) - close.middle).max(axis=1) < 1.6 * reach
+    around = np.abs(fields.mesh.points[triangles].mean(axis=1) - middle).max(axis=1) < 1.3 * half
     with figure(1, 3, size=(15.0, 4.7)) as (drawing, axes):
         drawing.suptitle(heading(fields))
         _contours(
-            axes[0], drawing, fields.points, triangles[around], values[0], (0.0, tops[0]), "von Mises stress [MPa]"
+            axes[0], drawing, fields.mesh.points, triangles[around], values[0], (0.0, tops[0]), "von Mises stress [MPa]"
         )
         _contours(
-            axes[1], drawing, fields.points, triangles[around], values[1], (-0.2 * tops[1], tops[1]),
+            axes[1], drawing, fields.mesh.points, triangles[around], values[1], (-0.2 * tops[1], tops[1]),
             "largest principal stress [MPa]",
         )  # fmt: skip
         peak = rounded_up(float(values[0][triangles[near]].max())) if near.any() else tops[0]
         _contours(
-            axes[2], drawing, fields.points, triangles[near], values[0], (0.0, peak),
+            axes[2], drawing, fields.mesh.points, triangles[near], values[0], (0.0, peak),
             "von Mises stress at the contact [MPa]",
         )  # fmt: skip
         for panel in axes[:2]:

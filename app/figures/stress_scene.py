@@ -61,8 +61,8 @@ def render_fields(fields: PairFields, module: float, path: Path) -> None:
     from gearbench.figures.stress import heading, limits, view
 
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)  # not that there is no screen, which is no secret
-    points = np.column_stack([1e3 * fields.points, np.zeros(len(fields.points))])
-    quadratic = {pyvista.CellType.QUADRATIC_TRIANGLE: fields.triangles}
+    points = np.column_stack([1e3 * fields.mesh.points, np.zeros(len(fields.mesh.points))])
+    quadratic = {pyvista.CellType.QUADRATIC_TRIANGLE: fields.mesh.cells}
     scene: Any = pyvista.Plotter(off_screen=True, shape=(1, 2), window_size=[1600, 850], border=False)
     (x, y), half = view(fields, module)
     names = ("von Mises\n[MPa]", "principal\n[MPa]")

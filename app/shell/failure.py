@@ -15,10 +15,11 @@ DONE, DEFECT, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130  # DEFECT: one of ours
 # Errors that carry one sentence for the user. Their modules are looked up among those already imported: what
 # was not imported cannot have been raised, and importing it here would cost time.
 USER_ERRORS = (
+    ("gearbench.files.whole", "FileError"),
     ("gearbench.rig.errors", "CaseError"),
     ("gearbench.records.errors", "RecordError"),
     ("gearbench.geometry.error", "GeometryError"),
-    ("gearbench.geometry.mesh.sector_mesh", "MeshingUnavailable"),
+    ("gearbench.geometry.mesh.filling", "MeshingUnavailable"),
     ("gearbench.lumped.errors", "LumpedError"),
     ("gearbench.fem.contact.static", "ContactError"),
     ("gearbench.identification.excitation.comb", "CombError"),

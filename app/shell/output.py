@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from gearbench.files import write_text, write_whole
 from gearbench.shell.failure import InputError
 
 _MARK = "run.json"
@@ -31,15 +32,9 @@ class Output:
         """Where a product belongs."""
         return self.folder / name
 
-    def write(self, name: str, write: Callable[[Path], None]) -> Path:
-        """Let `write` fill a temporary file of the same suffix and rename it to `name`."""
-        target = self.folder / name
-        temporary = self.folder / f".{target.stem}.{os.getpid()}{target.suffix}"
-        try:
-            write(temporary)
-            os.replace(temporary, target)
-        finally:
-            temporary.unlink(missing_ok=True)
+    def write(self, name: str, write: Callable[[Path], object]) -> Path:
+        """Let `write` fill the product `name`, which appears when it is complete. Raises FileError."""
+        target = write_whole(self.path(name), write)
         mark = self.mark()
         if name not in mark.get("files", []):
             self.set_mark(mark | {"files": [*mark.get("files", []), name]})
@@ -47,11 +42,7 @@ class Output:
 
     def write_text(self, name: str, text: str) -> Path:
         """Write a text product."""
-
-        def write(path: Path) -> None:
-            path.write_text(text, encoding="utf-8")
-
-        return self.write(name, write)
+        return self.write(name, lambda path: path.write_text(text, encoding="utf-8"))
 
     def mark(self) -> dict[str, Any]:
         """What the folder says about itself: command, identity and files of the run; empty when nothing."""
@@ -63,9 +54,7 @@ class Output:
 
     def set_mark(self, mark: dict[str, Any]) -> None:
         """Replace that in one step."""
-        temporary = self.path(f".{_MARK}.{os.getpid()}")
-        temporary.write_text(json.dumps(mark, indent=2) + "\n", encoding="utf-8")
-        os.replace(temporary, self.path(_MARK))
+        write_text(self.path(_MARK), json.dumps(mark, indent=2) + "\n")
 
 
 def fingerprint(*parts: str) -> str:

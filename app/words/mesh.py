@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING, Any
 from gearbench.shell.failure import InputError
 
 if TYPE_CHECKING:
-    from gearbench.geometry.export.meshes import PlaneMesh
+    from gearbench.geometry import PairMesh
     from gearbench.geometry.mesh.sector import Element
-    from gearbench.geometry.mesh.sweep import SolidMesh
     from gearbench.rig import Rig
 
 SUFFIXES = (".msh", ".vtu", ".inp", ".dxf", ".step")
@@ -70,22 +69,18 @@ def check_crack(rig: Rig, gear: str, out: Path, option: Element | None = None, s
         refuse_crack(one, option or setting, f"rig.{name}", key)
 
 
-def mesh_report(plane: PlaneMesh, solid: SolidMesh | None) -> dict[str, Any]:
+def mesh_report(plane: PairMesh, solid: PairMesh | None) -> dict[str, Any]:
     """Counts and quality of what was written. A solid's section is the plane mesh, whose quality is its own."""
-    from gearbench.geometry.mesh.quality import quad_quality, quality
+    from gearbench.geometry import quality
 
-    found: dict[str, Any]
-    if plane.kind == "triangle6":
-        flat = quality(plane.points, plane.triangles)
-        found = {"triangles": flat.triangles, "nodes": flat.nodes, "smallest_angle_deg": degrees(flat.angle)}
-        found["smallest_relative_jacobian"] = flat.jacobian
-    else:
-        square = quad_quality(plane.points, plane.triangles)
-        found = {"quadrilaterals": square.quads, "nodes": square.nodes, "smallest_angle_deg": degrees(square.angle)}
-        found |= {"largest_angle_deg": degrees(square.widest), "smallest_relative_jacobian": square.jacobian}
+    flat = quality(plane)
+    found: dict[str, Any] = {plane.kind.plural: flat.elements, "nodes": flat.nodes}
+    found["smallest_angle_deg"] = degrees(flat.angle)
+    if plane.kind.corners == 4:
+        found["largest_angle_deg"] = degrees(flat.widest)
+    found["smallest_relative_jacobian"] = flat.jacobian
     if solid is not None:
-        kind = "wedges" if solid.kind == "wedge15" else "hexahedra"
-        found |= {kind: len(solid.cells), "nodes": len(solid.points)}
+        found |= {solid.kind.plural: len(solid.cells), "nodes": len(solid.points)}
     return found
 
 

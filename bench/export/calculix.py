@@ -19,9 +19,10 @@ from gearbench.fem.contact.law import PAIRS, contact_in
 from gearbench.fem.contact.static import position, solve_torque, static_cycle
 from gearbench.fem.gear.elasticity import plane_moduli
 from gearbench.geometry.export.calculix import PENALTIES, Deck, Placement, Touch
-from gearbench.geometry.mesh.assembly import AssembledMesh, assembled
+from gearbench.geometry.mesh.assembly import assembled, outline_sides
 from gearbench.geometry.mesh.grading import Grading, HalfBoundary, half_boundary, refined_boundary
-from gearbench.geometry.mesh.sector_mesh import SectorMesh, sector_within
+from gearbench.geometry.mesh.sector_mesh import sector_within
+from gearbench.geometry.mesh.values import GearMesh, SectorMesh
 from gearbench.geometry.tooth.profile import Profile
 from gearbench.rig import Case
 from gearbench.rig.neutral import effects_in
@@ -182,7 +183,7 @@ def _gears(elastic: ElasticRig, phase: float, met: tuple[Meeting, ...]) -> tuple
     )
 
 
-def _gear_mesh(tooth: Profile, hub_radius: float, met: dict[int, Meeting], gear: int) -> AssembledMesh:
+def _gear_mesh(tooth: Profile, hub_radius: float, met: dict[int, Meeting], gear: int) -> GearMesh:
     """A gear whose sectors `met` (by their number counter-clockwise from tooth 0) touch their mates."""
     z, module = tooth.teeth, tooth.module
     plain = half_boundary(tooth, hub_radius, FAR * module, FAR_GRADING)
@@ -226,8 +227,8 @@ def _touch(gears: tuple[Placement, Placement], meeting: Meeting) -> Touch:
     found = []
     for gear, number, wider in ((0, -meeting.tooth, slave), (1, meeting.tooth, 1 - slave)):
         mesh = gears[gear].mesh
-        sides = mesh.sides[number % len(mesh.sides)]
-        middles = mesh.points[mesh.triangles[sides[:, 0], 3 + sides[:, 1]]]
+        sides = outline_sides(mesh, number % mesh.teeth)
+        middles = mesh.points[mesh.middles[sides[:, 0], sides[:, 1]]]
         # Arc lengths along the flank, from the tip's middle inwards, start at the contact.
         nearest = int(np.argmin(np.linalg.norm(middles - meeting.place(gear, number), axis=1)))
         distance = np.linalg.norm(middles - middles[nearest], axis=1)

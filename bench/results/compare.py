@@ -16,7 +16,7 @@ from gearbench.bench.errors import BenchError
 from gearbench.bench.results.compare_records import differences
 from gearbench.bench.results.measures import mesh_orders, mode_range, synchronous_mean
 from gearbench.records import SCHEMA as RECORD_SCHEMA
-from gearbench.records import read_record
+from gearbench.records import read_dataset, read_record
 
 Array = NDArray[np.float64]
 
@@ -86,10 +86,7 @@ def load_results(path: Path) -> Results:
 
 
 def _read(path: Path) -> xr.Dataset:
-    try:
-        found = xr.load_dataset(path, engine="h5netcdf", decode_cf=False)
-    except (OSError, ValueError, KeyError, RuntimeError) as error:
-        raise BenchError(f"{path} is truncated or no NetCDF-4 file ({error})") from error
+    found = read_dataset(path, error=BenchError)
     return read_record(path) if found.attrs.get("schema") == RECORD_SCHEMA else found
 
 

@@ -14,15 +14,16 @@ from gearbench.bench.elastic.rig import ElasticRig
 from gearbench.bench.errors import BenchError
 from gearbench.fem.contact.static import static_cycle
 from gearbench.fem.stress.fields import ElasticGear, GearField, elastic_gear, gear_field, loaded_sectors
-from gearbench.fem.stress.loaded import Pressed, joined, pair_loads, pressed_teeth
+from gearbench.fem.stress.loaded import Pressed, all_strips, pair_loads, pressed_teeth
 from gearbench.fem.stress.pressure import Strips
 from gearbench.fem.stress.recovery import principal, rotated, turn_stress, von_mises
 from gearbench.fem.stress.zoom import divided
-from gearbench.geometry.export.files import written_whole
+from gearbench.files import write_whole
+from gearbench.geometry.mesh.values import PairMesh, joined
+from gearbench.geometry.pair.numbering import sector_of
 from gearbench.rig import Rig
 
 Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 REACH = 2  # sectors shown on either side of the loaded teeth
 FINEST = 0.2  # of the half-width of contact: elements there
@@ -41,15 +42,12 @@ class Contact:
 class PairFields:
     """Both gears at a mesh phase, in the frame of the rig: driver's centre at the origin, driven gear's at +x.
 
-    points (n, 2) [m]: of the undeformed gears, the driver turned by its DTE; triangles (m, 6), gear (m,) 0 or 1, tooth
-    (m,); displacement (n, 2) [m]: elastic, relative to the hubs; stress (n, 3) [Pa]: xx, yy, xy; out_of_plane (n,)
-    [Pa]; contacts; phase [cycles], torque [N m] and dte [m].
+    mesh: quadratic triangles of the undeformed gears, the driver turned by its DTE; displacement (n, 2) [m]: elastic,
+    relative to the hubs; stress (n, 3) [Pa]: xx, yy, xy; out_of_plane (n,) [Pa]; contacts; phase [cycles], torque [N m]
+    and dte [m].
     """
 
-    points: Array
-    triangles: Indices
-    gear: Indices
-    tooth: Indices
+    mesh: PairMesh
     displacement: Array
     stress: Array
     out_of_plane: Array
@@ -106,23 +104,20 @@ def pair_fields(
     for number, pressed in enumerate(pressed_teeth(law, (meshing.driver, meshing.driven), pairs)):
         gear, teeth = gears[number], gears[number].shape.teeth
         sectors = loaded_sectors([p.sector for p in pressed], teeth, reach)
-        field = gear_field(gear, joined(teeth, pressed), sectors)
+        field = gear_field(gear, all_strips(teeth, pressed), sectors)
         at = np.array([number * law.centre, 0.0])
         parts.append(_placed(field, pressed, number, angles[number], at))
     strain = elastic.rig.material.poisson if elastic.rig.material.state == "plane-strain" else 0.0
-    first = len(parts[0].points)
-    joint = {
-        name: np.concatenate([getattr(p, name) for p in parts])
-        for name in ("points", "gear", "tooth", "displacement", "stress")
-    }
+    stress = np.concatenate([part.stress for part in parts])
     return PairFields(
-        triangles=np.concatenate([parts[0].triangles, first + parts[1].triangles]),
-        out_of_plane=strain * (joint["stress"][:, 0] + joint["stress"][:, 1]),
+        mesh=joined([part.mesh for part in parts]),
+        displacement=np.concatenate([part.displacement for part in parts]),
+        stress=stress,
+        out_of_plane=strain * (stress[:, 0] + stress[:, 1]),
         contacts=parts[0].contacts,
         phase=phase,
         torque=float(sum((1 - 2 * p.side) * p.force * p.contact.lever1 for p in pairs)),
         dte=dte,
-        **joint,
     )
 
 
@@ -130,10 +125,7 @@ def pair_fields(
 class _Part:
     """One gear's share of `PairFields`."""
 
-    points: Array
-    triangles: Indices
-    gear: Indices
-    tooth: Indices
+    mesh: PairMesh
     displacement: Array
     stress: Array
     contacts: tuple[Contact, ...]
@@ -146,22 +138,19 @@ def _placed(field: GearField, pressed: Sequence[Pressed], number: int, angle: fl
     count = 0
     for sector, u, regular in zip(field.sectors, field.displacement, field.stress, strict=True):
         own = [_spot(p.strips) for p in pressed if p.sector == sector]
-        cells, values = divided(mesh.triangles, np.hstack([mesh.points, u, regular]), _size(own))
+        cells, values = divided(mesh.cells, np.hstack([mesh.points, u, regular]), _size(own))
         strips, turn = field.strips_in(sector), angle + 2 * pi * sector / teeth
         x = values[:, :2]
         points.append(centre + rotated(x, turn))
         moved.append(rotated(values[:, 2:4] + strips.displacement(x, field.gear.moduli), turn))
         stress.append(turn_stress(values[:, 4:] + strips.stress(x), turn))
         triangles.append(count + cells)
-        tooth.append(np.full(len(cells), (-sector if number == 0 else sector) % teeth))
+        tooth.append(np.full(len(cells), sector_of(sector, number, teeth)))
         contacts += [Contact(centre + rotated(one.middle, turn), one.half_width) for one in own]
         count += len(x)
     cells = np.concatenate(triangles)
     return _Part(
-        np.concatenate(points),
-        cells,
-        np.full(len(cells), number),
-        np.concatenate(tooth),
+        PairMesh(np.concatenate(points), cells, np.full(len(cells), number), np.concatenate(tooth)),
         np.concatenate(moved),
         np.concatenate(stress),
         tuple(contacts),
@@ -191,12 +180,13 @@ def write_fields(path: Path, fields: PairFields) -> Path:
     """Write a .vtu file for ParaView: m and Pa; `stress` in the order xx, yy, zz, xy, yz, xz."""
     import meshio
 
-    zero = np.zeros(len(fields.points))
+    mesh = fields.mesh
+    zero = np.zeros(len(mesh.points))
     xx, yy, xy = fields.stress.T
     largest, least = fields.principal.T
     content = meshio.Mesh(
-        np.column_stack([fields.points, zero]),
-        [("triangle6", fields.triangles)],
+        np.column_stack([mesh.points, zero]),
+        [(mesh.kind.name, mesh.cells)],
         point_data={
             "displacement": np.column_stack([fields.displacement, zero]).astype(np.float32),
             "stress": np.column_stack([xx, yy, fields.out_of_plane, xy, zero, zero]).astype(np.float32),
@@ -204,6 +194,6 @@ def write_fields(path: Path, fields: PairFields) -> Path:
             "principal_1": largest.astype(np.float32),
             "principal_2": least.astype(np.float32),
         },
-        cell_data={"gear": [fields.gear.astype(np.int32)], "tooth": [fields.tooth.astype(np.int32)]},
+        cell_data={"gear": [mesh.gear.astype(np.int32)], "tooth": [mesh.tooth.astype(np.int32)]},
     )
-    return written_whole(path, lambda name: meshio.write(str(name), content, file_format="vtu"))
+    return write_whole(path, lambda name: meshio.write(str(name), content, file_format="vtu"))

@@ -11,14 +11,12 @@ from numpy.typing import NDArray
 from gearbench.fem.gear.crack import CrackedTooth, condense_crack
 from gearbench.fem.gear.elasticity import assemble, plane_moduli
 from gearbench.fem.gear.flank import flank_trace
-from gearbench.fem.gear.flexibility import REACH, flank_kernels, kernel_samples
-from gearbench.fem.gear.ring import make_ring, ring_modes, rotation
+from gearbench.fem.gear.flexibility import flank_kernels, kernel_samples
+from gearbench.fem.gear.ring import make_ring, ring_modes
 from gearbench.geometry.mesh.sector import Element, meshed_sector, refuse_crack
-from gearbench.geometry.mesh.sector_mesh import SectorMesh
+from gearbench.geometry.tooth.fillet import rotation
 from gearbench.geometry.tooth.profile import profile
 from gearbench.rig import Gear, Material
-
-__all__ = ["REACH", "CondensedGear", "condense", "flank_kernels", "kernel_samples", "rounded"]
 
 Array = NDArray[np.float64]
 
@@ -78,19 +76,19 @@ def condense(
     refuse_crack(gear, element)
     gear = rounded(gear)
     shape = profile(gear)
-    mesh = meshed_sector(shape, gear, element_size or gear.module / 12, element)
+    mesh = meshed_sector(shape, gear, element_size, element)
     moduli = plane_moduli(material)
-    stiffness, mass = assemble(mesh.points, mesh.cells, moduli)
-    ring = make_ring(mesh, gear.teeth, stiffness, mass)
+    stiffness, mass = assemble(mesh, moduli)
+    ring = make_ring(mesh, stiffness, mass)
     s, last = kernel_samples(shape, gear.module / 7)
     front, back = flank_kernels(ring, mesh, shape, moduli, s)
     areal = material.density * gear.face_width
     found = ring_modes(ring, areal, gear.face_width, modes)
-    traces = [flank_trace(shape, mesh.points, mesh.boundary_edges, s, side) for side in (0, 1)]
+    traces = [flank_trace(shape, mesh, s, side) for side in (0, 1)]
     rigid = _rigid_shapes(mesh.points, gear.teeth)
     n = len(s)
     crack = None
-    if gear.crack is not None and gear.crack.meshed and isinstance(mesh, SectorMesh):
+    if gear.crack is not None and gear.crack.meshed:
         crack = condense_crack(gear, shape, ring, mesh, moduli, s, element_size)
     return CondensedGear(
         teeth=gear.teeth,

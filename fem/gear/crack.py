@@ -18,8 +18,8 @@ from gearbench.fem.gear.elasticity import PlaneModuli, assemble
 from gearbench.fem.gear.flank import boundary_quadrature, flank_trace
 from gearbench.fem.gear.flexibility import REACH, flank_loads, regular_forces, regular_motion
 from gearbench.fem.gear.ring import Ring, cut_influence, make_ring, odd_sector_forces, ring_response, to_cuts
-from gearbench.geometry.mesh.cracked_sector import CrackedSector, cracked_sector
-from gearbench.geometry.mesh.sector_mesh import SectorMesh
+from gearbench.geometry.mesh.cracked_sector import cracked_sector
+from gearbench.geometry.mesh.values import SectorMesh
 from gearbench.geometry.tooth.profile import Profile
 from gearbench.rig import Gear
 
@@ -74,7 +74,7 @@ def condense_crack(
     opened, closed = (_odd_sector(ring, influence, sector, shape, moduli, s, loads) for sector in sectors)
     pushed, own = opened[0] - closed[0], opened[1] - closed[1]
     extra = np.empty((2 * reach + 1, 2 * reach + 1, 2, 2, len(s), len(s)))
-    traces = [flank_trace(shape, mesh.points, mesh.boundary_edges, s, side) for side in (0, 1)]
+    traces = [flank_trace(shape, mesh, s, side) for side in (0, 1)]
     for b, offset in enumerate(range(-reach, reach + 1)):
         for side in (0, 1):
             answer = own[side] if offset == 0 else _answer(ring, traces[side], influence[offset]) @ pushed
@@ -90,7 +90,7 @@ def _answer(ring: Ring, trace: csr_matrix, u_cut: Array) -> Array:
 
 def _sound_motion(ring: Ring, mesh: SectorMesh, shape: Profile, moduli: PlaneModuli, s: Array, reach: int) -> _Loads:
     """Loads on all teeth in question: those of one tooth's working flank, turned and mirrored."""
-    quadrature = boundary_quadrature(shape, mesh.points, mesh.triangles, mesh.boundary_edges)
+    quadrature = boundary_quadrature(shape, mesh)
     front = flank_loads(shape, s)
     hub_points = mesh.points[mesh.hub]
     offsets = np.arange(-reach, reach + 1)
@@ -121,13 +121,12 @@ def _mirrored_cuts(u: Array) -> Array:
 
 
 def _odd_sector(
-    ring: Ring, influence: Array, sector: CrackedSector, shape: Profile, moduli: PlaneModuli, s: Array, loads: _Loads
+    ring: Ring, influence: Array, sector: SectorMesh, shape: Profile, moduli: PlaneModuli, s: Array, loads: _Loads
 ) -> tuple[Array, Array]:
     """Forces (cut unknowns, loads) with which sector 0 acts on a ring of sound sectors, and what each of its flanks
     does (side, n, loads), the half-plane's part left out."""
-    odd = make_ring(sector, ring.teeth, *assemble(sector.points, sector.triangles, moduli))
-    edges = np.concatenate((sector.boundary_edges, sector.faces))
-    quadrature = boundary_quadrature(shape, sector.points, sector.triangles, edges, sides=(0, 1))
+    odd = make_ring(sector, *assemble(sector, moduli))
+    quadrature = boundary_quadrature(shape, sector, sides=(0, 1))
     on_cuts, on_inner = [], []
     for a in range(-loads.reach, loads.reach + 1):
         for side in (0, 1):
@@ -142,7 +141,7 @@ def _odd_sector(
     u_cut = without + influence[0] @ pushed
     answers = []
     for side in (0, 1):
-        trace = flank_trace(shape, sector.points, sector.boundary_edges, s, side)
+        trace = flank_trace(shape, sector, s, side)
         # Few samples, many loads: the trace is solved for, not the loads.
         weights = odd.solve_inner(trace[:, odd.inner].T.toarray())
         inner = np.concatenate([weights.T @ f for f in on_inner], axis=1)

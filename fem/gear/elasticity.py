@@ -11,6 +11,7 @@ from skfem import Basis, BilinearForm, ElementQuad2, ElementTriP2, ElementVector
 from skfem.helpers import dot
 from skfem.models.elasticity import linear_elasticity
 
+from gearbench.geometry.mesh.values import Mesh
 from gearbench.rig import Material
 
 Array = NDArray[np.float64]
@@ -43,16 +44,12 @@ def plane_moduli(material: Material) -> PlaneModuli:
 DEGREE = {6: 6, 9: 9}
 
 
-def assemble(points: Array, cells: NDArray[np.int64], moduli: PlaneModuli) -> tuple[csr_matrix, csr_matrix]:
-    """Stiffness and mass (unit thickness, unit density); unknown 2 n + c is component c of node n.
-
-    points: (n, 2) [m]; cells: quadratic triangles (m, 6), corners then mid-side nodes of edges 01, 12, 20, or
-    biquadratic quadrilaterals (m, 9), corners, mid-side nodes of edges 01, 12, 23, 30 and the centre.
-    """
+def assemble(mesh: Mesh, moduli: PlaneModuli) -> tuple[csr_matrix, csr_matrix]:
+    """Stiffness and mass (unit thickness, unit density) of a plane mesh; unknown 2 n + c is component c of node n."""
+    points, cells = mesh.points, mesh.cells
     size = cells.shape[1]
     mesh_type, element = (MeshTri2, ElementTriP2()) if size == 6 else (MeshQuad2, ElementQuad2())
-    mesh = mesh_type(points.T.copy(), cells.T.copy())
-    basis = Basis(mesh, ElementVector(element), intorder=DEGREE[size])
+    basis = Basis(mesh_type(points.T.copy(), cells.T.copy()), ElementVector(element), intorder=DEGREE[size])
     lame, shear = moduli.lame
 
     @BilinearForm

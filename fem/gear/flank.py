@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
+from gearbench.geometry.mesh.values import SectorMesh
 from gearbench.geometry.tooth.profile import Profile
 
 Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 MIRROR = np.array([1.0, -1.0])
 
@@ -37,22 +37,22 @@ class BoundaryQuadrature:
 
 
 def boundary_quadrature(
-    shape: Profile, points: Array, cells: Indices, edges: Indices, order: int = 8, sides: Sequence[int] = (0,)
+    shape: Profile, mesh: SectorMesh, order: int = 8, sides: Sequence[int] = (0,)
 ) -> BoundaryQuadrature:
-    """Gauss quadrature of `order` points on curved boundary edges (k, 3): corner, corner, middle node.
+    """Gauss quadrature of `order` points on the curved edges of a sector that may carry tractions.
 
     On the flanks that carry the loads (`sides`, 0: working, 1: back) points and normals are those of the exact profile:
     the isoparametric boundary has kinks at its nodes, which a load beside one would see.
     """
+    points, edges = mesh.points, mesh.free_edges
     xi, weight = np.polynomial.legendre.leggauss(order)
     xi, weight = (xi + 1) / 2, weight / 2
     x = np.einsum("qa,kac->kqc", _shape(xi), points[edges])
     tangent = np.einsum("qa,kac->kqc", _slope(xi), points[edges])
     length = np.hypot(tangent[..., 0], tangent[..., 1])
     normal = np.stack([tangent[..., 1], -tangent[..., 0]], axis=-1) / length[..., None]
-    corners = 3 if cells.shape[1] == 6 else 4
-    owner = {int(mid): n for n, cell in enumerate(cells) for mid in cell[corners : 2 * corners]}
-    centre = points[cells[[owner[int(m)] for m in edges[:, 2]]][:, :corners]].mean(axis=1)
+    owner = {int(mid): n for n, middles in enumerate(mesh.middles) for mid in middles}
+    centre = points[mesh.corners[[owner[int(m)] for m in edges[:, 2]]]].mean(axis=1)
     outward = np.sign(np.sum((points[edges[:, 2]] - centre) * normal[:, order // 2], axis=1))
     normal *= outward[:, None, None]
     for side in sides:
@@ -96,12 +96,13 @@ def flank_coordinate(profile: Profile, points: Array) -> Array:
     return np.where(on, s, np.nan)
 
 
-def flank_trace(profile: Profile, points: Array, edges: Indices, s: Array, side: int) -> csr_matrix:
+def flank_trace(profile: Profile, mesh: SectorMesh, s: Array, side: int) -> csr_matrix:
     """Matrix (len(s), unknowns) that gives the displacement along the inward normal at arc lengths s.
 
     side 0: working flank (counter-clockwise), side 1: back flank (its mirror image).
     """
     mirror = MIRROR if side else np.ones(2)
+    points, edges = mesh.points, mesh.boundary_edges
     coordinate = flank_coordinate(profile, points * mirror)
     own = edges[~np.isnan(coordinate[edges]).any(axis=1)]
     ends = np.sort(coordinate[own[:, :2]], axis=1)

@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 from gearbench.fem.gear.elasticity import PlaneModuli
 from gearbench.fem.gear.flamant import LineLoad
 from gearbench.fem.gear.flank import MIRROR, BoundaryQuadrature, boundary_quadrature, flank_trace
-from gearbench.fem.gear.ring import Ring, ring_response, rotation
-from gearbench.geometry.mesh.sector import Sector
+from gearbench.fem.gear.ring import Ring, ring_response
+from gearbench.geometry.mesh.values import SectorMesh
+from gearbench.geometry.tooth.fillet import rotation
 from gearbench.geometry.tooth.profile import Profile
 
 Array = NDArray[np.float64]
@@ -83,10 +84,10 @@ def regular_motion(points: Array, loads: list[LineLoad], moduli: PlaneModuli) ->
     return np.array([-load.displacement(points, moduli.modulus, moduli.poisson).ravel() for load in loads]).T
 
 
-def flank_kernels(ring: Ring, mesh: Sector, shape: Profile, moduli: PlaneModuli, s: Array) -> tuple[Array, Array]:
+def flank_kernels(ring: Ring, mesh: SectorMesh, shape: Profile, moduli: PlaneModuli, s: Array) -> tuple[Array, Array]:
     """Kernels (front, back) of `CondensedGear`."""
     teeth = ring.teeth
-    quadrature = boundary_quadrature(shape, mesh.points, mesh.cells, mesh.boundary_edges)
+    quadrature = boundary_quadrature(shape, mesh)
     at, normal = shape.points(s), shape.normals(s)
     loads = flank_loads(shape, s)
 
@@ -102,7 +103,7 @@ def flank_kernels(ring: Ring, mesh: Sector, shape: Profile, moduli: PlaneModuli,
     kernels = np.empty((2, len(offsets), len(s), len(s)))
     for side in (0, 1):
         mirror = MIRROR if side else np.ones(2)
-        trace = flank_trace(shape, mesh.points, mesh.boundary_edges, s, side)
+        trace = flank_trace(shape, mesh, s, side)
         for m, offset in enumerate(offsets):
             regular = (trace @ response[m]).T
             own = side == 0 and offset == 0

@@ -11,30 +11,19 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from math import pi
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_matrix, csr_matrix
 from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
+from gearbench.geometry.mesh.values import SectorMesh
+from gearbench.geometry.tooth.fillet import rotation
+
 Array = NDArray[np.float64]
 Solver = Callable[[Array], Array]
 Indices = NDArray[np.int64]
 SectorField = Callable[[int], Array]
-
-
-class SectorLike(Protocol):
-    """What the ring needs of a sector mesh (see `geometry.mesh.SectorMesh`)."""
-
-    @property
-    def points(self) -> Array: ...
-    @property
-    def cut_low(self) -> Indices: ...
-    @property
-    def cut_high(self) -> Indices: ...
-    @property
-    def hub(self) -> Indices: ...
 
 
 def symmetric_lu(matrix: csc_matrix) -> Solver:
@@ -46,12 +35,6 @@ def symmetric_lu(matrix: csc_matrix) -> Solver:
 def unknowns(nodes: Indices) -> Indices:
     """Unknowns 2 n, 2 n + 1 of nodes."""
     return (2 * np.asarray(nodes)[:, None] + np.arange(2)).ravel()
-
-
-def rotation(angle: float) -> Array:
-    """2 x 2 rotation matrix, counter-clockwise."""
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[c, -s], [s, c]])
 
 
 @dataclass(frozen=True)
@@ -86,8 +69,7 @@ class Ring:
 
 
 def make_ring(
-    sector: SectorLike,
-    teeth: int,
+    sector: SectorMesh,
     stiffness: csr_matrix,
     mass: csr_matrix,
     factorise: Callable[[csc_matrix], Solver] = symmetric_lu,
@@ -104,7 +86,7 @@ def make_ring(
     solve = factorise(k_ii.tocsc())
     modes = solve(k_ic.toarray())
     condensed = stiffness[cuts][:, cuts].toarray() - k_ic.T @ modes
-    return Ring(teeth, stiffness, mass, hub, low, high, inner, solve, modes, 0.5 * (condensed + condensed.T))
+    return Ring(sector.teeth, stiffness, mass, hub, low, high, inner, solve, modes, 0.5 * (condensed + condensed.T))
 
 
 def ring_response(ring: Ring, forces: SectorField, hub: SectorField, wanted: Indices) -> Array:

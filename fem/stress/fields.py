@@ -17,10 +17,12 @@ from numpy.typing import NDArray
 from gearbench.fem.gear.body import rounded
 from gearbench.fem.gear.elasticity import PlaneModuli, assemble, plane_moduli
 from gearbench.fem.gear.flank import BoundaryQuadrature, boundary_quadrature
-from gearbench.fem.gear.ring import Ring, make_ring, ring_response, rotation
+from gearbench.fem.gear.ring import Ring, make_ring, ring_response
 from gearbench.fem.stress.pressure import Strips
 from gearbench.fem.stress.recovery import Recovery, make_recovery, ring_stress
-from gearbench.geometry.mesh.sector_mesh import SectorMesh, sector_mesh
+from gearbench.geometry.mesh.sector_mesh import sector_mesh
+from gearbench.geometry.mesh.values import SectorMesh
+from gearbench.geometry.tooth.fillet import rotation
 from gearbench.geometry.tooth.profile import Profile, profile
 from gearbench.rig import Gear, Material
 
@@ -63,11 +65,11 @@ def elastic_gear(gear: Gear, material: Material, element_size: float | None = No
     """Mesh and factorise one sector; arguments as `body.condense`. Raises GeometryError."""
     gear = rounded(gear)
     shape = profile(gear)
-    mesh = sector_mesh(shape, gear, element_size or gear.module / 12)
+    mesh = sector_mesh(shape, gear, element_size)
     moduli = plane_moduli(material)
-    ring = make_ring(mesh, gear.teeth, *assemble(mesh.points, mesh.triangles, moduli))
-    quadrature = boundary_quadrature(shape, mesh.points, mesh.triangles, mesh.boundary_edges)
-    return ElasticGear(shape, mesh, moduli, ring, quadrature, make_recovery(mesh.points, mesh.triangles, moduli))
+    ring = make_ring(mesh, *assemble(mesh, moduli))
+    quadrature = boundary_quadrature(shape, mesh)
+    return ElasticGear(shape, mesh, moduli, ring, quadrature, make_recovery(mesh, moduli))
 
 
 def regular_loads(gear: ElasticGear, strips: Strips, sector: int) -> tuple[Array, Array]:
@@ -93,5 +95,5 @@ def gear_field(gear: ElasticGear, strips: Strips, sectors: Sequence[int]) -> Gea
     forces, hub = (partial(lambda part, j: both[j][part], part) for part in (0, 1))
     wanted = np.asarray(sectors, dtype=np.int64)
     found = ring_response(gear.ring, forces, hub, wanted)[:, :, 0].reshape(len(wanted), -1, 2)
-    stress = ring_stress(gear.recovery, gear.mesh, teeth, dict(zip(sectors, found, strict=True)))
+    stress = ring_stress(gear.recovery, gear.mesh, dict(zip(sectors, found, strict=True)))
     return GearField(gear, tuple(sectors), found, np.array([stress[j] for j in sectors]), strips)

@@ -15,8 +15,9 @@ from gearbench.fem.contact.law import PAIRS, Law, contact_in
 from gearbench.fem.contact.line import gap_to_master, line_contact, touching_point
 from gearbench.fem.contact.static import ContactError, position
 from gearbench.fem.gear.flank import MIRROR
-from gearbench.fem.gear.ring import rotation
 from gearbench.fem.stress.pressure import Strips
+from gearbench.geometry.pair.numbering import sector_of
+from gearbench.geometry.tooth.fillet import rotation
 from gearbench.geometry.tooth.profile import Profile
 
 Array = NDArray[np.float64]
@@ -33,7 +34,7 @@ class PairLoad:
 
     def sector(self, gear: int, teeth: int) -> int:
         """Number of the gear's loaded sector (0: driver, 1: driven), counted counter-clockwise from tooth 0."""
-        return (-self.tooth if gear == 0 else self.tooth + self.side) % teeth
+        return sector_of(self.tooth + (self.side if gear else 0), gear, teeth)
 
 
 @dataclass(frozen=True)
@@ -128,7 +129,7 @@ def pressed_teeth(
     return out
 
 
-def joined(teeth: int, pressed: Sequence[Pressed]) -> Strips:
+def all_strips(teeth: int, pressed: Sequence[Pressed]) -> Strips:
     """All strips of a gear in the frame of its tooth 0. At least one tooth must be pressed."""
     parts = [p.strips.turned(rotation(2 * pi * p.sector / teeth)) for p in pressed]
     return Strips(*(np.concatenate([getattr(part, one.name) for part in parts]) for one in fields(Strips)))

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.fem.gear.elasticity import PlaneModuli
-from gearbench.fem.gear.ring import SectorLike, rotation
+from gearbench.geometry.mesh.values import Mesh, SectorMesh
+from gearbench.geometry.tooth.fillet import rotation
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -77,8 +78,9 @@ class Recovery:
         return np.asarray(self.nodal_sum(displacement) / self.count[:, None])
 
 
-def make_recovery(points: Array, triangles: Indices, moduli: PlaneModuli) -> Recovery:
-    """Prepare the recovery on curved quadratic triangles; points (n, 2) [m]."""
+def make_recovery(mesh: Mesh, moduli: PlaneModuli) -> Recovery:
+    """Prepare the recovery on curved quadratic triangles."""
+    points, triangles = mesh.points, mesh.cells
     reference = shape_slopes(SAMPLES)
     jacobian = np.einsum("qad,mac->mqcd", reference, points[triangles])
     slopes = np.einsum("qad,mqdc->mqac", reference, np.linalg.inv(jacobian))
@@ -100,9 +102,10 @@ def turn_stress(stress: Array, angle: float) -> Array:
     )
 
 
-def ring_stress(recovery: Recovery, sector: SectorLike, teeth: int, fields: dict[int, Array]) -> dict[int, Array]:
+def ring_stress(recovery: Recovery, sector: SectorMesh, fields: dict[int, Array]) -> dict[int, Array]:
     """Nodal stress of sectors, averaged over their common cuts too; sector numbers to displacements (n, 2), each in
     its own frame. A cut whose other side is not among them is averaged over its own side."""
+    teeth = sector.teeth
     pitch = 2 * pi / teeth
     sums = {j: recovery.nodal_sum(u) for j, u in fields.items()}
     out = {}

@@ -9,17 +9,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from math import pi
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from gearbench.fem.gear.body import REACH, kernel_samples
 from gearbench.fem.gear.flamant import LineLoad
-from gearbench.fem.gear.ring import ring_response, rotation
+from gearbench.fem.gear.flexibility import REACH, flank_loads, kernel_samples, regular_forces, regular_motion
+from gearbench.fem.gear.ring import ring_response
 from gearbench.fem.stress.fields import ElasticGear
 from gearbench.fem.stress.loaded import PairLoad
+from gearbench.geometry.pair.numbering import sector_of
 
 Array = NDArray[np.float64]
 
@@ -118,36 +118,32 @@ def root_kernel(gear: ElasticGear, width: float, spacing: float | None = None) -
     root = root_edges(gear)
     reach = min(REACH, (gear.ring.teeth - 1) // 2)
     offsets = np.arange(-reach, reach + 1)
-    at, normal = shape.points(s), shape.normals(s)
-    space = np.array([np.cos(pi / shape.teeth), np.sin(pi / shape.teeth)])
-
-    def loads_in(j: int) -> list[LineLoad]:
-        turn = rotation(-2 * pi * j / shape.teeth)
-        return [LineLoad(turn @ x, -(turn @ n), turn @ space) for x, n in zip(at, normal, strict=True)]
+    loads = flank_loads(shape, s)
 
     def forces(j: int) -> Array:
-        q = gear.quadrature
-        return np.asarray(q.load @ -np.array([one.traction(q.points, q.normals).ravel() for one in loads_in(j)]).T)
+        return regular_forces(gear.quadrature, loads.seen_from(j))
 
-    hub_points, moduli = gear.mesh.points[gear.mesh.hub], gear.moduli
+    hub_points = gear.mesh.points[gear.mesh.hub]
 
     def hub(j: int) -> Array:
-        return -np.array([x.displacement(hub_points, moduli.modulus, moduli.poisson).ravel() for x in loads_in(j)]).T
+        return regular_motion(hub_points, loads.seen_from(j), gear.moduli)
 
     found = ring_response(gear.ring, forces, hub, offsets % shape.teeth)
     front = np.empty((len(offsets), len(s), len(root.nodes)))
     back = np.empty_like(front)
-    flip = np.array([1.0, -1.0])
+    flip, mirror = np.array([1.0, -1.0]), gear.mesh.mirror
+    assert mirror is not None  # stress is that of sound sectors
     for m, offset in enumerate(offsets):
         u = found[m].T.reshape(len(s), -1, 2)
-        loads = loads_in(int(offset))
-        front[m] = _boundary_stress(gear, root, u, loads)
+        seen = loads.seen_from(int(offset))
+        front[m] = _boundary_stress(gear, root, u, seen)
         # A load on the back flank is the mirror image: seen there, this root is on the other side.
         mirrored = RootEdges(
-            gear.mesh.mirror[root.nodes], root.slopes, root.points * flip, root.tangents * flip, root.normals * flip
+            mirror[root.nodes], root.slopes, root.points * flip, root.tangents * flip, root.normals * flip
         )
-        back[len(offsets) - 1 - m] = _boundary_stress(gear, mirrored, u, loads)
+        back[len(offsets) - 1 - m] = _boundary_stress(gear, mirrored, u, seen)
     angle = np.arctan2(np.abs(root.tangents[:, 1]), np.abs(root.tangents[:, 0]))
+    at, normal = shape.points(s), shape.normals(s)
     levers = at[:, 0] * normal[:, 1] - at[:, 1] * normal[:, 0]
     return RootKernel(s, last, levers, root.points, angle, front, back, width)
 
@@ -164,7 +160,7 @@ def _boundary_stress(gear: ElasticGear, root: RootEdges, regular: Array, loads: 
 
 def root_stress(kernel: RootKernel, pairs: list[PairLoad], teeth: int, gear: int, tooth: int) -> Array:
     """Stress (k,) [Pa] along the working root of one tooth (of gear 0: driver, 1: driven) under the loaded pairs."""
-    own = (-tooth if gear == 0 else tooth) % teeth
+    own = sector_of(tooth, gear, teeth)
     total = np.zeros(len(kernel.angle))
     for one in pairs:
         k = one.contact

@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.geometry.export.files import written_whole
-from gearbench.geometry.mesh.assembly import AssembledMesh
+from gearbench.files import write_text
+from gearbench.geometry.mesh.values import GearMesh
 from gearbench.rig import Material
 
 Array = NDArray[np.float64]
@@ -34,7 +34,7 @@ NAMES = ("DRIVER", "DRIVEN")
 class Placement:
     """A gear in the world: mesh, polar angle of its tooth 0 [rad], x of its centre and face width [m]."""
 
-    mesh: AssembledMesh
+    mesh: GearMesh
     angle: float
     centre: float
     width: float
@@ -48,7 +48,7 @@ class Placement:
 @dataclass(frozen=True)
 class Touch:
     """Flanks of a tooth pair that may touch: gear of the slave surface (0 driver, 1 driven), `sides` (e, 2) of slave
-    and master (see AssembledMesh), and the size of the elements in contact [m]."""
+    and master (see `outline_sides`), and the size of the elements in contact [m]."""
 
     slave: int
     slave_sides: Index
@@ -85,12 +85,8 @@ def deck_text(deck: Deck) -> str:
 
 
 def write_deck(path: str | Path, deck: Deck) -> Path:
-    """Write the input. Raises GeometryError for a missing folder."""
-    return written_whole(path, lambda name: _save(name, deck_text(deck)))
-
-
-def _save(path: Path, text: str) -> None:
-    path.write_text(text, encoding="utf-8")
+    """Write the input. Raises FileError."""
+    return write_text(path, deck_text(deck))
 
 
 def _head(deck: Deck) -> Iterator[str]:
@@ -110,7 +106,7 @@ def _meshes(deck: Deck) -> Iterator[str]:
         # CalculiX reads twenty characters of a number.
         yield from (f"{node + i}, {x:.12g}, {y:.12g}, 0." for i, (x, y) in enumerate(gear.points().tolist()))
         yield f"*ELEMENT, TYPE=CPE6, ELSET=E_{name}"
-        rows = (gear.mesh.triangles + node).tolist()
+        rows = (gear.mesh.cells + node).tolist()
         yield from (f"{element + i}, " + ", ".join(map(str, row)) for i, row in enumerate(rows))
         yield f"*NSET, NSET=HUB_{name}"
         yield from _rows((gear.mesh.hub + node).tolist())
@@ -123,7 +119,7 @@ def _hubs(deck: Deck) -> Iterator[str]:
     CalculiX prints no moment of such a body (nor of *RIGID BODY). So the angle is the motion along x of one face of a
     cube, very stiff, whose other face is moved by the angle wanted: the force on that face is the moment.
     """
-    element = sum(len(gear.mesh.triangles) for gear in deck.gears) + 1
+    element = sum(len(gear.mesh.cells) for gear in deck.gears) + 1
     stiffness = f"{STIFF * 1e3 * deck.torques[0] / abs(deck.rotation):.2e}"
     first = sum(len(gear.mesh.points) for gear in deck.gears)
     for number, (gear, name) in enumerate(zip(deck.gears, NAMES, strict=True)):
@@ -164,7 +160,7 @@ def _behaviour(deck: Deck, touch: Touch, penalty: float) -> str:
 
 
 def _contacts(deck: Deck) -> Iterator[str]:
-    first = (1, 1 + len(deck.gears[0].mesh.triangles))
+    first = (1, 1 + len(deck.gears[0].mesh.cells))
     for k, touch in enumerate(deck.touches):
         yield f"*SURFACE INTERACTION, NAME=CONTACT{k}"
         yield _behaviour(deck, touch, PENALTIES[0])

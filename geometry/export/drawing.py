@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.geometry.export.files import written_whole
-from gearbench.geometry.mesh.sector_mesh import gmsh_session
+from gearbench.files import write_whole
+from gearbench.geometry.mesh.filling import gmsh_session
 from gearbench.geometry.pair.kinematics import Pair, pair
 from gearbench.geometry.tooth.outline import Segment, half_outline
 from gearbench.geometry.tooth.profile import Profile
@@ -119,7 +119,7 @@ def write_dxf(path: Path, gears: Iterable[Placed]) -> Path:
                 file.writelines(_dxf_gear(gear))
             file.write(_groups([(0, "ENDSEC"), (0, "EOF")]))
 
-    return written_whole(path, write)
+    return write_whole(path, write)
 
 
 def _step_gear(occ: Any, gear: Placed) -> None:
@@ -173,4 +173,4 @@ def write_step(path: Path, gears: Iterable[Placed]) -> Path:
             finally:
                 gmsh.model.remove()
 
-    return written_whole(path, write)
+    return write_whole(path, write)

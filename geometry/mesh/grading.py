@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 
+from gearbench.geometry.mesh.element_size import default_size
 from gearbench.geometry.tooth.outline import Segment, half_outline, joined
 from gearbench.geometry.tooth.profile import Profile, radial
 
@@ -62,6 +63,11 @@ class HalfBoundary:
     hub: Chain
     axis: Chain
 
+    @property
+    def sides(self) -> tuple[Chain, Chain, Chain, Chain]:
+        """The sides in order around the half sector."""
+        return self.outline, self.cut, self.hub, self.axis
+
 
 @dataclass(frozen=True)
 class Cloud:
@@ -103,7 +109,7 @@ def size_samples(length: float, size: Callable[[Array], Array]) -> tuple[Array, 
 
 def tip_size(tooth: Profile, element_size: float) -> float:
     """Element size on the tip edge [m]; it shrinks with the elements of a mesh finer than the default one."""
-    finer = min(1.0, element_size / (tooth.module / 12))
+    finer = min(1.0, element_size / default_size(tooth.module))
     return min(element_size, finer * max(tooth.edge_radius / 4, CORNER_SIZE))
 
 

@@ -1,4 +1,4 @@
-"""One tooth sector as curved quadrilaterals of second order (nine nodes), and the full gear.
+"""One tooth sector as curved quadrilaterals of second order (nine nodes).
 
 gmsh fills every second edge of the boundary with triangles and joins them to quadrilaterals where it can; each of both
 is then divided at the middles of its sides, which leaves quadrilaterals alone.
@@ -6,15 +6,16 @@ is then divided at the middles of its sides, which leaves quadrilaterals alone.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.geometry.mesh.element_size import flank_size
+from gearbench.geometry.mesh.filling import fill, raise_order, ring_of
 from gearbench.geometry.mesh.grading import Grading, HalfBoundary, half_boundary
-from gearbench.geometry.mesh.sector_mesh import fill, mirrored, raise_order, repeated, sides_of
+from gearbench.geometry.mesh.sector_mesh import mirrored
+from gearbench.geometry.mesh.values import SectorMesh
 from gearbench.geometry.tooth.profile import Profile
 from gearbench.rig import Gear
 
@@ -30,81 +31,23 @@ FLAT = 1.0
 TURNED = [1, 0, 3, 2, 4, 7, 6, 5, 8]
 
 
-@dataclass(frozen=True)
-class QuadSectorMesh:
-    """One tooth sector as `SectorMesh`, but of `quads` (m, 9): four corners counter-clockwise, the middles of 0-1, 1-2,
-    2-3 and 3-0, and the centre (gmsh and meshio order)."""
-
-    teeth: int
-    points: Array
-    quads: Index
-    cut_low: Index
-    cut_high: Index
-    hub: Index
-    boundary_edges: Index
-    mirror: Index
-
-    @property
-    def cells(self) -> Index:
-        """The elements, whatever their kind."""
-        return self.quads
-
-
-@dataclass(frozen=True)
-class QuadGearMesh:
-    """A full gear of quadrilaterals: `points`, `quads`, `hub`, `boundary_edges` as in QuadSectorMesh."""
-
-    teeth: int
-    points: Array
-    quads: Index
-    hub: Index
-    boundary_edges: Index
-
-    @property
-    def cells(self) -> Index:
-        """The elements, whatever their kind."""
-        return self.quads
-
-
-def full_quads(sector: QuadSectorMesh) -> QuadGearMesh:
-    """The gear of which this is a sector, each tooth an exact rotation; cut nodes are shared."""
-    points, node_of = repeated(sector.teeth, sector.points, sector.cut_low, sector.cut_high)
-    return QuadGearMesh(
-        teeth=sector.teeth,
-        points=points,
-        quads=node_of[:, sector.quads].reshape(-1, 9),
-        hub=np.unique(node_of[:, sector.hub]),
-        boundary_edges=node_of[:, sector.boundary_edges].reshape(-1, 3),
-    )
-
-
-def quad_sector_mesh(tooth: Profile, gear: Gear, element_size: float | None = None) -> QuadSectorMesh:
+def quad_sector_mesh(tooth: Profile, gear: Gear, element_size: float | None = None) -> SectorMesh:
     """Mesh one tooth sector with quadrilaterals. `element_size` [m] and errors as in `sector_mesh`."""
     boundary = half_boundary(tooth, gear.hub_radius, flank_size(gear.module, element_size), GRADING)
     corners, quads = _divided(boundary)
-    points, half, sides = raise_order(corners, quads, boundary)
+    points, half, sides = raise_order(corners, quads, boundary.sides)
     corner, middle = points[half[:, :4]].sum(axis=1), points[half[:, 4:]].sum(axis=1)
     # The centre of the cell that its four sides span (Coons).
     centres = 0.5 * middle - 0.25 * corner
     half = np.column_stack((half, len(points) + np.arange(len(half))))
-    whole = mirrored(tooth.teeth, np.concatenate((points, centres)), half, sides, TURNED)
-    return QuadSectorMesh(
-        teeth=tooth.teeth,
-        points=whole.points,
-        quads=whole.cells,
-        cut_low=whole.cut_low,
-        cut_high=whole.cut_high,
-        hub=whole.hub,
-        boundary_edges=whole.boundary_edges,
-        mirror=whole.mirror,
-    )
+    return mirrored(tooth.teeth, np.concatenate((points, centres)), half, sides, TURNED)
 
 
 def _divided(boundary: HalfBoundary) -> tuple[Array, Index]:
     """Corners (n, 2), those of the boundary first, and quadrilaterals (m, 4) inside it."""
-    ring = np.concatenate([chain.corners[:-1] for chain in sides_of(boundary)])
+    ring = ring_of(boundary.sides)
     coarse, triangles, quads = fill(ring[::2], recombine=True)
-    coarse, *cells = _without_ears(coarse, _ccw(coarse, triangles), _ccw(coarse, quads), ring[::2])
+    coarse, *cells = _without_ears(coarse, triangles, _ccw(coarse, quads), ring[::2])
     count = len(coarse)
     edges = [np.sort(np.stack((cell, np.roll(cell, -1, axis=1)), axis=2), axis=2) for cell in cells]
     unique, inverse = np.unique(np.concatenate([e.reshape(-1, 2) for e in edges]), axis=0, return_inverse=True)

@@ -1,4 +1,4 @@
-"""Quality of a mesh of curved quadratic triangles."""
+"""Quality of a plane mesh of curved second-order elements."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+
+from gearbench.geometry.mesh.values import Mesh
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -17,19 +19,27 @@ _NODES = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [0.5, 0.0], [0.5, 0.5], [
 
 @dataclass(frozen=True)
 class Quality:
-    """Measured on every triangle; the worst is kept. `jacobian`: lower bound of the map's determinant over
-    the triangle, relative to twice its area (1 for straight sides with centred middles; <= 0: folded).
-    `angle`: smallest corner angle of the straight-sided triangle [rad]. `aspect`: inradius over circumradius,
-    twice (1: equilateral). `growth`: largest ratio of the square roots of the areas of two triangles that
-    share an edge."""
+    """Measured on every element; the worst is kept.
 
-    triangles: int
+    `jacobian`: lower bound of the map's determinant over the element, relative to what the element's area makes of it
+    (1: straight sides with centred middles, for a quadrilateral a parallelogram; <= 0: folded). `angle`, `widest`:
+    smallest and largest corner angle of the straight-sided element [rad]. `aspect`: inradius over circumradius of a
+    triangle, twice (1: equilateral); None for quadrilaterals. `growth`: largest ratio of the square roots of the areas
+    of two elements that share an edge. `area` [m^2]: of the mesh."""
+
+    elements: int
     nodes: int
     jacobian: float
     angle: float
-    aspect: float
+    widest: float
+    aspect: float | None
     growth: float
     area: float
+
+
+def quality(mesh: Mesh) -> Quality:
+    """Measure a plane mesh of triangles or of quadrilaterals."""
+    return (_triangle_quality if mesh.kind.corners == 3 else _quad_quality)(mesh)
 
 
 def shape_gradients(at: Array) -> Array:
@@ -53,8 +63,8 @@ def areas(points: Array, triangles: Index) -> Array:
     return determinants(points, triangles, middles).sum(axis=1) / 6
 
 
-def quality(points: Array, triangles: Index) -> Quality:
-    """Measure a mesh: points (n, 2), triangles (m, 6)."""
+def _triangle_quality(mesh: Mesh) -> Quality:
+    points, triangles = mesh.points, mesh.cells
     area = areas(points, triangles)
     value = determinants(points, triangles, _NODES)
     corner, middle = value[:, :3], value[:, 3:]
@@ -66,23 +76,28 @@ def quality(points: Array, triangles: Index) -> Quality:
     angles = np.arccos(np.clip(cosines, -1, 1))
     angles = np.column_stack((angles, np.pi - angles.sum(axis=1)))
     aspect = 8 * np.prod(np.sin(angles / 2), axis=1)
+    return _worst(mesh, lowest, angles, area, float(aspect.min()))
+
+
+def _worst(mesh: Mesh, jacobian: Array, angles: Array, area: Array, aspect: float | None) -> Quality:
+    """What is kept of the elements' relative determinants (m,), corner angles (m, 3 or 4) and areas (m,)."""
     return Quality(
-        triangles=len(triangles),
-        nodes=len(points),
-        jacobian=float(lowest.min()),
+        elements=len(mesh.cells),
+        nodes=len(np.unique(mesh.cells)),
+        jacobian=float(jacobian.min()),
         angle=float(angles.min()),
-        aspect=float(aspect.min()),
-        growth=_growth(triangles, area),
+        widest=float(angles.max()),
+        aspect=aspect,
+        growth=_growth(mesh.middles, area),
         area=float(area.sum()),
     )
 
 
-def _growth(triangles: Index, area: Array) -> float:
-    """Largest ratio of sizes across an edge (middles identify the edges)."""
-    middle = triangles[:, 3:].ravel()
-    order = np.argsort(middle, kind="stable")
-    owner = np.repeat(np.arange(len(triangles)), 3)[order]
-    shared = np.flatnonzero(np.diff(middle[order]) == 0)
+def _growth(middles: Index, area: Array) -> float:
+    """Largest ratio of sizes across an edge; `middles` (m, 3 or 4) of the elements' sides identify the edges."""
+    order = np.argsort(middles.ravel(), kind="stable")
+    owner = np.repeat(np.arange(len(middles)), middles.shape[1])[order]
+    shared = np.flatnonzero(np.diff(middles.ravel()[order]) == 0)
     ratio = np.sqrt(area[owner[shared]] / area[owner[shared + 1]])
     return float(np.maximum(ratio, 1 / ratio).max(initial=1.0))
 
@@ -97,19 +112,6 @@ _BERNSTEIN = np.linalg.inv(
 _PLACES = np.array([[0, 0], [2, 0], [2, 2], [0, 2], [1, 0], [2, 1], [1, 2], [0, 1], [1, 1]])
 
 
-@dataclass(frozen=True)
-class QuadQuality:
-    """Measured on every quadrilateral; the worst is kept. `jacobian`: lower bound of the map's determinant over the
-    element, relative to its area (1: parallelogram; <= 0: folded). `angle`, `widest`: smallest and largest corner angle
-    of the straight-sided quadrilateral [rad]."""
-
-    quads: int
-    nodes: int
-    jacobian: float
-    angle: float
-    widest: float
-    area: float
-
 
 def quad_determinants(points: Array, quads: Index, at: Array) -> Array:
     """Determinants (m, n, n) of the map of each quadrilateral (m, 9) of the unit square at all pairs of `at` (n,)."""
@@ -122,21 +124,14 @@ def quad_determinants(points: Array, quads: Index, at: Array) -> Array:
     return along[..., 0] * across[..., 1] - along[..., 1] * across[..., 0]
 
 
-def quad_quality(points: Array, quads: Index) -> QuadQuality:
-    """Measure a mesh of quadrilaterals: points (n, 2), quads (m, 9)."""
+def _quad_quality(mesh: Mesh) -> Quality:
+    points, quads = mesh.points, mesh.cells
     at, weight = np.polynomial.legendre.leggauss(3)
     weight = weight / 2
     area = np.einsum("mij,i,j->m", quad_determinants(points, quads, (at + 1) / 2), weight, weight)
     bound = np.einsum("ai,bj,mij->mab", _BERNSTEIN, _BERNSTEIN, quad_determinants(points, quads, _STEPS))
-    corners = points[quads[:, :4]]
+    corners = points[mesh.corners]
     ahead, back = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
     cross = ahead[..., 0] * back[..., 1] - ahead[..., 1] * back[..., 0]
     angles = np.arctan2(cross, np.sum(ahead * back, axis=2)) % (2 * np.pi)
-    return QuadQuality(
-        quads=len(quads),
-        nodes=len(np.unique(quads)),
-        jacobian=float((bound.min(axis=(1, 2)) / area).min()),
-        angle=float(angles.min()),
-        widest=float(angles.max()),
-        area=float(area.sum()),
-    )
+    return _worst(mesh, bound.min(axis=(1, 2)) / area, angles, area, None)

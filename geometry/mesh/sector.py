@@ -5,18 +5,18 @@ from __future__ import annotations
 from typing import Literal
 
 from gearbench.geometry.error import GeometryError
-from gearbench.geometry.mesh.quads import QuadSectorMesh, quad_sector_mesh
-from gearbench.geometry.mesh.sector_mesh import SectorMesh, sector_mesh
+from gearbench.geometry.mesh.quads import quad_sector_mesh
+from gearbench.geometry.mesh.sector_mesh import sector_mesh
+from gearbench.geometry.mesh.values import SectorMesh
 from gearbench.geometry.tooth.profile import Profile
 from gearbench.rig import Gear
 
 Element = Literal["triangle", "quadrilateral"]
-Sector = SectorMesh | QuadSectorMesh
 
 
 def meshed_sector(
     tooth: Profile, gear: Gear, element_size: float | None = None, element: Element = "triangle"
-) -> Sector:
+) -> SectorMesh:
     """One sound tooth sector of quadratic triangles or biquadratic quadrilaterals. `element_size` [m] and errors as in
     `sector_mesh`."""
     if element == "quadrilateral":

@@ -6,39 +6,17 @@ of the plane ones times half the height of a layer.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.geometry.error import GeometryError
+from gearbench.geometry.mesh.values import KINDS, PairMesh, joined
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 MOST_LAYERS = 200
 DEFAULT_LAYERS = 8
-# Corners of the plane elements by their number of nodes.
-_CORNERS = {6: 3, 9: 4}
-
-
-@dataclass(frozen=True)
-class SolidMesh:
-    """Points (n, 3) [m]; `cells` (m, 15) wedges or (m, 20) hexahedra: corners of the lower face counter-clockwise, of
-    the upper face, middles of the lower, the upper and the upright sides (VTK and Abaqus order); for each the number of
-    its gear (0, 1) and tooth."""
-
-    points: Array
-    cells: Index
-    gear: Index
-    tooth: Index
-
-    @property
-    def kind(self) -> str:
-        """meshio's name of the elements."""
-        return {15: "wedge15", 20: "hexahedron20"}[self.cells.shape[1]]
-
 
 def swept(points: Array, cells: Index, width: float, layers: int = DEFAULT_LAYERS) -> tuple[Array, Index]:
     """Sweep plane cells (m, 6) or (m, 9) over the face width [m], centred on z = 0, in equal layers.
@@ -47,7 +25,7 @@ def swept(points: Array, cells: Index, width: float, layers: int = DEFAULT_LAYER
     """
     if not 1 <= layers <= MOST_LAYERS:
         raise GeometryError(f"layers = {layers} must lie between 1 and {MOST_LAYERS}")
-    k = _CORNERS[cells.shape[1]]
+    k = KINDS[cells.shape[1]].corners
     section = np.unique(cells[:, : 2 * k])  # the centre of a quadrilateral has no place in a solid
     corner = np.unique(cells[:, :k])
     place, upright = np.full((2, len(points)), -1, dtype=np.int64)
@@ -69,12 +47,14 @@ def _at(points: Array, z: float) -> Array:
     return np.column_stack((points, np.full(len(points), z)))
 
 
-def joined(parts: Sequence[SolidMesh]) -> SolidMesh:
-    """Several solids, which share no nodes, as one mesh."""
-    first = np.cumsum([0] + [len(part.points) for part in parts[:-1]])
-    return SolidMesh(
-        points=np.concatenate([part.points for part in parts]),
-        cells=np.concatenate([part.cells + n for part, n in zip(parts, first, strict=True)]),
-        gear=np.concatenate([part.gear for part in parts]),
-        tooth=np.concatenate([part.tooth for part in parts]),
-    )
+def sweep(mesh: PairMesh, widths: tuple[float, float], layers: int = DEFAULT_LAYERS) -> PairMesh:
+    """The gears of a plane mesh as solids, each over its own face width [m] about z = 0. Errors as in `swept`."""
+    parts = []
+    for number, width in enumerate(widths):
+        chosen = mesh.gear == number
+        if not chosen.any():
+            continue
+        used, cells = np.unique(mesh.cells[chosen], return_inverse=True)
+        points, solids = swept(mesh.points[used], cells.reshape(-1, mesh.cells.shape[1]), width, layers)
+        parts.append(PairMesh(points, solids, np.full(len(solids), number), np.tile(mesh.tooth[chosen], layers)))
+    return joined(parts)

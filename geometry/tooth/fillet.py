@@ -29,6 +29,12 @@ def radial(angle: ArrayLike) -> Array:
     return np.stack((np.cos(angle), np.sin(angle)), axis=-1)
 
 
+def rotation(angle: float) -> Array:
+    """Matrix (2, 2) of a counter-clockwise rotation by `angle` [rad]."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s], [s, c]])
+
+
 def tangential(angle: ArrayLike) -> Array:
     """Unit vectors (..., 2) perpendicular to those at the polar `angle`, counter-clockwise."""
     angle = np.asarray(angle, dtype=float)

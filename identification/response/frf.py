@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from gearbench.identification.truth.periodic import Complexes, Floats
-from gearbench.records.storage import write_atomically
+from gearbench.records.storage import read_dataset, write_dataset
 
 SCHEMA = "gearbench-frf/1"
 KINDS = ("identified", "exact", "frozen")
@@ -127,23 +127,16 @@ def htf(dataset: xr.Dataset) -> xr.DataArray:
 
 
 def write_frf(dataset: xr.Dataset, path: str | Path) -> None:
-    """Validate and write as NetCDF-4; `path` is replaced in one step."""
+    """Validate and write as NetCDF-4; `path` is replaced in one step. Raises FrfError and FileError."""
     validate_frf(dataset)
-    encoding: dict[str, dict[str, Any]] = {str(name): {"_FillValue": None} for name in dataset.variables}
-    write_atomically(path, lambda temporary: dataset.to_netcdf(temporary, engine="h5netcdf", encoding=encoding))
+    write_dataset(dataset, path)
 
 
 def read_frf(path: str | Path) -> xr.Dataset:
     """Read into memory and validate. Raises FrfError for a missing, broken or unfit file."""
-    source = Path(path)
-    if not source.is_file():
-        raise FrfError(f"frequency response {source} does not exist")
-    try:
-        dataset = xr.load_dataset(source, engine="h5netcdf", decode_cf=False)
-    except (OSError, ValueError, KeyError, RuntimeError) as error:
-        raise FrfError(f"{source} is truncated or no NetCDF-4 file ({error})") from error
+    dataset = read_dataset(path, "frequency response", FrfError)
     try:
         validate_frf(dataset)
     except FrfError as error:
-        raise FrfError(f"{source}: {error}") from None
+        raise FrfError(f"{path}: {error}") from None
     return dataset

@@ -14,6 +14,7 @@ from gearbench.cases import case_path
 from gearbench.cli import run_command_line
 from gearbench.commands.stress_output import field_files, field_phases
 from gearbench.figures.stress import limits, plot_fields, plot_root_stress, rounded_up, tooth_history
+from gearbench.geometry import PairMesh
 from gearbench.lumped.stiffness.iso6336_root import root_stress
 from gearbench.rig import Case, read_case
 from gearbench.shell.failure import InputError
@@ -135,12 +136,9 @@ def fields() -> PairFields:
     """A square of two triangles around a contact, stress growing with x to 1.7 MPa, and 90 MPa at the contact."""
     x, y = (values.ravel() for values in np.meshgrid([-1e-3, 0.0, 1e-3], [-1e-3, 0.0, 1e-3]))
     xx = np.where(np.hypot(x, y) < 1e-6, 90e6, 1.7e9 * x)
-    zero = np.zeros(9)
+    zero, none = np.zeros(9), np.zeros(2, dtype=np.int64)
     return PairFields(
-        points=np.column_stack([x, y]),
-        triangles=np.array([[0, 2, 8, 1, 5, 4], [0, 8, 6, 4, 7, 3]]),
-        gear=np.zeros(2, dtype=np.int64),
-        tooth=np.zeros(2, dtype=np.int64),
+        mesh=PairMesh(np.column_stack([x, y]), np.array([[0, 2, 8, 1, 5, 4], [0, 8, 6, 4, 7, 3]]), none, none),
         displacement=np.zeros((9, 2)),
         stress=np.column_stack([xx, zero, zero]),
         out_of_plane=zero,

@@ -56,9 +56,9 @@ def numbers(rows: list[str]) -> np.ndarray:
 def test_both_gears_are_whole_and_sound(model: ContactModel) -> None:
     for gear, teeth, hub in zip(model.deck.gears, (20, 21), (12e-3, 12e-3), strict=True):
         mesh = gear.mesh
-        found = quality(mesh.points, mesh.triangles)
+        found = quality(mesh)
         assert found.jacobian > 0.3 and np.degrees(found.angle) > 8
-        assert len(mesh.sides) == teeth and found.nodes == len(mesh.points)
+        assert mesh.teeth == teeth and found.nodes == len(mesh.points)
         assert np.allclose(np.hypot(*mesh.points[mesh.hub].T), hub, rtol=1e-12)
         # No two nodes at one place: sectors are joined, not laid side by side.
         assert len(np.unique(mesh.points.round(10), axis=0)) == len(mesh.points)

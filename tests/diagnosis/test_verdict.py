@@ -24,7 +24,7 @@ from gearbench.diagnosis.verdict import (
     read_verdict,
     write_verdict,
 )
-from gearbench.records import RecordError
+from gearbench.files import FileError
 
 # As another program would write it from the specification.
 TREE: dict[str, Any] = {
@@ -121,23 +121,8 @@ def test_minimal_verdict_of_a_foreign_program() -> None:
     assert parse_verdict(text).effects == ()
 
 
-def test_a_failing_write_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = tmp_path / "verdict.json"
-    path.write_text("old", encoding="utf-8")
-
-    def fail(target: Path, text: str) -> None:
-        target.write_text(text[:10], encoding="utf-8")
-        raise OSError("disk full")
-
-    monkeypatch.setattr(module, "_write", fail)
-    with pytest.raises(OSError, match="disk full"):
-        write_verdict(VERDICT, path)
-    assert path.read_text(encoding="utf-8") == "old"
-    assert len(list(tmp_path.iterdir())) == 1
-
-
 def test_a_missing_folder_is_named(tmp_path: Path) -> None:
-    with pytest.raises(RecordError, match="nowhere does not exist"):
+    with pytest.raises(FileError, match="nowhere must exist"):
         write_verdict(VERDICT, tmp_path / "nowhere" / "verdict.json")
 
 

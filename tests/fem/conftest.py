@@ -15,7 +15,9 @@ from gearbench.fem.contact.law import Law, elastic_pair, make_law
 from gearbench.fem.gear.body import CondensedGear, condense
 from gearbench.fem.gear.elasticity import PlaneModuli, assemble, plane_moduli
 from gearbench.fem.gear.ring import Ring, make_ring
-from gearbench.geometry.mesh.sector_mesh import GearMesh, SectorMesh, full_mesh, sector_mesh
+from gearbench.geometry.mesh.assembly import full_mesh
+from gearbench.geometry.mesh.sector_mesh import sector_mesh
+from gearbench.geometry.mesh.values import GearMesh, SectorMesh
 from gearbench.geometry.pair.kinematics import Pair
 from gearbench.geometry.tooth.profile import Profile, profile
 from gearbench.rig import Gear, Material, Rig, Support, Supports
@@ -78,9 +80,9 @@ def coarse() -> Coarse:
     shape = profile(gear)
     moduli = plane_moduli(STEEL)
     sector = sector_mesh(shape, gear, gear.module / 3)
-    ring = make_ring(sector, gear.teeth, *assemble(sector.points, sector.triangles, moduli))
+    ring = make_ring(sector, *assemble(sector, moduli))
     full = full_mesh(sector)
-    return Coarse(gear, shape, moduli, sector, ring, full, *assemble(full.points, full.triangles, moduli))
+    return Coarse(gear, shape, moduli, sector, ring, full, *assemble(full, moduli))
 
 
 @pytest.fixture(scope="session")

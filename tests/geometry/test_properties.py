@@ -135,7 +135,7 @@ def _between_all(tooth: Profile, part: np.ndarray) -> np.ndarray:
 def test_the_mesh_of_every_gear_is_valid(gear: Gear) -> None:
     tooth = made(gear)
     mesh = sector_mesh(tooth, gear)
-    found = quality(mesh.points, mesh.triangles)
+    found = quality(mesh)
     assert found.jacobian > 0.2
     assert np.degrees(found.angle) > 1.0
     exact = sector_area(tooth, gear.hub_radius)
@@ -159,7 +159,7 @@ def test_every_tooth_is_the_first_one_turned(gear: Gear, teeth: int) -> None:
         angle = 2 * pi * k / teeth
         turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
         assert np.abs(whole.points[whole.node_of[k]] - sector.points @ turn.T).max() < 4e-15 * tooth.tip_radius + 1e-18
-    found = quality(whole.points, whole.triangles)
+    found = quality(whole)
     assert found.jacobian > 0.2
     area = teeth * sector_area(tooth, gear.hub_radius)
     assert abs(found.area / area - 1) < 5e-6

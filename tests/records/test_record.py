@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from gearbench.files import FileError
 from gearbench.records import (
     RecordError,
     make_record,
@@ -105,7 +106,7 @@ def test_truncated_file_is_refused(tmp_path: Path, keep: int) -> None:
 def test_missing_file_and_missing_folder_are_named(tmp_path: Path) -> None:
     with pytest.raises(RecordError, match=r"nothing\.nc does not exist"):
         read_record(tmp_path / "nothing.nc")
-    with pytest.raises(RecordError, match=r"folder .*deep does not exist"):
+    with pytest.raises(FileError, match=r"folder .*deep must exist"):
         write_record(_record(), tmp_path / "deep" / "record.nc")
 
 

@@ -34,7 +34,7 @@ def test_errors_of_every_package_are_listed(package: str) -> None:
 
 def test_listed_errors_exist() -> None:
     for module, name in USER_ERRORS:
-        assert issubclass(getattr(__import__(module, fromlist=[name]), name), ValueError | ImportError)
+        assert issubclass(getattr(__import__(module, fromlist=[name]), name), ValueError | ImportError | OSError)
     assert len(user_errors()) == len(USER_ERRORS)
 
 

@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 
 from gearbench.fem.contact.kernel import cross_flexibility, grid_position, make_kernel, table_at
-from gearbench.fem.gear.body import CondensedGear, _rigid_shapes, condense, flank_kernels, kernel_samples
+from gearbench.fem.gear.body import CondensedGear, _rigid_shapes, condense
 from gearbench.fem.gear.elasticity import assemble, plane_moduli
 from gearbench.fem.gear.flamant import LineLoad
 from gearbench.fem.gear.flank import boundary_quadrature, flank_coordinate, flank_trace
+from gearbench.fem.gear.flexibility import flank_kernels, kernel_samples
 from gearbench.fem.gear.ring import make_ring, ring_response
 from gearbench.geometry.mesh.sector_mesh import sector_mesh
+from gearbench.geometry.mesh.values import SectorMesh
 from gearbench.geometry.tooth.profile import profile
 from gearbench.rig import Material
 
@@ -62,8 +64,8 @@ def test_kernel_and_half_plane_equal_a_resolved_pressure_patch(gear: Any, small:
     wheel = gear()
     shape, moduli = profile(wheel), plane_moduli(STEEL)
     mesh = sector_mesh(shape, wheel, 6e-5)
-    ring = make_ring(mesh, wheel.teeth, *assemble(mesh.points, mesh.triangles, moduli))
-    quadrature = boundary_quadrature(shape, mesh.points, mesh.triangles, mesh.boundary_edges)
+    ring = make_ring(mesh, *assemble(mesh, moduli))
+    quadrature = boundary_quadrature(shape, mesh)
     at = flank_coordinate(shape, quadrature.points)
     half = 2e-4
     middles = np.array([0.5 * (shape.s_form + shape.s_end), shape.s_end - 3e-4])
@@ -97,7 +99,7 @@ def test_kernel_and_half_plane_equal_a_resolved_pressure_patch(gear: Any, small:
             (summed(kernel.back[kernel.reach]), 1, 0),
             (summed(kernel.front[kernel.reach + 1]), 0, 1),
         ):
-            trace = flank_trace(shape, mesh.points, mesh.boundary_edges, s, side)
+            trace = flank_trace(shape, mesh, s, side)
             np.testing.assert_allclose(trace @ u[tooth][:, k], expected, rtol=2e-3)
 
 
@@ -110,7 +112,7 @@ def test_the_hub_balances_a_flank_load(coarse: Any) -> None:
     teeth = ring.teeth
     s0 = 0.6 * shape.s_form + 0.4 * shape.s_end
     point, normal = shape.points(s0), shape.normals(s0)
-    quadrature = boundary_quadrature(shape, mesh.points, mesh.triangles, mesh.boundary_edges)
+    quadrature = boundary_quadrature(shape, mesh)
     rigid = _rigid_shapes(mesh.points, teeth)
     applied = np.array([-normal[0], -normal[1], -(point[0] * normal[1] - point[1] * normal[0])])
 
@@ -174,16 +176,13 @@ def refined(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.n
     return every.reshape(-1, 2)[first], node[:, children].reshape(-1, 6)
 
 
-class Cut:
+def cut_sector(points: np.ndarray, triangles: np.ndarray, teeth: int, hub_radius: float) -> SectorMesh:
     """What the ring needs of a refined sector."""
-
-    def __init__(self, points: np.ndarray, teeth: int, hub_radius: float) -> None:
-        radius, angle = np.hypot(*points.T), np.arctan2(points[:, 1], points[:, 0])
-        by_radius = np.argsort(radius, kind="stable")
-        self.points = points
-        self.cut_low = by_radius[np.abs(angle[by_radius] + np.pi / teeth) < 1e-9]
-        self.cut_high = by_radius[np.abs(angle[by_radius] - np.pi / teeth) < 1e-9]
-        self.hub = np.nonzero(radius < hub_radius * (1 + 1e-5))[0]
+    radius, angle = np.hypot(*points.T), np.arctan2(points[:, 1], points[:, 0])
+    by_radius = np.argsort(radius, kind="stable")
+    low, high = (by_radius[np.abs(angle[by_radius] + sign * np.pi / teeth) < 1e-9] for sign in (1, -1))
+    hub = np.nonzero(radius < hub_radius * (1 + 1e-5))[0]
+    return SectorMesh(points, triangles, teeth, low, high, hub, np.empty((0, 3), dtype=np.int64))
 
 
 def test_the_energy_of_a_loaded_tooth_converges_at_order_four(gear: Any) -> None:
@@ -194,15 +193,15 @@ def test_the_energy_of_a_loaded_tooth_converges_at_order_four(gear: Any) -> None
     wheel = gear(12, profile_shift=0.4, tip_edge_radius=4e-4, hub_radius=9e-3)
     shape, moduli = profile(wheel), plane_moduli(STEEL)
     mesh = sector_mesh(shape, wheel, wheel.module / 2.2)
-    points, triangles = mesh.points, mesh.triangles
+    points, triangles = mesh.points, mesh.cells
     centre = np.array([shape.reference_radius, 0.0])
     energy = []
     for level in range(3):
         if level:
             points, triangles = refined(points, triangles)
-        cut = Cut(points, wheel.teeth, wheel.hub_radius)
-        stiffness, mass = assemble(points, triangles, moduli)
-        ring = make_ring(cut, wheel.teeth, stiffness, mass)
+        cut = cut_sector(points, triangles, wheel.teeth, wheel.hub_radius)
+        stiffness, mass = assemble(cut, moduli)
+        ring = make_ring(cut, stiffness, mass)
         bump = np.exp(-np.sum(((points - centre) / wheel.module) ** 2, axis=1))
         force = (mass @ np.column_stack([0.3 * bump, -bump]).ravel())[:, None]
         none, held = np.zeros_like(force), np.zeros((len(ring.hub), 1))
@@ -270,10 +269,6 @@ def test_flank_kernels_scale_with_one_over_modulus(coarse: Any) -> None:
     s = np.linspace(coarse.shape.s_form + 1e-6, coarse.shape.s_end - 1e-6, 4)
     front, _ = flank_kernels(coarse.ring, coarse.sector, coarse.shape, coarse.moduli, s)
     stiffer = plane_moduli(Material(youngs_modulus=2 * STEEL.youngs_modulus))
-    ring = make_ring(
-        coarse.sector,
-        coarse.gear.teeth,
-        *assemble(coarse.sector.points, coarse.sector.triangles, stiffer),
-    )
+    ring = make_ring(coarse.sector, *assemble(coarse.sector, stiffer))
     half, _ = flank_kernels(ring, coarse.sector, coarse.shape, stiffer, s)
     np.testing.assert_allclose(2 * half, front, rtol=1e-9)

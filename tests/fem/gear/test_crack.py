@@ -14,8 +14,10 @@ from gearbench.fem.contact.law import make_law
 from gearbench.fem.contact.static import static_cycle
 from gearbench.fem.gear.body import CondensedGear, condense
 from gearbench.fem.gear.elasticity import assemble
-from gearbench.fem.gear.ring import make_ring, odd_ring_response, rotation
+from gearbench.fem.gear.ring import make_ring, odd_ring_response
+from gearbench.geometry.mesh.assembly import assembled
 from gearbench.geometry.mesh.cracked_sector import cracked_sector
+from gearbench.geometry.tooth.fillet import rotation
 from gearbench.rig import Crack, Gear, Material
 
 STEEL = Material()
@@ -33,21 +35,11 @@ def test_ring_with_one_cracked_sector_equals_the_full_mesh(coarse: Any) -> None:
     """Forces on the cracked tooth and on others, cuts included, and a moving hub; one mesh of all, solved directly."""
     teeth, sound = coarse.full.teeth, coarse.sector
     mesh = cracked_sector(coarse.shape, cracked(coarse.gear, 1.5e-3), coarse.gear.module / 3)
-    odd = make_ring(mesh, teeth, *assemble(mesh.points, mesh.triangles, coarse.moduli))
-    # The full mesh with sector 0 replaced: its cuts and hub keep their nodes, the others are new.
-    kept = np.unique(np.concatenate([coarse.full.node_of[k].ravel() for k in range(1, teeth)]))
-    number = np.full(len(coarse.full.points), -1)
-    number[kept] = np.arange(len(kept))
-    own = np.full(len(mesh.points), -1)
-    for name in ("cut_low", "cut_high"):
-        own[getattr(mesh, name)] = number[coarse.full.node_of[0][getattr(sound, name)]]
-    fresh = np.flatnonzero(own < 0)
-    own[fresh] = len(kept) + np.arange(len(fresh))
-    points = np.concatenate([coarse.full.points[kept], mesh.points[fresh]])
-    node_of = [own, *(number[coarse.full.node_of[k]] for k in range(1, teeth))]
+    odd = make_ring(mesh, *assemble(mesh, coarse.moduli))
     sectors = [mesh, *[sound] * (teeth - 1)]
-    triangles = np.concatenate([n[s.triangles] for n, s in zip(node_of, sectors, strict=True)])
-    stiffness, _ = assemble(points, triangles, coarse.moduli)
+    full = assembled(sectors)
+    points, node_of = full.points, full.node_of
+    stiffness, _ = assemble(full, coarse.moduli)
 
     rng = np.random.default_rng(3)
     forces = [np.zeros((2 * len(s.points), 2)) for s in sectors]
@@ -55,7 +47,7 @@ def test_ring_with_one_cracked_sector_equals_the_full_mesh(coarse: Any) -> None:
         edge = dofs(np.unique(np.concatenate([sectors[k].boundary_edges.ravel(), sectors[k].cut_low])))
         forces[k][edge] = 1e3 * rng.standard_normal((len(edge), 2))
         forces[k][dofs(sectors[k].hub)] = 0.0
-    held = dofs(np.unique(np.concatenate([n[s.hub] for n, s in zip(node_of, sectors, strict=True)])))
+    held = dofs(full.hub)
     u = np.zeros((2 * len(points), 2))
     x, y = points[held[::2] // 2].T
     u[held[::2], 0], u[held[1::2], 1], u[held[::2], 1] = -1e-6 * y, 2e-8, 1e-8

@@ -9,6 +9,7 @@ import pytest
 from scipy.sparse.linalg import spsolve
 
 from gearbench.fem.gear.elasticity import assemble, plane_moduli
+from gearbench.geometry.mesh.values import Mesh
 from gearbench.geometry.tooth.body import body
 from gearbench.rig import Material
 
@@ -75,12 +76,12 @@ def test_plane_moduli_follow_from_hookes_law_in_three_dimensions(state: Any) -> 
 def test_a_node_outside_the_mesh_is_refused(coarse: Any) -> None:
     points = np.vstack([coarse.sector.points, [1.0, 1.0]])
     with pytest.raises(ValueError, match="belongs to no element"):
-        assemble(points, coarse.sector.triangles, coarse.moduli)
+        assemble(Mesh(points, coarse.sector.cells), coarse.moduli)
 
 
 def test_mass_of_a_quadratic_triangle_is_exact() -> None:
     """Of a straight element of area A: A/30 on corners, 8 A/45 in the middle of sides (Zienkiewicz, table of P2)."""
     corners = np.array([[0.0, 0.0], [2.0, 0.0], [0.5, 1.0]])
     points = np.vstack([corners, 0.5 * (corners + np.roll(corners, -1, axis=0))])
-    _, mass = assemble(points, np.arange(6)[None], plane_moduli(Material()))
+    _, mass = assemble(Mesh(points, np.arange(6)[None]), plane_moduli(Material()))
     np.testing.assert_allclose(mass.diagonal()[::2], [1 / 30] * 3 + [8 / 45] * 3, rtol=1e-12)

@@ -11,8 +11,9 @@ from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
 from gearbench.fem.gear.body import _rigid_shapes
 from gearbench.fem.gear.elasticity import assemble, plane_moduli
-from gearbench.fem.gear.ring import make_ring, ring_modes, ring_response, rotation, symmetric_lu
+from gearbench.fem.gear.ring import make_ring, ring_modes, ring_response, symmetric_lu
 from gearbench.geometry.mesh.sector_mesh import sector_mesh
+from gearbench.geometry.tooth.fillet import rotation
 from gearbench.geometry.tooth.profile import profile
 from gearbench.rig import Material
 
@@ -158,7 +159,7 @@ def test_the_body_twists_like_an_annulus(gear: Any) -> None:
     wheel = gear(20, hub_radius=8e-3)
     shape, moduli = profile(wheel), plane_moduli(Material())
     sector = sector_mesh(shape, wheel, wheel.module / 2.2)
-    ring = make_ring(sector, wheel.teeth, *assemble(sector.points, sector.triangles, moduli))
+    ring = make_ring(sector, *assemble(sector, moduli))
     node = int(sector.boundary_edges[len(sector.boundary_edges) // 2, 2])
     force = np.zeros((2 * len(sector.points), 1))
     force[2 * node + 1] = 1.0

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
 from gearbench.fem.contact.static import ContactError, position, solve_torque
-from gearbench.fem.gear.ring import rotation
 from gearbench.fem.stress import loaded as loaded_module
 from gearbench.fem.stress.fields import (
     ElasticGear,
@@ -21,8 +20,9 @@ from gearbench.fem.stress.fields import (
     loaded_sectors,
     regular_loads,
 )
-from gearbench.fem.stress.loaded import PairLoad, joined, pair_loads, pressed_teeth
+from gearbench.fem.stress.loaded import PairLoad, all_strips, pair_loads, pressed_teeth
 from gearbench.fem.stress.recovery import principal
+from gearbench.geometry.tooth.fillet import rotation
 from gearbench.rig import Material
 
 Array = NDArray[np.float64]
@@ -45,7 +45,7 @@ def field(unequal: Any, wheel: ElasticGear) -> GearField:
     """All sectors of the driver where two pairs carry."""
     pressed, _ = pressed_teeth(unequal.law, (unequal.pair.driver, unequal.pair.driven), loaded(unequal, -0.5))
     assert len(pressed) == 2
-    return gear_field(wheel, joined(20, pressed), range(20))
+    return gear_field(wheel, all_strips(20, pressed), range(20))
 
 
 def total_stress(field: GearField, sector: int, at: Array, regular: Array) -> Array:
@@ -60,7 +60,7 @@ def test_pressures_carry_the_static_solutions_moments(unequal: Any, phase: float
         moment = -sum(p.strips.moment.sum() for p in pressed) * 0.02
         levers = [p.contact.lever1 if gear == 0 else p.contact.lever2 for p in pairs]
         assert moment == pytest.approx(sum(p.force * x for p, x in zip(pairs, levers, strict=True)), rel=1e-12)
-        assert joined(teeth, pressed).moment.sum() * 0.02 == pytest.approx(-moment, rel=1e-12)
+        assert all_strips(teeth, pressed).moment.sum() * 0.02 == pytest.approx(-moment, rel=1e-12)
         # Scaling to that moment leaves action and reaction equal to a few in ten thousand.
         for one, p in zip(pairs, pressed, strict=True):
             assert np.hypot(*p.strips.force) * 0.02 == pytest.approx(one.force, rel=2e-3)
@@ -70,7 +70,7 @@ def test_sectors_equal_the_whole_gear_solved_at_once(coarse: Any, unequal: Any) 
     """Same loads on the full mesh, assembled by scikit-fem and solved directly."""
     gear = elastic_gear(coarse.gear, STEEL, coarse.gear.module / 3)
     pressed, _ = pressed_teeth(unequal.law, (unequal.pair.driver, unequal.pair.driven), loaded(unequal, -0.5))
-    strips = joined(20, pressed)
+    strips = all_strips(20, pressed)
     found = gear_field(gear, strips, (19, 0, 1, 7))
     full, size = coarse.full, 2 * len(coarse.full.points)
     force, held = np.zeros((size // 2, 2)), np.zeros((size // 2, 2))
@@ -162,7 +162,7 @@ def test_the_contact_stress_is_hertzs(unequal: Any, wheel: ElasticGear) -> None:
     light = TORQUE / 60
     (one,) = pairs = pair_loads(unequal.law, 0.0, solve_torque(unequal.law, 0.0, light))
     pressed, _ = pressed_teeth(unequal.law, (unequal.pair.driver, unequal.pair.driven), pairs)
-    field = gear_field(wheel, joined(20, pressed), (0,))
+    field = gear_field(wheel, all_strips(20, pressed), (0,))
     rho = unequal.pair.driver.base_radius * np.tan(unequal.pair.working_pressure_angle)
     other = unequal.pair.line_of_action - rho
     load, modulus = one.force / 0.02, STEEL.youngs_modulus / 2
@@ -188,7 +188,7 @@ def test_displacement_joins_across_the_cut_and_closes_the_gap(unequal: Any, whee
     gears = (wheel, elastic_gear(unequal.rig.driven, STEEL, 0.5e-3))
     yielded = 0.0
     for gear, pressed, s in zip(gears, both, (pairs[0].contact.s1, pairs[0].contact.s2), strict=True):
-        found = gear_field(gear, joined(gear.shape.teeth, pressed), (0, 1))
+        found = gear_field(gear, all_strips(gear.shape.teeth, pressed), (0, 1))
         strips = found.strips_in(0)
         at, into = gear.shape.points(s)[None], -gear.shape.normals(s)
         i = int(np.argmin(np.hypot(*(gear.mesh.points - at).T)))

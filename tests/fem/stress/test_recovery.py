@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import pi
 
 import numpy as np
@@ -12,24 +11,14 @@ from numpy.typing import NDArray
 from gearbench.fem.gear.elasticity import PlaneModuli, assemble
 from gearbench.fem.gear.ring import make_ring, ring_response
 from gearbench.fem.stress.recovery import make_recovery, principal, ring_stress, turn_stress, von_mises
+from gearbench.geometry.mesh.values import Mesh, SectorMesh
 
 MODULI = PlaneModuli(2.0e11, 0.3)
 INNER, OUTER, SECTORS = 0.02, 0.05, 12
 
 
-@dataclass(frozen=True)
-class Sector:
-    """A sector of a plain ring; every node on its circle."""
-
-    points: NDArray[np.float64]
-    triangles: NDArray[np.int64]
-    cut_low: NDArray[np.int64]
-    cut_high: NDArray[np.int64]
-    hub: NDArray[np.int64]
-    rim: NDArray[np.int64]
-
-
-def ring_sector(radial: int, around: int) -> Sector:
+def ring_sector(radial: int, around: int) -> SectorMesh:
+    """A sector of a plain ring, every node on its circle; its boundary is the rim."""
     r = np.linspace(INNER, OUTER, 2 * radial + 1)
     phi = np.linspace(-pi / SECTORS, pi / SECTORS, 2 * around + 1)
     node = np.arange(len(r) * len(phi)).reshape(len(r), len(phi))
@@ -40,20 +29,21 @@ def ring_sector(radial: int, around: int) -> Sector:
             n = node[i : i + 3, j : j + 3]
             cells.append([n[0, 0], n[2, 0], n[2, 2], n[1, 0], n[2, 1], n[1, 1]])
             cells.append([n[0, 0], n[2, 2], n[0, 2], n[1, 1], n[1, 2], n[0, 1]])
-    return Sector(points, np.array(cells), node[:, 0], node[:, -1], node[0], node[-1])
+    rim = np.column_stack([node[-1, :-2:2], node[-1, 2::2], node[-1, 1::2]])
+    return SectorMesh(points, np.array(cells), SECTORS, node[:, 0], node[:, -1], node[0], rim)
 
 
 @pytest.fixture(scope="module")
-def sector() -> Sector:
+def sector() -> SectorMesh:
     return ring_sector(16, 4)
 
 
-def test_constant_strain_is_recovered_exactly_on_curved_elements(sector: Sector) -> None:
+def test_constant_strain_is_recovered_exactly_on_curved_elements(sector: SectorMesh) -> None:
     gradient = np.array([[1.0e-3, 2.0e-4], [-5.0e-4, 7.0e-4]])
     exx, eyy, gxy = 1.0e-3, 7.0e-4, -3.0e-4
     e, nu = MODULI.modulus, MODULI.poisson
     wanted = [e / (1 - nu**2) * (exx + nu * eyy), e / (1 - nu**2) * (eyy + nu * exx), e / (2 * (1 + nu)) * gxy]
-    found = make_recovery(sector.points, sector.triangles, MODULI).nodal(sector.points @ gradient.T)
+    found = make_recovery(sector, MODULI).nodal(sector.points @ gradient.T)
     np.testing.assert_allclose(found, np.tile(wanted, (len(found), 1)), rtol=1e-9, atol=1e-9 * max(wanted))
 
 
@@ -71,28 +61,27 @@ def test_linear_strain_is_recovered_exactly_on_straight_elements() -> None:
     points = np.column_stack([x, y])
     e, nu = MODULI.modulus, MODULI.poisson
     u = np.column_stack([x * y, -0.5 * x**2 - 0.5 * nu * y**2]) / e * 1e6
-    found = make_recovery(points, np.array(cells), MODULI).nodal(u)
+    found = make_recovery(Mesh(points, np.array(cells)), MODULI).nodal(u)
     np.testing.assert_allclose(found, np.column_stack([1e6 * y, 0 * y, 0 * y]), atol=1e-3)
 
 
-def lame(sector: Sector, pressure: float) -> NDArray[np.float64]:
+def lame(sector: SectorMesh, pressure: float) -> NDArray[np.float64]:
     """Nodal stress of the ring pulled outwards at its rim and held at its hub, by sectors; sector 3's."""
-    edges = np.column_stack([sector.rim[:-2:2], sector.rim[1::2], sector.rim[2::2]])
     force = np.zeros((2 * len(sector.points), 1))
     # Simpson's weights are the consistent ones of an arc that is divided evenly.
-    arc = OUTER * 2 * pi / SECTORS / len(edges)
-    for nodes in edges:
-        for n, weight in zip(nodes, (1 / 6, 4 / 6, 1 / 6), strict=True):
+    arc = OUTER * 2 * pi / SECTORS / len(sector.boundary_edges)
+    for nodes in sector.boundary_edges:
+        for n, weight in zip(nodes, (1 / 6, 1 / 6, 4 / 6), strict=True):
             force[2 * n : 2 * n + 2, 0] += pressure * arc * weight * sector.points[n] / OUTER
-    ring = make_ring(sector, SECTORS, *assemble(sector.points, sector.triangles, MODULI))
+    ring = make_ring(sector, *assemble(sector, MODULI))
     held = np.zeros((len(ring.hub), 1))
     wanted = np.array([2, 3, 4])
     u = ring_response(ring, lambda j: force, lambda j: held, wanted)[:, :, 0].reshape(3, -1, 2)
-    recovery = make_recovery(sector.points, sector.triangles, MODULI)
-    return ring_stress(recovery, sector, SECTORS, dict(zip([2, 3, 4], u, strict=True)))[3]
+    recovery = make_recovery(sector, MODULI)
+    return ring_stress(recovery, sector, dict(zip([2, 3, 4], u, strict=True)))[3]
 
 
-def test_a_thick_ring_has_lames_stresses(sector: Sector) -> None:
+def test_a_thick_ring_has_lames_stresses(sector: SectorMesh) -> None:
     """u = A (r - ri^2/r), so sigma_r = E/(1-nu^2) A ((1+nu) + (1-nu) ri^2/r^2), sigma_t with the other sign."""
     pressure, nu = 1e8, MODULI.poisson
     radius, angle = np.hypot(*sector.points.T), np.arctan2(sector.points[:, 1], sector.points[:, 0])

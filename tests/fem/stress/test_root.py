@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gearbench.fem.contact.static import solve_torque
 from gearbench.fem.stress.fields import ElasticGear, elastic_gear, gear_field
-from gearbench.fem.stress.loaded import PairLoad, joined, pair_loads, pressed_teeth
+from gearbench.fem.stress.loaded import PairLoad, all_strips, pair_loads, pressed_teeth
 from gearbench.fem.stress.recovery import principal
 from gearbench.fem.stress.root import RootKernel, peak, root_kernel, root_stress
 from gearbench.rig import Material
@@ -45,7 +45,7 @@ def test_the_field_has_the_same_stress(
     """Nodal stress from inside the elements, of the true pressure: loaded tooth and neighbours, tip corners too."""
     pairs = loaded(unequal, phase, side)
     pressed, _ = pressed_teeth(unequal.law, (unequal.pair.driver, unequal.pair.driven), pairs)
-    field = gear_field(wheel, joined(20, pressed), range(20))
+    field = gear_field(wheel, all_strips(20, pressed), range(20))
     radius = np.hypot(*wheel.mesh.points.T)
     edges = wheel.mesh.boundary_edges
     # Not beside the flank, where a contact may be near.

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearbench.geometry import GeometryError, gear_area
+from gearbench.files import FileError
+from gearbench.geometry import gear_area
 from gearbench.geometry.export.drawing import placed_gears, write_dxf, write_step
 from gearbench.rig import Gear, Rig
 
@@ -86,5 +87,5 @@ def test_step_holds_both_solids(tmp_path: Path, bench: Rig, capfd: pytest.Captur
 
 
 def test_a_missing_folder_is_named(tmp_path: Path, bench: Rig) -> None:
-    with pytest.raises(GeometryError, match=r"must exist$"):
+    with pytest.raises(FileError, match=r"must exist$"):
         write_dxf(tmp_path / "none" / "pair.dxf", placed_gears(bench))

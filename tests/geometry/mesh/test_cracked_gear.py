@@ -9,9 +9,10 @@ from math import pi, radians
 import numpy as np
 import pytest
 
-from gearbench.geometry import GeometryError, PlaneMesh, mesh_pair, pair
-from gearbench.geometry.export.meshes import mesh_gear, sweep_plane
+from gearbench.geometry import GeometryError, Mesh, PairMesh, mesh_pair, pair
+from gearbench.geometry.mesh.gears import mesh_gear
 from gearbench.geometry.mesh.quality import areas, quality
+from gearbench.geometry.mesh.sweep import sweep
 from gearbench.geometry.tooth.crack import slit
 from gearbench.rig import Crack, Gear, Rig, Support, Supports
 
@@ -28,7 +29,7 @@ def rig(cracked: int | None) -> Rig:
 
 
 @cache
-def meshed(cracked: int | None) -> PlaneMesh:
+def meshed(cracked: int | None) -> PairMesh:
     return mesh_pair(rig(cracked), GEAR.module / 4)
 
 
@@ -38,9 +39,9 @@ def in_two_places(points: np.ndarray) -> np.ndarray:
     return np.asarray(places[count > 1])
 
 
-def sides(mesh: PlaneMesh, number: int) -> Counter[tuple[int, int]]:
+def sides(mesh: PairMesh, number: int) -> Counter[tuple[int, int]]:
     """How often the corner edges of a gear's triangles occur."""
-    cells = mesh.triangles[mesh.gear == number][:, :3]
+    cells = mesh.cells[mesh.gear == number][:, :3]
     ends = np.concatenate([cells[:, [0, 1]], cells[:, [1, 2]], cells[:, [2, 0]]])
     return Counter(map(tuple, np.sort(ends, axis=1).tolist()))
 
@@ -68,7 +69,7 @@ def test_the_slit_is_open_in_the_tooth_that_meshes_third(number: int) -> None:
     assert 0.9 * CRACK.length < along[-1] < CRACK.length - 1e-6
     # What touches the slit is numbered as the case numbers it.
     pressed = {int(node) for place in cut for node in np.flatnonzero(np.hypot(*(mesh.points - place).T) < 1e-10)}
-    beside = np.isin(mesh.triangles, list(pressed)).any(axis=1)
+    beside = np.isin(mesh.cells, list(pressed)).any(axis=1)
     assert set(mesh.tooth[beside]) == {3} and set(mesh.gear[beside]) == {number}
 
 
@@ -78,23 +79,23 @@ def test_it_is_one_gear_whose_outline_runs_round_the_slit() -> None:
     for mesh in (cracked, sound):
         count = sides(mesh, 0)
         assert set(count.values()) == {1, 2}
-        cells = mesh.triangles[mesh.gear == 0]
+        cells = mesh.cells[mesh.gear == 0]
         # Euler: a ring, whether a slit runs into it or not.
         assert len(np.unique(cells[:, :3])) - len(count) + len(cells) == 0
         ends = np.array([side for side, times in count.items() if times == 1])
         found.append(np.hypot(*(mesh.points[ends[:, 0]] - mesh.points[ends[:, 1]]).T).sum())
-        assert quality(mesh.points, cells).jacobian > 0.3
+        assert quality(Mesh(mesh.points, cells)).jacobian > 0.3
     assert found[0] - found[1] == pytest.approx(2 * CRACK.length, rel=0.01)
-    own, other = (areas(m.points, m.triangles[m.gear == 0]).sum() for m in (cracked, sound))
+    own, other = (areas(m.points, m.cells[m.gear == 0]).sum() for m in (cracked, sound))
     assert own == pytest.approx(other, rel=1e-6)
     assert len(in_two_places(sound.points)) == 0
 
 
 def test_the_swept_gear_has_the_slit_over_its_whole_width() -> None:
     plane = meshed(0)
-    solid = sweep_plane(plane, (GEAR.face_width, GEAR.face_width), 2)
+    solid = sweep(plane, (GEAR.face_width, GEAR.face_width), 2)
     flat = in_two_places(plane.points)
-    corners = np.isin(np.round(plane.points[np.unique(plane.triangles[:, :3])], 11), flat).all(axis=1).sum() / 2
+    corners = np.isin(np.round(plane.points[np.unique(plane.cells[:, :3])], 11), flat).all(axis=1).sum() / 2
     assert len(in_two_places(solid.points)) == 3 * len(flat) + 2 * corners
 
 

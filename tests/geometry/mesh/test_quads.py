@@ -12,11 +12,22 @@ import numpy as np
 import pytest
 from shared.gears import likely_gear
 
-from gearbench.geometry import GeometryError, PlaneMesh, gear_area, profile, sector_area, sector_mesh, write_mesh
-from gearbench.geometry.export.meshes import gear_plane, sweep_plane
-from gearbench.geometry.mesh.quads import full_quads, quad_sector_mesh
-from gearbench.geometry.mesh.quality import quad_determinants, quad_quality
-from gearbench.geometry.mesh.sweep import swept
+from gearbench.geometry import (
+    GeometryError,
+    Mesh,
+    PairMesh,
+    full_mesh,
+    gear_area,
+    profile,
+    quality,
+    sector_area,
+    sector_mesh,
+    write_mesh,
+)
+from gearbench.geometry.mesh.gears import gear_plane
+from gearbench.geometry.mesh.quads import quad_sector_mesh
+from gearbench.geometry.mesh.quality import quad_determinants
+from gearbench.geometry.mesh.sweep import sweep, swept
 from gearbench.rig import Gear
 
 MakeGear = Callable[..., Gear]
@@ -39,7 +50,7 @@ def test_quadrilaterals_fill_the_sector(name: str, per_module: int) -> None:
     gear = Gear(**{"teeth": 20, "module": 2e-3, "face_width": 0.02, "hub_radius": 0.01, **CASES[name]})
     tooth = profile(gear)
     mesh = quad_sector_mesh(tooth, gear, gear.module / per_module)
-    found = quad_quality(mesh.points, mesh.quads)
+    found = quality(mesh)
     assert found.area == pytest.approx(sector_area(tooth, gear.hub_radius), rel=1e-5)
     assert found.jacobian > 0.1
     assert np.degrees(found.angle) > 15 and np.degrees(found.widest) < 165
@@ -61,17 +72,17 @@ def test_areas_of_known_quadrilaterals() -> None:
     corners = np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 2.0], [0.0, 2.0]])
     middles = 0.5 * (corners + np.roll(corners, -1, axis=0))
     points = np.concatenate((corners, middles, [[1.5, 1.0]]))
-    square = quad_quality(points, np.arange(9)[None])
+    square = quality(Mesh(points, np.arange(9)[None]))
     assert (square.area, square.jacobian) == (pytest.approx(6.0), pytest.approx(1.0))
     assert (square.angle, square.widest) == (pytest.approx(pi / 2), pytest.approx(pi / 2))
     # A middle pushed out by h adds the parabola's 2/3 of chord times h.
     points[4] += [0.0, -0.3]
-    assert quad_quality(points, np.arange(9)[None]).area == pytest.approx(6.0 + 2 / 3 * 3 * 0.3)
+    assert quality(Mesh(points, np.arange(9)[None])).area == pytest.approx(6.0 + 2 / 3 * 3 * 0.3)
     sampled = quad_determinants(points, np.arange(9)[None], np.linspace(0, 1, 41)).min()
-    bound = quad_quality(points, np.arange(9)[None])
+    bound = quality(Mesh(points, np.arange(9)[None]))
     assert bound.jacobian * bound.area <= sampled + 1e-12
     points[8] = [4.0, 1.0]  # beyond the opposite side: folded
-    assert quad_quality(points, np.arange(9)[None]).jacobian < 0
+    assert quality(Mesh(points, np.arange(9)[None])).jacobian < 0
 
 
 def solid_volumes(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
@@ -93,27 +104,23 @@ def solid_volumes(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
 def test_swept_gear_has_the_volume_of_its_profile(tmp_path: Path, gear: MakeGear, element: str) -> None:
     one = gear(teeth=12, profile_shift=0.3)
     tooth = profile(one)
-    if element == "triangle":
-        from gearbench.geometry import full_mesh
-
-        plane = gear_plane(full_mesh(sector_mesh(tooth, one, one.module / 4)))
-    else:
-        plane = gear_plane(full_quads(quad_sector_mesh(tooth, one, one.module / 4)))
-    solid = sweep_plane(plane, (one.face_width, one.face_width), 3)
+    sector = (sector_mesh if element == "triangle" else quad_sector_mesh)(tooth, one, one.module / 4)
+    plane = gear_plane(full_mesh(sector))
+    solid = sweep(plane, (one.face_width, one.face_width), 3)
     volume = solid_volumes(solid.points, solid.cells)
     exact = one.face_width * (gear_area(tooth)[0] - pi * one.hub_radius**2)
     assert volume.min() > 0
     assert volume.sum() == pytest.approx(exact, rel=1e-5)
     assert np.ptp(solid.points[:, 2]) == pytest.approx(one.face_width, rel=1e-12)
     assert len(np.unique(solid.cells)) == len(solid.points)
-    assert len(solid.cells) == 3 * len(plane.triangles)
+    assert len(solid.cells) == 3 * len(plane.cells)
     # Middles of upright sides lie between their corners.
     k = 3 if element == "triangle" else 4
     ends = 0.5 * (solid.points[solid.cells[:, :k]] + solid.points[solid.cells[:, k : 2 * k]])
     assert np.allclose(solid.points[solid.cells[:, -k:]], ends, atol=1e-15)
     for suffix in (".vtu", ".msh"):
         read = meshio.read(write_mesh(tmp_path / f"gear{suffix}", solid))
-        assert np.array_equal(read.cells_dict[solid.kind], solid.cells)
+        assert np.array_equal(read.cells_dict[solid.kind.name], solid.cells)
     text = write_mesh(tmp_path / "gear.inp", solid).read_text()
     assert f"TYPE={'C3D15' if element == 'triangle' else 'C3D20'}, ELSET=E_DRIVER" in text
 
@@ -135,7 +142,7 @@ def test_quadrilaterals_of_many_gears() -> None:
             assume(False)
             raise
         mesh = quad_sector_mesh(tooth, gear)
-        found = quad_quality(mesh.points, mesh.quads)
+        found = quality(mesh)
         assert found.jacobian > 0.0
         assert abs(found.area / sector_area(tooth, gear.hub_radius) - 1) < 2e-5
 
@@ -144,7 +151,7 @@ def test_quadrilaterals_of_many_gears() -> None:
 
 def test_quads_round_trip(tmp_path: Path, gear: MakeGear) -> None:
     one = gear(teeth=9, hub_radius=0.003)
-    plane: PlaneMesh = gear_plane(full_quads(quad_sector_mesh(profile(one), one, one.module / 3)))
+    plane: PairMesh = gear_plane(full_mesh(quad_sector_mesh(profile(one), one, one.module / 3)))
     for suffix in (".vtu", ".msh"):
         read = meshio.read(write_mesh(tmp_path / f"gear{suffix}", plane))
-        assert np.array_equal(read.cells_dict["quad9"], plane.triangles)
+        assert np.array_equal(read.cells_dict["quad9"], plane.cells)

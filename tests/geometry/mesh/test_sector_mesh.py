@@ -23,6 +23,7 @@ from gearbench.geometry import (
     sector_area,
     sector_mesh,
 )
+from gearbench.geometry.mesh.assembly import assembled
 from gearbench.geometry.mesh.quality import areas, determinants
 from gearbench.rig import Gear
 
@@ -102,19 +103,19 @@ def test_boundary_edges_run_counter_clockwise_from_cut_to_cut(meshed: Meshed) ->
 
 def test_triangles_are_valid_and_fill_the_sector(meshed: Meshed) -> None:
     gear, tooth, mesh = meshed
-    found = quality(mesh.points, mesh.triangles)
+    found = quality(mesh)
     assert found.area == pytest.approx(sector_area(tooth, gear.hub_radius), rel=2e-6)
     assert found.jacobian > 0.5
     assert np.degrees(found.angle) > 20
-    assert 600 < found.triangles < 2600
+    assert 600 < found.elements < 2600
     # Sampled densely, the determinant stays above the bound that the quality states.
     steps = np.linspace(0, 1, 9)
     at = np.array([(a, b) for a in steps for b in steps if a + b <= 1 + 1e-12])
-    sampled = determinants(mesh.points, mesh.triangles, at).min(axis=1) / (
-        2 * areas(mesh.points, mesh.triangles)
+    sampled = determinants(mesh.points, mesh.cells, at).min(axis=1) / (
+        2 * areas(mesh.points, mesh.cells)
     )
     assert sampled.min() >= found.jacobian - 1e-9
-    assert found.nodes == len(mesh.points) == len(np.unique(mesh.triangles))
+    assert found.nodes == len(mesh.points) == len(np.unique(mesh.cells))
 
 
 def test_cuts_match_by_rotation_and_the_mesh_is_its_mirror_image(meshed: Meshed) -> None:
@@ -131,8 +132,8 @@ def test_cuts_match_by_rotation_and_the_mesh_is_its_mirror_image(meshed: Meshed)
     assert mesh.hub[0] == mesh.cut_low[0] and mesh.hub[-1] == mesh.cut_high[0]
     assert np.abs(mesh.points[mesh.mirror] - mesh.points * [1.0, -1.0]).max() < 1e-15
     assert np.array_equal(mesh.mirror[mesh.cut_low], mesh.cut_high)
-    flipped = np.sort(mesh.mirror[mesh.triangles], axis=1)
-    assert {tuple(row) for row in flipped} == {tuple(row) for row in np.sort(mesh.triangles, axis=1)}
+    flipped = np.sort(mesh.mirror[mesh.cells], axis=1)
+    assert {tuple(row) for row in flipped} == {tuple(row) for row in np.sort(mesh.cells, axis=1)}
 
 
 def test_sizes_are_graded(meshed: Meshed) -> None:
@@ -156,9 +157,9 @@ def test_sizes_are_graded(meshed: Meshed) -> None:
 def test_finer_elements_everywhere(gear: MakeGear) -> None:
     one = gear(teeth=30, hub_radius=0.012)
     coarse, fine = (sector_mesh(profile(one), one, one.module / n) for n in (12, 24))
-    assert 1.7 < len(fine.triangles) / len(coarse.triangles) < 5
+    assert 1.7 < len(fine.cells) / len(coarse.cells) < 5
     error = [
-        abs(quality(mesh.points, mesh.triangles).area / sector_area(profile(one), 0.012) - 1)
+        abs(quality(mesh).area / sector_area(profile(one), 0.012) - 1)
         for mesh in (coarse, fine)
     ]
     assert error[1] < error[0] / 8  # curved boundaries: fourth order, here with different node counts
@@ -172,7 +173,7 @@ def test_deterministic_also_in_threads(gear: MakeGear) -> None:
         others = list(pool.map(lambda _: sector_mesh(tooth, one), range(3)))
     for other in others:
         assert np.array_equal(first.points, other.points)
-        assert np.array_equal(first.triangles, other.triangles)
+        assert np.array_equal(first.cells, other.cells)
 
 
 def test_a_running_gmsh_session_is_left_alone(gear: MakeGear, capfd: pytest.CaptureFixture[str]) -> None:
@@ -202,7 +203,7 @@ def test_full_gear_has_no_seams(gear: MakeGear) -> None:
     whole = full_mesh(sector)
     assert len(whole.points) == 17 * (len(sector.points) - len(sector.cut_low))
     assert len(np.unique(whole.points.round(10), axis=0)) == len(whole.points)
-    assert areas(whole.points, whole.triangles).sum() == pytest.approx(
+    assert areas(whole.points, whole.cells).sum() == pytest.approx(
         17 * sector_area(tooth, one.hub_radius), rel=1e-6
     )
     # Every tooth is the first one, rotated; every inner edge has two triangles, the rest is profile and hub.
@@ -210,14 +211,14 @@ def test_full_gear_has_no_seams(gear: MakeGear) -> None:
         angle = 2 * pi * k / 17
         turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
         assert np.abs(whole.points[whole.node_of[k]] - sector.points @ turn.T).max() < 1e-15
-    middles, count = np.unique(whole.triangles[:, 3:], return_counts=True)
+    middles, count = np.unique(whole.cells[:, 3:], return_counts=True)
     free = set(middles[count == 1])
     assert count.max() == 2
     hub_middles = set(whole.hub) & free
     assert free == set(whole.boundary_edges[:, 2]) | hub_middles
     assert len(whole.boundary_edges) == 17 * len(sector.boundary_edges)
     with pytest.raises(GeometryError, match=r"teeth = 18 .* 17 teeth"):
-        full_mesh(sector, 18)
+        assembled([sector] * 18)
 
 
 @pytest.mark.parametrize("size", [0.0, 4e-6, 1.1e-3])
