@@ -36,6 +36,9 @@ def write_record(record: xr.Dataset, path: str | Path) -> None:
     """Validate the record and write it as NetCDF-4, uncompressed; `path` is replaced in one step.
 
     Raises RecordError for a bad record or a missing folder.
+
+    >>> import gearbench as gb
+    >>> gb.write_record(gb.simulate(gb.read_case("quick_lumped", ["experiment.realisations=1"])), "record.nc")
     """
     validate_record(record)
     encoding = {str(name): {"_FillValue": None} for name in record.variables}
@@ -45,7 +48,13 @@ def write_record(record: xr.Dataset, path: str | Path) -> None:
 
 
 def read_record(path: str | Path) -> xr.Dataset:
-    """Read a record into memory and validate it. Raises RecordError for a missing, broken or unfit file."""
+    """Read a record into memory and validate it. Raises RecordError for a missing, broken or unfit file.
+
+    >>> import gearbench as gb
+    >>> gb.write_record(gb.simulate(gb.read_case("quick_lumped", ["experiment.realisations=1"])), "record.nc")
+    >>> gb.read_record("record.nc").attrs["schema"]
+    'gearbench-record/1'
+    """
     source = Path(path)
     if not source.is_file():
         raise RecordError(f"record {source} does not exist")

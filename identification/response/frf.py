@@ -117,24 +117,50 @@ def validate_frf(dataset: xr.Dataset) -> None:
 
 
 def itf(dataset: xr.Dataset) -> xr.DataArray:
-    """Complex ITF (frequency, phase) [m/N]."""
+    """Complex ITF (frequency, phase) [m/N].
+
+    >>> import gearbench as gb
+    >>> record = gb.simulate(gb.read_case("quick_lumped", ["experiment.realisations=2"]))
+    >>> settings = gb.IdentificationSettings(harmonics=8, order=1, window=12, band=(1200.0, 1300.0))
+    >>> gb.itf(gb.identify([record], settings)).dims
+    ('frequency', 'phase')
+    """
     return (dataset["itf_re"] + 1j * dataset["itf_im"]).rename("itf")
 
 
 def htf(dataset: xr.Dataset) -> xr.DataArray:
-    """Complex HTF (harmonic, frequency) [m/N]."""
+    """Complex HTF (harmonic, frequency) [m/N].
+
+    >>> import gearbench as gb
+    >>> record = gb.simulate(gb.read_case("quick_lumped", ["experiment.realisations=2"]))
+    >>> settings = gb.IdentificationSettings(harmonics=8, order=1, window=12, band=(1200.0, 1300.0))
+    >>> gb.htf(gb.identify([record], settings)).sizes["harmonic"]
+    17
+    """
     return (dataset["htf_re"] + 1j * dataset["htf_im"]).rename("htf")
 
 
 def write_frf(dataset: xr.Dataset, path: str | Path) -> None:
-    """Validate and write as NetCDF-4; `path` is replaced in one step."""
+    """Validate and write as NetCDF-4; `path` is replaced in one step. Raises FrfError, or RecordError for the folder.
+
+    >>> import gearbench as gb
+    >>> record = gb.simulate(gb.read_case("quick_lumped", ["experiment.realisations=2"]))
+    >>> settings = gb.IdentificationSettings(harmonics=8, order=1, window=12, band=(1200.0, 1300.0))
+    >>> gb.write_frf(gb.identify([record], settings), "frf.nc")
+    """
     validate_frf(dataset)
     encoding: dict[str, dict[str, Any]] = {str(name): {"_FillValue": None} for name in dataset.variables}
     write_atomically(path, lambda temporary: dataset.to_netcdf(temporary, engine="h5netcdf", encoding=encoding))
 
 
 def read_frf(path: str | Path) -> xr.Dataset:
-    """Read into memory and validate. Raises FrfError for a missing, broken or unfit file."""
+    """Read into memory and validate. Raises FrfError for a missing, broken or unfit file.
+
+    >>> import gearbench as gb
+    >>> gb.read_frf("none.nc")
+    Traceback (most recent call last):
+    gearbench.identification.response.frf.FrfError: frequency response none.nc does not exist
+    """
     source = Path(path)
     if not source.is_file():
         raise FrfError(f"frequency response {source} does not exist")
