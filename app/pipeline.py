@@ -1,4 +1,4 @@
-"""The main job for one experiment: statics, record, frequency responses, pictures, summary."""
+"""The main job: statics, record, frequency responses, pictures and summary of every experiment of a case."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gearbench.geometry.pair.zones import contact_span, fewest_pairs, zone_label
-from gearbench.shell.output import Output
-from gearbench.shell.progress import Progress
+from gearbench.shell.failure import InputError
+from gearbench.shell.output import Output, claimed, fingerprint
+from gearbench.shell.progress import Silent, Steps
 from gearbench.words.summary import run_numbers
 from gearbench.words.summary_text import honest_warning, summary_text
 
@@ -46,7 +47,7 @@ class Job:
 
     case: Case
     output: Output
-    progress: Progress
+    progress: Steps
     suffix: str = ""
 
     def name(self, base: str) -> str:
@@ -70,6 +71,38 @@ class Job:
         if not self.output.has(name):
             self.progress.step(name)
             self.output.write(name, draw)
+
+
+def run(case: Case, out: str | Path, *, force: bool = False, progress: Steps | None = None) -> list[dict[str, Any]]:
+    """The main job of a case: geometry, mesh, simulation, identification, pictures and summary in the folder `out`.
+
+    Returns the numbers of each experiment's summary (one, or one for each condition). Resumes in the folder of the same
+    case and sources; another's is refused unless `force`, which removes what that run wrote. `progress` hears of steps
+    and of fractions done. Raises InputError for the folder or a case without multisine, and what a step raises.
+
+    >>> import gearbench as gb
+    >>> short = ["realisations=4", "samples_per_period=4096", "multisine.band_hz=[900, 1500]"]
+    >>> lpm = ["band_hz=[1200, 1300]", "harmonics=8", "order=1", "window=8"]
+    >>> keys = [f"experiment.{key}" for key in short] + [f"identification.{key}" for key in lpm]
+    >>> (numbers,) = gb.run(gb.read_case("quick_lumped", keys), "out_first")
+    >>> f"{numbers['te_peak_to_peak_um']:.2f} um"
+    '5.53 um'
+    """
+    from gearbench.bench.refusals.readiness import check_case
+    from gearbench.records.provenance import source_digest
+    from gearbench.rig import dump_case
+
+    # What cannot be run is refused before a folder is made.
+    check_case(case)
+    for _, one in case.experiments():
+        if one.experiment.multisine is None:
+            raise InputError(
+                "experiment.multisine is missing: without excitation run has nothing to identify; `simulate` and"
+                " `static` need none"
+            )
+    with claimed(Path(out), "run", fingerprint(dump_case(case), source_digest()), force) as output:
+        jobs = [Job(one, output, progress or Silent(), f"-{name}" if name else "") for name, one in case.experiments()]
+        return [run_experiment(job) for job in jobs]
 
 
 def run_experiment(job: Job) -> dict[str, Any]:

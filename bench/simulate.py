@@ -25,7 +25,12 @@ def simulate(case: Case, model: str | None = None, progress: ProgressReport | No
     """Record of the case's experiment, simulated with `model` (absent: the case's own).
 
     `progress(fraction, note)` is called now and then. A case with conditions has one experiment for each:
-    simulate `case.under(condition)`. Raises BenchError for an unknown model, and what the solver raises.
+    simulate each of `case.experiments()`. Raises BenchError for an unknown model, and what the solver raises.
+
+    >>> import gearbench as gb
+    >>> record = gb.simulate(gb.read_case("quick_lumped", ["experiment.realisations=2"]))
+    >>> record["angle_driver"].sizes["realisation"], record["angle_driver"].attrs["units"]
+    (2, 'rad')
     """
     name = model or case.simulation.model
     if name not in SIMULATORS:

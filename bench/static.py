@@ -45,6 +45,11 @@ def static(
     the next one.
     Loads are driver torques [N m] or transmission errors [m]; without either, the experiment's mean torque.
     Raises BenchError for bad loads or an unknown model, and what the solver raises.
+
+    >>> import gearbench as gb
+    >>> found = gb.static(gb.read_case("quick_lumped"), torque=[100.0, 200.0])
+    >>> (1e6 * found["transmission_error"].mean("phase")).round(1).values
+    array([4.2, 8.3])
     """
     name = model or case.simulation.model
     if name not in SOLVERS:

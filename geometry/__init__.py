@@ -1,4 +1,8 @@
-"""Gear geometry: exact profile, pair kinematics, bodies, data sheet, mesh and export."""
+"""Gear geometry: exact profile, pair kinematics, bodies, data sheet, mesh and export.
+
+`tooth`: one gear: profile, fillet, flank deviations, crack, what may be. `pair`: kinematics, interference, data sheet,
+zones of contact. `mesh`: finite-element meshes of tooth sectors and gears. `export`: files for other programs.
+"""
 
 from gearbench.geometry.error import GeometryError
 from gearbench.geometry.export.meshes import write_mesh

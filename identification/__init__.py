@@ -1,4 +1,9 @@
-"""Frequency-domain identification: multisines, DTE, periodically time-varying frequency responses and their truth."""
+"""Frequency-domain identification: multisines, DTE, periodically time-varying frequency responses and their truth.
+
+`excitation`: multisines and residue combs. `spectra`: from records to spectra of force and DTE. `lpm`: the local
+polynomial method. `truth`: periodic systems whose exact response is known. `response`: the dataset of a time-varying
+frequency response, natural frequencies against mesh phase.
+"""
 
 from gearbench.identification.excitation.multisine import MultisineError, MultisineSignal, random_phase_multisine
 from gearbench.identification.identify import IdentificationSettings, identify

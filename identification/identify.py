@@ -76,6 +76,15 @@ def identify(
 
     Reports `progress(fraction, message)`. Raises SpectraError, TransmissionError or LpmError (all
     ValueError) with one sentence when the records do not fit together or cannot support the request.
+
+    >>> import gearbench as gb
+    >>> record = gb.simulate(gb.read_case("quick_lumped", ["experiment.realisations=2"]))
+    >>> settings = gb.IdentificationSettings(harmonics=8, order=1, window=12, band=(500.0, 1500.0))
+    >>> frf = gb.identify([record], settings)
+    >>> dict(frf["itf_re"].sizes), frf["itf_re"].attrs["units"]
+    ({'frequency': 501, 'phase': 256}, 'm/N')
+    >>> f"{frf.attrs['expected_error']:.0%}"
+    '11%'
     """
     settings = settings or IdentificationSettings()
     report = progress or (lambda fraction, message: None)

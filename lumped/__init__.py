@@ -1,6 +1,8 @@
 """The lumped model: mesh stiffness, equations of motion, Runge-Kutta integration.
 
-`gearbench.lumped.linear.runge_kutta` loads Numba and is therefore imported by its own name only.
+`stiffness`: analytic mesh stiffness and standards. `linear`: the periodic model with three degrees of freedom.
+`nonlinear`: the model with one mesh spring and the effects of real rigs. Time integration loads Numba and is therefore
+imported by its own name only (`gearbench.lumped.linear.runge_kutta`, `gearbench.lumped.nonlinear.model`).
 """
 
 from gearbench.lumped.errors import LumpedError

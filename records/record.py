@@ -47,6 +47,13 @@ def make_record(
     None are dropped. `channel_attributes` adds attributes to single channels, `start` [s] is the time of
     the first sample. Raises RecordError for an unknown channel, a wrong shape, or anything that
     `validate_record` refuses.
+
+    >>> import gearbench as gb
+    >>> import numpy as np
+    >>> signals = {"force": np.ones((1, 8)), "dte": np.zeros((1, 8))}
+    >>> record = gb.make_record(signals, {"sampling_rate": 1000.0, "samples_per_period": 4, "periods": 2})
+    >>> dict(record.sizes), record["dte"].attrs["units"]
+    ({'realisation': 1, 'time': 8}, 'm')
     """
     if not channels:
         raise RecordError("a record needs at least one channel")
@@ -74,7 +81,15 @@ def make_record(
 
 
 def validate_record(record: xr.Dataset) -> None:
-    """Raise RecordError, in one sentence, if the dataset is not a usable record."""
+    """Raise RecordError, in one sentence, if the dataset is not a usable record.
+
+    >>> import gearbench as gb
+    >>> record = gb.simulate(gb.read_case("quick_lumped", ["experiment.realisations=1"]))
+    >>> gb.validate_record(record)
+    >>> gb.validate_record(record.drop_vars("time"))
+    Traceback (most recent call last):
+    gearbench.records.errors.RecordError: a record needs the coordinate time [s]
+    """
     schema = record.attrs.get("schema")
     if schema != SCHEMA:
         raise RecordError(f"schema is {schema!r}, but a record has schema {SCHEMA!r}")

@@ -30,13 +30,23 @@ def read_dataset(path: str | Path, what: str = "file", error: type[ValueError] =
 
 
 def write_record(record: xr.Dataset, path: str | Path) -> None:
-    """Validate the record and write it as `write_dataset` does. Raises RecordError for a bad record, and FileError."""
+    """Validate the record and write it as `write_dataset` does. Raises RecordError for a bad record, and FileError.
+
+    >>> import gearbench as gb
+    >>> gb.write_record(gb.simulate(gb.read_case("quick_lumped", ["experiment.realisations=1"])), "record.nc")
+    """
     validate_record(record)
     write_dataset(record, path)
 
 
 def read_record(path: str | Path) -> xr.Dataset:
-    """Read a record into memory and validate it. Raises RecordError for a missing, broken or unfit file."""
+    """Read a record into memory and validate it. Raises RecordError for a missing, broken or unfit file.
+
+    >>> import gearbench as gb
+    >>> gb.write_record(gb.simulate(gb.read_case("quick_lumped", ["experiment.realisations=1"])), "record.nc")
+    >>> gb.read_record("record.nc").attrs["schema"]
+    'gearbench-record/1'
+    """
     record = read_dataset(path, "record")
     if "time" in record.data_vars:
         record = record.set_coords("time")

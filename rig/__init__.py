@@ -1,4 +1,7 @@
-"""What is tested: gears, rig, experiment and case, as immutable SI values."""
+"""What is tested: gears, rig, experiment and case, as immutable SI values.
+
+`casefile`: cases from and to TOML, where units meet; the values themselves lie on top, one idea a file.
+"""
 
 from gearbench.rig.casefile.case import Case, CaseError, dump_case, read_case
 from gearbench.rig.drive import Coupling, Drive, Ripple

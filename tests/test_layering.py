@@ -17,7 +17,7 @@ ROOT = Path(__file__).resolve().parent.parent
 MAY_IMPORT: dict[str, set[str]] = {
     "rig": set(),
     "records": set(),
-    "cases": set(),
+    "cases": {"rig"},
     "kernels": set(),
     "files": set(),
     "geometry": {"rig"},

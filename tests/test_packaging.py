@@ -102,3 +102,9 @@ def test_every_direct_dependency_is_pinned() -> None:
     wanted = PYPROJECT["project"]["dependencies"] + PYPROJECT["project"]["optional-dependencies"]["dev"]
     assert {requirement.split(">=")[0] for requirement in wanted} <= pinned
     assert "gearbench" not in pinned
+
+
+def test_type_checkers_are_told_that_it_is_typed() -> None:
+    """The marker on top speaks for all sub-packages (PEP 561)."""
+    assert SETUPTOOLS["package-data"]["gearbench"] == ["py.typed"]
+    assert (ROOT / "app" / "py.typed").read_bytes() == b""

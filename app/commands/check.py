@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from math import isnan
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from gearbench.commands.simulate import experiments
 from gearbench.shell.options import CaseArgument, JsonOption, SetOption, load_case, print_json
 from gearbench.words.combs import comb_data, comb_lines, comb_reports
 
@@ -34,9 +32,7 @@ def check(
 
     rows = data_sheet(loaded.rig, [1e-3 * number for number in diameter or []])
     check_case(loaded)
-    names = [condition.name for condition in loaded.conditions] or [""]
-    under = [experiment for experiment, _ in experiments(loaded, Path("record.nc"))]
-    combs = comb_reports(list(zip(names, under, strict=True)))
+    combs = comb_reports(loaded.experiments())
     if as_json:
         data = {row.name: {"value": row.value, "unit": row.unit} for row in rows}
         print_json({"case": loaded.name, "data": data, "combs": [comb_data(comb) for comb in combs]})

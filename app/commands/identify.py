@@ -34,21 +34,19 @@ def identify(
     as_json: JsonOption = False,
 ) -> None:
     """Identify the time-varying frequency response from force to DTE out of records."""
-    from gearbench.identification import IdentificationSettings, write_frf
-    from gearbench.identification import identify as estimate
-    from gearbench.records import read_record
+    import gearbench as gb
 
     check_out(out, records)
     seen = {path.resolve() for path in records}
     if len(seen) < len(records):
         raise InputError(f"RECORD is given {len(records)} times but names {len(seen)} file(s): each one counts once")
-    settings = IdentificationSettings(method=method, harmonics=harmonics, order=order, window=window, band=band_hz)
+    settings = gb.IdentificationSettings(method=method, harmonics=harmonics, order=order, window=window, band=band_hz)
     with Progress("identify") as progress:
         progress.step("reading")
-        loaded = [read_record(path) for path in records]
+        loaded = [gb.read_record(path) for path in records]
         progress.step("local polynomial method")
-        found = estimate(loaded, settings, progress=progress)
-        write_frf(found, out)
+        found = gb.identify(loaded, settings, progress=progress)
+        gb.write_frf(found, out)
     summary = frf_summary(found, out)
     if as_json:
         print_json(summary)

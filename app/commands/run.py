@@ -8,10 +8,7 @@ from typing import Annotated
 
 import typer
 
-from gearbench.commands.simulate import experiments
-from gearbench.shell.failure import InputError
 from gearbench.shell.options import CaseArgument, JsonOption, SetOption, load_case, print_json
-from gearbench.shell.output import claimed, fingerprint
 from gearbench.shell.progress import Progress
 from gearbench.words.summary_text import headline
 
@@ -27,28 +24,11 @@ def run(
 ) -> None:
     """Run a case: geometry, mesh, simulation, identification, pictures, summary. Resumes in its own folder."""
     loaded = load_case(case, settings)
-    from gearbench.bench.refusals.readiness import check_case
-    from gearbench.pipeline import Job, run_experiment
-    from gearbench.records.provenance import source_digest
-    from gearbench.rig import dump_case
+    import gearbench as gb
 
-    # What cannot be run is refused before a folder is made.
-    check_case(loaded)
-    for experiment, _ in experiments(loaded, Path("record.nc")):
-        if experiment.experiment.multisine is None:
-            raise InputError(
-                "experiment.multisine is missing: without excitation run has nothing to identify; `simulate` and"
-                " `static` need none"
-            )
     folder = out or Path(f"out_{re.sub(r'[^A-Za-z0-9._-]+', '_', loaded.name)}")
-    summaries = []
-    with (
-        claimed(folder, "run", fingerprint(dump_case(loaded), source_digest()), force) as output,
-        Progress(f"run {loaded.name}") as progress,
-    ):
-        for experiment, path in experiments(loaded, Path("record.nc")):
-            suffix = path.stem.removeprefix("record")
-            summaries.append(run_experiment(Job(experiment, output, progress, suffix)))
+    with Progress(f"run {loaded.name}") as progress:
+        summaries = gb.run(loaded, folder, force=force, progress=progress)
     if as_json:
         print_json(summaries if loaded.conditions else summaries[0])
         return

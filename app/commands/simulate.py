@@ -31,9 +31,8 @@ def simulate(
     """
     loaded = load_case(case, settings)
     check_out(out, [case])
-    from gearbench.bench import simulate as carry_out
+    import gearbench as gb
     from gearbench.bench.refusals.readiness import check_timing
-    from gearbench.records import write_record
 
     chosen = {"model": model or loaded.simulation.model}
     check_timing(loaded.model_copy(update={"simulation": loaded.simulation.model_copy(update=chosen)}))
@@ -41,8 +40,8 @@ def simulate(
     with Progress(f"simulate {loaded.name}") as progress:
         for experiment, path in experiments(loaded, out):
             progress.step(path.name)
-            record = carry_out(experiment, model, progress)
-            write_record(record, path)
+            record = gb.simulate(experiment, model, progress)
+            gb.write_record(record, path)
             summaries.append(record_summary(record, path))
     if as_json:
         print_json(summaries if loaded.conditions else summaries[0])
@@ -56,10 +55,9 @@ def simulate(
 
 def experiments(case: Case, out: Path) -> list[tuple[Case, Path]]:
     """The case under each of its conditions (or as it is, without any) and the record that belongs to it."""
-    if not case.conditions:
-        return [(case, out)]
-    names = [(condition, out.with_name(f"{out.stem}-{condition.name}{out.suffix}")) for condition in case.conditions]
-    return [(case.under(condition), path) for condition, path in names]
+    return [
+        (one, out.with_name(f"{out.stem}-{name}{out.suffix}") if name else out) for name, one in case.experiments()
+    ]
 
 
 def record_summary(record: Any, path: Path) -> dict[str, Any]:

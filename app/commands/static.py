@@ -63,12 +63,12 @@ def static(
             others.append(picture)
     elastic = (model or loaded.simulation.model) == "reduced"
     files = _check_stress(loaded, elastic, out, fields or [], root_figure, others)
-    from gearbench.bench.static import static as solve
+    import gearbench as gb
     from gearbench.records import write_dataset
 
     with Progress(f"static {loaded.name}") as progress:
         progress.step("mesh cycle")
-        result = solve(
+        result = gb.static(
             loaded,
             model,
             torque=torque_nm or (),

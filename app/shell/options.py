@@ -50,16 +50,9 @@ def check_picture(path: Path, inputs: Sequence[Path | str] = (), option: str = "
 
 def load_case(name: str, settings: Sequence[str] | None) -> Case:
     """The case in a file or, where there is no such file, the shipped case of that name."""
-    from gearbench.cases import case_files
-    from gearbench.rig import CaseError, read_case
+    import gearbench as gb
 
-    path = Path(name)
-    if not path.exists():
-        shipped = case_files()
-        if name not in shipped:
-            raise CaseError(f"case file {name} does not exist, and the shipped cases are {', '.join(shipped)}")
-        path = shipped[name]
-    return read_case(path, settings or ())
+    return gb.read_case(name, settings or ())
 
 
 def print_json(summary: Any) -> None:

@@ -5,9 +5,29 @@ from __future__ import annotations
 import sys
 import time
 from types import TracebackType
-from typing import Any
+from typing import Any, Protocol
 
 _SECONDS_BETWEEN_LINES = 5.0
+
+
+class Steps(Protocol):
+    """Who hears of a job that has several steps."""
+
+    def step(self, name: str) -> None:
+        """Begin the next step; the one before is done."""
+
+    def __call__(self, fraction: float, note: str = "") -> None:
+        """The fraction done (0..1) of the present step."""
+
+
+class Silent:
+    """Says nothing."""
+
+    def step(self, name: str) -> None:
+        """Nothing is told of a step."""
+
+    def __call__(self, fraction: float, note: str = "") -> None:
+        """Nor of how far it is."""
 
 
 class Progress:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -77,12 +78,17 @@ def load_results(path: Path) -> Results:
         return Results(path.name, found.get("record"), found.get("static"), found.get("frf"))
     if not path.is_file():
         raise BenchError(f"{path} does not exist")
-    result = _read(path)
+    return results_of(path.stem, _read(path), str(path))
+
+
+def results_of(name: str, result: xr.Dataset, where: str = "") -> Results:
+    """A single record, static result or frequency response as results of that name. Raises BenchError, which calls
+    it `where`."""
     schema = str(result.attrs.get("schema", "none"))
     if schema not in _SCHEMAS:
-        raise BenchError(f"{path} has schema {schema}, which is not one of {', '.join(_SCHEMAS)}")
+        raise BenchError(f"{where or name} has schema {schema}, which is not one of {', '.join(_SCHEMAS)}")
     found = {_SCHEMAS[schema]: result}
-    return Results(path.stem, found.get("record"), found.get("static"), found.get("frf"))
+    return Results(name, found.get("record"), found.get("static"), found.get("frf"))
 
 
 def _read(path: Path) -> xr.Dataset:
@@ -118,7 +124,7 @@ def compare(one: Results, two: Results) -> list[Row]:
     return rows
 
 
-def write_csv(rows: list[Row], path: Path) -> None:
+def write_csv(rows: Sequence[Row], path: Path) -> None:
     """compare.csv; NaN as an empty field."""
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)

@@ -117,23 +117,49 @@ def validate_frf(dataset: xr.Dataset) -> None:
 
 
 def itf(dataset: xr.Dataset) -> xr.DataArray:
-    """Complex ITF (frequency, phase) [m/N]."""
+    """Complex ITF (frequency, phase) [m/N].
+
+    >>> import gearbench as gb
+    >>> record = gb.simulate(gb.read_case("quick_lumped", ["experiment.realisations=2"]))
+    >>> settings = gb.IdentificationSettings(harmonics=8, order=1, window=12, band=(1200.0, 1300.0))
+    >>> gb.itf(gb.identify([record], settings)).dims
+    ('frequency', 'phase')
+    """
     return (dataset["itf_re"] + 1j * dataset["itf_im"]).rename("itf")
 
 
 def htf(dataset: xr.Dataset) -> xr.DataArray:
-    """Complex HTF (harmonic, frequency) [m/N]."""
+    """Complex HTF (harmonic, frequency) [m/N].
+
+    >>> import gearbench as gb
+    >>> record = gb.simulate(gb.read_case("quick_lumped", ["experiment.realisations=2"]))
+    >>> settings = gb.IdentificationSettings(harmonics=8, order=1, window=12, band=(1200.0, 1300.0))
+    >>> gb.htf(gb.identify([record], settings)).sizes["harmonic"]
+    17
+    """
     return (dataset["htf_re"] + 1j * dataset["htf_im"]).rename("htf")
 
 
 def write_frf(dataset: xr.Dataset, path: str | Path) -> None:
-    """Validate and write as NetCDF-4; `path` is replaced in one step. Raises FrfError and FileError."""
+    """Validate and write as NetCDF-4; `path` is replaced in one step. Raises FrfError and FileError.
+
+    >>> import gearbench as gb
+    >>> record = gb.simulate(gb.read_case("quick_lumped", ["experiment.realisations=2"]))
+    >>> settings = gb.IdentificationSettings(harmonics=8, order=1, window=12, band=(1200.0, 1300.0))
+    >>> gb.write_frf(gb.identify([record], settings), "frf.nc")
+    """
     validate_frf(dataset)
     write_dataset(dataset, path)
 
 
 def read_frf(path: str | Path) -> xr.Dataset:
-    """Read into memory and validate. Raises FrfError for a missing, broken or unfit file."""
+    """Read into memory and validate. Raises FrfError for a missing, broken or unfit file.
+
+    >>> import gearbench as gb
+    >>> gb.read_frf("none.nc")
+    Traceback (most recent call last):
+    gearbench.identification.response.frf.FrfError: frequency response none.nc does not exist
+    """
     dataset = read_dataset(path, "frequency response", FrfError)
     try:
         validate_frf(dataset)

@@ -55,6 +55,10 @@ class Case(Value):
         """The case whose experiment is that of one condition."""
         return self.model_copy(update={"experiment": condition.experiment, "conditions": ()})
 
+    def experiments(self) -> list[tuple[str, Case]]:
+        """The case under each of its conditions and that one's name; without any, the case itself under no name."""
+        return [(condition.name, self.under(condition)) for condition in self.conditions] or [("", self)]
+
 
 def read_case(path: str | Path, overrides: Sequence[str] = ()) -> Case:
     """Read a case file; `overrides` are `dotted.key=value` settings that replace keys before validation.
@@ -138,6 +142,11 @@ def _sentence(error: ValidationError) -> str:
 
 
 def dump_case(case: Case) -> str:
-    """The case as TOML text with every key; `read_case` of it gives an equal case."""
+    """The case as TOML text with every key; `read_case` of it gives an equal case.
+
+    >>> import gearbench as gb
+    >>> print(gb.dump_case(gb.read_case("quick_lumped")).splitlines()[0])
+    name = "quick_lumped"
+    """
     tables = write_tables(Case, case, "", case.uncertainty)
     return tables + write_conditions(case.conditions, case.uncertainty)

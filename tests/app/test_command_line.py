@@ -91,7 +91,7 @@ def test_a_defect_is_told_from_bad_input(monkeypatch: pytest.MonkeyPatch, capsys
     def broken(path: object, overrides: object = ()) -> None:
         raise ValueError("no error of ours is a plain ValueError")
 
-    monkeypatch.setattr("gearbench.rig.read_case", broken)
+    monkeypatch.setattr("gearbench.cases.read_file", broken)
     monkeypatch.delenv("GEARBENCH_DEBUG", raising=False)
     assert run_command_line(["check", "paper_fe"]) == 1
     err = capsys.readouterr().err
@@ -106,14 +106,14 @@ def test_interruption_is_130(monkeypatch: pytest.MonkeyPatch, capsys: pytest.Cap
         os.kill(os.getpid(), signal.SIGTERM)
 
     before = signal.getsignal(signal.SIGTERM)
-    monkeypatch.setattr("gearbench.rig.read_case", interrupted)
+    monkeypatch.setattr("gearbench.cases.read_file", interrupted)
     assert run_command_line(["check", "paper_fe"]) == 130
     assert signal.getsignal(signal.SIGTERM) is before
 
     def ctrl_c(path: object, overrides: object = ()) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("gearbench.rig.read_case", ctrl_c)
+    monkeypatch.setattr("gearbench.cases.read_file", ctrl_c)
     assert run_command_line(["check", "paper_fe"]) == 130
     assert "interrupted" in capsys.readouterr().err
 
