@@ -33,11 +33,6 @@ ABOUT = {
     "frozen.nc": "frequency response with coefficients frozen at each phase (not the truth)",
     "linearised.nc": "first natural frequency of the finite-element model, linearised at each mesh phase",
     "gears.png": "gear pair and mesh",
-    "stiffness.png": "mesh stiffness over the mesh period",
-    "record.png": "torque and DTE against time",
-    "itf.png": "magnitude of the ITF over frequency and mesh phase",
-    "natural_frequency.png": "natural frequency against mesh phase",
-    "summary.json": "the numbers of this summary",
 }
 
 
@@ -110,6 +105,7 @@ def run_experiment(job: Job) -> dict[str, Any]:
     from gearbench.bench import simulate
     from gearbench.bench.results.responses import identify_case, linearised_modes, reference_results
     from gearbench.bench.static import static
+    from gearbench.figures.of_run import FIGURES, RunResults
     from gearbench.geometry import pair
     from gearbench.identification import read_frf, write_frf
     from gearbench.records import read_dataset, read_record, write_dataset, write_record
@@ -140,8 +136,11 @@ def run_experiment(job: Job) -> dict[str, Any]:
     zones = fewest_pairs(span)
     numbers = run_numbers(case, statics, record, results, modes, zones)
     numbers["support_corner_hz"] = _support_corner(case)
-    _draw_results(job, statics, record, results, modes, honest_warning(numbers), zones, zone_label(span))
-    numbers["files"] = {job.name(base): about for base, about in ABOUT.items() if job.output.has(job.name(base))}
+    drawn = RunResults(statics, record, results, modes, zones, zone_label(span), honest_warning(numbers))
+    for figure in FIGURES:
+        job.picture(figure.name, partial(figure.draw, drawn))
+    about = ABOUT | {figure.name: figure.about for figure in FIGURES} | {"summary.json": "the numbers of this summary"}
+    numbers["files"] = {job.name(base): words for base, words in about.items() if job.output.has(job.name(base))}
     _write_summary(job, numbers)
     return numbers
 
@@ -165,27 +164,6 @@ def _draw_gears(job: Job, meshing: Pair) -> None:
         draw_pair(path, job.case.rig, meshing, mesh)
 
     job.picture("gears.png", draw)
-
-
-def _draw_results(
-    job: Job,
-    statics: xr.Dataset,
-    record: xr.Dataset,
-    results: dict[str, xr.Dataset],
-    modes: dict[str, xr.Dataset],
-    warning: str,
-    zones: list[tuple[float, float]],
-    label: str,
-) -> None:
-    from gearbench.figures.frf import draw_itf, draw_natural_frequencies
-    from gearbench.figures.record import draw_record, draw_stiffness
-
-    job.picture("stiffness.png", lambda path: draw_stiffness(path, statics, zones, label))
-    job.picture("record.png", lambda path: draw_record(path, record))
-    job.picture("itf.png", lambda path: draw_itf(path, results, warning))
-    job.picture(
-        "natural_frequency.png", lambda path: draw_natural_frequencies(path, results | modes, zones, label, warning)
-    )
 
 
 def _write_summary(job: Job, numbers: dict[str, Any]) -> None:

@@ -94,7 +94,7 @@ def static_dataset(
     share: Array | None = None,
     unloaded: Array | None = None,
 ) -> xr.Dataset:
-    """The results as a dataset (DESIGN: static.nc); arrays (load, phase), `share` (load, phase, pair), `unloaded`
+    """The results as a dataset that `static.nc` holds; arrays (load, phase), `share` (load, phase, pair), `unloaded`
     (phase,): the transmission error without load."""
     unit, values = loads
     fields = {

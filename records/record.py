@@ -1,7 +1,7 @@
 """The record: one labelled dataset, the only thing that identification and diagnosis read.
 
 A record is an `xarray.Dataset` with dimensions `realisation` and `time`, coordinate `time` [s], and float64
-channels `(realisation, time)` in SI units. Attributes describe sampling and rig (DESIGN: Record).
+channels `(realisation, time)` in SI units. Attributes describe sampling and rig.
 
 Periods: a record holds `periods` excitation periods of `samples_per_period` samples each. A simulation in
 steady state repeats itself, so it may store the mean over several periods instead: then
@@ -26,8 +26,8 @@ SCHEMA = "gearbench-record/1"
 
 # Without these the record cannot be cut into periods.
 SAMPLING_ATTRIBUTES = ("sampling_rate", "samples_per_period", "periods")
-# Without these the DTE and the generalised force cannot be computed from angles and torques (physics,
-# section 1).
+# Without these the DTE and the generalised force cannot be computed from angles and torques
+# (docs/physics.md, "Axes, signs, zeros").
 RIG_ATTRIBUTES = ("base_radius_driver", "base_radius_driven", "driven_boundary")
 INERTIA_ATTRIBUTES = ("inertia_driver", "inertia_driven")
 # Largest departure of the time coordinate from a uniform grid, in samples.

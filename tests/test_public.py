@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import doctest
 import inspect
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -107,6 +108,14 @@ def failures(function: Callable[..., Any], name: str) -> tuple[int, bool]:
     runner.run(test)
     used = any(f"gb.{name}(" in example.source for example in test.examples)
     return runner.failures, used
+
+
+def test_what_the_readme_says_of_python_runs(capsys: pytest.CaptureFixture[str]) -> None:
+    section = (ROOT / "README.md").read_text(encoding="utf-8").split("\n## In Python\n")[1].split("\n## ")[0]
+    code = "\n".join(line[4:] for line in section.splitlines() if line.startswith("    "))
+    assert code.startswith("import gearbench as gb\n")
+    exec(compile(code, "README.md", "exec"), {})
+    assert re.fullmatch(r"1[12]\d\d\.\d+ Hz, expected error 0\.\d+\n", capsys.readouterr().out)
 
 
 def test_a_false_example_is_seen() -> None:

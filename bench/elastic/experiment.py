@@ -218,7 +218,7 @@ def _block(
 
 
 def _dte(case: Case, meshing: Pair, samples: Array) -> Array:
-    """DTE [m] of samples (..., CHANNELS), see physics, section 1."""
+    """DTE [m] of samples (..., CHANNELS), see docs/physics.md, "Axes, signs, zeros"."""
     along = 1.0 if case.rig.support.direction == "line-of-action" else cos(meshing.working_pressure_angle)
     turned = meshing.driver.base_radius * samples[..., 0] - meshing.driven.base_radius * samples[..., 1]
     return np.asarray(turned + along * (samples[..., 2] - samples[..., 3]))

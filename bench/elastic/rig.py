@@ -23,7 +23,7 @@ from gearbench.rig import Case, Rig, Simulation
 
 Array = NDArray[np.float64]
 
-FREQUENCY_ERROR = 5e-4  # of the highest identified mode (physics, section 4)
+FREQUENCY_ERROR = 5e-4  # of the highest identified mode (docs/physics.md, "Time integration")
 STEPS_PER_MESH_PERIOD = 200
 
 

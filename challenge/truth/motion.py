@@ -1,6 +1,6 @@
 """Equations of motion of the truth rig and their fourth-order Runge-Kutta integration, compiled.
 
-Signs as in physics, section 1: dte = rb1 theta1 - rb2 theta2 + (y1 - y2) cos a + (x1 - x2) sin a. Friction acts
+dte = rb1 theta1 - rb2 theta2 + (y1 - y2) cos a + (x1 - x2) sin a; docs/physics.md, "Axes, signs, zeros". Friction acts
 across the line of action against the sliding velocity rho1 theta1' - rho2 theta2' + (y1' - y2') sin a - (x1' - x2')
 cos a of each pair. The back flanks touch along the mirrored line of action once the backlash is used up; they carry
 no friction, and their teeth no errors but eccentricity and profile.

@@ -9,8 +9,8 @@ measured deflection, mu A the friction lever of each row, Q(y) the support's for
     load            [M2 + J_2 s^2 theta2] / rb2 - F_m (1 + mu A2)
     driven support  [(m2 s^2 + c2 s) y2 + Q2(y2)] / g - F_m (1 + mu As)
 
-H is the coupling's compliance (0: rigid). Signs: physics, sections 1 and 4. A residual is zero for a rig that the
-unknowns describe, and noise besides.
+H is the coupling's compliance (0: rigid). Signs: docs/physics.md, "Axes, signs, zeros". A residual is zero for a
+rig that the unknowns describe, and noise besides.
 """
 
 from __future__ import annotations

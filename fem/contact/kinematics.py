@@ -1,7 +1,8 @@
 """Where two flanks meet: exact gap, common normal and contact points of one tooth pair, tip edges included.
 
 Each gear has a frame in which its working flank faces counter-clockwise; the driven gear's frame is turned by pi, so
-that both gears look alike (see physics, section 1). A back-flank contact is the mirror image of a working one.
+that both gears look alike (docs/physics.md, "Axes, signs, zeros"). A back-flank contact is the mirror image of a
+working one.
 """
 
 from __future__ import annotations
@@ -92,7 +93,8 @@ def teeth_of(pair: Pair) -> tuple[Tooth, Tooth]:
 
 @compiled
 def edge_contact(slave: Tooth, master: Tooth, c_slave: float, c_master: float, dx: float, dy: float):
-    """Gap of the slave's tip edge to the master's involute (physics 4): rb (angle + inv(alpha) - psi_b) - radius.
+    """Gap of the slave's tip edge to the master's involute: rb (angle + inv(alpha) - psi_b) - radius (docs/physics.md,
+    "Contact law").
 
     Returns gap, tangent angle of the master's normal, roll length of the master's foot, lever on the slave and the
     angle that the contact has moved along the edge arc (negative: still on the involute).

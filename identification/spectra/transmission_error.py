@@ -1,4 +1,4 @@
-"""Dynamic transmission error (DTE) and generalised force of a record (physics, section 1)."""
+"""Dynamic transmission error (DTE) and generalised force of a record (docs/physics.md, "Axes, signs, zeros")."""
 
 from __future__ import annotations
 

@@ -7,8 +7,8 @@
 
 x = rb1 theta1 - rb2 theta2 [m]; g = cos(working pressure angle) for tangential supports, 1 along the line
 of action; e is the static transmission error, zero unless given. The mesh stays in contact, so the model
-is linear and periodic in the mesh phase. Signs and zeros: physics, sections 1 and 6. State: (x, y1, y2,
-x', y1', y2').
+is linear and periodic in the mesh phase. Signs and zeros: docs/physics.md,
+"Axes, signs, zeros". State: (x, y1, y2, x', y1', y2').
 """
 
 from __future__ import annotations

@@ -51,7 +51,7 @@ def rigid(meshing: Pair, side: int, phase: float, moved: tuple[float, float, flo
 
 
 def flank(meshing: Pair, gear: int, tooth: int, side: int, angle: float, centre: Array, s: Array) -> Array:
-    """Points of a flank in the world (physics, section 1), gears drawn from their profiles."""
+    """Points of a flank in the world (docs/physics.md, "Axes, signs, zeros"), gears drawn from their profiles."""
     shape = (meshing.driver, meshing.driven)[gear]
     points = shape.points(s) * (MIRROR if side else 1.0)
     if gear == 0:

@@ -33,7 +33,8 @@ def turned(points: np.ndarray, angle: float) -> np.ndarray:
 
 
 class Flanks:
-    """Both flanks in the world, as functions of arc length, at a rigid position (physics, section 1)."""
+    """Both flanks in the world, as functions of arc length, at a rigid position (docs/physics.md,
+    "Axes, signs, zeros")."""
 
     def __init__(self, meshing: Pair, side: int, tooth: int, position: tuple[float, ...]) -> None:
         theta1, theta2, dx, dy = position

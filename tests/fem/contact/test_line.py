@@ -31,7 +31,7 @@ def solve(twins: Any, xi: float, force: float) -> tuple[float, float, np.ndarray
 @pytest.mark.parametrize("force", [50.0, 2000.0])
 @pytest.mark.parametrize("place", [-0.6, 0.0, 0.5])
 def test_hertz(twins: Any, place: float, force: float) -> None:
-    """Half-width, peak pressure and approach of two cylinders (Johnson 1985, eqs. 4.43-4.45; physics 4)."""
+    """Half-width, peak pressure and approach of two cylinders (Johnson 1985, eqs. 4.43-4.45)."""
     total = twins.pair.line_of_action
     xi = 0.5 * total + place * 3e-3
     radius = xi * (total - xi) / total

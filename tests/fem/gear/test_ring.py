@@ -152,7 +152,8 @@ def test_hub_coupling_is_the_integral_over_the_full_mesh(coarse: Any, modes: Any
 
 
 def test_the_body_twists_like_an_annulus(gear: Any) -> None:
-    """Equal tangential loads on all teeth: u = T r/(4 pi G b) (1/r_i^2 - 1/r^2) below the rim (physics 5).
+    """Equal tangential loads on all teeth: u = T r/(4 pi G b) (1/r_i^2 - 1/r^2) below the rim (docs/physics.md,
+    "Statics").
 
     The teeth disturb that by (r/rim)^z: 1e-4 of it is left at two thirds of the rim.
     """

@@ -1,4 +1,4 @@
-"""DTE and force of a record against physics section 1 written out by hand."""
+"""DTE and force of a record against docs/physics.md, "Axes, signs, zeros", written out by hand."""
 
 import warnings
 from collections.abc import Callable
