@@ -9,11 +9,11 @@ from math import pi
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from gearbench.bench.results.summary import run_numbers
 from gearbench.geometry.pair.zones import contact_span, fewest_pairs, zone_label
 from gearbench.shell.output import Output
 from gearbench.shell.progress import Progress
-from gearbench.words.summary import run_numbers
-from gearbench.words.summary_text import honest_warning, summary_text
+from gearbench.words.summary import honest_warning, summary_text
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -13,7 +13,7 @@ from gearbench.shell.failure import InputError
 from gearbench.shell.options import CaseArgument, JsonOption, SetOption, load_case, print_json
 from gearbench.shell.output import claimed, fingerprint
 from gearbench.shell.progress import Progress
-from gearbench.words.summary_text import headline
+from gearbench.words.summary import headline
 
 
 def run(
