@@ -9,12 +9,12 @@ from math import pi
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from gearbench.bench.results.summary import run_numbers
 from gearbench.geometry.pair.zones import contact_span, fewest_pairs, zone_label
 from gearbench.shell.failure import InputError
 from gearbench.shell.output import Output, claimed, fingerprint
 from gearbench.shell.progress import Silent, Steps
-from gearbench.words.summary import run_numbers
-from gearbench.words.summary_text import honest_warning, summary_text
+from gearbench.words.summary import honest_warning, summary_text
 
 if TYPE_CHECKING:
     import xarray as xr

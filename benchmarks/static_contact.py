@@ -23,9 +23,9 @@ import numpy as np
 
 from gearbench.bench.elastic.rig import elastic_rig
 from gearbench.cases import case_path
-from gearbench.fem.contact.cache import stored_gear
 from gearbench.fem.contact.law import Law, elastic_pair, make_law
 from gearbench.fem.contact.static import static_cycle
+from gearbench.fem.gear.store import stored_gear
 from gearbench.rig import Case, Gear, Material, Rig, Support, Supports, read_case
 
 CALCULIX = Path(__file__).resolve().parents[1] / "tests" / "validation" / "calculix"

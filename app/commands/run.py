@@ -10,7 +10,7 @@ import typer
 
 from gearbench.shell.options import CaseArgument, JsonOption, SetOption, load_case, print_json
 from gearbench.shell.progress import Progress
-from gearbench.words.summary_text import headline
+from gearbench.words.summary import headline
 
 
 def run(

@@ -10,7 +10,7 @@ import typer
 from gearbench.commands.stress_output import field_files, field_phases, write_all
 from gearbench.shell.options import CaseArgument, JsonOption, SetOption, check_out, check_picture, load_case, print_json
 from gearbench.shell.progress import Progress
-from gearbench.words.stress import root_lines, root_tables
+from gearbench.words.root_stress import root_lines, root_tables
 
 if TYPE_CHECKING:
     from gearbench.rig import Case

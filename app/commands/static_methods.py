@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from gearbench.words.root_stress import root_stress_data, root_stress_lines
+from gearbench.words.iso_root_stress import root_stress_data, root_stress_lines
 from gearbench.words.stiffness import stiffness_data, stiffness_lines
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gearbench.figures.frf import draw_itf
 from gearbench.figures.plotting import BLUE, ORANGE, figure, save
-from gearbench.words.summary_text import ENOUGH
+from gearbench.words.summary import ENOUGH
 
 if TYPE_CHECKING:
     from gearbench.bench.results.compare import Results

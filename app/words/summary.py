@@ -1,74 +1,142 @@
-"""The summary of a run: first the answers, then an honest account of how far they go."""
+"""The words of summary.md."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from math import isfinite
+from typing import Any
 
-import numpy as np
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from gearbench.geometry.pair.zones import Span
-    from gearbench.rig import Case
+AGREES = 0.75  # identified and linearised ranges further apart than this ratio are not the same mode
+ENOUGH = 0.02  # expected rms error of the ITF above which pictures carry a warning
 
 
-def run_numbers(
-    case: Case,
-    static: xr.Dataset,
-    record: xr.Dataset,
-    results: Mapping[str, xr.Dataset],
-    modes: Mapping[str, xr.Dataset],
-    zones: Sequence[Span],
-) -> dict[str, Any]:
-    """All numbers of a summary, for JSON.
-
-    `results`: identified and, for lumped cases, exact and frozen; `modes`: natural frequencies from elsewhere.
-    """
-    from gearbench.bench.results.measures import itf_difference, median_in, mesh_orders, mode_range
-
-    te = 1e6 * static["transmission_error"].values[0]
-    stiffness = static["stiffness_tangent"].values[0]
-    dte = 1e6 * record["dte"].values
-    identified = results["identified"]
-    numbers: dict[str, Any] = {
-        "case": case.name,
-        "model": record.attrs.get("model", ""),
-        "te_peak_to_peak_um": float(te.max() - te.min()),
-        "te_mesh_orders_um": [float(value) for value in mesh_orders(te)],
-        "first_mode_hz": mode_range(identified),
-        "first_mode_fewest_pairs_hz": median_in(identified, zones, inside=True),
-        "first_mode_most_pairs_hz": median_in(identified, zones, inside=False),
-        "first_mode_damping": first_mode_damping(identified),
-        "torque_mean_nm": float(record.attrs["torque_mean"]),
-        "dte_record_peak_to_peak_um": float(dte.max() - dte.min()),
-        "stiffness_n_per_um": (float(stiffness.min()) / 1e6, float(stiffness.max()) / 1e6),
-        "realisations": int(record.sizes["realisation"]),
-        "mesh_frequency_hz": 1.0 / float(record.attrs["mesh_period"]),
-        "sampling_rate_hz": float(record.attrs["sampling_rate"]),
-        "duration_s": record.sizes["time"] / float(record.attrs["sampling_rate"]),
-        "settling_residual": record.attrs.get("settling_residual"),
-        "identification": {key: plain(value) for key, value in identified.attrs.items()},
-        "record_warnings": record.attrs.get("warnings", ""),
-    }
-    for name, result in (*results.items(), *modes.items()):
-        if name != "identified":
-            numbers[f"first_mode_{name}_hz"] = mode_range(result)
-    if "exact" in results:
-        numbers["itf_error_against_exact"] = itf_difference(identified, results["exact"])
-        numbers["frozen_against_exact"] = itf_difference(results["frozen"], results["exact"])
-    return numbers
+def honest_warning(numbers: dict[str, Any]) -> str:
+    """A sentence or two for the pictures where the record cannot support the ITF, else nothing."""
+    found = numbers["identification"]
+    duration = found.get("record_duration", numbers["realisations"] * found["joint_period"])
+    needed = found.get("record_needed", 0.0)
+    expected, branches = found["expected_error"], found["harmonics"]
+    if needed <= duration and expected <= ENOUGH:
+        return ""
+    wanted = f" where about {needed:.3g} s are needed" if needed > duration else ""
+    smear = f", which smear the switches over {1 / (2 * branches):.2g} mesh periods" if branches else ""
+    return (
+        f"This record cannot support the ITF in full: {numbers['realisations']} realisation(s) give {duration:g} s of"
+        f" distinct excitation{wanted}, enough for {branches} branches a side{smear}. Expected error"
+        f" {expected:.0%} rms, several times that at the switches; nothing is smoothed or masked."
+    )
 
 
-def first_mode_damping(frf: xr.Dataset) -> float:
-    """Median damping ratio of the first mode over the mesh period; NaN where no mode was found."""
-    values = frf["damping_ratio"].values
-    return float(np.nanmedian(values[0])) if len(values) and np.isfinite(values[0]).any() else float("nan")
+def headline(numbers: dict[str, Any]) -> list[str]:
+    """The first lines of a summary: peak-to-peak TE, mesh orders 1-3, range of the first mode."""
+    orders = ", ".join(f"{value:.4g}" for value in numbers["te_mesh_orders_um"])
+    return [
+        f"Peak-to-peak TE: {numbers['te_peak_to_peak_um']:.4g} um (static, {numbers['torque_mean_nm']:g} N m)",
+        f"TE mesh orders 1-3: {orders} um",
+        f"First mode: {_first_mode(numbers)}",
+    ]
 
 
-def plain(value: Any) -> Any:
-    """An attribute of a dataset as a plain Python value."""
-    if hasattr(value, "tolist"):
-        return value.tolist()
-    return value
+def summary_text(numbers: dict[str, Any]) -> str:
+    """summary.md: the answers first, then the account of how far they go."""
+    parts = ["  \n".join(headline(numbers)), f"# {numbers['case']}", *_account(numbers), *_what(numbers)]
+    return "\n\n".join([*(part for part in parts if part), *_files(numbers)]) + "\n"
+
+
+def _first_mode(numbers: dict[str, Any]) -> str:
+    if not isfinite(numbers["first_mode_hz"][0]):
+        return "none in the identified band"
+    low, high = numbers["first_mode_hz"]
+    linearised = numbers.get("first_mode_linearised_hz", (float("nan"),) * 2)
+    if high < AGREES * linearised[0] or AGREES * low > linearised[1]:
+        return (
+            f"none that the model confirms: the record has a hump at {_range((low, high))} Hz, the linearised model its"
+            f" first mode at {_range(linearised)} Hz"
+        )
+    text = f"{_range(numbers['first_mode_hz'])} Hz over the mesh period"
+    fewest, most = numbers["first_mode_fewest_pairs_hz"], numbers["first_mode_most_pairs_hz"]
+    if isfinite(fewest) and isfinite(most):
+        text += f" (medians {fewest:.0f} Hz where the fewest tooth pairs are in contact, {most:.0f} Hz elsewhere)"
+    return text
+
+
+def _range(limits: tuple[float, float]) -> str:
+    return f"{limits[0]:.0f}-{limits[1]:.0f}"
+
+
+def _what(numbers: dict[str, Any]) -> list[str]:
+    model = {"lumped": "lumped model", "reduced": "reduced finite-element model"}.get(numbers["model"], "model")
+    stiffness = numbers["stiffness_n_per_um"]
+    lines = [
+        "## What was done and found",
+        f"The {model} ran {numbers['realisations']} realisation(s) of {numbers['duration_s']:g} s at"
+        f" {numbers['sampling_rate_hz']:g} Hz, {numbers['torque_mean_nm']:g} N m mean torque and"
+        f" {numbers['mesh_frequency_hz']:g} Hz mesh frequency.",
+        "TE is the static transmission error under the mean torque with the gear centres held; a mesh order is the"
+        " amplitude of its sine. In the record, with multisine and supports, the DTE spans"
+        f" {numbers['dte_record_peak_to_peak_um']:.4g} um. The tangent mesh stiffness runs from {stiffness[0]:.4g} to"
+        f" {stiffness[1]:.4g} N/um over the mesh period.",
+        *_law(numbers),
+    ]
+    corner = numbers["support_corner_hz"]
+    if corner is not None and corner < 0.1 * numbers["first_mode_hz"][0]:
+        lines.append(
+            f"The supports are over-damped: above k/(2 pi c) = {corner:.3g} Hz their dampers and not their springs"
+            " carry the gears, which shows in the damping of the first mode."
+        )
+    for name, words in (
+        ("exact", "the exact ITF"),
+        ("frozen", "frozen coefficients (not the truth)"),
+        ("linearised", "the finite-element model, linearised at each phase (frozen)"),
+    ):
+        if isfinite(numbers.get(f"first_mode_{name}_hz", (float("nan"),))[0]):
+            lines.append(f"First-mode range from {words}: {_range(numbers[f'first_mode_{name}_hz'])} Hz.")
+    if numbers["settling_residual"] is not None:
+        lines.append(
+            f"Steady state: from period to period the DTE changes by {numbers['settling_residual']:.2g} of its"
+            " standard deviation."
+        )
+    return lines
+
+
+def _law(numbers: dict[str, Any]) -> list[str]:
+    """Whether the first mode follows the number of tooth pairs."""
+    fewest, most = numbers["first_mode_fewest_pairs_hz"], numbers["first_mode_most_pairs_hz"]
+    if not (isfinite(fewest) and isfinite(most)):
+        return []
+    law = "lower" if fewest < most else "NOT lower"
+    return [
+        f"The first mode is {law} where the fewest tooth pairs carry. Its damping ratio is about"
+        f" {numbers['first_mode_damping']:.2g}."
+    ]
+
+
+def _account(numbers: dict[str, Any]) -> list[str]:
+    found = numbers["identification"]
+    lines = [
+        "## How far to trust the identified response",
+        f"Local polynomial method with {found['harmonics']} branches on each side, order {found['order']} and"
+        f" {2 * found['window'] + 1} lines a window: {found['unknowns']} unknowns from {found['equations']} equations"
+        f" in each of {found['windows']} windows; condition number {found['condition_number']:.3g}.",
+        f"Expected error of the ITF: {found['expected_error']:.2%} of its rms (variance"
+        f" {found['variance_error']:.2%}, missing branches {found['truncation_error']:.2%}); at most"
+        f" {found['expected_error_bound']:.2%} if the whole residual is missing response.",
+    ]
+    if "itf_error_against_exact" in numbers:
+        lines.append(
+            f"Measured against the exact ITF the identified one errs by {numbers['itf_error_against_exact']:.2%};"
+            f" the frozen one differs from the exact by {numbers['frozen_against_exact']:.1%} and is no reference."
+        )
+    else:
+        lines.append("This model has no exact response to measure against: the error is an estimate.")
+    warnings = [line for line in str(found.get("warnings", "")).splitlines() if line]
+    warnings += [line for line in str(numbers["record_warnings"] or "").split("; ") if line]
+    warnings = [f"**{honest_warning(numbers)}**" if honest_warning(numbers) else "", *warnings]
+    lines.append("\n".join(f"- {line}" for line in warnings if line))
+    return lines
+
+
+def _files(numbers: dict[str, Any]) -> list[str]:
+    rows = [f"| `{name}` | {about} |" for name, about in numbers["files"].items() if not name.endswith(".png")]
+    table = "\n".join(["| file | what it holds |", "|---|---|", *rows])
+    pictures = [f"![{about}]({name})" for name, about in numbers["files"].items() if name.endswith(".png")]
+    return ["## Files", table, "## Pictures", *pictures]

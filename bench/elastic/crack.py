@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from math import degrees
 
-from gearbench.fem.contact.cache import stored_gear
 from gearbench.fem.gear.elasticity import plane_moduli
 from gearbench.fem.gear.patch import patch_compliance
+from gearbench.fem.gear.store import stored_gear
 from gearbench.geometry import Profile, pair
 from gearbench.lumped.stiffness.potential_energy import tooth_compliance
 from gearbench.rig import Gear, Material, Rig

@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from gearbench.bench.errors import BenchError
 from gearbench.bench.plan.schedule import Schedule
-from gearbench.fem.contact.cache import stored_gear, stored_law
 from gearbench.fem.contact.law import Law, elastic_pair
 from gearbench.fem.contact.static import position, static_cycle
+from gearbench.fem.contact.store import stored_law
 from gearbench.fem.gear.body import CondensedGear
+from gearbench.fem.gear.store import stored_gear
 from gearbench.fem.motion.machine import Machine, contact_rows, make_machine, mass_matrix
 from gearbench.fem.motion.transient import frequency_error, make_scheme
 from gearbench.geometry import Body, Pair, body

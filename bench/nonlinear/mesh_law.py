@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from gearbench.bench.elastic.rig import ElasticRig, elastic_rig
 from gearbench.bench.errors import BenchError
-from gearbench.fem.contact.cache import cached, key_for
 from gearbench.fem.contact.law import EDGE_SEPARATION, LOAD_RANGE, PAIRS, Law, newton_step
 from gearbench.fem.contact.static import position, static_cycle
+from gearbench.fem.gear.store import cached, key_for
 from gearbench.geometry import Pair, pair
 from gearbench.geometry.tooth.profile import involute
 from gearbench.kernels.compiled import compiled

@@ -10,7 +10,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from gearbench.bench.elastic.rig import ElasticRig
-from gearbench.fem.contact.cache import cached, key_for
+from gearbench.fem.gear.store import cached, key_for
 from gearbench.fem.stress.fields import elastic_gear
 from gearbench.fem.stress.loaded import PairLoad, pair_loads
 from gearbench.fem.stress.root import RootKernel, peak, root_kernel, root_stress

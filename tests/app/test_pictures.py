@@ -16,7 +16,7 @@ from gearbench.figures.gear import draw_pair
 from gearbench.figures.record import draw_record
 from gearbench.geometry import pair
 from gearbench.rig import read_case
-from gearbench.words.summary_text import headline, honest_warning
+from gearbench.words.summary import headline, honest_warning
 
 
 def frf(rows: int = 40, phases: int = 32, scale: float = 1.0) -> xr.Dataset:

@@ -16,7 +16,7 @@ from gearbench.cli import run_command_line
 from gearbench.identification import SpectraError, identify
 from gearbench.records import make_record
 from gearbench.rig import read_case
-from gearbench.words.summary_text import headline
+from gearbench.words.summary import headline
 
 
 @pytest.mark.parametrize(

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_matrix
 
-from gearbench.fem.contact.cache import stored_gear
 from gearbench.fem.contact.law import elastic_pair, make_law
 from gearbench.fem.contact.static import static_cycle
 from gearbench.fem.gear.body import condense
 from gearbench.fem.gear.elasticity import PlaneModuli, assemble
+from gearbench.fem.gear.store import stored_gear
 from gearbench.geometry import GeometryError
 from gearbench.geometry.mesh.quads import quad_sector_mesh
 from gearbench.geometry.mesh.sector import Element

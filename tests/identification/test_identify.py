@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from shared.ptv import periodic_filter
+from shared.reference_rig import ReferenceRig, reference_record
 
 from gearbench.identification import IdentificationSettings, LpmError, SpectraError, TransmissionError, identify, itf
 from gearbench.identification.response.frf import htf
@@ -14,7 +15,6 @@ from gearbench.identification.spectra.joint import joint_periods
 from gearbench.identification.spectra.records import record_spectra
 from gearbench.identification.truth.monodromy import exact_itf
 from gearbench.identification.truth.periodic import truncation_error
-from gearbench.identification.truth.reference import ReferenceRig, reference_record
 from gearbench.records.record import make_record
 
 # A faster mesh needs fewer branches: 16 reach 512 Hz to each side.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from shared.contact_models import RUNS, difference
 from shared.root_stresses import FINEST, roots
 
-from gearbench.shell.validation import Check
+from gearbench.commands.checks import Check
 
 
 def contact_models(on_line: bool) -> float:

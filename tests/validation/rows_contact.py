@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from gearbench.commands.checks import Check, NotRun
 from gearbench.fem.contact.law import Law, elastic_pair, make_law
 from gearbench.fem.contact.static import static_cycle
 from gearbench.fem.gear.body import condense
 from gearbench.rig import Gear, Material, Rig, Support, Supports
-from gearbench.shell.validation import Check, NotRun
 
 STORED = Path(__file__).parent / "calculix" / "reference.json"
 

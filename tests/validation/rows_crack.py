@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
+from gearbench.commands.checks import Check
 from gearbench.fem.gear.body import condense
 from gearbench.fem.gear.elasticity import plane_moduli
 from gearbench.fem.gear.patch import patch_compliance
 from gearbench.geometry.tooth.profile import profile
 from gearbench.rig import Crack, Gear, Material
-from gearbench.shell.validation import Check
 
 REFERENCE = Path(__file__).parent / "calculix" / "crack_reference.json"
 

@@ -19,10 +19,10 @@ from gearbench.challenge.making.plan import parse_mix
 from gearbench.challenge.scoring.judge import score_folder
 from gearbench.challenge.scoring.score import score
 from gearbench.commands.challenge import diagnose_case, read
+from gearbench.commands.checks import Check, Got
 from gearbench.commands.diagnosis_job import Diagnosis, diagnose, take_in
 from gearbench.records import write_record
 from gearbench.rig import Friction, read_case
-from gearbench.shell.validation import Check, Got
 
 HIDDEN = 0.06  # coefficient of friction
 SEED = 20

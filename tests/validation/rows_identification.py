@@ -6,7 +6,9 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
+from shared.reference_rig import ReferenceRig, reference_record
 
+from gearbench.commands.checks import Check, NotRun
 from gearbench.identification import (
     IdentificationSettings,
     exact_itf,
@@ -15,8 +17,6 @@ from gearbench.identification import (
     identify,
     itf,
 )
-from gearbench.identification.truth.reference import ReferenceRig, reference_record
-from gearbench.shell.validation import Check, NotRun
 
 BAND = (700.0, 2500.0)
 FREQUENCIES = np.arange(BAND[0], BAND[1] + 1, 4.0)

@@ -6,13 +6,13 @@ from functools import cache
 
 import numpy as np
 
+from gearbench.commands.checks import Check
 from gearbench.fem.contact.law import Law, elastic_pair, make_law
 from gearbench.fem.contact.static import static_cycle
 from gearbench.fem.gear.body import condense
 from gearbench.geometry import Pair
 from gearbench.geometry.mesh.sector import Element
 from gearbench.rig import Gear, Material, Rig, Support, Supports
-from gearbench.shell.validation import Check
 
 MILLIMETRE = 1e-3
 SUPPORT = Support(stiffness=1e8)

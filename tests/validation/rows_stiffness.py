@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gearbench.commands.checks import Check, NotRun
 from gearbench.geometry import Pair, pair
 from gearbench.lumped.stiffness.iso6336 import (
     basic_rack_factor,
@@ -23,7 +24,6 @@ from gearbench.lumped.stiffness.iso6336 import (
 from gearbench.lumped.stiffness.potential_energy import foundation_polynomials, hertz_compliance, tooth_compliance
 from gearbench.lumped.stiffness.weber_banaschek import pair_stiffness
 from gearbench.rig import Gear, Material, Rig, Support, Supports
-from gearbench.shell.validation import Check, NotRun
 
 Array = NDArray[np.float64]
 DEGREE = pi / 180

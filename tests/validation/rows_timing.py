@@ -15,13 +15,13 @@ from gearbench.bench.linear.run import tables_for
 from gearbench.bench.plan.excitation import torque_realisation
 from gearbench.bench.plan.schedule import schedule
 from gearbench.cases import case_path
-from gearbench.fem.contact.cache import stored_gear
+from gearbench.commands.checks import Check
 from gearbench.fem.contact.static import static_cycle
+from gearbench.fem.gear.store import stored_gear
 from gearbench.geometry import pair
 from gearbench.lumped import lumped_model
 from gearbench.lumped.linear.runge_kutta import integrate
 from gearbench.rig import read_case
-from gearbench.shell.validation import Check
 
 LUMPED_STEPS = 100 * 4 * 2**17 * 4
 

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.bench.elastic.rig import ElasticRig, elastic_rig, machine_for
+from gearbench.commands.checks import Check
 from gearbench.fem.contact.static import static_cycle
 from gearbench.fem.motion.transient import advance, initial_state, make_scheme
 from gearbench.rig import Gear, Rig, Simulation, Support, Supports
-from gearbench.shell.validation import Check
 
 Array = NDArray[np.float64]
 

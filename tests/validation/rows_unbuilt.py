@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from gearbench.shell.validation import Check, NotRun
+from gearbench.commands.checks import Check, NotRun
 
 
 def missing(what: str) -> Callable[[], float]:

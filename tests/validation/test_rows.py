@@ -2,7 +2,7 @@
 
 import pytest
 
-from gearbench.shell.validation import Check, checks, run
+from gearbench.commands.checks import Check, checks, run
 
 
 @pytest.mark.validation

@@ -16,7 +16,7 @@ from gearbench.geometry import pair
 from gearbench.lumped.stiffness.iso6336_root import root_stress
 from gearbench.rig import Case, read_case
 from gearbench.shell.failure import InputError
-from gearbench.words.root_stress import root_stress_data, root_stress_lines
+from gearbench.words.iso_root_stress import root_stress_data, root_stress_lines
 from gearbench.words.stiffness import stiffness_data, stiffness_lines
 
 

@@ -186,6 +186,6 @@ def test_the_factorisation_can_be_injected(coarse: Any) -> None:
         calls.append(matrix.shape[0])
         return splu(matrix.tocsc()).solve
 
-    ring = make_ring(coarse.sector, coarse.full.teeth, coarse.ring.stiffness, coarse.ring.mass, factorise)
+    ring = make_ring(coarse.sector, coarse.ring.stiffness, coarse.ring.mass, factorise)
     assert len(calls) == 1
     np.testing.assert_allclose(ring.cut_stiffness, coarse.ring.cut_stiffness, rtol=1e-8, atol=1.0)

@@ -6,11 +6,11 @@ import h5py
 import numpy as np
 import pytest
 import xarray as xr
+from shared.reference_rig import ReferenceRig
 
 from gearbench.identification.response.exact import exact_frf, frozen_frf
 from gearbench.identification.response.frf import FrfError, htf, itf, make_frf, read_frf, validate_frf, write_frf
 from gearbench.identification.truth.periodic import PeriodicSystemError, itf_from_htf
-from gearbench.identification.truth.reference import ReferenceRig
 
 
 def sample(**attributes: object) -> xr.Dataset:

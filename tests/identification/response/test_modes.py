@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from shared.reference_rig import ReferenceRig
 
 from gearbench.identification.response.modes import frozen_modes, itf_modes
 from gearbench.identification.truth.periodic import PeriodicSystem, frozen_itf
-from gearbench.identification.truth.reference import ReferenceRig
 
 FREQUENCY = np.arange(600.0, 2000.0, 2.0)
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from shared.reference_rig import ReferenceRig
 
 from gearbench.identification.truth.harmonic_balance import harmonic_balance_itf
 from gearbench.identification.truth.monodromy import exact_itf, floquet_multipliers
@@ -13,7 +14,6 @@ from gearbench.identification.truth.periodic import (
     itf_from_htf,
     truncation_error,
 )
-from gearbench.identification.truth.reference import ReferenceRig
 
 PHASES = np.arange(32) / 32
 FREQUENCIES = np.array([150.0, 1010.0, 1190.0, 2300.0])

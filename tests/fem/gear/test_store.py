@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gearbench.fem.contact import cache
-from gearbench.fem.contact.cache import cached, code_digest, key_for, stored_gear, stored_law
+from gearbench.fem.contact.store import stored_law
+from gearbench.fem.gear import store
+from gearbench.fem.gear.store import cached, code_digest, gear_key, key_for, stored_gear
 from gearbench.rig import Material
 
 
@@ -68,7 +69,7 @@ def test_a_cache_that_cannot_be_written_costs_time_only(tmp_path: Path, monkeypa
 
 def test_the_key_follows_shape_and_code_but_not_mass(gear: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     def key(size: float | None = None, modes: int = 8, material: Material | None = None, **changes: Any) -> str:
-        return cache._gear_key(gear(**changes), material or Material(), size, modes)
+        return gear_key(gear(**changes), material or Material(), size, modes)
 
     plain = key()
     assert key(mass=5.0, inertia=0.1, bore_radius=0.01) == plain
@@ -84,13 +85,13 @@ def test_the_key_follows_shape_and_code_but_not_mass(gear: Any, monkeypatch: pyt
         key(material=Material(state="plane-strain")),
     ]
     assert len({plain, *others}) == 8
-    monkeypatch.setattr(cache, "code_digest", lambda: "other sources")
+    monkeypatch.setattr(store, "code_digest", lambda: "other sources")
     assert key() != plain
 
 
 def test_the_digest_covers_geometry_fem_and_libraries() -> None:
     assert len(code_digest()) == 64
-    assert set(cache.SOURCES) == {"gearbench.geometry", "gearbench.fem"}
+    assert set(store.SOURCES) == {"gearbench.geometry", "gearbench.fem", "gearbench.kernels"}
     assert key_for("gear", {"a": 1}) != key_for("law", {"a": 1})
 
 
@@ -105,7 +106,7 @@ def test_a_stored_gear_and_law_are_those_made(
     def never(*_: Any, **__: Any) -> None:
         raise AssertionError("condensed again")
 
-    monkeypatch.setattr(cache, "condense", never)
+    monkeypatch.setattr(store, "condense", never)
     found = stored_gear(wheel, Material(), 1e-3, 2)
     for name, value in vars(made).items():
         np.testing.assert_array_equal(getattr(found, name), value)

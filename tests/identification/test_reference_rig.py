@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from shared.reference_rig import ReferenceRig, integrate, reference_record
 
 from gearbench.identification.excitation.multisine import random_phase_multisine
 from gearbench.identification.truth.monodromy import exact_itf
-from gearbench.identification.truth.reference import ReferenceRig, integrate, reference_record
 
 
 def test_stiffness_law() -> None:

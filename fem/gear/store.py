@@ -1,13 +1,12 @@
-"""Condensed gears and contact curves on disk, under a hash of all that they depend on, our sources included."""
+"""Condensed gears, and other arrays, on disk under a hash of all that they depend on, our sources included."""
 
 from __future__ import annotations
 
 import hashlib
 import json
-import os
-import tempfile
 import zipfile
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import fields
 from functools import lru_cache
 from importlib.metadata import version
@@ -17,17 +16,17 @@ from typing import Any
 
 import numpy as np
 
-from gearbench.fem.contact.law import Curve, Law, elastic_pair, make_law
 from gearbench.fem.gear.body import CondensedGear, condense, rounded
 from gearbench.fem.gear.crack import CrackedTooth
+from gearbench.files import write_whole
 from gearbench.geometry.mesh.sector import Element
 from gearbench.kernels.compiled import cache_folder
-from gearbench.rig import Gear, Material, Rig, sound_gear
+from gearbench.rig import Gear, Material, sound_gear
 from gearbench.rig.value import Value
 
 Arrays = Mapping[str, Any]  # of numpy arrays
 
-SOURCES = ("gearbench.geometry", "gearbench.fem")
+SOURCES = ("gearbench.geometry", "gearbench.fem", "gearbench.kernels")
 LIBRARIES = ("numpy", "scipy", "scikit-fem", "gmsh")
 
 
@@ -63,16 +62,9 @@ def cached(key: str, make: Callable[[], Arrays]) -> Arrays:
             return {name: stored[name] for name in stored.files}
     except (OSError, ValueError, EOFError, zipfile.BadZipFile):
         arrays = make()
-    temporary = None
-    try:
+    with suppress(OSError):
         path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile(dir=path.parent, suffix=".tmp", delete=False) as handle:
-            temporary = handle.name
-            np.savez(handle, **arrays)
-        os.replace(temporary, path)
-    except OSError:
-        if temporary and os.path.exists(temporary):
-            os.unlink(temporary)
+        write_whole(path, lambda temporary: np.savez(temporary, **arrays))
     return arrays
 
 
@@ -84,7 +76,7 @@ def stored_gear(
     element: Element = "triangle",
 ) -> CondensedGear:
     """`condense(...)`, from disk where it has been done before."""
-    key = _gear_key(gear, material, element_size, modes, element)
+    key = gear_key(gear, material, element_size, modes, element)
     arrays = cached(key, lambda: _arrays(condense(gear, material, element_size, modes, element)))
     scalars = {"teeth": int, "last": int, "unknowns": int, "face_width": float}
     values: dict[str, Any] = {name: scalars[name](v) if name in scalars else v for name, v in arrays.items()}
@@ -94,45 +86,13 @@ def stored_gear(
     return CondensedGear(**values)
 
 
-def stored_law(
-    rig: Rig,
-    gears: tuple[CondensedGear, CondensedGear],
-    element_size: float | None = None,
-    modes: int = 8,
-    element: Element = "triangle",
-) -> Law:
-    """`make_law(...)` of a rig's pair, its load-approach curves from disk where they have been solved before."""
-    meshing = elastic_pair(rig)
-    # A crack adds to the flexibility beside the curves of sound teeth.
-    parts = [_gear_key(sound_gear(g), rig.material, element_size, modes, element) for g in (rig.driver, rig.driven)]
-    key = key_for("law", {"driver": parts[0], "driven": parts[1], "centre": meshing.centre_distance})
-    made: list[Law] = []
-    real = (rig.driver, rig.driven)
-
-    def make() -> Arrays:
-        made.append(make_law(meshing, *gears, rig.material, gears=real))
-        curves = made[0].curves.driver, made[0].curves.driven
-        return {f"{name}{i}": np.asarray(v) for i, c in enumerate(curves) for name, v in c._asdict().items()}
-
-    arrays = cached(key, make)
-    if made:
-        return made[0]
-
-    def curve(number: int) -> Curve:
-        values: list[Any] = [arrays[f"{name}{number}"] for name in Curve._fields]
-        plain: list[Any] = [float(v) if v.ndim == 0 else v for v in values]
-        return Curve(*plain)
-
-    return make_law(meshing, *gears, rig.material, curves=(curve(0), curve(1)), gears=real)
-
-
 def _arrays(gear: CondensedGear) -> Arrays:
     """What is stored of a condensed gear."""
     arrays = {f.name: np.asarray(getattr(gear, f.name)) for f in fields(gear) if f.name != "crack"}
     return arrays if gear.crack is None else arrays | {"extra": gear.crack.extra}
 
 
-def _gear_key(
+def gear_key(
     gear: Gear, material: Material, element_size: float | None, modes: int, element: Element = "triangle"
 ) -> str:
     """Cache entry of a condensed gear; totals of mass and inertia, tooth errors and the number of a cracked tooth do

@@ -18,7 +18,7 @@ from gearbench.geometry import PairMesh
 from gearbench.lumped.stiffness.iso6336_root import root_stress
 from gearbench.rig import Case, read_case
 from gearbench.shell.failure import InputError
-from gearbench.words.stress import root_lines, root_tables
+from gearbench.words.root_stress import root_lines, root_tables
 
 
 @pytest.mark.parametrize(
