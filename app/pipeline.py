@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from math import pi
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -106,18 +105,10 @@ def run_experiment(job: Job) -> dict[str, Any]:
     span = contact_span(meshing)
     zones = fewest_pairs(span)
     numbers = run_numbers(case, statics, record, results, modes, zones)
-    numbers["support_corner_hz"] = _support_corner(case)
     _draw_results(job, statics, record, results, modes, honest_warning(numbers), zones, zone_label(span))
     numbers["files"] = {job.name(base): about for base, about in ABOUT.items() if job.output.has(job.name(base))}
     _write_summary(job, numbers)
     return numbers
-
-
-def _support_corner(case: Case) -> float | None:
-    """Lowest corner frequency k/(2 pi c) [Hz] of the supports; None where they are not damped."""
-    supports = (case.rig.support.driver, case.rig.support.driven)
-    corners = [support.stiffness / (2 * pi * support.damping) for support in supports if support.damping]
-    return min(corners, default=None)
 
 
 def _draw_gears(job: Job, meshing: Pair) -> None:
