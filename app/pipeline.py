@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from math import pi
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -135,7 +134,6 @@ def run_experiment(job: Job) -> dict[str, Any]:
     span = contact_span(meshing)
     zones = fewest_pairs(span)
     numbers = run_numbers(case, statics, record, results, modes, zones)
-    numbers["support_corner_hz"] = _support_corner(case)
     drawn = RunResults(statics, record, results, modes, zones, zone_label(span), honest_warning(numbers))
     for figure in FIGURES:
         job.picture(figure.name, partial(figure.draw, drawn))
@@ -143,13 +141,6 @@ def run_experiment(job: Job) -> dict[str, Any]:
     numbers["files"] = {job.name(base): words for base, words in about.items() if job.output.has(job.name(base))}
     _write_summary(job, numbers)
     return numbers
-
-
-def _support_corner(case: Case) -> float | None:
-    """Lowest corner frequency k/(2 pi c) [Hz] of the supports; None where they are not damped."""
-    supports = (case.rig.support.driver, case.rig.support.driven)
-    corners = [support.stiffness / (2 * pi * support.damping) for support in supports if support.damping]
-    return min(corners, default=None)
 
 
 def _draw_gears(job: Job, meshing: Pair) -> None:

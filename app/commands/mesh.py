@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from gearbench.commands.mesh_options import check_crack, check_mesh_options
 from gearbench.shell.options import CaseArgument, JsonOption, SetOption, load_case, print_json
 from gearbench.shell.progress import Progress
-from gearbench.words.mesh import DEFAULT_LAYERS, check_crack, check_mesh_options, mesh_report, report_line
+from gearbench.words.mesh import mesh_report, report_line
 
 if TYPE_CHECKING:
     from gearbench.rig import Case, Rig
@@ -61,6 +62,8 @@ def mesh(
         _draw(loaded.rig, out, gear, as_json)
         return
     check_crack(loaded.rig, gear, out, element, loaded.simulation.element)
+    from gearbench.geometry.mesh.sweep import DEFAULT_LAYERS
+
     kind = element or loaded.simulation.element
     summary = _write_elements(loaded, out, gear, kind, layers or DEFAULT_LAYERS if dimension == 3 else None)
     if as_json:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -20,6 +20,9 @@ CaseArgument = Annotated[
 SetOption = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY=VALUE", help="replace a key of the case: rig.driver.teeth=30"),
+]
+ModelOption = Annotated[
+    Literal["lumped", "reduced"] | None, typer.Option("--model", help="absent: the case's simulation.model")
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="print the summary as JSON")]
 

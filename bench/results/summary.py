@@ -1,11 +1,14 @@
-"""The summary of a run: first the answers, then an honest account of how far they go."""
+"""The numbers of a run's summary."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import pi
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+from gearbench.bench.results.measures import itf_difference, median_in, mesh_orders, mode_range
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -26,8 +29,6 @@ def run_numbers(
 
     `results`: identified and, for lumped cases, exact and frozen; `modes`: natural frequencies from elsewhere.
     """
-    from gearbench.bench.results.measures import itf_difference, median_in, mesh_orders, mode_range
-
     te = 1e6 * static["transmission_error"].values[0]
     stiffness = static["stiffness_tangent"].values[0]
     dte = 1e6 * record["dte"].values
@@ -58,7 +59,15 @@ def run_numbers(
     if "exact" in results:
         numbers["itf_error_against_exact"] = itf_difference(identified, results["exact"])
         numbers["frozen_against_exact"] = itf_difference(results["frozen"], results["exact"])
+    numbers["support_corner_hz"] = support_corner(case)
     return numbers
+
+
+def support_corner(case: Case) -> float | None:
+    """Lowest corner frequency k/(2 pi c) [Hz] of the supports; None where they are not damped."""
+    supports = (case.rig.support.driver, case.rig.support.driven)
+    corners = [support.stiffness / (2 * pi * support.damping) for support in supports if support.damping]
+    return min(corners, default=None)
 
 
 def first_mode_damping(frf: xr.Dataset) -> float:

@@ -147,17 +147,6 @@ def odd_sector_forces(ring: Ring, odd: Ring, influence: Array, moved: Array) -> 
     return -np.linalg.solve(np.eye(len(change)) + change @ influence[0], change @ moved)
 
 
-def odd_ring_response(ring: Ring, odd: Ring, forces: SectorField, hub: SectorField, wanted: Indices) -> list[Array]:
-    """`ring_response` of a ring whose sector 0 is `odd`, with unknowns of its own."""
-    sectors = [odd, *[ring] * (ring.teeth - 1)]
-    moved = [hub(j) for j in range(ring.teeth)]
-    pairs = [to_cuts(sector, forces(j), moved[j]) for j, sector in enumerate(sectors)]
-    u_cut = _solve_cuts(ring, np.array([on_cuts for on_cuts, _ in pairs]))
-    influence = cut_influence(ring)
-    u_cut = u_cut + influence @ odd_sector_forces(ring, odd, influence, u_cut[0])
-    return [from_cuts(sectors[j], u_cut[j], pairs[j][1], moved[j]) for j in wanted]
-
-
 def _solve_cuts(ring: Ring, f_cut: Array) -> Array:
     """Block-circulant solution for both cuts of every sector; f_cut and result (teeth, cut unknowns, loads)."""
     n = len(ring.low)

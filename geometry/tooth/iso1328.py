@@ -100,14 +100,6 @@ def drawn_gear(gear: Gear, name: str = "gear") -> Gear:
     )
 
 
-def indexed(gear: Gear) -> Array:
-    """Cumulative pitch deviations (z,) [m] as an inspection about the axis sees them: arcs on the reference circle,
-    run-out included."""
-    wave = gear.runout / 2 * np.cos(2 * pi * np.arange(gear.teeth) / gear.teeth - gear.runout_phase)
-    errors = np.array(gear.pitch_error) if gear.pitch_error else np.zeros(gear.teeth)
-    return (errors + wave) / cos(gear.pressure_angle)
-
-
 def _draw_pitch(gear: Gear, limits: Tolerances, rng: np.random.Generator) -> tuple[Array, float, float]:
     """Pitch errors (z,) [m] normal to the flank, run-out F_r [m] and its phase [rad]."""
     z = gear.teeth

@@ -174,30 +174,9 @@ def excess(shape: Profile, gear: Gear, tooth: int, rho: ArrayLike) -> Array:
     return profile_excess(shape, gear, tooth, rho) + pitch
 
 
-def runout_excess(gear: Gear, angle: ArrayLike, back_phase: float = 0.0) -> Array:
-    """Excess [m] of run-out at the gear's rotation [rad]: half of F_r times a cosine. `back_phase` [rad] is added for
-    back flanks."""
-    return gear.runout / 2 * np.cos(np.asarray(angle, dtype=float) - gear.runout_phase + back_phase)
-
-
 def teeth_alike(gear: Gear) -> bool:
     """Whether all teeth of a gear move the mesh alike."""
     shaped = gear.profile_form and len(set(gear.profile_form_tooth)) > 1
     worn = (gear.wear or any(gear.wear_depth)) and len(set(gear.wear_tooth)) > 1
     lists = len(set(gear.pitch_error)) > 1 or len(set(gear.profile_slope_tooth)) > 1
     return not (shaped or worn or lists or gear.runout)
-
-
-def single_pitch_deviations(cumulative: ArrayLike) -> Array:
-    """Single pitch deviations (z,) from cumulative ones (z,), both of ISO 1328-1: f_p,i = F_p,i - F_p,i-1, the first
-    tooth's against the last one's."""
-    values = np.asarray(cumulative, dtype=float)
-    return values - np.roll(values, 1)
-
-
-def cumulative_pitch_deviations(single: ArrayLike) -> Array:
-    """Cumulative pitch deviations (z,) with mean zero from single ones (z,), which must add up to zero (a full turn);
-    what they miss it by is spread over all teeth."""
-    values = np.asarray(single, dtype=float)
-    total = np.cumsum(values - values.mean())
-    return total - total.mean()

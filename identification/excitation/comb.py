@@ -99,11 +99,6 @@ def hunting_teeth(teeth_driver: int, teeth_driven: int) -> int:
     return teeth_driver * teeth_driven // gcd(teeth_driver, teeth_driven)
 
 
-def choose_residue(modulus: int, teeth_driver: int, teeth_driven: int) -> int:
-    """The residue whose kinds of answer overlap least: the first of `ranked_residues`."""
-    return int(ranked_residues(modulus, teeth_driver, teeth_driven)[0])
-
-
 def ranked_residues(modulus: int, teeth_driver: int, teeth_driven: int) -> Ints:
     """Residues (R,) from the best down, all of them with {0, +-r, +-2r, +-3r} disjoint modulo `modulus`.
 

@@ -14,7 +14,7 @@ from gearbench.fem.contact.law import make_law
 from gearbench.fem.contact.static import static_cycle
 from gearbench.fem.gear.body import CondensedGear, condense
 from gearbench.fem.gear.elasticity import assemble
-from gearbench.fem.gear.ring import make_ring, odd_ring_response
+from gearbench.fem.gear.ring import Ring, _solve_cuts, cut_influence, from_cuts, make_ring, odd_sector_forces, to_cuts
 from gearbench.geometry.mesh.assembly import assembled
 from gearbench.geometry.mesh.cracked_sector import cracked_sector
 from gearbench.geometry.tooth.fillet import rotation
@@ -25,6 +25,17 @@ STEEL = Material()
 
 def cracked(gear: Gear, length: float, direction: float = 60.0) -> Gear:
     return gear.model_copy(update={"crack": Crack(tooth=3, length=length, direction=radians(direction))})
+
+
+def odd_ring_response(ring: Ring, odd: Ring, forces: Any, hub: Any, wanted: np.ndarray) -> list[np.ndarray]:
+    """`ring_response` of a ring whose sector 0 is `odd`, with unknowns of its own."""
+    sectors = [odd, *[ring] * (ring.teeth - 1)]
+    moved = [hub(j) for j in range(ring.teeth)]
+    pairs = [to_cuts(sector, forces(j), moved[j]) for j, sector in enumerate(sectors)]
+    u_cut = _solve_cuts(ring, np.array([on_cuts for on_cuts, _ in pairs]))
+    influence = cut_influence(ring)
+    u_cut = u_cut + influence @ odd_sector_forces(ring, odd, influence, u_cut[0])
+    return [from_cuts(sectors[j], u_cut[j], pairs[j][1], moved[j]) for j in wanted]
 
 
 def dofs(nodes: np.ndarray) -> np.ndarray:

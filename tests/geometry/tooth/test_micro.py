@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from math import pi
 from typing import Any
 
 import numpy as np
@@ -11,13 +10,10 @@ import pytest
 from gearbench.geometry import GeometryError
 from gearbench.geometry.tooth.micro import (
     check_micro,
-    cumulative_pitch_deviations,
     excess,
     profile_excess,
     relief,
     roll_length,
-    runout_excess,
-    single_pitch_deviations,
     slope_excess,
     teeth_alike,
 )
@@ -92,18 +88,6 @@ def test_wear_takes_material_off_and_pitch_errors_add_it(shape: Profile) -> None
 def test_an_ideal_gear_has_no_excess(shape: Profile) -> None:
     rho = np.linspace(0.0, 2 * shape.rho_end, 9)
     assert not excess(shape, gear(), 4, rho).any() and teeth_alike(gear())
-
-
-def test_runout_is_half_of_f_r() -> None:
-    eccentric = gear(runout=30e-6, runout_phase=0.7)
-    np.testing.assert_allclose(runout_excess(eccentric, [0.7, 0.7 + pi]), [15e-6, -15e-6], rtol=1e-12)
-
-
-def test_single_and_cumulative_pitch_deviations_are_each_others_inverse() -> None:
-    cumulative = np.array([0.0, 2.0, -1.0, 5.0, -6.0]) * 1e-6
-    single = single_pitch_deviations(cumulative)
-    np.testing.assert_allclose(single, np.array([6.0, 2.0, -3.0, 6.0, -11.0]) * 1e-6, rtol=1e-12)
-    np.testing.assert_allclose(cumulative_pitch_deviations(single), cumulative, atol=1e-20)
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,6 @@ import pytest
 
 from gearbench.identification.excitation.comb import (
     CombError,
-    choose_residue,
     hunting_teeth,
     overlaps,
     ranked_residues,
@@ -164,11 +163,10 @@ def test_chosen_residues_keep_the_classes_apart_and_overlap_least(teeth: tuple[i
     cost = [sum(one.strength * len(one.lines) for one in overlaps(modulus, *teeth, r)) for r in ranked]
     assert cost[0] <= min(cost) + 1e-9
     assert np.mean(cost[: len(cost) // 4 + 1]) <= np.mean(cost)
-    assert choose_residue(modulus, *teeth) == ranked[0]
 
 
 def test_hunting_ratios_leave_no_overlap_at_once() -> None:
-    residue = choose_residue(3906, 62, 63)
+    residue = ranked_residues(3906, 62, 63)[0]
     assert overlaps(3906, 62, 63, residue) == ()
     # Of equals the widest gap: between 3906/7 and 3906/6 three classes lie at least 3906/7 - 2 lines apart.
     assert min(residue, 3906 // 2 - 2 * residue) >= 550
@@ -199,5 +197,5 @@ def test_combs_that_cannot_be(modulus: int, residue: int, words: str) -> None:
 
 def test_too_few_lines_for_a_comb() -> None:
     with pytest.raises(CombError, match="modulo 5 has no residue"):
-        choose_residue(5, 5, 5)
-    assert choose_residue(6, 6, 6) == 1
+        ranked_residues(5, 5, 5)
+    assert ranked_residues(6, 6, 6)[0] == 1
