@@ -9,7 +9,7 @@ import xarray as xr
 
 from gearbench.bench.errors import BenchError
 from gearbench.bench.plan.schedule import ProgressReport
-from gearbench.bench.refusals.readiness import check_gears
+from gearbench.bench.readiness import check_gears
 from gearbench.rig import Case
 
 Simulator = Callable[[Case, ProgressReport | None], xr.Dataset]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gearbench.bench.errors import BenchError
 from gearbench.bench.plan.schedule import ProgressReport
-from gearbench.bench.refusals.readiness import check_gears
+from gearbench.bench.readiness import check_gears
 from gearbench.rig import Case
 
 Array = NDArray[np.float64]

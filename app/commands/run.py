@@ -27,7 +27,7 @@ def run(
 ) -> None:
     """Run a case: geometry, mesh, simulation, identification, pictures, summary. Resumes in its own folder."""
     loaded = load_case(case, settings)
-    from gearbench.bench.refusals.readiness import check_case
+    from gearbench.bench.readiness import check_case
     from gearbench.pipeline import Job, run_experiment
     from gearbench.records.provenance import source_digest
     from gearbench.rig import dump_case

@@ -32,7 +32,7 @@ def simulate(
     loaded = load_case(case, settings)
     check_out(out, [case])
     from gearbench.bench import simulate as carry_out
-    from gearbench.bench.refusals.readiness import check_timing
+    from gearbench.bench.readiness import check_timing
     from gearbench.records import write_record
 
     chosen = {"model": model or loaded.simulation.model}

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gearbench.bench.errors import BenchError
 from gearbench.bench.nonlinear.experiment import attributes_of, channels_of, signals_of
-from gearbench.bench.nonlinear.mesh_law import mesh_law
+from gearbench.bench.nonlinear.law_table import mesh_law
 from gearbench.bench.nonlinear.run import HEADROOM, Setup, change, make_setup
 from gearbench.bench.plan.schedule import schedule
 from gearbench.bench.record.attributes import lost_contact

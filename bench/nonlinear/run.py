@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.bench.errors import BenchError
-from gearbench.bench.nonlinear.mesh_law import mesh_law
+from gearbench.bench.nonlinear.law_table import mesh_law
 from gearbench.bench.plan.excitation import Torque
 from gearbench.bench.plan.schedule import Schedule
 from gearbench.bench.refusals.effects import refuse_unknown

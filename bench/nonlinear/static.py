@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from gearbench.bench.nonlinear.mesh_law import mesh_law
+from gearbench.bench.nonlinear.law_table import mesh_law
 from gearbench.bench.refusals.effects import refuse_unknown
 from gearbench.bench.refusals.load_range import check_dte
 from gearbench.bench.static import Loads, load_key, static_dataset

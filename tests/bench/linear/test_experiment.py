@@ -9,8 +9,8 @@ import pytest
 import xarray as xr
 
 from gearbench.bench import BenchError, simulate
-from gearbench.bench.linear.exact import exact_and_frozen, lumped_periodic_system
 from gearbench.bench.plan.excitation import torque_realisation
+from gearbench.bench.results.exact import exact_and_frozen, lumped_periodic_system
 from gearbench.geometry import pair
 from gearbench.identification.truth.harmonic_balance import harmonic_balance_itf
 from gearbench.identification.truth.monodromy import exact_itf
