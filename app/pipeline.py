@@ -75,6 +75,7 @@ class Job:
 def run_experiment(job: Job) -> dict[str, Any]:
     """All products of one experiment; the numbers of its summary."""
     from gearbench.bench import simulate
+    from gearbench.bench.models import model_for
     from gearbench.bench.results.responses import identify_case, linearised_modes, reference_results
     from gearbench.bench.static import static
     from gearbench.geometry import pair
@@ -89,7 +90,7 @@ def run_experiment(job: Job) -> dict[str, Any]:
     record = job.dataset("record.nc", _read_record, lambda: simulate(case, progress=progress), _write_record)
     modes: dict[str, xr.Dataset] = {}
     results = {"identified": job.dataset("frf.nc", read_frf, lambda: identify_case(case, record, progress), write_frf)}
-    if case.simulation.model == "lumped":
+    if not model_for(case)[1].elastic:
         made: dict[str, xr.Dataset] = {}
 
         def reference(kind: str) -> xr.Dataset:
@@ -121,9 +122,10 @@ def _draw_gears(job: Job, meshing: Pair) -> None:
     from gearbench.figures.gear import draw_pair
 
     def draw(path: Path) -> None:
+        from gearbench.bench.models import model_for
         from gearbench.geometry import mesh_pair
 
-        elastic = job.case.simulation.model == "reduced"
+        elastic = model_for(job.case)[1].elastic
         simulation = job.case.simulation
         mesh = mesh_pair(job.case.rig, simulation.element_size, simulation.element) if elastic else None
         draw_pair(path, job.case.rig, meshing, mesh)

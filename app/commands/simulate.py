@@ -3,11 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from gearbench.shell.options import CaseArgument, JsonOption, SetOption, check_out, load_case, print_json
+from gearbench.shell.options import (
+    CaseArgument,
+    JsonOption,
+    ModelOption,
+    SetOption,
+    check_out,
+    load_case,
+    print_json,
+)
 from gearbench.shell.progress import Progress
 
 if TYPE_CHECKING:
@@ -17,10 +25,7 @@ if TYPE_CHECKING:
 def simulate(
     case: CaseArgument,
     out: Annotated[Path, typer.Option("--out", help="record to write (NetCDF-4); NAME-CONDITION.nc with conditions")],
-    model: Annotated[
-        Literal["lumped", "reduced"] | None,
-        typer.Option("--model", help="absent: the case's simulation.model"),
-    ] = None,
+    model: ModelOption = None,
     settings: SetOption = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -35,8 +40,7 @@ def simulate(
     from gearbench.bench.readiness import check_timing
     from gearbench.records import write_record
 
-    chosen = {"model": model or loaded.simulation.model}
-    check_timing(loaded.model_copy(update={"simulation": loaded.simulation.model_copy(update=chosen)}))
+    check_timing(loaded)
     summaries = []
     with Progress(f"simulate {loaded.name}") as progress:
         for experiment, path in experiments(loaded, out):

@@ -3,12 +3,21 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from gearbench.commands.stress_output import field_files, field_phases, write_all
-from gearbench.shell.options import CaseArgument, JsonOption, SetOption, check_out, check_picture, load_case, print_json
+from gearbench.shell.options import (
+    CaseArgument,
+    JsonOption,
+    ModelOption,
+    SetOption,
+    check_out,
+    check_picture,
+    load_case,
+    print_json,
+)
 from gearbench.shell.progress import Progress
 from gearbench.words.stress import root_lines, root_tables
 
@@ -45,10 +54,7 @@ def static(
     root_figure: Annotated[
         Path | None, typer.Option("--root-figure", help="picture of the root stress over the mesh cycle as well")
     ] = None,
-    model: Annotated[
-        Literal["lumped", "reduced"] | None,
-        typer.Option("--model", help="absent: the case's simulation.model"),
-    ] = None,
+    model: ModelOption = None,
     settings: SetOption = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -61,7 +67,9 @@ def static(
         if picture is not None:
             check_picture(picture, others, option)
             others.append(picture)
-    elastic = (model or loaded.simulation.model) == "reduced"
+    from gearbench.bench.models import model_for
+
+    elastic = model_for(loaded, model)[1].elastic
     files = _check_stress(loaded, elastic, out, fields or [], root_figure, others)
     from gearbench.bench.static import static as solve
     from gearbench.records.storage import write_atomically
