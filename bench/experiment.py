@@ -16,7 +16,7 @@ from gearbench.bench.plan.excitation import torque_realisation
 from gearbench.bench.plan.schedule import ProgressReport, Schedule, schedule
 from gearbench.bench.plan.settling import Course, Steady, kept_samples, samples_to_run, steady_state
 from gearbench.bench.plan.workers import realisations
-from gearbench.bench.protocol import Drive, Prepared
+from gearbench.bench.protocol import Channels, Drive, Prepared
 from gearbench.bench.record.attributes import (
     experiment_attributes,
     joined,
@@ -36,10 +36,9 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Realisation:
-    """What one realisation leaves: channels (n,) before any sensor; `lost` samples without contact, None where the
-    model has no such thing; the rest as in `Steady`."""
+    """What one realisation leaves beside its channels: `lost` samples without contact, None where the model has no such
+    thing; the rest as in `Steady`."""
 
-    channels: dict[str, Array]
     lost: int | None
     residual: float
     settling_periods: int
@@ -63,11 +62,17 @@ def simulate(case: Case, model: str | None = None, progress: ProgressReport | No
     check_delays(case.rig, plan.repeats, plan.repeat_time)
     prepared = solver.prepare(case, plan, lambda note: report(0.0, note))
     report(0.0, f"integrating with {prepared.substeps} steps a sample")
-    return _record(case, plan, prepared, _realise(case, plan, prepared, report))
+    shape = (case.experiment.realisations, kept_samples(plan, prepared.keep))
+    # Filled row by row as realisations end: a hundred long ones are large, and must not be in memory twice.
+    channels = {name: np.empty(shape) for name in ("torque_driver", *Channels._fields)}
+    return _record(case, plan, prepared, channels, _realise(case, plan, prepared, channels, report))
 
 
-def _realise(case: Case, plan: Schedule, prepared: Prepared[Any], report: ProgressReport) -> list[Realisation]:
-    """All realisations of an experiment, told about and interrupted between their pieces."""
+def _realise(
+    case: Case, plan: Schedule, prepared: Prepared[Any], channels: dict[str, Array], report: ProgressReport
+) -> list[Realisation]:
+    """All realisations of an experiment, told about and interrupted between their pieces; each fills its row of the
+    channels (realisations, n), before any sensor."""
     total = case.experiment.realisations
     done = np.zeros(total)
     lock, stop = threading.Lock(), threading.Event()
@@ -86,9 +91,12 @@ def _realise(case: Case, plan: Schedule, prepared: Prepared[Any], report: Progre
         # A realisation that takes longer to settle than expected stays close to its end.
         course = course_of(prepared, drive, lambda samples: tell(min(samples / expected, 0.99)))
         steady = steady_state(course, plan, case.experiment, prepared.dte, prepared.keep, decay)
-        found = _realisation(prepared, plan, drive, steady)
+        torque = repeated(drive.torque, len(steady.outputs))
+        channels["torque_driver"][number] = torque
+        for name, values in prepared.channels(steady.outputs, torque)._asdict().items():
+            channels[name][number] = values
         tell(1.0)
-        return found
+        return _realisation(prepared, plan, steady)
 
     return realisations(run, total, stop)
 
@@ -113,11 +121,9 @@ def course_of(prepared: Prepared[Any], drive: Drive, ran: Callable[[int], None])
     return course
 
 
-def _realisation(prepared: Prepared[Any], plan: Schedule, drive: Drive, steady: Steady) -> Realisation:
-    torque = repeated(drive.torque, len(steady.outputs))
+def _realisation(prepared: Prepared[Any], plan: Schedule, steady: Steady) -> Realisation:
     apart = prepared.apart(steady.outputs)
     return Realisation(
-        channels={"torque_driver": torque, **prepared.channels(steady.outputs, torque)._asdict()},
         lost=None if apart is None else int(repeated(apart, _recorded(plan, prepared)).sum()),
         residual=steady.residual,
         settling_periods=steady.settling_periods,
@@ -131,13 +137,13 @@ def _recorded(plan: Schedule, prepared: Prepared[Any]) -> int:
     return kept_samples(plan, "mean") if prepared.keep == "mean" else plan.record_samples
 
 
-def _record(case: Case, plan: Schedule, prepared: Prepared[Any], runs: list[Realisation]) -> xr.Dataset:
+def _record(
+    case: Case, plan: Schedule, prepared: Prepared[Any], channels: dict[str, Array], runs: list[Realisation]
+) -> xr.Dataset:
     meshing = pair(case.rig)
     samples = _recorded(plan, prepared)
     averaged = prepared.keep == "mean"
     first = max(run.first for run in runs)
-    # Channel by channel, and each only once in memory: a hundred long realisations are large.
-    channels = {name: np.stack([run.channels.pop(name) for run in runs]) for name in list(runs[0].channels)}
     if has_sensors(case.rig):
         channels = sensed(channels, case.rig, meshing, plan, samples=samples, seed=case.experiment.seed)
     channels = {name: repeated(values, samples) for name, values in channels.items()}

@@ -88,8 +88,8 @@ class LinearRig:
             torque_driven=torque * (r2 / r1) if self.free else mesh_force * r2,
             angle_driver=share1 * x,
             angle_driven=-share2 * x,
-            y_driver=y1.copy(),
-            y_driven=y2.copy(),
+            y_driver=y1,
+            y_driven=y2,
             dte=self.dte(outputs),
             force=torque * self.force_per_torque,
         )
