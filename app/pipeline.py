@@ -82,7 +82,7 @@ def run(case: Case, out: str | Path, *, force: bool = False, progress: Steps | N
     >>> f"{numbers['te_peak_to_peak_um']:.2f} um"
     '5.53 um'
     """
-    from gearbench.bench.refusals.readiness import check_case
+    from gearbench.bench.readiness import check_case
     from gearbench.records.provenance import source_digest
     from gearbench.rig import dump_case
 
@@ -102,6 +102,7 @@ def run(case: Case, out: str | Path, *, force: bool = False, progress: Steps | N
 def run_experiment(job: Job) -> dict[str, Any]:
     """All products of one experiment; the numbers of its summary."""
     from gearbench.bench import simulate
+    from gearbench.bench.models import model_for
     from gearbench.bench.results.responses import identify_case, linearised_modes, reference_results
     from gearbench.bench.static import static
     from gearbench.figures.of_run import FIGURES, RunResults
@@ -120,7 +121,7 @@ def run_experiment(job: Job) -> dict[str, Any]:
     record = job.dataset("record.nc", read_record, lambda: simulate(case, progress=progress), write_record)
     modes: dict[str, xr.Dataset] = {}
     results = {"identified": job.dataset("frf.nc", read_frf, lambda: identify_case(case, record, progress), write_frf)}
-    if case.simulation.model == "lumped":
+    if not model_for(case)[1].elastic:
         made: dict[str, xr.Dataset] = {}
 
         def reference(kind: str) -> xr.Dataset:
@@ -147,9 +148,10 @@ def _draw_gears(job: Job, meshing: Pair) -> None:
     from gearbench.figures.gear import draw_pair
 
     def draw(path: Path) -> None:
+        from gearbench.bench.models import model_for
         from gearbench.geometry import mesh_pair
 
-        elastic = job.case.simulation.model == "reduced"
+        elastic = model_for(job.case)[1].elastic
         simulation = job.case.simulation
         mesh = mesh_pair(job.case.rig, simulation.element_size, simulation.element) if elastic else None
         draw_pair(path, job.case.rig, meshing, mesh)

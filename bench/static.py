@@ -2,31 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from importlib import import_module
+from collections.abc import Sequence
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from gearbench.bench.errors import BenchError
+from gearbench.bench.models import model_for
 from gearbench.bench.plan.schedule import ProgressReport
-from gearbench.bench.refusals.readiness import check_gears
+from gearbench.bench.record.static import load_key
+from gearbench.bench.refusals.gears import check_gears
 from gearbench.rig import Case
 
-Array = NDArray[np.float64]
-
 MOST_POSITIONS = 65_536
-SCHEMA = "gearbench-static/1"
-
-Loads = tuple[str, Array]  # "N m" (driver torque) or "m" (dte), and values
-StaticSolver = Callable[[Case, Loads, Array, ProgressReport | None], xr.Dataset]
-
-# Each model: module and function. Imported on use: one brings in Numba and the mesher.
-SOLVERS: dict[str, tuple[str, str]] = {
-    "lumped": ("gearbench.bench.linear.static", "static_lumped"),
-    "reduced": ("gearbench.bench.elastic.static", "static_reduced"),
-}
 
 
 def static(
@@ -51,9 +39,7 @@ def static(
     >>> (1e6 * found["transmission_error"].mean("phase")).round(1).values
     array([4.2, 8.3])
     """
-    name = model or case.simulation.model
-    if name not in SOLVERS:
-        raise BenchError(f"simulation.model = {name!r} has no static solution, unlike {', '.join(sorted(SOLVERS))}")
+    case, solver = model_for(case, model)
     if len(torque) and len(dte):
         raise BenchError("static loads are torques or transmission errors: give one kind")
     if positions < 2:
@@ -63,7 +49,8 @@ def static(
     if positions * cycles > MOST_POSITIONS:
         times = f" x cycles = {cycles}" if cycles > 1 else ""
         raise BenchError(f"positions = {positions}{times} must be at most {MOST_POSITIONS}")
-    if cycles > 1 and name != "reduced":
+    if cycles > 1 and not solver.elastic:
+        name = solver.name
         raise BenchError(f"cycles = {cycles} must be 1 for the model {name}, which has no teeth of their own at rest")
     unit, values = ("m", dte) if len(dte) else ("N m", torque or (case.experiment.torque_mean,))
     loads = np.asarray(values, dtype=float)
@@ -72,43 +59,5 @@ def static(
         if not (np.isfinite(load) and load > 0):
             raise BenchError(f"{key} = {load:g} must be finite and greater than 0")
     check_gears(case.rig)
-    module, function = SOLVERS[name]
-    solver: StaticSolver = getattr(import_module(module), function)
-    return solver(case, (unit, loads), np.arange(positions * cycles) / positions, progress)
-
-
-def load_key(unit: str) -> tuple[str, float]:
-    """What a user calls a load, and the factor from SI to that unit."""
-    return ("dte_um", 1e6) if unit == "m" else ("torque_nm", 1.0)
-
-
-def static_dataset(
-    loads: Loads,
-    phase: Array,
-    *,
-    transmission_error: Array,
-    torque: Array,
-    secant: Array,
-    tangent: Array,
-    attributes: dict[str, object],
-    share: Array | None = None,
-    unloaded: Array | None = None,
-) -> xr.Dataset:
-    """The results as a dataset that `static.nc` holds; arrays (load, phase), `share` (load, phase, pair), `unloaded`
-    (phase,): the transmission error without load."""
-    unit, values = loads
-    fields = {
-        "transmission_error": (transmission_error, "m"),
-        "torque": (torque, "N m"),
-        "stiffness_secant": (secant, "N/m"),
-        "stiffness_tangent": (tangent, "N/m"),
-    }
-    variables: dict[str, tuple[tuple[str, ...], Array, dict[str, str]]] = {
-        name: (("load", "phase"), data, {"units": units}) for name, (data, units) in fields.items()
-    }
-    coordinates = {"load": ("load", values, {"units": unit}), "phase": ("phase", phase, {"units": "cycles"})}
-    if share is not None:
-        variables["load_share"] = (("load", "phase", "pair"), share, {"units": "1"})
-    if unloaded is not None:
-        variables["transmission_error_unloaded"] = (("phase",), unloaded, {"units": "m"})
-    return xr.Dataset(variables, coords=coordinates, attrs={"schema": SCHEMA, **attributes})
+    phase = np.arange(positions * cycles) / positions
+    return solver.static(case, (unit, loads), phase, progress or (lambda fraction, note: None))

@@ -37,7 +37,7 @@ ROOMS: dict[str, tuple[str, ...]] = {
     "fem": ("gear", "contact", "motion", "stress"),
     "lumped": ("stiffness", "linear", "nonlinear"),
     "identification": ("excitation", "spectra", "lpm", "truth", "response"),
-    "bench": ("plan", "record", "refusals", "elastic", "nonlinear", "linear", "stress", "export", "results"),
+    "bench": ("plan", "record", "refusals", "linear", "elastic", "nonlinear", "stress", "export", "results"),
     "diagnosis": ("intake", "forces", "replay", "evidence"),
     "challenge": ("truth", "making", "scoring"),
     "app": ("shell", "words", "figures", "report", "commands"),

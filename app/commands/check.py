@@ -27,7 +27,7 @@ def check(
     """
     loaded = load_case(case, settings)
     from gearbench.bench.elastic.crack import crack_lines
-    from gearbench.bench.refusals.readiness import check_case
+    from gearbench.bench.readiness import check_case
     from gearbench.geometry import data_sheet
 
     rows = data_sheet(loaded.rig, [1e-3 * number for number in diameter or []])

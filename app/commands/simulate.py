@@ -29,10 +29,9 @@ def simulate(
     loaded = load_case(case, settings)
     check_out(out, [case])
     import gearbench as gb
-    from gearbench.bench.refusals.readiness import check_timing
+    from gearbench.bench.readiness import check_timing
 
-    chosen = {"model": model or loaded.simulation.model}
-    check_timing(loaded.model_copy(update={"simulation": loaded.simulation.model_copy(update=chosen)}))
+    check_timing(loaded)
     summaries = []
     with Progress(f"simulate {loaded.name}") as progress:
         for experiment, path in experiments(loaded, out):

@@ -67,7 +67,9 @@ def static(
         if picture is not None:
             check_picture(picture, others, option)
             others.append(picture)
-    elastic = (model or loaded.simulation.model) == "reduced"
+    from gearbench.bench.models import model_for
+
+    elastic = model_for(loaded, model)[1].elastic
     files = _check_stress(loaded, elastic, out, fields or [], root_figure, others)
     import gearbench as gb
     from gearbench.records import write_dataset

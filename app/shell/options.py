@@ -5,9 +5,11 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+
+from gearbench.bench.models import MODELS
 
 if TYPE_CHECKING:
     from gearbench.rig import Case
@@ -21,8 +23,20 @@ SetOption = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY=VALUE", help="replace a key of the case: rig.driver.teeth=30"),
 ]
+
+
+def _known_model(name: str) -> str:
+    """The name of a model. Raises BadParameter for an unknown one."""
+    if name not in MODELS:
+        raise typer.BadParameter(f"{name!r} is not one of {', '.join(MODELS)}")
+    return name
+
+
 ModelOption = Annotated[
-    Literal["lumped", "reduced"] | None, typer.Option("--model", help="absent: the case's simulation.model")
+    str | None,
+    typer.Option(
+        "--model", parser=_known_model, metavar=f"[{'|'.join(MODELS)}]", help="absent: the case's simulation.model"
+    ),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="print the summary as JSON")]
 

@@ -64,11 +64,10 @@ def _range(limits: tuple[float, float]) -> str:
 
 
 def _what(numbers: dict[str, Any]) -> list[str]:
-    model = {"lumped": "lumped model", "reduced": "reduced finite-element model"}.get(numbers["model"], "model")
     stiffness = numbers["stiffness_n_per_um"]
     lines = [
         "## What was done and found",
-        f"The {model} ran {numbers['realisations']} realisation(s) of {numbers['duration_s']:g} s at"
+        f"The {numbers['model_title']} ran {numbers['realisations']} realisation(s) of {numbers['duration_s']:g} s at"
         f" {numbers['sampling_rate_hz']:g} Hz, {numbers['torque_mean_nm']:g} N m mean torque and"
         f" {numbers['mesh_frequency_hz']:g} Hz mesh frequency.",
         "TE is the static transmission error under the mean torque with the gear centres held; a mesh order is the"

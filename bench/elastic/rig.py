@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gearbench.bench.errors import BenchError
 from gearbench.bench.plan.schedule import Schedule
+from gearbench.bench.record.attributes import bodies_of
 from gearbench.fem.contact.law import Law, elastic_pair
 from gearbench.fem.contact.static import position, static_cycle
 from gearbench.fem.contact.store import stored_law
@@ -18,14 +19,12 @@ from gearbench.fem.gear.body import CondensedGear
 from gearbench.fem.gear.store import stored_gear
 from gearbench.fem.motion.machine import Machine, contact_rows, make_machine, mass_matrix
 from gearbench.fem.motion.transient import frequency_error, make_scheme
-from gearbench.geometry import Body, Pair, body
+from gearbench.geometry import Body, Pair
 from gearbench.geometry.mesh.sector import refuse_crack
+from gearbench.lumped.linear.time_step import FREQUENCY_ERROR, STEPS_PER_MESH
 from gearbench.rig import Case, Rig, Simulation
 
 Array = NDArray[np.float64]
-
-FREQUENCY_ERROR = 5e-4  # of the highest identified mode (docs/physics.md, "Time integration")
-STEPS_PER_MESH_PERIOD = 200
 
 
 @dataclass(frozen=True)
@@ -47,11 +46,7 @@ def elastic_rig(
     for name, gear in (("rig.driver", rig.driver), ("rig.driven", rig.driven)):
         refuse_crack(gear, simulation.element, name, "simulation.element")
     meshing = elastic_pair(rig)
-    density = rig.material.density
-    bodies = (
-        body(meshing.driver, rig.driver, density, "rig.driver"),
-        body(meshing.driven, rig.driven, density, "rig.driven"),
-    )
+    bodies = bodies_of(rig, meshing)
     size, modes, element = simulation.element_size, simulation.modes, simulation.element
     say("condensing the driver")
     driver = stored_gear(rig.driver, rig.material, size, modes, element)
@@ -98,7 +93,8 @@ def natural_frequencies(machine: Machine, torque: float, phase: float) -> Array:
 
 
 def choose_substeps(machine: Machine, case: Case, plan: Schedule) -> int:
-    """Steps per sample that keep the highest mode within the identified band to FREQUENCY_ERROR.
+    """Steps per sample that keep the highest mode within the identified band to the same frequency error, and the mesh
+    period to as many steps, as the lumped models'.
 
     Raises BenchError where the case asks for fewer.
     """
@@ -112,7 +108,7 @@ def choose_substeps(machine: Machine, case: Case, plan: Schedule) -> int:
     )
     inside = modes[modes <= band[1]]
     highest = float(inside.max()) if len(inside) else band[1]
-    least = ceil(STEPS_PER_MESH_PERIOD / (plan.mesh_period * plan.sampling_rate))
+    least = ceil(STEPS_PER_MESH / (plan.mesh_period * plan.sampling_rate))
 
     def error(substeps: int) -> float:
         step = 1.0 / (plan.sampling_rate * substeps)
@@ -125,7 +121,7 @@ def choose_substeps(machine: Machine, case: Case, plan: Schedule) -> int:
     if asked and asked < needed:
         raise BenchError(
             f"simulation.substeps = {asked} is too few: a frequency error of at most"
-            f" {FREQUENCY_ERROR:.2%} at {highest:.0f} Hz and {STEPS_PER_MESH_PERIOD} steps a mesh period need"
+            f" {FREQUENCY_ERROR:.2%} at {highest:.0f} Hz and {STEPS_PER_MESH} steps a mesh period need"
             f" {needed} (0 chooses them)"
         )
     return asked or needed

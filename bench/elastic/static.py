@@ -7,10 +7,10 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from gearbench.bench.elastic.rig import elastic_rig
-from gearbench.bench.plan.schedule import ProgressReport
-from gearbench.bench.refusals.effects import ELASTIC_KEYS, cycles_to_repeat, refuse_effects
+from gearbench.bench.plan.schedule import ProgressReport, cycles_to_repeat
+from gearbench.bench.record.static import Loads, load_key, static_dataset
+from gearbench.bench.refusals.effects import ELASTIC_KEYS, refuse_effects
 from gearbench.bench.refusals.load_range import check_dte, check_torque
-from gearbench.bench.static import Loads, load_key, static_dataset
 from gearbench.fem.contact.law import elastic_pair
 from gearbench.fem.contact.static import static_cycle
 from gearbench.rig import Case
@@ -18,12 +18,11 @@ from gearbench.rig import Case
 Array = NDArray[np.float64]
 
 
-def static_reduced(case: Case, loads: Loads, phase: Array, progress: ProgressReport | None = None) -> xr.Dataset:
+def static_reduced(case: Case, loads: Loads, phase: Array, report: ProgressReport) -> xr.Dataset:
     """Static cycle with tip-edge contact, backlash and load sharing.
 
     Raises GeometryError, and ContactError where contact leaves the modelled flanks.
     """
-    report = progress or (lambda fraction, note: None)
     tables = ("rig.driver", "rig.driven", "rig.mesh")
     refuse_effects(case.rig, "static finite-element solution", tables, ELASTIC_KEYS)
     unit, values = loads

@@ -1,50 +1,101 @@
-"""One realisation of a lumped experiment: settle from the static equilibrium, then average the steady
-state."""
+"""A rig made ready for the linear lumped model, and its steps from block to block."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from math import gcd
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.bench.errors import BenchError
 from gearbench.bench.plan.excitation import Torque
 from gearbench.bench.plan.schedule import Schedule
-from gearbench.lumped import Lumped
+from gearbench.bench.plan.settling import Keep
+from gearbench.bench.plan.substeps import runge_kutta_substeps
+from gearbench.bench.protocol import Channels, Drive
+from gearbench.bench.record.attributes import bodies_of
+from gearbench.bench.record.channels import dte_of
+from gearbench.geometry import Pair, pair
+from gearbench.lumped import Lumped, lumped_model
 from gearbench.lumped.linear.runge_kutta import Tables, integrate, tabulate
-from gearbench.rig import Experiment
+from gearbench.lumped.stiffness.potential_energy import outside_foundation_fit
+from gearbench.rig import Case
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Setup:
-    """What all realisations share: model, tables for `substeps` steps a sample, force per driver torque
-    [1/m]."""
+class LinearRig:
+    """Model and mesh tables for `substeps` steps a sample; states are those of the integrator, (6,), outputs
+    (samples, 4): x, y1, y2 [m] and mesh force [N].
+
+    The rig repeats itself with every block, so the record is the mean of all blocks: a hundred realisations of four
+    periods stay within a gigabyte.
+    """
 
     model: Lumped
     tables: Tables
     substeps: int
-    force_per_torque: float
+    meshing: Pair
+    mean_torque: float
+    inertias: tuple[float, float]
+    free: bool  # the driven gear's speed is not imposed
+    samples_per_period: int
+    warnings: tuple[str, ...]
 
+    keep: ClassVar[Keep] = "mean"
+    piece: ClassVar[int] = 0
+    absolute: ClassVar[bool] = False
+    decay: ClassVar[float | None] = None
 
-@dataclass(frozen=True)
-class SteadyState:
-    """Mean over the recorded blocks, one block long.
+    @property
+    def force_per_torque(self) -> float:
+        """Generalised force per driver torque [1/m]."""
+        return 1.0 / self.meshing.driver.base_radius
 
-    `outputs` (samples, 4): x, y1, y2 [m], mesh force [N]; `torque` (samples,) [N m] on the driver;
-    `scatter` (4,) the rms of the departure of single blocks from the mean; `residual` the change of the
-    DTE from the last settling block to the first recorded one, largest value over its standard deviation;
-    `settling_periods` excitation periods.
-    """
+    @property
+    def settings(self) -> dict[str, Any]:
+        return {"model": "lumped", "substeps": self.substeps}
 
-    outputs: Array
-    torque: Array
-    scatter: Array
-    residual: float
-    settling_periods: int
+    @property
+    def attributes(self) -> dict[str, Any]:
+        return {}
+
+    def drive(self, torque: Torque) -> Drive:
+        fine = torque.sample(2 * self.substeps * self.samples_per_period)
+        return Drive(fine[:: 2 * self.substeps].copy(), self.force_per_torque * fine)
+
+    def start(self, sample: int) -> Array:
+        """At mesh phase 0, where every block begins."""
+        return self.model.equilibrium(self.force_per_torque * self.mean_torque)
+
+    def advance(self, drive: Drive, state: Array, samples: int) -> tuple[Array, Array]:
+        """One block from its start: both tables repeat with it, so every block begins at their first entry."""
+        return integrate(self.tables, drive.fine, state, samples=samples, substeps=self.substeps)
+
+    def dte(self, outputs: Array) -> Array:
+        return dte_of(outputs[:, 0], outputs[:, 1], outputs[:, 2], self.model.support_factor)
+
+    def channels(self, outputs: Array, torque: Array) -> Channels:
+        x, y1, y2, mesh_force = outputs.T
+        r1, r2 = self.meshing.driver.base_radius, self.meshing.driven.base_radius
+        mass = self.model.mesh_mass
+        # Angle per x: 1/r1 and 0 if the driven gear turns steadily, else shared as the inertias are.
+        share1 = mass * r1 / self.inertias[0]
+        share2 = mass * r2 / self.inertias[1] if self.free else 0.0
+        return Channels(
+            torque_driven=torque * (r2 / r1) if self.free else mesh_force * r2,
+            angle_driver=share1 * x,
+            angle_driven=-share2 * x,
+            y_driver=y1,
+            y_driven=y2,
+            dte=self.dte(outputs),
+            force=torque * self.force_per_torque,
+        )
+
+    def apart(self, outputs: Array) -> None:
+        """A heavily loaded mesh: the model has no backlash."""
 
 
 def tables_for(model: Lumped, plan: Schedule, substeps: int) -> Tables:
@@ -55,62 +106,21 @@ def tables_for(model: Lumped, plan: Schedule, substeps: int) -> Tables:
     return tabulate(model, cycles=plan.mesh_cycles // common, steps=steps // common, step=step)
 
 
-def steady_state(setup: Setup, plan: Schedule, experiment: Experiment, torque: Torque) -> SteadyState:
-    """Run one realisation. Raises BenchError if it does not settle within experiment.settling_periods_max."""
-    fine = torque.sample(2 * setup.substeps * plan.samples_per_period)
-    force = setup.force_per_torque * fine
-    state = setup.model.equilibrium(setup.force_per_torque * torque.mean)
-    state, before = _block(setup, plan, force, state)
-    settling = plan.block_periods
-    while True:
-        state, block = _block(setup, plan, force, state)
-        residual = _change(setup.model, before, block)
-        if residual <= experiment.settling_tolerance:
-            break
-        settling += plan.block_periods
-        if settling > experiment.settling_periods_max:
-            raise BenchError(
-                f"no steady state: after {settling} excitation periods the DTE still changes by"
-                f" {residual:.3g} of its standard deviation from period to period, which"
-                f" experiment.settling_tolerance limits to {experiment.settling_tolerance:g}; raise"
-                f" settling_periods_max = {experiment.settling_periods_max} or the damping"
-            )
-        before = block
-    mean, scatter = _average(setup, plan, force, state, block)
-    coarse = np.tile(fine[:: 2 * setup.substeps], plan.block_periods)
-    return SteadyState(mean, coarse, scatter, residual, settling)
-
-
-def _block(setup: Setup, plan: Schedule, force: Array, state: Array) -> tuple[Array, Array]:
-    """One block from its start: both tables repeat with it, so every block begins at their first entry."""
-    return integrate(setup.tables, force, state, samples=plan.block_samples, substeps=setup.substeps)
-
-
-def _dte(model: Lumped, outputs: Array) -> Array:
-    return outputs[:, :3] @ model.output_vector[:3]
-
-
-def _change(model: Lumped, before: Array, after: Array) -> float:
-    """Largest change of the DTE between two blocks over its standard deviation.
-
-    A DTE that hardly varies (constant torque and stiffness) is measured against a millionth of its mean
-    instead.
-    """
-    dte = _dte(model, after)
-    scale = max(float(dte.std()), 1e-6 * abs(float(dte.mean())), np.finfo(float).tiny)
-    return float(np.abs(dte - _dte(model, before)).max()) / scale
-
-
-def _average(setup: Setup, plan: Schedule, force: Array, state: Array, first: Array) -> tuple[Array, Array]:
-    """Mean over all recorded blocks, of which `first` has been run, and the rms departure (4,) from it."""
-    # Departures from the first block are small: their sums lose no digits.
-    total, squares = np.zeros_like(first), np.zeros_like(first)
-    for _ in range(plan.blocks - 1):
-        state, block = _block(setup, plan, force, state)
-        block -= first
-        total += block
-        block *= block
-        squares += block
-    total /= plan.blocks
-    variance = squares / plan.blocks - total**2
-    return first + total, np.sqrt(np.maximum(variance, 0.0).mean(axis=0))
+def prepare(case: Case, plan: Schedule) -> LinearRig:
+    """Model, step and tables of an experiment. Raises LumpedError or GeometryError."""
+    rig, meshing = case.rig, pair(case.rig)
+    model = lumped_model(rig, meshing, case.simulation)
+    substeps = runge_kutta_substeps(model.fastest_rate(), case.experiment, case.simulation, plan)
+    one, two = bodies_of(rig, meshing)
+    tabled = case.simulation.mesh_stiffness == "potential-energy"
+    return LinearRig(
+        model=model,
+        tables=tables_for(model, plan, substeps),
+        substeps=substeps,
+        meshing=meshing,
+        mean_torque=case.experiment.torque_mean,
+        inertias=(one.inertia, two.inertia),
+        free=rig.load.boundary == "torque",
+        samples_per_period=plan.samples_per_period,
+        warnings=tuple(outside_foundation_fit(rig, meshing)) if tabled else (),
+    )

@@ -6,9 +6,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from gearbench.bench.plan.schedule import ProgressReport
-from gearbench.bench.refusals.effects import is_nonlinear
-from gearbench.bench.static import Loads, static_dataset
+from gearbench.bench.record.static import Loads, static_dataset
 from gearbench.geometry import pair
 from gearbench.lumped import lumped_model
 from gearbench.rig import Case
@@ -16,16 +14,8 @@ from gearbench.rig import Case
 Array = NDArray[np.float64]
 
 
-def static_lumped(
-    case: Case, loads: Loads, phase: Array, progress: ProgressReport | None = None
-) -> xr.Dataset:
-    """Static response by the law k(phase), which depends on no load, so that secant and tangent agree; or by the
-    non-linear one."""
-    if is_nonlinear(case):
-        # Imported on use: it brings in the mesher.
-        from gearbench.bench.nonlinear.static import static_nonlinear
-
-        return static_nonlinear(case, loads, phase)
+def static_linear(case: Case, loads: Loads, phase: Array) -> xr.Dataset:
+    """Static response by the law k(phase), which depends on no load, so that secant and tangent agree."""
     meshing = pair(case.rig)
     model = lumped_model(case.rig, meshing, case.simulation)
     unit, values = loads

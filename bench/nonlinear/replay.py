@@ -9,12 +9,14 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from gearbench.bench.errors import BenchError
-from gearbench.bench.nonlinear.experiment import attributes_of, channels_of, signals_of
-from gearbench.bench.nonlinear.mesh_law import mesh_law
-from gearbench.bench.nonlinear.run import HEADROOM, Setup, change, make_setup
+from gearbench.bench.nonlinear.law_table import mesh_law
+from gearbench.bench.nonlinear.run import HEADROOM, Setup, make_setup, turning_inertia
 from gearbench.bench.plan.schedule import schedule
-from gearbench.bench.record.attributes import lost_contact
-from gearbench.bench.record.sensors import Signal, check_delays, delayed, measured
+from gearbench.bench.plan.settling import change
+from gearbench.bench.protocol import Drive
+from gearbench.bench.record.attributes import experiment_attributes, joined, lost_contact, rig_attributes
+from gearbench.bench.record.channels import mesh_phases, sensed, with_rotation
+from gearbench.bench.record.sensors import Signal, check_delays, delayed, repeated
 from gearbench.geometry import pair
 from gearbench.lumped.nonlinear.law import MeshLaw
 from gearbench.records import make_record
@@ -42,35 +44,40 @@ def replay(case: Case, record: xr.Dataset, law: MeshLaw | None = None, realisati
     torque = delayed(Signal(torque[None]), -case.rig.sensors.delay_torque_driver, rate).swing[0]
     frequency, phase = _rotation(case, record, realisation)
     experiment = _experiment(case.experiment, torque, frequency, rate, samples, periods)
+    case = case.model_copy(update={"experiment": experiment})
     meshing = pair(case.rig)
     law = law or mesh_law(case.rig, case.simulation, HEADROOM * float(np.abs(torque).max()))
     plan = schedule(experiment, case.rig)
-    setup = make_setup(case.rig, case.simulation, experiment, meshing, plan, law, phase)
-    check_delays(case.rig, setup.repeats, setup.block_samples / rate)
+    check_delays(case.rig, plan.repeats, plan.repeat_time)
+    setup = make_setup(case, plan, law, phase)
     force = resampled(torque, 2 * setup.substeps * samples) / meshing.driver.base_radius
-    outputs, residual = _settled(setup, force)
-    quiet = case.rig.sensors.model_copy(update={name: 0.0 for name in Sensors.model_fields if name.startswith("noise")})
-    rig = case.rig.model_copy(update={"sensors": quiet})
-    signals = signals_of(setup, np.resize(torque, len(outputs))[None], outputs[None])
-    seen = measured(signals, rig, rate, seed=0, samples=len(outputs), samples_per_period=samples)
+    outputs, residual = _settled(setup, Drive(torque, force))
+    applied = repeated(torque, len(outputs))
+    swings = {"torque_driver": applied, **setup.channels(outputs, applied)._asdict()}
+    rows = {name: values[None] for name, values in swings.items()}
+    quiet = case.rig.model_copy(update={"sensors": _quiet(case.rig.sensors)})
+    seen = with_rotation(sensed(rows, quiet, meshing, plan, samples=len(outputs), seed=0), plan, phase)
+    seen["mesh_phase"] = mesh_phases(plan, len(outputs), phase)[None]
     unsettled = None if residual <= TOLERANCE else f"the DTE still changes by {residual:.3g} from period to period"
-    lost = int((outputs[:, 5] == 0).sum())
+    lost = int(setup.apart(outputs).sum())
     attributes = {
-        **attributes_of(case.rig, meshing),
-        "sampling_rate": rate,
-        "samples_per_period": samples,
-        "periods": len(outputs) // samples,
+        **rig_attributes(case.rig, meshing),
+        **experiment_attributes(plan, len(outputs) // samples, float(torque.mean())),
+        "inertia_driver": turning_inertia(case.rig, meshing),
         "mesh_period": 1.0 / frequency,
-        "mesh_phase_origin": "geometry",
-        "torque_mean": float(torque.mean()),
         "settling_residual": residual,
         "contact_lost_samples": lost,
-        "warnings": "; ".join(filter(None, (lost_contact(lost, len(outputs)), unsettled))) or None,
+        "warnings": joined(lost_contact(lost, len(outputs)), unsettled),
         "model": "lumped",
         "mesh": "non-linear",
         "substeps": setup.substeps,
     }
-    return make_record(channels_of(setup, seen), attributes)
+    return make_record(seen, attributes)
+
+
+def _quiet(sensors: Sensors) -> Sensors:
+    """The sensors without their noise."""
+    return sensors.model_copy(update={name: 0.0 for name in Sensors.model_fields if name.startswith("noise")})
 
 
 def resampled(period: Array, points: int) -> Array:
@@ -114,20 +121,20 @@ def _experiment(
     return base.model_copy(update=values)
 
 
-def _settled(setup: Setup, force: Array) -> tuple[Array, float]:
+def _settled(setup: Setup, drive: Drive) -> tuple[Array, float]:
     """Outputs (samples, 7) of one repetition after free vibrations have died out, and how steady it is."""
-    mean = float(force.mean())
+    mean = float(drive.fine.mean())
     block = setup.block_samples
     decay = setup.model.slowest_decay(mean)
     early = min(ceil(log(1 / TRANSIENT) / max(decay, 1e-9) * setup.sampling_rate), block)
-    state, _ = setup.advance(force, setup.at_rest(mean, -early), -early, early)
-    end, outputs = setup.advance(force, state, 0, block)
-    residual = _unsteady(setup, state, end, outputs)
+    begin, _ = setup.advance(drive, setup.at_rest(mean, -early), early)
+    end, outputs = setup.advance(drive, begin, block)
+    residual = _unsteady(setup, begin.values, end.values, outputs)
     for _ in range(PERIODS_MAX):
         if residual <= TOLERANCE:
             break
         before = outputs
-        end, outputs = setup.advance(force, end, 0, block)
+        end, outputs = setup.advance(drive, end, block)
         residual = change(setup.dte(before), setup.dte(outputs))
     return outputs, residual
 

@@ -1,25 +1,34 @@
-"""One realisation on the non-linear lumped model: settle, then one stretch after which everything repeats."""
+"""A rig made ready for the non-linear lumped model, and its steps through tables of what varies with rotation.
+
+Channels are what sensors on the rig would show: torque_driver is the commanded torque, without ripple. All excitation
+periods are recorded, since their noise differs. What the model leaves out is listed in `lumped.nonlinear.model.LIMITS`
+and in the record's attribute `limits`.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import ceil, gcd, lcm, log
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.bench.errors import BenchError
-from gearbench.bench.nonlinear.mesh_law import mesh_law
+from gearbench.bench.nonlinear.law_table import mesh_law
 from gearbench.bench.plan.excitation import Torque
 from gearbench.bench.plan.schedule import Schedule
+from gearbench.bench.plan.settling import Keep
+from gearbench.bench.plan.substeps import runge_kutta_substeps
+from gearbench.bench.protocol import Channels, Drive
+from gearbench.bench.record.attributes import bodies_of
+from gearbench.bench.record.channels import dte_of, force_of, turned_by
 from gearbench.bench.refusals.effects import refuse_unknown
-from gearbench.geometry import Pair
-from gearbench.lumped import choose_substeps
+from gearbench.geometry import Pair, pair
 from gearbench.lumped.nonlinear.law import MeshLaw
-from gearbench.lumped.nonlinear.model import NonLinear, nonlinear_model
+from gearbench.lumped.nonlinear.model import LIMITS, NonLinear, nonlinear_model
 from gearbench.lumped.nonlinear.step import integrate
 from gearbench.lumped.nonlinear.tables import EXCESS, GAIN, Motion, tables
-from gearbench.rig import Experiment, Gear, Rig, Simulation
+from gearbench.lumped.stiffness.potential_energy import outside_foundation_fit
+from gearbench.rig import Case, Experiment, Rig
 
 Array = NDArray[np.float64]
 
@@ -27,20 +36,55 @@ MOST_ENTRIES = 2**20  # half steps tabulated at once
 HEADROOM = 2.0  # largest tabulated over largest applied load: resonances load the flanks more than the torque does
 
 
+class Outputs(NamedTuple):
+    """What the integrator hands out, each (...): coordinates [m], forces of mesh and at the load's base circle [N]."""
+
+    u1: Array
+    y1: Array
+    y2: Array
+    u2: Array
+    w: Array
+    mesh_force: Array
+    load_force: Array
+
+
+def columns(outputs: Array) -> Outputs:
+    """Outputs (..., 7) by name."""
+    return Outputs(*np.moveaxis(outputs, -1, 0))
+
+
+def excess_and_gain(table: Array) -> tuple[Array, Array]:
+    """Excess [m] and gain of the force out of the table's rows (..., columns)."""
+    return table[..., EXCESS], table[..., GAIN]
+
+
+class State(NamedTuple):
+    """The integrator's state (2 COORDINATES,) at a sample of the record."""
+
+    sample: int
+    values: Array
+
+
 @dataclass(frozen=True)
 class Setup:
     """What all realisations share. The rig repeats after `block_samples` samples; `table` covers them from sample
-    0 at `first_phase` [cycles], unless they are too many to keep. `repeats`: the record is at least that long."""
+    0 at `first_phase` [cycles], unless they are too many to keep."""
 
     model: NonLinear
+    meshing: Pair
     substeps: int
+    mean_torque: float
     sampling_rate: float
     samples_per_period: int
     cycles_per_sample: float
     block_samples: int
-    repeats: bool
-    table: Array | None
+    warnings: tuple[str, ...]
+    table: Array | None = None
     first_phase: float = 0.0
+
+    keep: ClassVar[Keep] = "one"
+    piece: ClassVar[int] = 0
+    absolute: ClassVar[bool] = False
 
     @property
     def step(self) -> float:
@@ -51,6 +95,24 @@ class Setup:
     def mesh_frequency(self) -> float:
         """Mesh frequency [Hz]."""
         return self.cycles_per_sample * self.sampling_rate
+
+    @property
+    def mean_force(self) -> float:
+        """Generalised force [N] of the mean torque."""
+        return self.mean_torque / self.meshing.driver.base_radius
+
+    @property
+    def decay(self) -> float:
+        return self.model.slowest_decay(self.mean_force)
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        return {"model": "lumped", "mesh": "non-linear", "substeps": self.substeps}
+
+    @property
+    def attributes(self) -> dict[str, Any]:
+        about = {"mesh": "non-linear", "limits": "; ".join(LIMITS)}
+        return {**about, "inertia_driver": turning_inertia(self.model.rig, self.meshing)}
 
     def phase_at(self, sample: int) -> float:
         """Mesh phase [cycles] of a sample."""
@@ -68,17 +130,28 @@ class Setup:
             ),
         )
 
-    def advance(self, force: Array, state: Array, start: int, samples: int) -> tuple[Array, Array]:
-        """Final state and outputs (samples, 7) from sample `start`; force [N]: one excitation period, half steps."""
+    def drive(self, torque: Torque) -> Drive:
+        fine = torque.sample(2 * self.substeps * self.samples_per_period)
+        return Drive(torque.sample(self.samples_per_period), fine / self.meshing.driver.base_radius)
+
+    def start(self, sample: int) -> State:
+        return self.at_rest(self.mean_force, sample)
+
+    def advance(self, drive: Drive, state: State, samples: int) -> tuple[State, Array]:
+        start, values = state
+        stop = start + samples
+        # Whole repetitions are counted from 0 again, so that they all read the same table.
+        after = stop if stop < 0 else stop % self.block_samples
         if self.table is not None and start == 0 and samples == self.block_samples:
-            return self._integrate(self.table, force, state, 0)
-        parts, stop = [], start + samples
+            values, outputs = self._integrate(self.table, drive.fine, values, 0)
+            return State(after, values), outputs
+        parts = []
         most = max(MOST_ENTRIES // (2 * self.substeps), 1)
         for at in range(start, stop, most):
             table = self.table_for(at, min(most, stop - at))
-            state, out = self._integrate(table, force, state, 2 * self.substeps * at % force.size)
+            values, out = self._integrate(table, drive.fine, values, 2 * self.substeps * at % drive.fine.size)
             parts.append(out)
-        return state, np.concatenate(parts)
+        return State(after, values), np.concatenate(parts)
 
     def _integrate(self, table: Array, force: Array, state: Array, first_entry: int) -> tuple[Array, Array]:
         return integrate(
@@ -93,15 +166,32 @@ class Setup:
         )
 
     def dte(self, outputs: Array) -> Array:
-        """DTE [m] of outputs (samples, 7)."""
-        return np.asarray(outputs[:, 0] - outputs[:, 3] + self.model.factor * (outputs[:, 1] - outputs[:, 2]))
+        out = columns(outputs)
+        return dte_of(out.u1 - out.u2, out.y1, out.y2, self.model.factor)
 
-    def at_rest(self, mean_force: float, start: int) -> Array:
-        """Static equilibrium under the mean force [N] at sample `start`."""
-        first = self.table_for(start, 1)[0]
-        phase = self.phase_at(start)
-        state = self.model.equilibrium(mean_force, float(first[EXCESS]), float(first[GAIN]), phase)
-        return state + self._common_motion(phase)
+    def channels(self, outputs: Array, torque: Array) -> Channels:
+        out = columns(outputs)
+        r1, r2 = self.model.base_radii
+        one, two = out.u1 / r1, out.u2 / r2
+        return Channels(
+            torque_driven=out.load_force * r2,
+            angle_driver=one,
+            angle_driven=two,
+            y_driver=out.y1,
+            y_driven=out.y2,
+            dte=dte_of(turned_by(self.meshing, one, two), out.y1, out.y2, self.model.factor),
+            force=force_of(torque, self.meshing),
+        )
+
+    def apart(self, outputs: Array) -> NDArray[np.bool_]:
+        return np.asarray(columns(outputs).mesh_force == 0)
+
+    def at_rest(self, mean_force: float, sample: int) -> State:
+        """Static equilibrium under the mean force [N] at a sample."""
+        excess, gain = excess_and_gain(self.table_for(sample, 1)[0])
+        phase = self.phase_at(sample)
+        state = self.model.equilibrium(mean_force, float(excess), float(gain), phase)
+        return State(sample, state + self._common_motion(phase))
 
     def _common_motion(self, phase: float) -> Array:
         """Motion of both gears together under ripple: nothing holds it back, so it must begin right."""
@@ -120,28 +210,10 @@ class Setup:
         return out
 
 
-@dataclass(frozen=True)
-class Steady:
-    """`outputs` (samples, 7) of one block, or of the whole record where that is shorter; `residual` the change of the
-    DTE from the block before, largest value over its standard deviation; `settling_periods` excitation periods."""
-
-    outputs: Array
-    residual: float
-    settling_periods: int
-
-
-def cycles_to_repeat(rig: Rig) -> int:
-    """Mesh cycles after which all teeth in contact are alike again: 1, the teeth of a gear, or the hunting period."""
-    first, second = _differs(rig.driver), _differs(rig.driven)
-    ripple = rig.drive.ripple
-    if ripple is not None and any(ripple.amplitude):
-        first = True
-    return lcm(rig.driver.teeth if first else 1, rig.driven.teeth if second else 1)
-
-
-def _differs(gear: Gear) -> bool:
-    cracked = gear.crack is not None and gear.crack.stiffness_loss > 0
-    return len(set(gear.pitch_error)) > 1 or gear.runout > 0 or cracked
+def turning_inertia(rig: Rig, meshing: Pair) -> float:
+    """Inertia [kg m^2] of the driver and of a rotor that turns with it."""
+    coupling, inertia = rig.drive.coupling, bodies_of(rig, meshing)[0].inertia
+    return inertia + coupling.inertia if coupling is not None and coupling.stiffness is None else inertia
 
 
 def largest_load(experiment: Experiment) -> float:
@@ -153,88 +225,29 @@ def largest_load(experiment: Experiment) -> float:
     return HEADROOM * (experiment.torque_mean + peak)
 
 
-def make_setup(
-    rig: Rig,
-    simulation: Simulation,
-    experiment: Experiment,
-    meshing: Pair,
-    plan: Schedule,
-    law: MeshLaw | None = None,
-    first_phase: float = 0.0,
-) -> Setup:
-    """Model, step and tables of an experiment that begins at `first_phase` [cycles].
+def make_setup(case: Case, plan: Schedule, law: MeshLaw | None = None, first_phase: float = 0.0) -> Setup:
+    """Model, step and tables of an experiment that begins at `first_phase` [cycles], with the mesh law given or solved.
 
     Raises LumpedError, BenchError, GeometryError or ContactError.
     """
+    rig, experiment, simulation, meshing = case.rig, case.experiment, case.simulation, pair(case.rig)
     refuse_unknown(rig)
     law = law or mesh_law(rig, simulation, largest_load(experiment))
     model = nonlinear_model(rig, meshing, law)
-    band = experiment.multisine.band[1] if experiment.multisine is not None else 0.0
-    # The forced response is a mode of that frequency as far as the time step is concerned.
-    rate = max(model.fastest_rate(experiment.torque_mean / meshing.driver.base_radius), 2 * np.pi * band)
-    substeps = choose_substeps(rate, plan.mesh_period, plan.sampling_rate, simulation.substeps)
-    periods, cycles = plan.blocks * plan.block_periods, plan.blocks * plan.mesh_cycles
-    whole = periods * cycles_to_repeat(rig)
-    repeat = whole // gcd(whole, cycles)
+    fastest = model.fastest_rate(experiment.torque_mean / meshing.driver.base_radius)
+    tabled = simulation.mesh_stiffness == "potential-energy"
     setup = Setup(
         model=model,
-        substeps=substeps,
+        meshing=meshing,
+        substeps=runge_kutta_substeps(fastest, experiment, simulation, plan),
+        mean_torque=experiment.torque_mean,
         sampling_rate=plan.sampling_rate,
         samples_per_period=plan.samples_per_period,
-        cycles_per_sample=cycles / (periods * plan.samples_per_period),
-        block_samples=repeat * plan.samples_per_period,
-        repeats=repeat <= periods,
-        table=None,
+        cycles_per_sample=plan.cycles_per_sample,
+        block_samples=plan.repeat_periods * plan.samples_per_period,
+        warnings=tuple(outside_foundation_fit(rig, meshing)) if tabled else (),
         first_phase=first_phase,
     )
-    if not setup.repeats or 2 * substeps * setup.block_samples > MOST_ENTRIES:
+    if not plan.repeats or 2 * setup.substeps * setup.block_samples > MOST_ENTRIES:
         return setup
     return replace(setup, table=setup.table_for(0, setup.block_samples))
-
-
-def steady_state(setup: Setup, experiment: Experiment, torque: Torque, record_samples: int) -> Steady:
-    """Run one realisation. Raises BenchError if it does not settle within experiment.settling_periods_max."""
-    fine = torque.sample(2 * setup.substeps * setup.samples_per_period)
-    force = fine / setup.model.base_radii[0]
-    mean = torque.mean / setup.model.base_radii[0]
-    if not setup.repeats:
-        return _long(setup, experiment, force, mean, record_samples)
-    state, before = setup.advance(force, setup.at_rest(mean, 0), 0, setup.block_samples)
-    settling = once = setup.block_samples // setup.samples_per_period
-    while True:
-        state, block = setup.advance(force, state, 0, setup.block_samples)
-        residual = change(setup.dte(before), setup.dte(block))
-        if residual <= experiment.settling_tolerance:
-            return Steady(block, residual, settling)
-        settling += once
-        if settling > experiment.settling_periods_max:
-            raise BenchError(
-                f"no steady state: after {settling} excitation periods the DTE still changes by {residual:.3g} of its"
-                " standard deviation from one repetition to the next, which experiment.settling_tolerance limits to"
-                f" {experiment.settling_tolerance:g}; raise settling_periods_max = {experiment.settling_periods_max} or"
-                " the damping"
-            )
-        before = block
-
-
-def _long(setup: Setup, experiment: Experiment, force: Array, mean: float, samples: int) -> Steady:
-    """A record shorter than what repeats: it begins when free vibrations have died out by the slowest decay rate."""
-    decay = setup.model.slowest_decay(mean)
-    wanted = log(1 / experiment.settling_tolerance) * setup.sampling_rate / setup.samples_per_period
-    periods = ceil(wanted / decay) if decay > 0 else experiment.settling_periods_max + 1
-    if periods > experiment.settling_periods_max:
-        raise BenchError(
-            f"no steady state: free vibrations take {periods} excitation periods to die out to"
-            f" experiment.settling_tolerance = {experiment.settling_tolerance:g}, more than settling_periods_max ="
-            f" {experiment.settling_periods_max}"
-        )
-    start = -periods * setup.samples_per_period
-    state, _ = setup.advance(force, setup.at_rest(mean, start), start, -start)
-    _, out = setup.advance(force, state, 0, samples)
-    return Steady(out, experiment.settling_tolerance, periods)
-
-
-def change(before: Array, after: Array) -> float:
-    """Largest change of a DTE over its standard deviation, or over a millionth of its mean if it hardly varies."""
-    scale = max(float(after.std()), 1e-6 * abs(float(after.mean())), np.finfo(float).tiny)
-    return float(np.abs(after - before).max()) / scale

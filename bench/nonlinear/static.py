@@ -6,15 +6,16 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from gearbench.bench.nonlinear.mesh_law import mesh_law
+from gearbench.bench.nonlinear.law_table import mesh_law
+from gearbench.bench.nonlinear.run import excess_and_gain
+from gearbench.bench.record.static import Loads, load_key, static_dataset
 from gearbench.bench.refusals.effects import refuse_unknown
 from gearbench.bench.refusals.load_range import check_dte
-from gearbench.bench.static import Loads, load_key, static_dataset
 from gearbench.fem.contact.curve import LOAD_RANGE
 from gearbench.geometry import Pair, pair
 from gearbench.lumped.nonlinear.law import MeshLaw
 from gearbench.lumped.nonlinear.model import COORDINATES, NonLinear, nonlinear_model
-from gearbench.lumped.nonlinear.tables import EXCESS, GAIN, Motion, tables
+from gearbench.lumped.nonlinear.tables import Motion, tables
 from gearbench.rig import Case
 from gearbench.rig.neutral import sound_gear
 
@@ -53,7 +54,7 @@ def static_nonlinear(case: Case, loads: Loads, phase: Array) -> xr.Dataset:
     law = mesh_law(case.rig, case.simulation, most)
     model = nonlinear_model(case.rig, meshing, law)
     table = tables(model, Motion(cycles=1.0, entries=len(phase), step=1.0))[:-1]
-    excess, gain = table[:, EXCESS], table[:, GAIN]
+    excess, gain = excess_and_gain(table)
     shape = (len(values), len(phase))
     if unit == "N m":
         force = np.broadcast_to(values[:, None] / radius, shape)
@@ -83,7 +84,7 @@ def linearised_matrices(case: Case, meshing: Pair, phases: int) -> tuple[Array, 
     force = case.experiment.torque_mean / meshing.driver.base_radius
     law = mesh_law(rig, case.simulation, 2 * case.experiment.torque_mean)
     model = nonlinear_model(rig, meshing, law)
-    gain = tables(model, Motion(cycles=1.0, entries=phases, step=1.0))[:-1, GAIN]
+    _, gain = excess_and_gain(tables(model, Motion(cycles=1.0, entries=phases, step=1.0))[:-1])
     phase = np.arange(phases) / phases
     tangent = gain * law.evaluate(deflection(law, force / gain, phase), phase)[1]
     seen = _relative(model)

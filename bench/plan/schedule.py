@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import pi
+from math import gcd, lcm, pi
 
 from gearbench.bench.errors import BenchError
-from gearbench.rig import Experiment, Rig
+from gearbench.geometry.tooth.iso1328 import drawn_gear
+from gearbench.geometry.tooth.micro import teeth_alike
+from gearbench.rig import Experiment, Gear, Rig
 
 # How far the mesh phase may drift over the record [cycles] for it to count as a whole number of mesh
 # periods: what the rounding of a speed in a case can do.
@@ -19,27 +21,56 @@ ProgressReport = Callable[[float, str], None]
 
 @dataclass(frozen=True)
 class Schedule:
-    """When is what: a block is the shortest run after which excitation and mesh both repeat, or the whole record where
-    `repeats` is false: teeth that differ then meet again only after a longer time.
-
-    `block_periods` excitation periods of `samples_per_period` samples make a block; it holds
-    `mesh_cycles` mesh periods; the record has `blocks` of them. `sampling_rate` in Hz, speeds in rad/s,
-    each positive in its gear's own direction.
+    """When is what. Excitation, mesh and teeth all repeat after `repeat_periods` excitation periods of
+    `samples_per_period` samples; the record has `periods` of them. A block is what is run at a time: a repetition, or
+    the whole record where that is shorter; it holds `mesh_cycles` mesh periods. `sampling_rate` in Hz, speeds in rad/s,
+    each positive in its gear's own direction; `repeat_cycles` is the number of mesh cycles after which the same teeth
+    meet again.
     """
 
     sampling_rate: float
     samples_per_period: int
-    block_periods: int
-    blocks: int
+    periods: int
+    repeat_periods: int
     mesh_cycles: int
     speed_driver: float
     speed_driven: float
-    repeats: bool = True
+    repeat_cycles: int = 1
+
+    @property
+    def repeats(self) -> bool:
+        """Whether the record is at least as long as what repeats."""
+        return self.repeat_periods <= self.periods
+
+    @property
+    def block_periods(self) -> int:
+        """Excitation periods of one block."""
+        return min(self.repeat_periods, self.periods)
+
+    @property
+    def blocks(self) -> int:
+        """Blocks that the record takes; the last one need not be used up."""
+        return -(-self.periods // self.block_periods)
 
     @property
     def block_samples(self) -> int:
         """Samples of one block."""
         return self.block_periods * self.samples_per_period
+
+    @property
+    def record_samples(self) -> int:
+        """Samples of all periods of the record."""
+        return self.periods * self.samples_per_period
+
+    @property
+    def repeat_time(self) -> float:
+        """Time [s] after which everything repeats."""
+        return self.repeat_periods * self.samples_per_period / self.sampling_rate
+
+    @property
+    def cycles_per_sample(self) -> float:
+        """Mesh cycles that pass in a sample."""
+        return self.mesh_cycles / self.block_samples
 
     @property
     def mesh_frequency(self) -> float:
@@ -52,11 +83,9 @@ class Schedule:
         return 1.0 / self.mesh_frequency
 
 
-def schedule(experiment: Experiment, rig: Rig, repeat: int = 1) -> Schedule:
-    """The schedule of an experiment on a rig that repeats after `repeat` mesh cycles.
-
-    Raises BenchError unless the record holds a whole number of mesh periods.
-    """
+def schedule(experiment: Experiment, rig: Rig) -> Schedule:
+    """The schedule of an experiment on a rig. Raises BenchError unless the record holds a whole number of mesh
+    periods."""
     wanted = experiment.mesh_frequency_for(rig.driver.teeth)
     if wanted >= experiment.sampling_rate / 2:
         raise BenchError(
@@ -73,23 +102,35 @@ def schedule(experiment: Experiment, rig: Rig, repeat: int = 1) -> Schedule:
             f"the record of {record:g} s (periods x samples_per_period / sampling_rate_hz) holds"
             f" {wanted * record:.6g} mesh periods at {wanted:g} Hz, which must be a whole number; {nearest}"
         )
-    whole = (
-        n
-        for n in range(1, experiment.periods + 1)
-        if not experiment.periods % n and not n * cycles % (experiment.periods * repeat)
-    )
-    found = next(whole, None)
-    block_periods = found or experiment.periods
-    blocks = experiment.periods // block_periods
-    mesh_cycles = cycles // blocks
+    repeat = cycles_to_repeat(rig)
+    whole = experiment.periods * repeat
+    repeat_periods = whole // gcd(whole, cycles)
+    block_periods = min(repeat_periods, experiment.periods)
+    mesh_cycles = block_periods * cycles // experiment.periods
     frequency = mesh_cycles / (block_periods * period)
     return Schedule(
         sampling_rate=experiment.sampling_rate,
         samples_per_period=experiment.samples_per_period,
-        block_periods=block_periods,
-        blocks=blocks,
+        periods=experiment.periods,
+        repeat_periods=repeat_periods,
         mesh_cycles=mesh_cycles,
         speed_driver=2 * pi * frequency / rig.driver.teeth,
         speed_driven=2 * pi * frequency / rig.driven.teeth,
-        repeats=found is not None,
+        repeat_cycles=repeat,
     )
+
+
+def cycles_to_repeat(rig: Rig) -> int:
+    """Mesh cycles after which the same teeth with the same errors meet again: 1 where all are alike, the teeth of the
+    gear whose teeth differ, or, where those of both do, the hunting period. Ripple of the drive counts as a difference
+    of the driver's teeth. Raises GeometryError for a grade that ISO 1328-1 has no tolerance for."""
+    ripple = rig.drive.ripple
+    driver = _differs(rig.driver, "rig.driver") or (ripple is not None and any(ripple.amplitude))
+    driven = _differs(rig.driven, "rig.driven")
+    return lcm(rig.driver.teeth if driver else 1, rig.driven.teeth if driven else 1)
+
+
+def _differs(gear: Gear, name: str) -> bool:
+    """Whether one tooth of a gear is unlike another."""
+    cracked = gear.crack is not None and (gear.crack.meshed or gear.crack.stiffness_loss > 0)
+    return cracked or not teeth_alike(drawn_gear(gear, name))

@@ -1,25 +1,48 @@
-"""What a record says about its rig."""
+"""What a record says about its rig and its experiment."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from gearbench.geometry import Body, Pair
+from gearbench.bench.plan.schedule import Schedule
+from gearbench.geometry import Body, Pair, body
 from gearbench.rig import Rig
 
 
-def rig_attributes(rig: Rig, meshing: Pair, bodies: tuple[Body, Body]) -> dict[str, Any]:
-    """Record attributes of teeth, base radii [m], inertias [kg m^2], pressure angle [rad] and boundaries."""
+def bodies_of(rig: Rig, meshing: Pair) -> tuple[Body, Body]:
+    """Masses and inertias of driver and driven gear. Raises GeometryError."""
+    density = rig.material.density
+    return (
+        body(meshing.driver, rig.driver, density, "rig.driver"),
+        body(meshing.driven, rig.driven, density, "rig.driven"),
+    )
+
+
+def rig_attributes(rig: Rig, meshing: Pair) -> dict[str, Any]:
+    """Record attributes of teeth, base radii [m], inertias of the gears [kg m^2], pressure angle [rad], boundaries."""
+    one, two = bodies_of(rig, meshing)
     return {
         "teeth_driver": rig.driver.teeth,
         "teeth_driven": rig.driven.teeth,
         "base_radius_driver": meshing.driver.base_radius,
         "base_radius_driven": meshing.driven.base_radius,
-        "inertia_driver": bodies[0].inertia,
-        "inertia_driven": bodies[1].inertia,
+        "inertia_driver": one.inertia,
+        "inertia_driven": two.inertia,
         "working_pressure_angle": meshing.working_pressure_angle,
         "support_direction": rig.support.direction,
         "driven_boundary": rig.load.boundary,
+    }
+
+
+def experiment_attributes(plan: Schedule, periods: int, torque_mean: float) -> dict[str, Any]:
+    """Record attributes of sampling and mesh period [s], of a record that holds that many excitation periods."""
+    return {
+        "sampling_rate": plan.sampling_rate,
+        "samples_per_period": plan.samples_per_period,
+        "periods": periods,
+        "mesh_period": plan.mesh_period,
+        "mesh_phase_origin": "geometry",
+        "torque_mean": torque_mean,
     }
 
 
@@ -31,3 +54,19 @@ def lost_contact(lost: int, total: int) -> str | None:
         f"the teeth are out of contact in {lost} of {total} samples, so the rig is not linear and its identified"
         " response depends on the excitation"
     )
+
+
+def unlike_periods(plan: Schedule) -> str | None:
+    """Warning where the mesh period is not the period of what happens."""
+    if plan.repeat_cycles == 1:
+        return None
+    after = (
+        f"mesh periods differ from one another, so the rig repeats after {plan.repeat_cycles} mesh periods"
+        f" ({plan.repeat_cycles * plan.mesh_period:.4g} s)"
+    )
+    return after if plan.repeats else f"{after}, longer than the record: none of its excitation periods is like another"
+
+
+def joined(*warnings: str | None) -> str | None:
+    """The sentences as an attribute; None without any."""
+    return "; ".join(filter(None, warnings)) or None

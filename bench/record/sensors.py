@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from gearbench.bench.errors import BenchError
 from gearbench.rig import Rig
 
 Array = NDArray[np.float64]
+Scalar = TypeVar("Scalar", bound=np.generic)
 
 # Channels in the order of their noise streams, and the field of their noise.
 CHANNELS = {
@@ -52,13 +54,18 @@ def measured(
     out = {}
     for number, name in enumerate(CHANNELS):
         signal = delayed(signals[name], getattr(rig.sensors, f"delay_{name}"), sampling_rate)
-        times = -(-samples // signal.swing.shape[-1])
-        swing = np.tile(signal.swing, (1, times))[:, :samples]
+        swing = repeated(signal.swing, samples)
         level = getattr(rig.sensors, CHANNELS[name])
         if level > 0.0:
             swing = swing + level * _noise(seed, number, swing.shape, samples_per_period)
         out[name] = Signal(swing, signal.ramp)
     return out
+
+
+def repeated(values: NDArray[Scalar], samples: int) -> NDArray[Scalar]:
+    """What repeats (..., n) over `samples` samples; the same array where that is its length."""
+    length = values.shape[-1]
+    return values if length == samples else np.take(values, np.arange(samples) % length, axis=-1)
 
 
 def _noise(seed: int, channel: int, shape: tuple[int, int], samples_per_period: int) -> Array:

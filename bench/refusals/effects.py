@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from math import lcm
 
 from gearbench.bench.errors import BenchError
-from gearbench.geometry.tooth.iso1328 import drawn_gear
-from gearbench.geometry.tooth.micro import teeth_alike
 from gearbench.rig import Case, Gear, Rig
 from gearbench.rig.neutral import FLANK_FIELDS, effects_in
 from gearbench.rig.value import key_of
@@ -56,17 +53,6 @@ def refuse_effects(rig: Rig, model: str, tables: tuple[str, ...] = ("rig",), rep
 
 def _is_crack(key: str, field: str) -> bool:
     return key in (f"rig.driver.{field}", f"rig.driven.{field}")
-
-
-def cycles_to_repeat(rig: Rig) -> int:
-    """Mesh cycles after which the same teeth with the same errors meet again: 1 where all are alike, the teeth of the
-    gear whose teeth differ, or, where those of both do, the hunting period."""
-    gears = (drawn_gear(rig.driver, "rig.driver"), drawn_gear(rig.driven, "rig.driven"))
-    return lcm(*(1 if teeth_alike(gear) and not _cracked(gear) else gear.teeth for gear in gears))
-
-
-def _cracked(gear: Gear) -> bool:
-    return gear.crack is not None and gear.crack.meshed
 
 
 def refuse_unknown(rig: Rig) -> None:

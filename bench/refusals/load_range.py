@@ -6,12 +6,24 @@ from math import inf
 
 from gearbench.bench.errors import BenchError
 from gearbench.fem.contact.curve import EDGE_SEPARATION, LOAD_RANGE
+from gearbench.fem.contact.law import elastic_pair
 from gearbench.geometry import Pair
+from gearbench.rig import Case
+
+
+def largest_torque(meshing: Pair) -> float:
+    """Largest driver torque [N m] that the modelled flanks can carry."""
+    return float(LOAD_RANGE[1] * meshing.face_width * meshing.driver.base_radius)
+
+
+def check_mean_torque(case: Case) -> None:
+    """Raise BenchError for a mean torque of a case beyond the modelled loads."""
+    check_torque(elastic_pair(case.rig), case.experiment.torque_mean, "experiment.torque_mean_nm")
 
 
 def check_torque(meshing: Pair, torque: float, key: str) -> None:
     """Raise BenchError for a driver torque [N m] beyond the modelled loads; `key` is what the user called it."""
-    most = LOAD_RANGE[1] * meshing.face_width * meshing.driver.base_radius
+    most = largest_torque(meshing)
     if not torque <= most:
         raise BenchError(f"{key} = {torque:g} is more than the modelled flanks can carry: at most {most:.4g}")
 

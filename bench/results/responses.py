@@ -6,8 +6,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from gearbench.bench.linear.exact import lumped_periodic_system
 from gearbench.bench.plan.schedule import ProgressReport
+from gearbench.bench.results.exact import lumped_periodic_system
 from gearbench.identification import IdentificationSettings, exact_frf, frozen_frf, identify
 from gearbench.rig import Case, Identification
 

@@ -83,7 +83,7 @@ def _row(model: str, torsion: bool, curve: Array, single: float | None) -> Stiff
 def _solved(rig: Rig, meshing: Pair, result: xr.Dataset, load: int) -> tuple[list[StiffnessRow], list[str]]:
     """Rows of the static solution, and what cannot be said of it."""
     curve = np.asarray(result["stiffness_secant"].values[load], dtype=float)
-    if result.attrs["model"] != "reduced":
+    if "load_share" not in result:
         # A lumped model's mesh joins two rigid gears, so its stiffness is meant from hub to hub.
         return [_row("lumped model", True, curve, None)], []
     alone = float(result["load_share"].values[load, 0].max()) >= ALONE

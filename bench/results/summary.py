@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gearbench.bench.models import model_for
 from gearbench.bench.results.measures import itf_difference, median_in, mesh_orders, mode_range
 
 if TYPE_CHECKING:
@@ -36,6 +37,7 @@ def run_numbers(
     numbers: dict[str, Any] = {
         "case": case.name,
         "model": record.attrs.get("model", ""),
+        "model_title": model_for(case)[1].title,
         "te_peak_to_peak_um": float(te.max() - te.min()),
         "te_mesh_orders_um": [float(value) for value in mesh_orders(te)],
         "first_mode_hz": mode_range(identified),

@@ -14,13 +14,13 @@ from scipy.interpolate import CubicSpline
 
 from gearbench.bench.plan.excitation import torque_realisation
 from gearbench.bench.plan.schedule import Schedule, schedule
-from gearbench.bench.record.attributes import rig_attributes
+from gearbench.bench.record.attributes import experiment_attributes, rig_attributes
+from gearbench.bench.record.sensors import repeated
 from gearbench.challenge.truth.levels import DELAYED, Foreign, Levels
 from gearbench.challenge.truth.motion import integrate
 from gearbench.challenge.truth.plant import DEGREES, OUTPUTS, STATES, Plant
 from gearbench.challenge.truth.rigs import Bench, build_plant
 from gearbench.challenge.truth.structure import Structure
-from gearbench.geometry import body
 from gearbench.records import make_record
 from gearbench.rig import Condition
 
@@ -127,7 +127,7 @@ def run_condition(bench: Bench, rig: Structure, levels: Levels, condition: Condi
     state = start_state(plant, torque, step, begin - settling)
     state, _ = integrate(plant, torque, state, step=step, first=begin - settling, outputs=1, stride=settling)
     stride = substeps // OVERSAMPLED
-    count = OVERSAMPLED * (experiment.periods * plan.samples_per_period + 2 * MARGIN)
+    count = OVERSAMPLED * (plan.record_samples + 2 * MARGIN)
     _, seen = integrate(plant, torque, state, step=step, first=begin, outputs=count, stride=stride)
     time = np.asarray((begin + stride * np.arange(count)) * step, dtype=np.float64)
     return Run(time, seen, np.ascontiguousarray(command))
@@ -138,9 +138,9 @@ def measure(
 ) -> xr.Dataset:
     """The record of one condition: delayed and noisy channels, attributes of the nominal rig, provenance of the
     challenge `name` and nothing else."""
-    experiment, plan = condition.experiment, schedule(condition.experiment, bench.nominal.rig)
+    plan = schedule(condition.experiment, bench.nominal.rig)
     run = run_condition(bench, rig, levels, condition)
-    channels = _channels(run, plan, levels, experiment.periods)
+    channels = _channels(run, plan, levels)
     sensors = bench.nominal.rig.sensors
     noise = {"angle": sensors.noise_angle, "y": sensors.noise_displacement, "torque": sensors.noise_torque}
     noisy = {
@@ -150,13 +150,13 @@ def measure(
     return make_record(noisy, _attributes(bench, condition, plan, name))
 
 
-def _channels(run: Run, plan: Schedule, levels: Levels, periods: int) -> dict[str, Array]:
-    samples = periods * plan.samples_per_period
+def _channels(run: Run, plan: Schedule, levels: Levels) -> dict[str, Array]:
+    samples = plan.record_samples
     time = np.arange(samples) / plan.sampling_rate
     exact = slice(MARGIN * OVERSAMPLED, (MARGIN + samples) * OVERSAMPLED, OVERSAMPLED)
     delay = dict(zip(DELAYED, levels.delay, strict=True))
     speed = {"angle_driver": plan.speed_driver, "angle_driven": plan.speed_driven}
-    channels = {"torque_driver": np.tile(run.command, periods)}
+    channels = {"torque_driver": repeated(run.command, samples)}
     for name in ("torque_driven", *DELAYED):
         values, late = run.seen[:, OUTPUTS.index(name)], delay.get(name, 0.0)
         seen = CubicSpline(run.time, values)(time - late) if late else values[exact]
@@ -165,19 +165,9 @@ def _channels(run: Run, plan: Schedule, levels: Levels, periods: int) -> dict[st
 
 
 def _attributes(bench: Bench, condition: Condition, plan: Schedule, name: str) -> dict[str, object]:
-    rig, meshing, experiment = bench.nominal.rig, bench.meshing, condition.experiment
-    bodies = (
-        body(meshing.driver, rig.driver, rig.material.density, "rig.driver"),
-        body(meshing.driven, rig.driven, rig.material.density, "rig.driven"),
-    )
     return {
-        **rig_attributes(rig, meshing, bodies),
-        "sampling_rate": plan.sampling_rate,
-        "samples_per_period": plan.samples_per_period,
-        "periods": experiment.periods,
-        "mesh_period": plan.mesh_period,
-        "mesh_phase_origin": "geometry",
-        "torque_mean": experiment.torque_mean,
+        **rig_attributes(bench.nominal.rig, bench.meshing),
+        **experiment_attributes(plan, plan.periods, condition.experiment.torque_mean),
         "condition": condition.name,
         "provenance": json.dumps({"challenge": name}),
     }

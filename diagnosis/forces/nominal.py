@@ -8,7 +8,7 @@ from math import cos, lcm, sin, tan
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.bench.nonlinear.mesh_law import mesh_law
+from gearbench.bench.nonlinear.law_table import mesh_law
 from gearbench.geometry import body, pair
 from gearbench.lumped.linear.model import equivalent_mass
 from gearbench.lumped.nonlinear.law import MeshLaw

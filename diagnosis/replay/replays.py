@@ -31,7 +31,7 @@ def replays(law: MeshLaw) -> Callable[[Case, xr.Dataset], xr.Dataset]:
 
 def replays_of(nominal: Case, measurements: Sequence[Measurement]) -> Callable[[Case, xr.Dataset], xr.Dataset]:
     """The replays of these measurements on the nominal rig's law."""
-    from gearbench.bench.nonlinear.mesh_law import mesh_law
+    from gearbench.bench.nonlinear.law_table import mesh_law
 
     return replays(mesh_law(nominal.rig, nominal.simulation, table_load(measurements)))
 

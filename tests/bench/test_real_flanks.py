@@ -9,9 +9,8 @@ import pytest
 import xarray as xr
 
 from gearbench.bench import BenchError
-from gearbench.bench.plan.schedule import schedule
-from gearbench.bench.refusals.effects import cycles_to_repeat
-from gearbench.bench.simulate import simulate
+from gearbench.bench.experiment import simulate
+from gearbench.bench.plan.schedule import cycles_to_repeat, schedule
 from gearbench.bench.static import static
 from gearbench.figures.static import plot_static
 from gearbench.geometry import GeometryError
@@ -120,13 +119,16 @@ def test_what_repeats(file: Path) -> None:
 
 
 def test_schedule_of_what_repeats(file: Path) -> None:
-    case = make(file)
-    plan = schedule(case.experiment, case.rig, TEETH)
-    assert (plan.block_periods, plan.blocks, plan.repeats) == (2, 1, True)
-    assert schedule(case.experiment, case.rig).block_periods == 1
-    once = make(file, "experiment.periods=3")
-    plan = schedule(once.experiment, once.rig, TEETH)
-    assert (plan.block_periods, plan.blocks, plan.repeats) == (3, 1, False)
+    def plan(*settings: str) -> tuple[int, int, bool]:
+        case = make(file, *settings)
+        found = schedule(case.experiment, case.rig)
+        return found.block_periods, found.blocks, found.repeats
+
+    assert plan() == (1, 2, True)
+    assert plan(PITCH) == (2, 1, True)
+    assert plan(PITCH, "experiment.periods=1") == (1, 1, False)
+    # A record need not hold whole repetitions.
+    assert plan(PITCH, "experiment.periods=3") == (2, 2, True)
 
 
 def test_a_grade_is_drawn_the_same_way_again(file: Path) -> None:

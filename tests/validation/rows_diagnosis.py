@@ -12,7 +12,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from gearbench.bench.simulate import simulate
+from gearbench.bench.experiment import simulate
 from gearbench.cases import case_path
 from gearbench.challenge.making.cases import make_challenge
 from gearbench.challenge.making.plan import parse_mix

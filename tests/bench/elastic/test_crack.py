@@ -9,7 +9,8 @@ import pytest
 
 from gearbench.bench.elastic.crack import crack_lines, stiffness_loss
 from gearbench.bench.errors import BenchError
-from gearbench.bench.refusals.effects import ELASTIC_KEYS, cycles_to_repeat, refuse_effects, refuse_unknown
+from gearbench.bench.plan.schedule import cycles_to_repeat
+from gearbench.bench.refusals.effects import ELASTIC_KEYS, refuse_effects, refuse_unknown
 from gearbench.fem.gear.body import condense
 from gearbench.geometry.tooth.profile import profile
 from gearbench.lumped.stiffness.potential_energy import tooth_compliance

@@ -9,8 +9,8 @@ import pytest
 import xarray as xr
 
 from gearbench.bench import BenchError, simulate
-from gearbench.bench.linear.exact import exact_and_frozen, lumped_periodic_system
 from gearbench.bench.plan.excitation import torque_realisation
+from gearbench.bench.results.exact import exact_and_frozen, lumped_periodic_system
 from gearbench.geometry import pair
 from gearbench.identification.truth.harmonic_balance import harmonic_balance_itf
 from gearbench.identification.truth.monodromy import exact_itf
@@ -228,4 +228,6 @@ def test_bad_requests_are_refused() -> None:
 def test_progress_runs_from_the_first_to_the_last_realisation() -> None:
     seen: list[float] = []
     simulate(make_case(samples_per_period=128, realisations=5), progress=lambda part, _: seen.append(part))
-    assert seen == pytest.approx([0.2, 0.4, 0.6, 0.8, 1.0])
+    assert seen == sorted(seen)
+    assert seen[0] == 0.0 and seen[-1] == 1.0
+    assert len(set(seen)) > 5  # within the realisations too

@@ -9,8 +9,8 @@ import pytest
 import xarray as xr
 
 from gearbench.bench import BenchError, simulate
-from gearbench.bench.nonlinear.mesh_law import mesh_law
-from gearbench.bench.nonlinear.run import cycles_to_repeat
+from gearbench.bench.nonlinear.law_table import mesh_law
+from gearbench.bench.plan.schedule import cycles_to_repeat
 from gearbench.bench.static import static
 from gearbench.rig import (
     Case,

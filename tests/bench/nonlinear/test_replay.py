@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 
 from gearbench.bench import BenchError, simulate
-from gearbench.bench.nonlinear.mesh_law import mesh_law
+from gearbench.bench.nonlinear.law_table import mesh_law
 from gearbench.bench.nonlinear.replay import replay, resampled
 from gearbench.records import make_record, validate_record
 from gearbench.rig import (

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from gearbench.bench import simulate
-from gearbench.bench.linear.exact import lumped_periodic_system
 from gearbench.bench.plan.excitation import torque_realisation
+from gearbench.bench.results.exact import lumped_periodic_system
 from gearbench.bench.static import static
 from gearbench.geometry import pair
 from gearbench.identification.truth.monodromy import exact_itf

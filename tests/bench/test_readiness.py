@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from gearbench.bench.errors import BenchError
-from gearbench.bench.refusals.readiness import check_case, check_gears
-from gearbench.bench.simulate import simulate
+from gearbench.bench.experiment import simulate
+from gearbench.bench.readiness import check_case, check_gears
 from gearbench.bench.static import static
 from gearbench.cases import case_path
 from gearbench.cli import run_command_line

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from gearbench.bench.elastic.rig import ElasticRig, elastic_rig
 from gearbench.bench.errors import BenchError
-from gearbench.fem.contact.law import EDGE_SEPARATION, LOAD_RANGE, PAIRS, Law, newton_step
+from gearbench.bench.refusals.load_range import largest_torque
+from gearbench.fem.contact.law import EDGE_SEPARATION, PAIRS, Law, newton_step
 from gearbench.fem.contact.static import position, static_cycle
 from gearbench.fem.gear.store import cached, key_for
 from gearbench.geometry import Pair, pair
@@ -46,7 +47,7 @@ def mesh_law(rig: Rig, simulation: Simulation, load_max_nm: float) -> MeshLaw:
     if simulation.mesh_stiffness != "finite-element":
         return linear_law(sound, simulation)
     meshing = pair(sound)
-    load = _table_load(sound, meshing, load_max_nm)
+    load = _table_load(meshing, load_max_nm)
     values: dict[str, Any] = {
         "driver": _bare(sound.driver),
         "driven": _bare(sound.driven),
@@ -79,12 +80,11 @@ def _bare(gear: Gear) -> Gear:
     return gear.model_copy(update={"mass": None, "inertia": None, "bore_radius": 0.0})
 
 
-def _table_load(rig: Rig, meshing: Pair, load_max: float) -> float:
+def _table_load(meshing: Pair, load_max: float) -> float:
     """Driver torque [N m] up to which the table is solved: the next step, within what the flanks can carry."""
     if not (np.isfinite(load_max) and load_max > 0):
         raise BenchError(f"the largest load of a mesh law must be positive and finite, not {load_max:g} N m")
-    width = min(rig.driver.face_width, rig.driven.face_width)
-    most = LOAD_RANGE[1] * width * meshing.driver.base_radius
+    most = largest_torque(meshing)
     if load_max > most:
         raise BenchError(
             f"a driver torque of {load_max:.4g} N m is more than the modelled flanks can carry: at most {most:.4g} N m"

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from gearbench.bench import BenchError
 from gearbench.bench.elastic.rig import elastic_rig
-from gearbench.bench.nonlinear import mesh_law as module
-from gearbench.bench.nonlinear.mesh_law import PHASES, mesh_law
+from gearbench.bench.nonlinear import law_table as module
+from gearbench.bench.nonlinear.law_table import PHASES, mesh_law
 from gearbench.fem.contact.law import Law
 from gearbench.fem.contact.static import position, static_cycle
 from gearbench.geometry import pair

@@ -1,0 +1,155 @@
+"""A rig made ready for the reduced finite-element model, and its steps in time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.bench.elastic.rig import ElasticRig, choose_substeps, elastic_rig, machine_for
+from gearbench.bench.errors import BenchError
+from gearbench.bench.plan.excitation import Torque
+from gearbench.bench.plan.schedule import Schedule
+from gearbench.bench.plan.settling import Keep
+from gearbench.bench.protocol import Channels, Drive, Note
+from gearbench.bench.record.channels import dte_of, force_of, support_factor, turned_by
+from gearbench.fem.contact.curve import EDGE_SEPARATION
+from gearbench.fem.motion.machine import Machine
+from gearbench.fem.motion.transient import CHANNELS, Scheme, advance, initial_state, make_scheme
+from gearbench.fem.motion.transient import State as Step
+from gearbench.rig import Case
+
+Array = NDArray[np.float64]
+
+
+class Samples(NamedTuple):
+    """What the integrator hands out, each (...): angles [rad], support motions [m], driven torque [N m], number of
+    tooth pairs that carry."""
+
+    angle_driver: Array
+    angle_driven: Array
+    y_driver: Array
+    y_driven: Array
+    torque_driven: Array
+    pairs: Array
+
+
+def columns(outputs: Array) -> Samples:
+    """Outputs (..., CHANNELS) by name."""
+    return Samples(*np.moveaxis(outputs, -1, 0))
+
+
+class State(NamedTuple):
+    """The integrator's state at a sample of the record, and the outputs (CHANNELS,) there, which it hands out at the
+    end of a step; unknown (zeros) where a simulation begins."""
+
+    sample: int
+    step: Step
+    here: Array
+
+
+@dataclass(frozen=True)
+class Elastic:
+    """Equations of motion and time step of a rig, shared by all realisations. Every block is recorded."""
+
+    elastic: ElasticRig
+    machine: Machine
+    scheme: Scheme
+    substeps: int
+    mean_torque: float
+    sampling_rate: float
+    samples_per_period: int
+
+    keep: ClassVar[Keep] = "every"
+    piece: ClassVar[int] = 512
+    absolute: ClassVar[bool] = True
+    decay: ClassVar[float | None] = None
+    warnings: ClassVar[tuple[str, ...]] = ()
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        one, two = self.elastic.gears
+        return {
+            "model": "reduced",
+            "substeps": self.substeps,
+            "modes_driver": len(one.omega),
+            "modes_driven": len(two.omega),
+            "unknowns_driver": one.unknowns,
+            "unknowns_driven": two.unknowns,
+        }
+
+    @property
+    def attributes(self) -> dict[str, Any]:
+        return {}
+
+    def drive(self, torque: Torque) -> Drive:
+        period = torque.sample(self.samples_per_period * self.substeps)
+        # Entry k of the shifted signal is the torque at the end of step k.
+        return Drive(period[:: self.substeps].copy(), np.roll(period, -1))
+
+    def start(self, sample: int) -> State:
+        step = initial_state(self.machine, self.mean_torque, sample / self.sampling_rate)
+        return State(sample, step, np.zeros(CHANNELS))
+
+    def advance(self, drive: Drive, state: State, samples: int) -> tuple[State, Array]:
+        first, steps = state.sample * self.substeps, samples * self.substeps
+        torque = np.take(drive.fine, np.arange(first, first + steps), mode="wrap")
+        step, outputs, failed = advance(self.machine, self.scheme, state.step, torque, self.substeps)
+        if failed < -1:
+            raise BenchError(
+                f"at t = {step.t:.6g} s the teeth overlap where contact leaves the modelled flanks: lower"
+                " experiment.torque_mean_nm or the multisine"
+            )
+        if failed >= 0:
+            raise BenchError(
+                f"contact was not found at t = {step.t:.6g} s; more simulation.substeps than {self.substeps} may help"
+            )
+        if not np.isfinite(outputs).all():
+            raise BenchError(f"the integration diverged before t = {step.t:.6g} s")
+        here = np.vstack([state.here[None], outputs[:-1]])
+        return State(state.sample + samples, step, outputs[-1]), here
+
+    def dte(self, outputs: Array) -> Array:
+        out = columns(outputs)
+        turned = turned_by(self.elastic.pair, out.angle_driver, out.angle_driven)
+        return dte_of(turned, out.y_driver, out.y_driven, support_factor(self.elastic.rig, self.elastic.pair))
+
+    def channels(self, outputs: Array, torque: Array) -> Channels:
+        """Raises BenchError where the flanks overlapped further than tip edges are followed."""
+        dte, out = self.dte(outputs), columns(outputs)
+        most = EDGE_SEPARATION * self.elastic.pair.driver.module
+        if dte.max() > most:
+            raise BenchError(
+                f"the DTE reaches {1e6 * dte.max():.4g} um, beyond the {1e6 * most:.4g} um to which contact off the"
+                " line of action is modelled for this module: lower experiment.torque_mean_nm or the multisine"
+            )
+        return Channels(
+            torque_driven=out.torque_driven,
+            angle_driver=out.angle_driver,
+            angle_driven=out.angle_driven,
+            y_driver=out.y_driver,
+            y_driven=out.y_driven,
+            dte=dte,
+            force=force_of(torque, self.elastic.pair),
+        )
+
+    def apart(self, outputs: Array) -> NDArray[np.bool_]:
+        return np.asarray(columns(outputs).pairs == 0)
+
+
+def prepare(case: Case, plan: Schedule, note: Note) -> Elastic:
+    """Gears condensed, contact tabulated, step chosen. Raises GeometryError, ContactError or BenchError."""
+    elastic = elastic_rig(case.rig, case.simulation, note)
+    machine = machine_for(elastic, plan.mesh_frequency)
+    substeps = choose_substeps(machine, case, plan)
+    return Elastic(
+        elastic=elastic,
+        machine=machine,
+        scheme=make_scheme(1.0 / (plan.sampling_rate * substeps), case.simulation.spectral_radius),
+        substeps=substeps,
+        mean_torque=case.experiment.torque_mean,
+        sampling_rate=plan.sampling_rate,
+        samples_per_period=plan.samples_per_period,
+    )

@@ -1,0 +1,197 @@
+"""One experiment, whatever the model: periods, realisations side by side, settling, and the record of it."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from gearbench.bench.models import model_for
+from gearbench.bench.plan.excitation import torque_realisation
+from gearbench.bench.plan.schedule import ProgressReport, Schedule, schedule
+from gearbench.bench.plan.settling import Course, Steady, kept_samples, samples_to_run, steady_state
+from gearbench.bench.plan.workers import realisations
+from gearbench.bench.protocol import Channels, Drive, Prepared
+from gearbench.bench.record.attributes import (
+    experiment_attributes,
+    joined,
+    lost_contact,
+    rig_attributes,
+    unlike_periods,
+)
+from gearbench.bench.record.channels import has_sensors, mesh_phases, sensed, with_rotation
+from gearbench.bench.record.sensors import check_delays, repeated
+from gearbench.bench.refusals.gears import check_gears
+from gearbench.geometry import pair
+from gearbench.records import make_record, provenance
+from gearbench.rig import Case, dump_case
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Realisation:
+    """What one realisation leaves beside its channels: `lost` samples without contact, None where the model has no such
+    thing; the rest as in `Steady`."""
+
+    lost: int | None
+    residual: float
+    settling_periods: int
+    first: int
+    scatter: Array | None
+
+
+def simulate(case: Case, model: str | None = None, progress: ProgressReport | None = None) -> xr.Dataset:
+    """Record of the case's experiment, simulated with `model` (absent: the case's own).
+
+    `progress(fraction, note)` is called now and then, from any thread. A case with conditions has one experiment for
+    each: simulate each of `case.experiments()`. The realisations run on all processors that this process may use; the
+    result does not depend on their number. Raises BenchError for an unknown model and for a motion that does not settle, and
+    what the solver raises, one sentence each.
+
+    >>> import gearbench as gb
+    >>> record = gb.simulate(gb.read_case("quick_lumped", ["experiment.realisations=2"]))
+    >>> record["angle_driver"].sizes["realisation"], record["angle_driver"].attrs["units"]
+    (2, 'rad')
+    """
+    report = progress or (lambda fraction, note: None)
+    case, solver = model_for(case, model)
+    check_gears(case.rig)
+    solver.refuse(case)
+    plan = schedule(case.experiment, case.rig)
+    check_delays(case.rig, plan.repeats, plan.repeat_time)
+    prepared = solver.prepare(case, plan, lambda note: report(0.0, note))
+    report(0.0, f"integrating with {prepared.substeps} steps a sample")
+    shape = (case.experiment.realisations, kept_samples(plan, prepared.keep))
+    # Filled row by row as realisations end: a hundred long ones are large, and must not be in memory twice.
+    channels = {name: np.empty(shape) for name in ("torque_driver", *Channels._fields)}
+    return _record(case, plan, prepared, channels, _realise(case, plan, prepared, channels, report))
+
+
+def _realise(
+    case: Case, plan: Schedule, prepared: Prepared[Any], channels: dict[str, Array], report: ProgressReport
+) -> list[Realisation]:
+    """All realisations of an experiment, told about and interrupted between their pieces; each fills its row of the
+    channels (realisations, n), before any sensor."""
+    total = case.experiment.realisations
+    done = np.zeros(total)
+    lock, stop = threading.Lock(), threading.Event()
+    decay = None if plan.repeats else prepared.decay
+    expected = samples_to_run(plan, prepared.keep)
+
+    def run(number: int) -> Realisation:
+        def tell(fraction: float) -> None:
+            if stop.is_set():
+                raise InterruptedError("another realisation has failed, or the run was interrupted")
+            with lock:
+                done[number] = fraction
+                report(float(done.mean()), f"realisation {number + 1} of {total}")
+
+        drive = prepared.drive(torque_realisation(case.experiment, number, case.rig))
+        # A realisation that takes longer to settle than expected stays close to its end.
+        course = course_of(prepared, drive, lambda samples: tell(min(samples / expected, 0.99)))
+        steady = steady_state(course, plan, case.experiment, prepared.dte, prepared.keep, decay)
+        torque = repeated(drive.torque, len(steady.outputs))
+        channels["torque_driver"][number] = torque
+        for name, values in prepared.channels(steady.outputs, torque)._asdict().items():
+            channels[name][number] = values
+        tell(1.0)
+        return _realisation(prepared, plan, steady)
+
+    return realisations(run, total, stop)
+
+
+def course_of(prepared: Prepared[Any], drive: Drive, ran: Callable[[int], None]) -> Course:
+    """The course of one realisation; `ran(samples)` is told between its pieces how far it has come, and may raise."""
+    run = 0
+
+    def course(first: int, lengths: Iterable[int]) -> Iterator[Array]:
+        nonlocal run
+        state = prepared.start(first)
+        for length in lengths:
+            parts = []
+            for at in range(0, length, prepared.piece or length):
+                count = min(prepared.piece or length, length - at)
+                state, outputs = prepared.advance(drive, state, count)
+                parts.append(outputs)
+                run += count
+                ran(run)
+            yield parts[0] if len(parts) == 1 else np.vstack(parts)
+
+    return course
+
+
+def _realisation(prepared: Prepared[Any], plan: Schedule, steady: Steady) -> Realisation:
+    apart = prepared.apart(steady.outputs)
+    return Realisation(
+        lost=None if apart is None else int(repeated(apart, _recorded(plan, prepared)).sum()),
+        residual=steady.residual,
+        settling_periods=steady.settling_periods,
+        first=steady.first,
+        scatter=steady.scatter,
+    )
+
+
+def _recorded(plan: Schedule, prepared: Prepared[Any]) -> int:
+    """Samples of the record: a mean over blocks is as long as one of them."""
+    return kept_samples(plan, "mean") if prepared.keep == "mean" else plan.record_samples
+
+
+def _record(
+    case: Case, plan: Schedule, prepared: Prepared[Any], channels: dict[str, Array], runs: list[Realisation]
+) -> xr.Dataset:
+    meshing = pair(case.rig)
+    samples = _recorded(plan, prepared)
+    averaged = prepared.keep == "mean"
+    first = max(run.first for run in runs)
+    if has_sensors(case.rig):
+        channels = sensed(channels, case.rig, meshing, plan, samples=samples, seed=case.experiment.seed)
+    channels = {name: repeated(values, samples) for name, values in channels.items()}
+    channels = _aligned(channels, runs, plan) if prepared.absolute else with_rotation(channels, plan)
+    phase = mesh_phases(plan, samples, first * plan.cycles_per_sample)
+    channels["mesh_phase"] = np.broadcast_to(phase, channels["dte"].shape)
+    lost = None if runs[0].lost is None else sum(run.lost or 0 for run in runs)
+    periods = samples // plan.samples_per_period
+    attributes = {
+        **rig_attributes(case.rig, meshing),
+        **experiment_attributes(plan, periods, case.experiment.torque_mean),
+        "periods_averaged": plan.blocks if averaged else None,
+        "settling_residual": max(run.residual for run in runs),
+        "settling_periods": max(run.settling_periods for run in runs),
+        "repeats_after_mesh_cycles": plan.repeat_cycles,
+        "hunting_period": plan.repeat_cycles * plan.mesh_period,
+        "contact_lost_samples": lost,
+        "warnings": joined(lost_contact(lost or 0, len(runs) * samples), unlike_periods(plan), *prepared.warnings),
+        "model": case.simulation.model,
+        "substeps": prepared.substeps,
+        **prepared.attributes,
+        "provenance": provenance(dump_case(case), case.experiment.seed, prepared.settings),
+    }
+    return make_record(
+        channels, attributes, channel_attributes=_scatter(prepared, runs), start=first / plan.sampling_rate
+    )
+
+
+def _aligned(channels: dict[str, Array], runs: list[Realisation], plan: Schedule) -> dict[str, Array]:
+    """Absolute angles brought to the latest start: others are whole blocks earlier."""
+    late = np.array([max(run.first for run in runs) - run.first for run in runs])[:, None] / plan.sampling_rate
+    if not late.any():
+        return channels
+    speeds = {"angle_driver": plan.speed_driver, "angle_driven": plan.speed_driven}
+    return {**channels, **{name: channels[name] + late * speed for name, speed in speeds.items()}}
+
+
+def _scatter(prepared: Prepared[Any], runs: list[Realisation]) -> Mapping[str, Mapping[str, float]]:
+    """Attribute period_scatter of the channels, the rms over all realisations; none where nothing is averaged."""
+    scatters = [run.scatter for run in runs if run.scatter is not None]
+    if not scatters:
+        return {}
+    rms = np.sqrt((np.stack(scatters) ** 2).mean(axis=0))
+    spread = prepared.channels(rms[None], np.zeros(1))._asdict()
+    measured = ("torque_driven", "angle_driver", "angle_driven", "y_driver", "y_driven")
+    return {name: {"period_scatter": abs(float(spread[name][0]))} for name in measured}

@@ -1,0 +1,203 @@
+"""When a simulation has settled, and what of its steady state becomes the record.
+
+A course is one realisation on its way: `course(first, lengths)` begins at rest at sample `first` of the record and
+yields the outputs (samples, n) of one stretch of that many samples after the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from itertools import repeat
+from math import ceil, exp, log
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.bench.errors import BenchError
+from gearbench.bench.plan.schedule import Schedule
+from gearbench.rig import Experiment
+
+Array = NDArray[np.float64]
+
+Course = Callable[[int, Iterable[int]], Iterator[Array]]
+Dte = Callable[[Array], Array]
+
+# What is kept of the steady state: every block of the record; the mean of those blocks and their scatter; one block,
+# which stands for them all. A mean and a block that stands for others have no time of their own: they begin at 0.
+Keep = Literal["every", "mean", "one"]
+
+
+@dataclass(frozen=True)
+class Steady:
+    """What is kept: outputs (samples, n) from sample `first` of the record's clock on.
+
+    residual: change of the DTE to the block before, largest value over its standard deviation; settling_periods:
+    excitation periods before what is kept; scatter (n,): rms departure of single blocks from their mean.
+    """
+
+    outputs: Array
+    residual: float
+    settling_periods: int
+    first: int = 0
+    scatter: Array | None = None
+
+
+class Settled(NamedTuple):
+    """Two blocks that follow one another, alike to within `residual`, and the number of blocks run before them."""
+
+    before: Array
+    after: Array
+    residual: float
+    earlier: int
+
+
+def change(before: Array, after: Array) -> float:
+    """Largest change of a DTE over its standard deviation, or over a millionth of its mean if it hardly varies."""
+    scale = max(float(after.std()), 1e-6 * abs(float(after.mean())), np.finfo(float).tiny)
+    return float(np.abs(after - before).max()) / scale
+
+
+def steady_state(
+    course: Course, plan: Schedule, experiment: Experiment, dte: Dte, keep: Keep, decay: float | None
+) -> Steady:
+    """Run one realisation until it is steady, and on to the end of the record.
+
+    decay: slowest rate [1/s] of free vibrations, where known. Raises BenchError if that takes more than
+    experiment.settling_periods_max.
+    """
+    if not plan.repeats:
+        if decay is None:
+            return _from_two_starts(course, plan, experiment, dte)
+        return _after_decay(course, plan, experiment, decay)
+    if keep == "every":
+        return _every_block(course, plan, experiment, dte)
+    blocks = course(0, repeat(plan.block_samples))
+    settled = _settle(blocks, plan, experiment, dte)
+    periods = (settled.earlier + 1) * plan.block_periods
+    if keep == "one":
+        return Steady(settled.after, settled.residual, periods)
+    mean, scatter = _average(settled.after, blocks, plan.blocks)
+    return Steady(mean, settled.residual, periods, scatter=scatter)
+
+
+def samples_to_run(plan: Schedule, keep: Keep) -> int:
+    """Samples of a realisation that settles at the first look, by which progress is told."""
+    if not plan.repeats:
+        return (plan.periods + 4) * plan.samples_per_period
+    return {"every": 1 + max(plan.blocks, 2), "mean": 1 + plan.blocks, "one": 2}[keep] * plan.block_samples
+
+
+def kept_samples(plan: Schedule, keep: Keep) -> int:
+    """Samples that are kept."""
+    return plan.block_samples if plan.repeats and keep != "every" else plan.record_samples
+
+
+def _settle(blocks: Iterator[Array], plan: Schedule, experiment: Experiment, dte: Dte, earlier: int = 0) -> Settled:
+    """The first two blocks that are alike, `earlier` blocks having been run."""
+    before = next(blocks)
+    while True:
+        after = next(blocks)
+        residual = change(dte(before), dte(after))
+        if residual <= experiment.settling_tolerance:
+            return Settled(before, after, residual, earlier)
+        earlier += 1
+        periods = (earlier + 1) * plan.block_periods
+        if periods > experiment.settling_periods_max:
+            raise _no_steady_state(
+                f"after {periods} excitation periods the DTE still changes by {residual:.3g} of its standard deviation"
+                " from one repetition to the next",
+                experiment,
+            )
+        before = after
+
+
+def _every_block(course: Course, plan: Schedule, experiment: Experiment, dte: Dte) -> Steady:
+    """Settle for one block, then keep those that follow one another without change."""
+    blocks = course(-plan.block_samples, repeat(plan.block_samples))
+    next(blocks)
+    # One block more than recorded shows the change from block to block where only one is wanted.
+    settled = _settle(blocks, plan, experiment, dte, earlier=1)
+    kept, earlier = [settled.before, settled.after], settled.earlier
+    if plan.blocks == 1:
+        kept, earlier = [settled.after], earlier + 1
+    kept += [next(blocks) for _ in range(plan.blocks - 2)]
+    return Steady(
+        np.vstack(kept)[: plan.record_samples],
+        settled.residual,
+        earlier * plan.block_periods,
+        first=(earlier - 1) * plan.block_samples,
+    )
+
+
+def _average(first: Array, blocks: Iterator[Array], count: int) -> tuple[Array, Array]:
+    """Mean over `count` blocks, of which `first` has been run, and the rms departure (n,) from it."""
+    # Departures from the first block are small: their sums lose no digits.
+    total, squares = np.zeros_like(first), np.zeros_like(first)
+    for _ in range(count - 1):
+        block = next(blocks)
+        block -= first
+        total += block
+        block *= block
+        squares += block
+    total /= count
+    variance = squares / count - total**2
+    return first + total, np.sqrt(np.maximum(variance, 0.0).mean(axis=0))
+
+
+def _after_decay(course: Course, plan: Schedule, experiment: Experiment, decay: float) -> Steady:
+    """A record shorter than what repeats: it begins when free vibrations have died out by their slowest rate."""
+    period = plan.samples_per_period / plan.sampling_rate
+    wanted = log(1 / experiment.settling_tolerance) * plan.sampling_rate / plan.samples_per_period
+    most = experiment.settling_periods_max
+    if not decay > 0:
+        raise _no_steady_state("free vibrations do not die out: they grow or keep their size", experiment)
+    periods = ceil(wanted / decay)
+    if periods > most:
+        raise _no_steady_state(
+            f"free vibrations take {periods} excitation periods to die out: after {most} they still have"
+            f" {exp(-decay * most * period):.3g} of their size",
+            experiment,
+        )
+    settling = periods * plan.samples_per_period
+    _, outputs = course(-settling, (settling, plan.record_samples))
+    return Steady(outputs, experiment.settling_tolerance, periods)
+
+
+def _from_two_starts(course: Course, plan: Schedule, experiment: Experiment, dte: Dte) -> Steady:
+    """A record shorter than what repeats, of a model that does not know how fast its vibrations die out.
+
+    No period is like the one before, so the steady state shows in another way: two histories, one begun an excitation
+    period before the other, must agree over the first recorded period.
+    """
+
+    def history(settling: int) -> tuple[Iterator[Array], Array]:
+        periods = course(-settling * plan.samples_per_period, repeat(plan.samples_per_period))
+        for _ in range(settling):
+            next(periods)
+        return periods, next(periods)
+
+    before = history(1)[1]
+    settling = 2
+    while True:
+        periods, first = history(settling)
+        residual = change(dte(before), dte(first))
+        if residual <= experiment.settling_tolerance:
+            break
+        if settling >= experiment.settling_periods_max:
+            raise _no_steady_state(
+                f"after {settling} excitation periods the DTE still depends by {residual:.3g} of its standard deviation"
+                " on when the simulation began",
+                experiment,
+            )
+        before, settling = first, settling + 1
+    kept = [first, *(next(periods) for _ in range(plan.periods - 1))]
+    return Steady(np.vstack(kept), residual, settling)
+
+
+def _no_steady_state(found: str, experiment: Experiment) -> BenchError:
+    return BenchError(
+        f"no steady state: {found}, which experiment.settling_tolerance limits to {experiment.settling_tolerance:g};"
+        f" raise settling_periods_max = {experiment.settling_periods_max} or the damping"
+    )
