@@ -104,7 +104,7 @@ def run_experiment(job: Job) -> dict[str, Any]:
     from gearbench.bench import simulate
     from gearbench.bench.models import model_for
     from gearbench.bench.results.responses import identify_case, linearised_modes, reference_results
-    from gearbench.bench.static import static
+    from gearbench.bench.statics import static
     from gearbench.figures.of_run import FIGURES, RunResults
     from gearbench.geometry import pair
     from gearbench.identification import read_frf, write_frf

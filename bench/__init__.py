@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from gearbench.bench.experiment import simulate
     from gearbench.bench.results.compare import Results, Row
     from gearbench.bench.results.comparison import Comparison, compare
-    from gearbench.bench.static import static
+    from gearbench.bench.statics import static
 
 __all__ = ["BenchError", "Comparison", "Results", "Row", "compare", "simulate", "static"]
 
@@ -27,7 +27,7 @@ _HOMES = {
     "Row": "gearbench.bench.results.compare",
     "compare": "gearbench.bench.results.comparison",
     "simulate": "gearbench.bench.experiment",
-    "static": "gearbench.bench.static",
+    "static": "gearbench.bench.statics",
 }
 
 

@@ -51,8 +51,8 @@ def simulate(case: Case, model: str | None = None, progress: ProgressReport | No
 
     `progress(fraction, note)` is called now and then, from any thread. A case with conditions has one experiment for
     each: simulate each of `case.experiments()`. The realisations run on all processors that this process may use; the
-    result does not depend on their number. Raises BenchError for an unknown model and for a motion that does not settle, and
-    what the solver raises, one sentence each.
+    result does not depend on their number. Raises BenchError for an unknown model and for a motion that does not
+    settle, and what the solver raises, one sentence each.
 
     >>> import gearbench as gb
     >>> record = gb.simulate(gb.read_case("quick_lumped", ["experiment.realisations=2"]))

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from gearbench.bench.plan.workers import processors
-from gearbench.bench.static import static
+from gearbench.bench.statics import static
 from gearbench.challenge.answers import Answer, read_answers, write_answers
 from gearbench.challenge.errors import ChallengeError
 from gearbench.challenge.making.nominal import nominal_text

@@ -10,7 +10,7 @@ import xarray as xr
 
 from gearbench.bench import BenchError
 from gearbench.bench.plan.workers import realisations
-from gearbench.bench.static import static
+from gearbench.bench.statics import static
 from gearbench.cases import case_path
 from gearbench.cli import run_command_line
 from gearbench.identification import SpectraError, identify

@@ -19,7 +19,7 @@ from gearbench.bench.plan.settling import Keep
 from gearbench.bench.protocol import Channels, Drive, Model, Note
 from gearbench.bench.record.channels import force_of
 from gearbench.bench.record.static import Loads, static_dataset
-from gearbench.bench.static import static
+from gearbench.bench.statics import static
 from gearbench.cases import case_path
 from gearbench.geometry import Pair, pair
 from gearbench.rig import Case, Simulation, read_case

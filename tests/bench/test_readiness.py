@@ -10,7 +10,7 @@ import pytest
 from gearbench.bench.errors import BenchError
 from gearbench.bench.experiment import simulate
 from gearbench.bench.readiness import check_case, check_gears
-from gearbench.bench.static import static
+from gearbench.bench.statics import static
 from gearbench.cases import case_path
 from gearbench.cli import run_command_line
 from gearbench.geometry import GeometryError, sector_mesh

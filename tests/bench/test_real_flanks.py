@@ -11,7 +11,7 @@ import xarray as xr
 from gearbench.bench import BenchError
 from gearbench.bench.experiment import simulate
 from gearbench.bench.plan.schedule import cycles_to_repeat, schedule
-from gearbench.bench.static import static
+from gearbench.bench.statics import static
 from gearbench.figures.static import plot_static
 from gearbench.geometry import GeometryError
 from gearbench.rig import Case, read_case

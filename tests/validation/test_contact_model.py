@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from shared.contact_models import RUNS, case_of, model_of, stiff_limit
 
-from gearbench.bench.static import static
+from gearbench.bench.statics import static
 from gearbench.geometry.export.calculix import write_deck
 
 # The smallest one; about a minute.

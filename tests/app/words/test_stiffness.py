@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from gearbench.bench.results.stiffness_table import StiffnessTable, stiffness_table
-from gearbench.bench.static import static
+from gearbench.bench.statics import static
 from gearbench.cases import case_path
 from gearbench.commands.static_methods import draw_largest, methods_data, methods_lines, stiffness_tables
 from gearbench.figures.stiffness import draw_stiffness_table

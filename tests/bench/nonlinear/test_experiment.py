@@ -11,7 +11,7 @@ import xarray as xr
 from gearbench.bench import BenchError, simulate
 from gearbench.bench.nonlinear.law_table import mesh_law
 from gearbench.bench.plan.schedule import cycles_to_repeat
-from gearbench.bench.static import static
+from gearbench.bench.statics import static
 from gearbench.rig import (
     Case,
     Coupling,

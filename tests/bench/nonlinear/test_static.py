@@ -10,7 +10,7 @@ import pytest
 from gearbench.bench import simulate
 from gearbench.bench.plan.excitation import torque_realisation
 from gearbench.bench.results.exact import lumped_periodic_system
-from gearbench.bench.static import static
+from gearbench.bench.statics import static
 from gearbench.geometry import pair
 from gearbench.identification.truth.monodromy import exact_itf
 from gearbench.rig import (

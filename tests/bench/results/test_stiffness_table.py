@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gearbench.bench.results.stiffness_table import StiffnessTable, stiffness_table
-from gearbench.bench.static import static
+from gearbench.bench.statics import static
 from gearbench.cases import case_path
 from gearbench.geometry import pair
 from gearbench.lumped.stiffness.iso6336 import iso_stiffness

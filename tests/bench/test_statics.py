@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gearbench.bench import BenchError
-from gearbench.bench.static import static
+from gearbench.bench.statics import static
 from gearbench.cases import case_path
 from gearbench.geometry import pair
 from gearbench.rig import Case, read_case
