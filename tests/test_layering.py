@@ -37,7 +37,7 @@ ROOMS: dict[str, tuple[str, ...]] = {
     "lumped": ("stiffness", "linear", "nonlinear"),
     "identification": ("excitation", "spectra", "lpm", "truth", "response"),
     "bench": ("plan", "record", "refusals", "elastic", "nonlinear", "linear", "stress", "export", "results"),
-    "diagnosis": ("intake", "forces", "replay", "evidence"),
+    "diagnosis": ("intake", "forces", "effects", "evidence", "replay"),
     "challenge": ("truth", "making", "scoring"),
     "app": ("shell", "words", "figures", "report", "commands"),
 }
