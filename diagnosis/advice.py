@@ -38,7 +38,7 @@ def advice_of(measurements: Sequence[Measurement], held_out: Measurement | None)
         said.append("Add a record at another speed: effects of time can then be told from those of rotation.")
     if held_out is None:
         said.append(
-            "Add a record with other phases, to be held out: only such a record shows how far the gap shrinks on data that"
-            " were not fitted."
+            "Add a record with other phases, to be held out: only such a record shows how far the gap shrinks on data"
+            " that were not fitted."
         )
     return tuple(said)

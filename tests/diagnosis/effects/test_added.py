@@ -254,12 +254,12 @@ def leaves(value: object, path: str) -> dict[str, object]:
 @pytest.mark.parametrize("effect", LIBRARY, ids=lambda effect: effect.name)
 def test_an_effect_moves_the_fields_that_it_says(base: Bench, effect: Effect) -> None:
     p = 0.5 * base.unknowns.prior()
+    plain = recalibrated(base.nominal, base.fitted(p))
+    before = leaves(plain.rig, "rig")
     moved: set[str] = set()
     for hypothesis in effect.hypotheses(base.model):
         wide = hypothesis.prior(base.unknowns)
         values = np.where(wide > base.unknowns.prior(), 0.4 * wide, p)
-        plain = recalibrated(base.nominal, base.fitted(values))
-        before = leaves(plain.rig, "rig")
         after = leaves(added(plain, hypothesis, base.fitted(values))[0].rig, "rig")
         moved |= {key for key in {*before, *after} if before.get(key) != after.get(key)}
     fields = {key: [one for one in effect.fields if f"{key}.".startswith(f"{one}.")] for key in moved}
