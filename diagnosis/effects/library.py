@@ -14,6 +14,7 @@ from gearbench.diagnosis.effects.free_forms import unknowns as free_unknowns
 from gearbench.diagnosis.effects.friction import FRICTION
 from gearbench.diagnosis.effects.pitch_error import PITCH_ERROR
 from gearbench.diagnosis.effects.sensor_delay import SENSOR_DELAY
+from gearbench.diagnosis.effects.support_stiffness import SUPPORT_STIFFNESS
 from gearbench.diagnosis.effects.tooth_crack import TOOTH_CRACK
 from gearbench.diagnosis.effects.torque_ripple import TORQUE_RIPPLE
 from gearbench.diagnosis.forces.condition import Condition
@@ -31,6 +32,7 @@ LIBRARY: tuple[Effect, ...] = (
     SENSOR_DELAY,
     TORQUE_RIPPLE,
     BACKLASH,
+    SUPPORT_STIFFNESS,
 )
 
 
