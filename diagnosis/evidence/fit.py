@@ -91,10 +91,11 @@ def _normal(problem: Problem, p: Array, factors: Sequence[Array], plain: bool = 
             gradient += 2 * (j.T @ r)
             continue
         r, j = whitened(blocks, at.residuals, at.jacobian, factor)
-        stiffer = stiffening_gradient(condition, unknowns, p)
+        stiffer = stiffening_gradient(condition, unknowns, at.departures)
         slope, curve = of_level(blocks, at.residuals, at.jacobian, at.mesh_jacobian, factor, stiffer)
         information += 2 * (j.T @ j) + curve
-        gradient += 2 * (j.T @ r) + slope - log_volume_gradient(model, condition, blocks, unknowns, p, stiffer)
+        volume = log_volume_gradient(model, condition, blocks, unknowns, at.departures, stiffer)
+        gradient += 2 * (j.T @ r) + slope - volume
     return information, gradient
 
 

@@ -49,8 +49,10 @@ BACKLASH_STEP = 1e-7  # [m]
 
 @dataclass(frozen=True)
 class Linearised:
-    """Residuals in B used bins, their Jacobian (4, B, unknowns), and that (B, unknowns) of the mesh force."""
+    """Residuals in B used bins under `departures`, their Jacobian (4, B, unknowns), and that (B, unknowns) of the mesh
+    force."""
 
+    departures: Departures
     residuals: Residuals
     jacobian: Complex
     mesh_jacobian: Complex
@@ -76,7 +78,7 @@ def linearised(
     _support_columns(at, put)
     _drive_columns(at, put)
     _friction_columns(at, put)
-    return Linearised(residuals.at(used), out, mesh_jacobian)
+    return Linearised(departures, residuals.at(used), out, mesh_jacobian)
 
 
 @dataclass(frozen=True)

@@ -34,23 +34,28 @@ def log_volume(
 
 
 def log_volume_gradient(
-    model: NominalModel, condition: Condition, blocks: Blocks, unknowns: Unknowns, p: Array, stiffer: Array
+    model: NominalModel,
+    condition: Condition,
+    blocks: Blocks,
+    unknowns: Unknowns,
+    departures: Departures,
+    stiffer: Array,
 ) -> Array:
-    """Gradient (size,) of `log_volume`; `stiffer` (size,) is that of its `stiffening`."""
+    """Gradient (size,) of `log_volume` by the unknowns; `stiffer` (size,) is that of its `stiffening`."""
     gradient = 2 * blocks.used.size * stiffer
-    for side, parts, whole in _dynamic_stiffness(model, condition, blocks, unknowns.departures(p, condition)):
+    for side, parts, whole in _dynamic_stiffness(model, condition, blocks, departures):
         for slot, part in parts.items():
             for entry in unknowns.moving.get((slot, side), ()):
                 gradient[entry] += 2 * float((part / whole).real.sum())
     return gradient
 
 
-def stiffening_gradient(condition: Condition, unknowns: Unknowns, p: Array) -> Array:
+def stiffening_gradient(condition: Condition, unknowns: Unknowns, departures: Departures) -> Array:
     """Gradient (size,) of `Mesh.stiffening`: the mean logarithm over time of the mesh stiffness's factor."""
     gradient = np.zeros(unknowns.size)
     for entry in unknowns.moving.get(("scale", 0), ()):
         gradient[entry] = 1.0
-    loss = unknowns.departures(p, condition).loss
+    loss = departures.loss
     soft = softened(condition, loss)
     left = (condition.load_share * soft).sum(axis=-1)
     weaker = (condition.load_share * soft**2 / left[:, None])[..., None] * condition.bending

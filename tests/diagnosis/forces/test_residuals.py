@@ -103,7 +103,8 @@ def test_gradient_of_the_volume(prepared: Prepared) -> None:
     p = usual(where)
     p[where["crack"]] = 0.1
     p[where["shape"]] = 0.0  # of second order in the stiffness, left out
-    gradient = log_volume_gradient(made, condition, blocks, where, p, stiffening_gradient(condition, where, p))
+    at = where.departures(p, condition)
+    gradient = log_volume_gradient(made, condition, blocks, where, at, stiffening_gradient(condition, where, at))
     keys = ("stiffness", "damping", "mass", "scale", "crack")
     for entry in (number for key in keys for number in range(*where[key].indices(where.size))):
         step = np.zeros(where.size)
