@@ -14,9 +14,9 @@ from typing import Any
 
 from gearbench.challenge.errors import ChallengeError
 from gearbench.files import write_text
+from gearbench.rig.contract import PLACES
 
 KINDS = ("effect", "none", "foreign")
-PLACES = ("mesh", "driver-support", "driven-support", "drive", "load", "sensor", "none")
 
 
 @dataclass(frozen=True)

@@ -1,11 +1,13 @@
 """Which effect that the simulation leaves out causes its gap to the measurement.
 
 `intake`: records become measurements, checked against the nominal rig. `forces`: the force missing from each equation
-of motion, and how it depends on the unknowns. `replay`: rigs simulated under the records' own torque: recalibration,
-gap, gap budget. `evidence`: hypotheses, their evidence, the decision between them.
+of motion, and how it depends on the unknowns. `effects`: the library, an effect a file. `evidence`: hypotheses, their
+evidence, the decision between them. `replay`: rigs simulated under the records' own torque: recalibration, gap, gap
+budget.
 """
 
+from gearbench.diagnosis.diagnosis import Diagnosis, diagnose
 from gearbench.diagnosis.errors import DiagnosisError
 from gearbench.diagnosis.verdict import Verdict, read_verdict, verdict_json
 
-__all__ = ["DiagnosisError", "Verdict", "read_verdict", "verdict_json"]
+__all__ = ["Diagnosis", "DiagnosisError", "Verdict", "diagnose", "read_verdict", "verdict_json"]

@@ -13,7 +13,7 @@ APART = 1.1
 def advice_of(measurements: Sequence[Measurement], held_out: Measurement | None) -> tuple[str, ...]:
     """Sentences about what these records lack; none if they hold all that diagnosis can use."""
     everything = [*measurements, *([held_out] if held_out else [])]
-    found = []
+    said = []
     for channel, words in (
         ("y_driver", "the displacement of the driver (y_driver)"),
         ("y_driven", "the displacement of the driven gear (y_driven)"),
@@ -21,21 +21,24 @@ def advice_of(measurements: Sequence[Measurement], held_out: Measurement | None)
     ):
         lacking = [one.name for one in everything if channel not in one.periods]
         if lacking:
-            found.append(f"Measure {words}: it is missing in {', '.join(lacking)}.")
-    single = [one.name for one in everything if one.rows < 2]
+            said.append(f"Measure {words}: it is missing in {', '.join(lacking)}.")
+    single = [one.name for one in everything if one.repetitions < 2]
     if single:
-        found.append(f"Record two hunting periods or more: there is one only in {', '.join(single)}.")
+        said.append(f"Record two hunting periods or more: there is one only in {', '.join(single)}.")
     adrift = [one.name for one in everything if one.drift]
     if adrift:
-        found.append(f"Let the rig warm up and the sensors settle: {', '.join(adrift)} drifted while recording.")
+        said.append(f"Let the rig warm up and the sensors settle: {', '.join(adrift)} drifted while recording.")
     if any(not one.phase_known for one in everything):
-        found.append("Refer the mesh phase to the teeth (an index pulse at tooth 0): single teeth can then be named.")
+        said.append("Refer the mesh phase to the teeth (an index pulse at tooth 0): single teeth can then be named.")
     torques = [float(one.mean("torque_driver").mean()) for one in measurements]
     speeds = [one.mesh_frequency for one in measurements]
     if max(torques) < APART * min(torques):
-        found.append("Add a record at another mean torque: effects of load and of position then come apart.")
+        said.append("Add a record at another mean torque: effects of load can then be told from those of position.")
     if max(speeds) < APART * min(speeds):
-        found.append("Add a record at another speed: effects of time and of rotation then come apart.")
+        said.append("Add a record at another speed: effects of time can then be told from those of rotation.")
     if held_out is None:
-        found.append("Add a record with other phases, to be held out: only it tells how far the gap really shrinks.")
-    return tuple(found)
+        said.append(
+            "Add a record with other phases, to be held out: only such a record shows how far the gap shrinks on data"
+            " that were not fitted."
+        )
+    return tuple(said)

@@ -16,13 +16,12 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from gearbench.diagnosis.errors import DiagnosisError
 from gearbench.files import write_text
+from gearbench.rig.contract import Place
 
 SCHEMA: Literal["gearbench-verdict/1"] = "gearbench-verdict/1"
 
 Outcome = Literal["effect", "none", "unknown"]
-Place = Literal["mesh", "driver-support", "driven-support", "drive", "load", "sensor", "none"]
 Kind = Literal["channel", "band", "class", "phase", "tooth", "place", "condition"]
-PLACES: tuple[str, ...] = get_args(Place)
 KINDS: tuple[str, ...] = get_args(Kind)
 
 # Departure of a sum of probabilities from 1 that rounding in a file explains.

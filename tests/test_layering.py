@@ -38,7 +38,7 @@ ROOMS: dict[str, tuple[str, ...]] = {
     "lumped": ("stiffness", "linear", "nonlinear"),
     "identification": ("excitation", "spectra", "lpm", "truth", "response"),
     "bench": ("plan", "record", "refusals", "linear", "elastic", "nonlinear", "stress", "export", "results"),
-    "diagnosis": ("intake", "forces", "replay", "evidence"),
+    "diagnosis": ("intake", "forces", "effects", "evidence", "replay"),
     "challenge": ("truth", "making", "scoring"),
     "app": ("shell", "words", "figures", "report", "commands"),
 }

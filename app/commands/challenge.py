@@ -109,13 +109,13 @@ def read(path: Path) -> Mapping[str, Any]:
 
 def diagnose_case(records: Sequence[Path], nominal: Path, folder: Path, without: Sequence[str]) -> str | None:
     """Diagnose one case and write its verdict; one sentence instead when it cannot be diagnosed."""
-    from gearbench.commands.diagnosis_job import diagnose, take_in
+    from gearbench.diagnosis import diagnose
     from gearbench.diagnosis.verdict import write_verdict
     from gearbench.rig import read_case
     from gearbench.shell.failure import user_errors
 
     try:
-        made = diagnose(take_in(records, read_case(nominal), without=without), shares=False, refine=False)
+        made = diagnose(records, read_case(nominal), without=without, quick=True)
     except user_errors() as error:
         return str(error)
     write_verdict(made.verdict, folder / "verdict.json")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -16,8 +16,8 @@ from gearbench.shell.output import Output, claimed, fingerprint
 from gearbench.shell.progress import Progress
 
 if TYPE_CHECKING:
-    from gearbench.commands.diagnosis_job import Diagnosis, Simulate, Taken
-    from gearbench.report.diagnosis import Report
+    from gearbench.diagnosis.diagnosis import Diagnosis, Inputs
+    from gearbench.report.diagnosis import Report, Source
     from gearbench.rig import Case
 
 PICTURES = {
@@ -53,16 +53,16 @@ def diagnose(
 ) -> None:
     """Diagnose the gap between records and the nominal rig: where it is, what causes it, how far it shrinks."""
     nominal = load_case(rig, settings)
-    from gearbench.commands.diagnosis_job import take_in
+    from gearbench.diagnosis.diagnosis import take_in
     from gearbench.words.diagnosis import confidence, headline
 
     with Progress(f"diagnose {nominal.name}") as progress:
         progress.step("reading")
-        taken = take_in(records, nominal, held_out=held_out, without=without or ())
-        with claimed(out, "diagnose", _identity(taken, records), force) as output:
-            diagnosis = found(taken, output, progress.step)
+        inputs = take_in(records, nominal, held_out=held_out, without=without or ())
+        with claimed(out, "diagnose", _identity(inputs), force) as output:
+            diagnosis = diagnosis_in(output, inputs, progress.step)
             progress.step("report")
-            write_report(diagnosis, records, output)
+            write_report(diagnosis, output)
     if as_json:
         print_json(json.loads(output.path("verdict.json").read_text(encoding="utf-8")))
         return
@@ -71,34 +71,24 @@ def diagnose(
     typer.echo(f"{out}: report.html, verdict.json, updated.toml")
 
 
-def found(
-    taken: Taken,
-    output: Output,
-    report: Callable[[str], None] = lambda step: None,
-    *,
-    find: Callable[..., object] | None = None,
-    simulate: Simulate | None = None,
-) -> Diagnosis:
+def diagnosis_in(output: Output, inputs: Inputs, progress: Callable[[str], None]) -> Diagnosis:
     """The diagnosis that an earlier run left in the folder; else made, and written to it."""
-    from gearbench.commands.diagnosis_job import Diagnosis
-    from gearbench.commands.diagnosis_job import diagnose as job
+    from gearbench.diagnosis.diagnosis import Diagnosis, diagnosed
     from gearbench.diagnosis.verdict import read_verdict, verdict_json
     from gearbench.rig import read_case
 
     if all(output.has(name) for name in ("verdict.json", "recalibrated.toml", "updated.toml")):
         verdict = read_verdict(output.path("verdict.json"))
         updated = read_case(output.path("updated.toml")) if verdict.verdict == "effect" else None
-        return Diagnosis(taken, verdict, read_case(output.path("recalibrated.toml")), updated)
-    made = job(taken, find=find, simulate=simulate, report=report)
+        return Diagnosis(inputs, verdict, read_case(output.path("recalibrated.toml")), updated)
+    made = diagnosed(inputs, progress)
     output.write("recalibrated.toml", partial(_write_case, made.recalibrated))
     output.write("updated.toml", partial(_write_case, made.updated))
     output.write_text("verdict.json", verdict_json(made.verdict))
     return made
 
 
-def write_report(
-    diagnosis: Diagnosis, records: Sequence[Path], output: Output, simulate: Simulate | None = None
-) -> None:
+def write_report(diagnosis: Diagnosis, output: Output) -> None:
     """The pictures and report.html, unless an earlier run left them."""
     from gearbench.report.diagnosis import report_page
 
@@ -106,69 +96,66 @@ def write_report(
     mark = output.mark()
     if mark.get("complete") and all(output.has(name) for name in mark.get("files", [])) and output.has(wanted[0]):
         return
-    report = report_of(diagnosis, records, simulate)
+    report = report_of(diagnosis)
     for name, (draw, _) in report.pictures.items():
         output.write(f"{name}.png", draw)
     output.write_text("report.html", report_page(report))
     output.set_mark(output.mark() | {"complete": True})
 
 
-def report_of(diagnosis: Diagnosis, records: Sequence[Path], simulate: Simulate | None = None) -> Report:
+def report_of(diagnosis: Diagnosis) -> Report:
     """What the report shows of a diagnosis."""
-    from gearbench.commands.diagnosis_job import default_replay, traces_of
+    from gearbench.diagnosis.diagnosis import replays_of
+    from gearbench.diagnosis.replay.traces import traces_of
     from gearbench.figures.diagnosis import draw_where
     from gearbench.figures.diagnosis_gap import draw_gap, draw_traces
     from gearbench.report.diagnosis import Report
 
-    verdict = diagnosis.verdict
+    verdict, inputs = diagnosis.verdict, diagnosis.inputs
     draws: dict[str, Callable[[Path], None]] = {}
     if verdict.where:
         draws["where"] = partial(draw_where, shares=verdict.where)
     if verdict.gap:
-        draws["gap"] = partial(draw_gap, gaps=verdict.gap, record=diagnosis.taken.judged.name)
-        traces = traces_of(diagnosis, simulate or default_replay(diagnosis.taken))
-        assert traces is not None
+        draws["gap"] = partial(draw_gap, gaps=verdict.gap, record=inputs.judged.name)
+        simulate = replays_of(inputs.nominal, inputs.all)
+        traces = traces_of(verdict.gap[0].channel, inputs.judged, diagnosis.stages, simulate)
         draws["traces"] = partial(draw_traces, traces=traces)
     pictures = {name: (draw, PICTURES[name]) for name, draw in draws.items()}
-    return Report(
-        diagnosis.taken.nominal.name, verdict, _sources(diagnosis.taken, records), pictures, _about(diagnosis.taken)
-    )
+    return Report(inputs.nominal.name, verdict, _sources(inputs), pictures, _about(inputs))
 
 
-def _sources(taken: Taken, records: Sequence[Path]) -> tuple:
+def _sources(inputs: Inputs) -> tuple[Source, ...]:
     from gearbench.report.diagnosis import Source
 
     made = []
-    for path in records:
-        digest = _digest(path)
-        for one in (*taken.measurements, *([taken.held_out] if taken.held_out else [])):
-            if one.path == path:
-                used = "judging" if one is taken.held_out else "finding"
-                made.append(Source(one.name, path.name, digest, used, one.warnings))
+    for one in inputs.all:
+        assert one.path is not None
+        used = "judging" if one is inputs.held_out else "finding"
+        made.append(Source(one.name, one.path.name, _digest(one.path), used, one.warnings))
     return tuple(made)
 
 
-def _about(taken: Taken) -> tuple[tuple[str, str], ...]:
+def _about(inputs: Inputs) -> tuple[tuple[str, str], ...]:
     from gearbench.records.provenance import package_version, source_digest
     from gearbench.rig import dump_case
 
-    case = hashlib.sha256(dump_case(taken.nominal).encode()).hexdigest()
+    case = hashlib.sha256(dump_case(inputs.nominal).encode()).hexdigest()
     return (
         ("gearbench", package_version()),
         ("sources (SHA-256)", source_digest()[:16]),
-        ("nominal rig", taken.nominal.name),
+        ("nominal rig", inputs.nominal.name),
         ("its case (SHA-256)", case[:16]),
-        ("left out of the library", ", ".join(taken.without) or "nothing"),
+        ("left out of the library", ", ".join(inputs.without) or "nothing"),
     )
 
 
-def _identity(taken: Taken, records: Sequence[Path]) -> str:
+def _identity(inputs: Inputs) -> str:
     from gearbench.records.provenance import source_digest
     from gearbench.rig import dump_case
 
-    held_out = taken.held_out.name if taken.held_out else ""
-    parts = [dump_case(taken.nominal), source_digest(), held_out, ",".join(sorted(taken.without))]
-    return fingerprint(*parts, *(f"{path.name} {_digest(path)}" for path in records))
+    held_out = inputs.held_out.name if inputs.held_out else ""
+    parts = [dump_case(inputs.nominal), source_digest(), held_out, ",".join(sorted(inputs.without))]
+    return fingerprint(*parts, *(f"{one.path.name} {_digest(one.path)}" for one in inputs.all if one.path))
 
 
 def _digest(path: Path) -> str:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +14,7 @@ from gearbench.words.diagnosis import CHANNELS, STAGE_WORDS, STAGES, whole_band
 from gearbench.words.diagnosis import number as number_of
 
 if TYPE_CHECKING:
+    from gearbench.diagnosis.replay.traces import Traces
     from gearbench.diagnosis.verdict import Gap
 
 Array = NDArray[np.float64]
@@ -25,20 +25,6 @@ MARKS = {"nominal": "s", "recalibrated": "o", "with_effect": "D", "floor": "|"}
 WIDTHS = (3.0, 1.8, 1.1)
 # Bands of an octave in the spectrum of the gap.
 PER_OCTAVE = 6
-
-
-@dataclass(frozen=True)
-class Traces:
-    """One channel on the held-out record: `measured` (N,) and `simulated` (stage -> (N,)), in `unit`, sampled at
-    `rate` [Hz]; `noise` (lines,) rms of the noise of the measured mean in each line, None if unknown; `mesh` [Hz]."""
-
-    channel: str
-    unit: str
-    rate: float
-    mesh: float
-    measured: Array
-    simulated: Mapping[str, Array]
-    noise: Array | None
 
 
 def draw_gap(path: Path, gaps: Sequence[Gap], record: str) -> None:

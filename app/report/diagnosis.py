@@ -18,7 +18,9 @@ from gearbench.words.diagnosis import (
     effects_in_words,
     headline,
     interval,
+    meaning,
     number,
+    parameter_in_words,
     percent,
     whole_band,
     with_std,
@@ -73,16 +75,21 @@ def report_page(report: Report) -> str:
 
 def _probability(verdict: Verdict) -> str:
     parts = (
-        ("effect of the library", verdict.probability.effect, BLUE),
+        ("one of the known effects", verdict.probability.effect, BLUE),
         ("no effect", verdict.probability.none, GREEN),
-        ("something else", verdict.probability.unknown, ORANGE),
+        ("a cause that is not known", verdict.probability.unknown, ORANGE),
     )
     return bar([(name, value, percent(value), colour) for name, value, colour in parts])
 
 
 def _parameters(verdict: Verdict) -> list[str]:
     rows = [
-        (effects_in_words([effect.name]), percent(effect.probability), name.replace("_", " "), *_value(parameter))
+        (
+            effects_in_words([effect.name]),
+            percent(effect.probability),
+            parameter_in_words(effect.name, name),
+            *_value(parameter),
+        )
         for effect in verdict.effects
         for name, parameter in effect.parameters.items()
     ]
@@ -91,6 +98,7 @@ def _parameters(verdict: Verdict) -> list[str]:
     return [
         text("What is found", "h2"),
         table(("effect", "probability", "parameter", "value ± std", "unit"), rows, numbers=(1, 3)),
+        *(text(meaning(effect.name)) for effect in verdict.effects if meaning(effect.name)),
     ]
 
 
@@ -108,14 +116,14 @@ def _how_far(report: Report) -> list[str]:
     where = (
         f"Rms of measured minus simulated on record {record}, which was held out of the search"
         if report.verdict.held_out
-        else f"Rms of measured minus simulated on record {record}. No record was held out, so this gap is that of the"
-        " fit itself and flatters it"
+        else f"Rms of measured minus simulated on record {record}. No record was held out: the rig was fitted to this"
+        " very record, and the gap on another one would be larger"
     )
     main = [gap for gap in gaps if gap in whole_band(gaps) or gap.channel == gaps[0].channel]
     rest = len(gaps) - len(main)
     return [
         text("How far the gap shrinks", "h2"),
-        text(f"{where}; in brackets where nine of ten repetitions would fall."),
+        text(f"{where}. In brackets: the range in which nine of ten repeated measurements would fall."),
         *_pictures(report, ("gap", "traces")),
         _gap_table(main),
         folded("All channels and bands", _gap_table(gaps)) if rest else "",
@@ -151,8 +159,8 @@ def _candidates(verdict: Verdict) -> list[str]:
     return [
         text("Which causes were weighed", "h2"),
         text(
-            "Log evidence below that of the best: how much less likely the records are under this cause, its parameters"
-            " averaged over (natural logarithm; -3 is one in twenty). In bold: the verdict."
+            "Each cause against the best one, by log evidence: the natural logarithm of how much less likely the"
+            " records are if it is the cause (-3: one in twenty), whatever its size. In bold: the verdict."
         ),
         table(("cause", "log evidence", *(("gap on held-out",) if judged else ())), rows, numbers=(1, 2), best=bold),
         text(f"{more} less likely ones are left out.", style="small") if more else "",
@@ -163,12 +171,15 @@ def _where(report: Report) -> list[str]:
     if not report.verdict.where:
         return []
     place = report.verdict.place
-    words = f"The missing force acts {PLACES[place]}. " if place != "none" else "No place stands out. "
+    words = "No place stands out. "
+    if place != "none":
+        words = f"The force that the simulation lacks acts {PLACES[place]}. "
     return [
         text("Where the gap is", "h2"),
         text(
-            f"{words}Below, the gap of the nominal rig is divided in several ways; each adds up to 100 %. Where a floor"
-            " exceeds its bar the size of the gap needs no cause, and only its pattern tells one."
+            f"{words}Below, the gap of the nominal rig is divided in several ways; each adds up to 100 %. The marks"
+            " show how much of a part measurement noise and the uncertainty of the nominal rig could make: where a mark"
+            " lies beyond its bar, the size of that part alone is no sign of an effect."
         ),
         *_pictures(report, ("where",)),
     ]
@@ -180,9 +191,13 @@ def _limits(report: Report) -> list[str]:
     losses = [f"{source.name}: {warning}" for source in report.sources for warning in source.warnings]
     return [
         text("What these records cannot tell", "h2"),
-        text("Not to be told apart:" if same else "Every cause that was weighed can be told from the others."),
+        text(
+            "These causes would leave the same traces in the records:"
+            if same
+            else "Each cause that was weighed would leave traces of its own."
+        ),
         items(same),
-        text("Said about the records:") if losses else "",
+        text("What the records lack:") if losses else "",
         items(losses),
         *([text("What to measure next", "h2"), items(verdict.advice)] if verdict.advice else []),
     ]

@@ -6,26 +6,12 @@ from collections.abc import Sequence
 from math import floor, isfinite, log10
 from typing import TYPE_CHECKING
 
+from gearbench.diagnosis.effects.library import LIBRARY
+
 if TYPE_CHECKING:
     from gearbench.diagnosis.verdict import Gap, Range, Verdict
 
-EFFECTS = {
-    "backlash": "backlash",
-    "friction": "friction between the flanks",
-    "eccentricity": "run-out of a gear",
-    "pitch-error": "pitch errors",
-    "tooth-crack": "a cracked tooth",
-    "coupling": "an elastic coupling",
-    "bearing-nonlinearity": "a support that stiffens with its deflection",
-    "contact-nonlinearity": "a mesh that stiffens with its load",
-    "sensor-delay": "a delay of one sensor",
-    "torque-ripple": "ripple of the driving torque",
-    "profile-error": "an error of the tooth profile",
-    "encoder-runout": "run-out of an encoder",
-    "temperature-drift": "drift with temperature",
-    "support-stiffness": "another stiffness of a support",
-    "mesh-damping": "another damping of the mesh",
-}
+EFFECTS = {effect.name: effect for effect in LIBRARY}
 PLACES = {
     "mesh": "in the mesh",
     "driver-support": "at the driver's support",
@@ -66,10 +52,24 @@ SHOWN_UNITS = {"m": (1e6, "um"), "rad": (1e6, "urad"), "1": (1.0, "")}
 
 def effects_in_words(names: Sequence[str]) -> str:
     """`friction between the flanks and a cracked tooth`; the nominal rig alone where there is no effect."""
-    words = [EFFECTS.get(name, name.replace("-", " ")) for name in names]
+    words = [EFFECTS[name].noun if name in EFFECTS else name.replace("-", " ") for name in names]
     if not words:
         return "the nominal rig"
     return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
+
+
+def parameter_in_words(effect: str, name: str) -> str:
+    """`coefficient of friction`, `delay (angle of the driver)`: a parameter's name in a verdict as an engineer says it;
+    that of an unknown program's effect as it stands."""
+    about, _, last = name.rpartition(".")
+    words = EFFECTS[effect].parameters.get(last, last) if effect in EFFECTS else last
+    words = words.replace("_", " ")
+    return f"{words} ({CHANNELS.get(about, about).replace('_', ' ')})" if about else words
+
+
+def meaning(effect: str) -> str:
+    """What an effect is and where to look for it; empty for one that the library lacks."""
+    return EFFECTS[effect].meaning if effect in EFFECTS else ""
 
 
 def headline(verdict: Verdict) -> str:
@@ -79,15 +79,15 @@ def headline(verdict: Verdict) -> str:
         words = effects_in_words([effect.name for effect in verdict.effects])
         return f"{words[:1].upper()}{words[1:]} {'explains' if len(verdict.effects) == 1 else 'explain'} the gap."
     if verdict.verdict == "none":
-        return "No further effect is needed: the nominal rig explains the records within its uncertainties."
+        return "No effect is needed: within its uncertainties the nominal rig explains the records."
     where = f" It arises {place}." if verdict.place != "none" else ""
-    return f"No effect of the library explains the gap.{where}"
+    return f"None of the known effects explains the gap.{where}"
 
 
 def confidence(verdict: Verdict) -> str:
     """How sure, where, and how far the gap shrinks, in a sentence or two."""
     sure = getattr(verdict.probability, verdict.verdict)
-    words = {"effect": "an effect of the library", "none": "no effect", "unknown": "something else"}
+    words = {"effect": "one of the known effects", "none": "no effect", "unknown": "a cause that is not known"}
     parts = [f"Probability of {words[verdict.verdict]}: {percent(sure)}."]
     if verdict.verdict == "effect" and verdict.place != "none":
         parts.append(f"It acts {PLACES[verdict.place]}.")

@@ -13,6 +13,7 @@ from gearbench.challenge.scoring.intervals import COVERAGE, Rate, brier, middle,
 from gearbench.challenge.scoring.outcomes import TRUE_VERDICT, VERDICTS, Outcome, named_effects
 from gearbench.challenge.scoring.reach import reach_table
 from gearbench.challenge.truth.effects import EFFECTS, SEVERITY
+from gearbench.rig.contract import rank_of
 
 EFFECT_RESULTS = ("right", "class", "part", "wrong", "missed", "refused", "failed")
 CONTROL_RESULTS = ("right", "named", "flagged", "failed")
@@ -51,14 +52,9 @@ def score(outcomes: Sequence[Outcome]) -> Table:
 def grouped(outcomes: Sequence[Outcome]) -> dict[str, list[Outcome]]:
     """Outcomes by what was at work: the library's effects first, in their order."""
     groups: dict[str, list[Outcome]] = {}
-    for outcome in sorted(outcomes, key=lambda o: _rank("+".join(o.answer.effects))):
+    for outcome in sorted(outcomes, key=lambda o: rank_of("+".join(o.answer.effects))):
         groups.setdefault("+".join(outcome.answer.effects), []).append(outcome)
     return groups
-
-
-def _rank(name: str) -> tuple[int, str]:
-    names = list(EFFECTS)
-    return (names.index(name), "") if name in names else (len(names), name)
 
 
 def _rate(outcomes: Sequence[Outcome], holds: Callable[[Outcome], bool]) -> Rate:

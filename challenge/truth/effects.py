@@ -1,6 +1,6 @@
 """The withheld effects: what each does to a rig's levels, where it sits, and what an answer says of its size.
 
-Names and places are those of the diagnosis' contract; the foreign effects have places but no library entry.
+Names and places are those of `rig.contract`; the foreign effects have places but no library entry.
 Severities are drawn log-uniform from SEVERITY, in multiples of the sizes in `levels`.
 """
 

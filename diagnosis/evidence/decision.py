@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,11 +10,12 @@ from numpy.typing import NDArray
 
 from gearbench.diagnosis.evidence.calibration import LIMITS, Limits
 from gearbench.diagnosis.evidence.search import Search, Tried
-from gearbench.diagnosis.forces.unknowns import ROWS
+from gearbench.diagnosis.forces.equations import PLACES
+from gearbench.diagnosis.verdict import Outcome
+from gearbench.rig.contract import Place
 
 Array = NDArray[np.float64]
 
-PLACE_OF_ROW = (*ROWS, "mesh")
 SHARPNESS = 3.0  # nats over which a probability goes from 1/2 to 3/4 or so
 
 
@@ -22,55 +24,80 @@ class Decision:
     """`verdict` effect, none or unknown; `place`; the winner (effect only); probabilities of the three; `because` says
     in one sentence what decided."""
 
-    verdict: str
-    place: str
+    verdict: Outcome
+    place: Place
     winner: Tried | None
     probability: dict[str, float]
     because: str
 
 
-def decide(found: Search, silent: Array, unsteady: Array, limits: Limits = LIMITS) -> Decision:
-    """The decision. `silent` (rows + 1,) is what the best effect's fit (else the background's) leaves unexplained by
-    row, `unsteady` (rows + 1,) the excess scatter between periods."""
-    best, free = named(found, limits), found.best_free
-    worst = int(np.argmax(unsteady / np.array(limits.unsteady)))
-    if unsteady[worst] > limits.unsteady[worst]:
-        place = PLACE_OF_ROW[worst]
-        return _unknown(place, f"periods differ by more than noise in the row of the {place}")
-    needed = limits.free if best is None else limits.competitor_factor * best.gain + limits.competitor_offset
-    if free and free.gain > needed:
-        return _unknown(free.hypothesis.place, f"a free form at the {free.hypothesis.place} explains clearly more")
-    loud = int(np.argmax(silent / np.array(limits.silent)))
-    if silent[loud] > limits.silent[loud] and not (best and best.gain > silent[loud]):
-        place = PLACE_OF_ROW[loud]
-        return _unknown(place, f"the row of the {place} keeps what should be silent")
+def decide(search: Search, silent: Array, unsteady: Array, limits: Limits = LIMITS) -> Decision:
+    """The decision. `silent` (equations + 1,) is what the best effect's fit (else the background's) leaves unexplained
+    by equation, `unsteady` (equations + 1,) the excess scatter between repetitions."""
+    best, free = named(search, limits), search.best_free
+    place, over = _worst(unsteady, limits.unsteady)
+    if over > 1.0:
+        return _unknown(place, f"the force missing {_at(place)} changes from one repetition to the next")
+    needed = limits.free
     if best:
-        ahead = best.gain - limits.of(best.hypothesis.effect)
-        return Decision("effect", best.hypothesis.place, best, _shares(ahead), "its evidence clears the limit")
-    gains = [one.gain - limits.of(one.hypothesis.effect) for one in found.tried if one.hypothesis.effect and one.fit]
-    return Decision("none", "none", None, _shares(max(gains, default=-limits.effect)), "no hypothesis clears its limit")
+        needed = limits.competitor_factor * best.log_bayes_factor + limits.competitor_offset
+    if free and free.log_bayes_factor > needed:
+        found = free.hypothesis.place
+        return _unknown(found, f"a force {_at(found)} without any given form explains the records clearly better")
+    place, over = _worst(silent, limits.silent)
+    left = float(silent[PLACES.index(place)])
+    if over > 1.0 and not (best and best.log_bayes_factor > left):
+        return _unknown(place, f"a force {_at(place)} remains that no effect of the library explains")
+    if best:
+        assert best.hypothesis.effect is not None
+        margin = best.log_bayes_factor - limits.of(best.hypothesis.effect)
+        because = "its evidence exceeds what rigs without an effect reach"
+        return Decision("effect", best.hypothesis.place, best, _probabilities(margin), because)
+    margins = [
+        one.log_bayes_factor - limits.of(one.hypothesis.effect)
+        for one in search.tried
+        if one.hypothesis.effect and one.fit
+    ]
+    because = "no effect has more evidence than rigs without an effect give it"
+    return Decision("none", "none", None, _probabilities(max(margins, default=-limits.effect)), because)
 
 
-def named(found: Search, limits: Limits = LIMITS) -> Tried | None:
+def named(search: Search, limits: Limits = LIMITS) -> Tried | None:
     """The best effect of the library whose evidence clears its limit and whose size the background does not have; none
     if another effect of that size, which does not clear its own limit, has much more evidence."""
     large = [
         one
-        for one in found.tried
-        if one.hypothesis.effect and one.fit is not None and one.size > limits.size and one.gain > 0.0
+        for one in search.tried
+        if one.hypothesis.effect
+        and one.fit is not None
+        and one.size > limits.size_of(one.hypothesis.effect)
+        and one.log_bayes_factor > 0.0
     ]
-    cleared = [one for one in large if one.gain > limits.of(one.hypothesis.effect)]
-    best = max(cleared, key=lambda one: one.gain, default=None)
-    if best is None or best.gain < limits.rival * max(one.gain for one in large):
+    cleared = [
+        one for one in large if one.hypothesis.effect and one.log_bayes_factor > limits.of(one.hypothesis.effect)
+    ]
+    best = max(cleared, key=lambda one: one.log_bayes_factor, default=None)
+    if best is None or best.log_bayes_factor < limits.rival * max(one.log_bayes_factor for one in large):
         return None
     return best
 
 
-def _unknown(place: str, because: str) -> Decision:
+def _worst(values: Array, limits: Mapping[str, float]) -> tuple[Place, float]:
+    """The place whose value (equations + 1,) is largest over its limit, and that ratio."""
+    over = values / np.array([limits[place] for place in PLACES])
+    worst = int(np.argmax(over))
+    return PLACES[worst], float(over[worst])
+
+
+def _at(place: str) -> str:
+    return f"{'in' if place == 'mesh' else 'at'} the {place.replace('-', ' ')}"
+
+
+def _unknown(place: Place, because: str) -> Decision:
     return Decision("unknown", place, None, {"effect": 0.1, "none": 0.05, "unknown": 0.85}, because)
 
 
-def _shares(ahead: float) -> dict[str, float]:
+def _probabilities(ahead: float) -> dict[str, float]:
     """Probabilities by how far the evidence lies beyond the limit."""
     effect = 1.0 / (1.0 + np.exp(-np.clip(ahead / SHARPNESS, -40, 40)))
     return {"effect": 0.95 * effect, "none": 0.95 * (1 - effect), "unknown": 1.0 - 0.95}

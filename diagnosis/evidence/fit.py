@@ -1,14 +1,13 @@
 """Refit of all unknowns to the force residuals under one hypothesis, and its Laplace evidence.
 
 The cost is the negative logarithm of the posterior: that of `blocks`, plus the Gaussian prior, less the logarithm of
-how much the unknowns stretch the measured motion into forces (without it, zero stiffness would explain every error of
-motion). Gauss-Newton steps with the missing parts lambda re-estimated between them; a step that does not lower the
-cost is shortened, then refused.
+the volume by which the unknowns stretch the measured motion into forces. Gauss-Newton steps with the missing parts
+lambda re-estimated between them; a step that does not lower the cost is shortened, then refused.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,16 +15,13 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_solve, solve_triangular
 
 from gearbench.diagnosis.errors import DiagnosisError
-from gearbench.diagnosis.forces.condition import Condition
-from gearbench.diagnosis.forces.covariance import Blocks, missing, of_level, square_of, whitened
-from gearbench.diagnosis.forces.jacobian import rows_and_columns, stiffening_slope
-from gearbench.diagnosis.forces.nominal import Machine
-from gearbench.diagnosis.forces.parameters import Layout
-from gearbench.diagnosis.forces.residuals import rows
-from gearbench.diagnosis.forces.unknowns import ROWS, SUPPORTS
+from gearbench.diagnosis.evidence.problem import Problem
+from gearbench.diagnosis.forces.covariance import missing, of_level, square_of, whitened
+from gearbench.diagnosis.forces.jacobian import linearised
+from gearbench.diagnosis.forces.residuals import residuals
+from gearbench.diagnosis.forces.volume import log_volume, log_volume_gradient, stiffening_gradient
 
 Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 ROUNDS = 12  # of expectation-maximisation between two steps
 HALVINGS = 4
@@ -36,22 +32,13 @@ ENOUGH = 1.0  # change of the cost that no longer matters
 
 
 @dataclass(frozen=True)
-class Problem:
-    """Everything that the hypotheses share."""
-
-    machine: Machine
-    conditions: tuple[Condition, ...]
-    where: Layout
-    blocks: tuple[Blocks, ...]
-
-
-@dataclass(frozen=True)
 class Fit:
     """The fit of one hypothesis.
 
-    Unknowns `p` (P,), prior `sd` (P,), `precision` (P, P) of the posterior, `information` (P, P) of the data alone and
-    their `pull` (P,): the data's cost is p' information p / 2 - pull p to second order. `factors`: lambda
-    (rows + 1, blocks) of every condition; `cost` without the prior's normalisation; `steps` taken.
+    Unknowns `p` (size,), prior `sd` (size,), `precision` (size, size) of the posterior, `information` (size, size) of
+    the data alone and their `pull` (size,): the data's cost is p' information p / 2 - pull p to second order.
+    `factors`: lambda (equations + 1, blocks) of every condition; `cost` without the prior's normalisation; `steps`
+    taken.
     """
 
     p: Array
@@ -66,7 +53,7 @@ class Fit:
 
     @property
     def std(self) -> Array:
-        """Posterior standard deviations (P,)."""
+        """Posterior standard deviations (size,)."""
         root = root_of(self.precision * self.sd[:, None] * self.sd[None, :])
         inverse = solve_triangular(root, np.eye(len(self.sd)), lower=True)
         return np.asarray(self.sd * np.sqrt((inverse**2).sum(axis=0)))
@@ -75,72 +62,41 @@ class Fit:
 def score(
     problem: Problem, p: Array, sd: Array, factors: Sequence[Array], rounds: int = ROUNDS
 ) -> tuple[float, list[Array]]:
-    """Cost of unknowns (P,), and the lambda found there from those given. No rounds: plain weighted squares with the
+    """Cost of unknowns (size,), and the lambda found there from those given. No rounds: plain weighted squares with the
     lambda given."""
-    total, found = 0.5 * float(((p / sd) ** 2).sum()), []
+    lambdas: list[Array] = []
+    total = 0.5 * float(((p / sd) ** 2).sum())
     for condition, blocks, start in zip(problem.conditions, problem.blocks, factors, strict=True):
-        found_here = rows(problem.machine, condition, problem.where, p).at(blocks.used)
+        departures = problem.unknowns.departures(p, condition)
+        here = residuals(problem.model, condition, departures).at(blocks.used)
         if rounds == 0:
-            total += square_of(blocks, replace(found_here, stiffening=0.0), start)
-            found.append(start)
+            total += square_of(blocks, replace(here, stiffening=0.0), start)
+            lambdas.append(start)
             continue
-        factor, cost = missing(blocks, found_here, start, rounds)
-        total += cost - stretch(problem, condition, blocks, p, found_here.stiffening)
-        found.append(factor)
-    return total, found
+        factor, cost = missing(blocks, here, start, rounds)
+        total += cost - log_volume(problem.model, condition, blocks, departures, here.stiffening)
+        lambdas.append(factor)
+    return total, lambdas
 
 
 def _normal(problem: Problem, p: Array, factors: Sequence[Array], plain: bool = False) -> tuple[Array, Array]:
-    """Information (P, P) and gradient (P,) of the data's cost; `plain`: of the weighted squares alone."""
-    size = problem.where.size
-    information, gradient = np.zeros((size, size)), np.zeros(size)
+    """Information (size, size) and gradient (size,) of the data's cost; `plain`: of the weighted squares alone."""
+    model, unknowns = problem.model, problem.unknowns
+    information, gradient = np.zeros((unknowns.size, unknowns.size)), np.zeros(unknowns.size)
     for condition, blocks, factor in zip(problem.conditions, problem.blocks, factors, strict=True):
-        found, columns, pressing = rows_and_columns(problem.machine, condition, problem.where, p, blocks.used)
+        at = linearised(model, condition, unknowns, p, blocks.used)
         if plain:
-            r, j = whitened(blocks, replace(found, stiffening=0.0), columns, factor)
+            r, j = whitened(blocks, replace(at.residuals, stiffening=0.0), at.jacobian, factor)
             information += 2 * (j.T @ j)
             gradient += 2 * (j.T @ r)
             continue
-        r, j = whitened(blocks, found, columns, factor)
-        stiffer = stiffening_slope(condition, problem.where, p)
-        slope, curve = of_level(blocks, found, columns, pressing, factor, stiffer)
+        r, j = whitened(blocks, at.residuals, at.jacobian, factor)
+        stiffer = stiffening_gradient(condition, unknowns, at.departures)
+        slope, curve = of_level(blocks, at.residuals, at.jacobian, at.mesh_jacobian, factor, stiffer)
         information += 2 * (j.T @ j) + curve
-        gradient += 2 * (j.T @ r) + slope - stretch_slope(problem, condition, blocks, p, stiffer)
+        volume = log_volume_gradient(model, condition, blocks, unknowns, at.departures, stiffer)
+        gradient += 2 * (j.T @ r) + slope - volume
     return information, gradient
-
-
-def stretch(problem: Problem, condition: Condition, blocks: Blocks, p: Array, stiffening: float) -> float:
-    """Log of the volume by which the unknowns stretch one condition's measured motion into residuals: the mesh's
-    stiffness (`stiffening` is the mean logarithm of its factor) the deflection, dynamic stiffness the supports."""
-    total = 2 * blocks.used.size * stiffening
-    for _, _, whole in _dynamic_stiffness(problem, condition, blocks, p):
-        total += 2 * float(np.log(np.abs(whole)).sum())
-    return total
-
-
-def stretch_slope(problem: Problem, condition: Condition, blocks: Blocks, p: Array, stiffer: Array) -> Array:
-    """Gradient (P,) of `stretch`; `stiffer` (P,) is that of its `stiffening`."""
-    gradient = 2 * blocks.used.size * stiffer
-    for side, parts, whole in _dynamic_stiffness(problem, condition, blocks, p):
-        for key, part in parts.items():
-            gradient[problem.where[key].start + side] += 2 * float((part / whole).real.sum())
-    return gradient
-
-
-def _dynamic_stiffness(
-    problem: Problem, condition: Condition, blocks: Blocks, p: Array
-) -> Iterator[tuple[int, dict[str, Complex], Complex]]:
-    """Of each support that has a row: side, derivatives of its dynamic stiffness to its unknowns, and it (B,)."""
-    where, machine, omega = problem.where, problem.machine, condition.omega[blocks.used]
-    for side, (row, *_) in enumerate(SUPPORTS):
-        if row not in blocks.rows:
-            continue
-        spring = np.full(omega.size, machine.stiffness[side] * np.exp(p[where["stiffness"]][side]), dtype=complex)
-        damper = np.asarray(1j * omega * machine.damping[side] * np.exp(p[where["damping"]][side]), dtype=complex)
-        inertia = -(omega**2) * machine.mass[side] + 0j
-        whole = spring + damper + inertia * (1 + p[where["mass"]][side])
-        parts = {"stiffness": spring, "damping": damper, "mass": np.asarray(inertia, dtype=complex)}
-        yield side, parts, whole
 
 
 def refit(
@@ -152,15 +108,15 @@ def refit(
     most: int = 12,
     coarse: Sequence[float] = (),
 ) -> Fit:
-    """The fit under prior standard deviations `sd` (P,), from `start` (P,) and, if known, lambda there.
+    """The fit under prior standard deviations `sd` (size,), from `start` (size,) and, if known, lambda there.
 
     `coarse` lists values of lambda, the same everywhere, for first rounds of plain weighted least squares: no block is
     given up before the unknowns have had their chance (graduated non-convexity).
     """
-    low, high = problem.where.bounds()
+    low, high = problem.unknowns.bounds()
     p = np.clip(start, low, high)
     if factors is None:
-        factors = [np.ones((len(ROWS) + 1, len(b.count)))[[*b.rows, len(ROWS)]] for b in problem.blocks]
+        factors = [np.ones((len(b.with_mesh), len(b.count))) for b in problem.blocks]
     steps = 0
     for least in coarse:
         fixed = [np.full_like(factor, least) for factor in factors]
@@ -179,7 +135,7 @@ def _descend(
     problem: Problem, sd: Array, p: Array, factors: Sequence[Array], most: int, rounds: int
 ) -> tuple[Array, float, Sequence[Array], int]:
     """Unknowns, cost, lambda and number of steps after at most `most` steps downhill."""
-    low, high = problem.where.bounds()
+    low, high = problem.unknowns.bounds()
     cost, lambdas = score(problem, p, sd, factors, 4 * rounds)
     steps = 0
     for _ in range(most):
@@ -189,9 +145,9 @@ def _descend(
         length, before = min(1.0, LONGEST / float(np.abs(move / sd).max())), cost
         for _ in range(HALVINGS):
             trial = np.clip(p + length * move, low, high)
-            value, found = score(problem, trial, sd, lambdas, rounds)
+            value, better = score(problem, trial, sd, lambdas, rounds)
             if value < cost:
-                p, cost, lambdas = trial, value, found
+                p, cost, lambdas = trial, value, better
                 break
             length *= 0.4
         if before - cost < ENOUGH:
@@ -206,8 +162,8 @@ def _solve(information: Array, sd: Array, right: Array) -> Array:
 
 
 def root_of(scaled: Array) -> Array:
-    """Lower Cholesky factor (P, P) of a precision in units of the prior. Where the data tell 1e16 times more of one
-    unknown than the prior, rounding outweighs the prior's ones: then as little is added as makes it definite."""
+    """Lower Cholesky factor (size, size) of a precision in units of the prior. Where the data tell 1e16 times more of
+    one unknown than the prior, rounding outweighs the prior's ones: then as little is added as makes it definite."""
     largest = float(np.diag(scaled).max())
     for part in ROUNDING:
         try:

@@ -2,24 +2,27 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.diagnosis.evidence.fit import Fit, Problem, refit, score
-from gearbench.diagnosis.evidence.hypotheses import Hypothesis, free_forms, library, predicted_gains, starts
-from gearbench.diagnosis.forces.parameters import Layout
-from gearbench.diagnosis.forces.unknowns import ROWS
+from gearbench.diagnosis.effects.effect import Hypothesis, widened
+from gearbench.diagnosis.effects.free_forms import free_forms
+from gearbench.diagnosis.effects.library import hypotheses
+from gearbench.diagnosis.evidence.fit import Fit, refit, score
+from gearbench.diagnosis.evidence.prediction import predicted_factors, starts
+from gearbench.diagnosis.evidence.problem import Problem
+from gearbench.diagnosis.forces.equations import PLACES
+from gearbench.diagnosis.forces.unknowns import Unknowns
 
 Array = NDArray[np.float64]
 Report = Callable[[str], None]
 
-PROMISING = -1.5  # predicted gain below which a hypothesis is not refitted
+PROMISING = -1.5  # predicted log Bayes factor below which a hypothesis is not refitted
 MOST = 6  # refits of single hypotheses
-MOST_TEETH = 2  # of these, single cracked teeth
-FROM_BEGINNING = ("friction",)  # always refitted, as it trades with the mesh's shape
 STEPS_BASE, STEPS = 16, 12
 RADIAL_TRIALS = (-0.6, -0.2, 0.2, 0.7)  # logarithms of stiffness over the prior's
 COARSE = (4.0,)  # lambda of the first rounds
@@ -27,11 +30,11 @@ COARSE = (4.0,)  # lambda of the first rounds
 
 @dataclass(frozen=True)
 class Tried:
-    """A hypothesis, how much log evidence it adds to the background alone, its fit (None: not promising), and how large
-    the fit takes the effect to be: rms of its unknowns over their background's standard deviations."""
+    """A hypothesis, its log Bayes factor over the background alone, its fit (None: not promising), and how large the
+    fit takes the effect to be: rms of its unknowns over their background's standard deviations."""
 
     hypothesis: Hypothesis
-    gain: float
+    log_bayes_factor: float
     fit: Fit | None
     size: float = 0.0
 
@@ -46,56 +49,61 @@ class Search:
     @property
     def best_free(self) -> Tried | None:
         """The best free form; None if none was worth a refit."""
-        return next((one for one in self.tried if not one.hypothesis.effect and one.fit is not None), None)
+        return next((one for one in self.tried if one.hypothesis.effect is None and one.fit is not None), None)
 
 
 def search(problem: Problem, without: Sequence[str] = (), report: Report = lambda step: None) -> Search:
     """Fit the background, then refit the hypotheses that its quadratic predicts to be worth it."""
-    where = problem.where
+    unknowns = problem.unknowns
     report("background")
     begin = begin_of(problem)
-    base = refit(problem, where.prior(), begin, most=STEPS_BASE, coarse=COARSE)
+    base = refit(problem, unknowns.prior(), begin, most=STEPS_BASE, coarse=COARSE)
     report("everything at once")
-    effects = library(where, tuple(without))
-    sd = where.prior({group for effect in effects for group in effect.groups})
+    effects = hypotheses(problem.model, without)
+    # Groups that are wide as a whole; single entries are alternatives to one another, or numbers of the background.
+    sd = widened(unknowns, [wide for one in effects for wide in one.wide if wide.at is None])
     free = refit(problem, sd, begin, most=STEPS, coarse=COARSE)
-    again = refit(problem, where.prior(), free.p, free.factors, most=STEPS_BASE)
+    again = refit(problem, unknowns.prior(), free.p, free.factors, most=STEPS_BASE)
     base = again if again.cost < base.cost else base
-    hypotheses = effects + free_forms()
-    gains = predicted_gains(base, where, hypotheses)
-    gains = np.maximum(gains, [min(gain, 1.0) for gain in predicted_gains(free, where, hypotheses)])
+    listed = effects + free_forms()
+    promised = predicted_factors(base, unknowns, listed)
+    promised = np.maximum(promised, [min(factor, 1.0) for factor in predicted_factors(free, unknowns, listed)])
     begun: dict[int, tuple[Start, float]] = {}
-    for number, hypothesis in enumerate(hypotheses):
-        if hypothesis.name not in FROM_BEGINNING and (gains[number] >= PROMISING or starts(hypothesis, where)):
+    for number, hypothesis in enumerate(listed):
+        if not _always(hypothesis) and (promised[number] >= PROMISING or starts(hypothesis, unknowns)):
             begun[number] = _start(problem, (base, free), hypothesis)
-            gains[number] = max(gains[number], begun[number][1])
-    chosen = _promising(hypotheses, gains)
+            promised[number] = max(promised[number], begun[number][1])
+    chosen = _promising(listed, promised)
     tried = []
-    for number, (hypothesis, gain) in enumerate(zip(hypotheses, gains, strict=True)):
+    for number, (hypothesis, factor) in enumerate(zip(listed, promised, strict=True)):
         if number not in chosen:
-            tried.append(Tried(hypothesis, min(float(gain), 0.0), None))
+            tried.append(Tried(hypothesis, min(float(factor), 0.0), None))
             continue
         report(hypothesis.name)
-        sd = hypothesis.prior(where)
+        sd = hypothesis.prior(unknowns)
         if number in begun:
             fit = refit(problem, sd, *begun[number][0], most=STEPS)
         else:
             fit = refit(problem, sd, begin, most=STEPS, coarse=COARSE)
         evidence = fit.log_evidence - float(np.log(hypothesis.choices))
-        tried.append(Tried(hypothesis, evidence, fit, relative_size(where, hypothesis, fit)))
+        tried.append(Tried(hypothesis, evidence, fit, relative_size(unknowns, hypothesis, fit)))
     base, tried = _level(problem, base, tried)
-    return Search(base, tuple(sorted(tried, key=lambda one: -one.gain)))
+    return Search(base, tuple(sorted(tried, key=lambda one: -one.log_bayes_factor)))
+
+
+def _always(hypothesis: Hypothesis) -> bool:
+    return hypothesis.effect is not None and hypothesis.effect.always
 
 
 def begin_of(problem: Problem) -> Array:
-    """Where to begin (P,): the radial supports, whose resonances may lie anywhere in the band, by trial."""
-    where, sd = problem.where, problem.where.prior()
-    even = [np.full((len(b.rows) + 1, len(b.count)), COARSE[0]) for b in problem.blocks]
-    best, least = np.zeros(where.size), np.inf
+    """Where to begin (size,): the radial supports, whose resonances may lie anywhere in the band, by trial."""
+    unknowns, sd = problem.unknowns, problem.unknowns.prior()
+    even = [np.full((len(b.with_mesh), len(b.count)), COARSE[0]) for b in problem.blocks]
+    best, least = np.zeros(unknowns.size), np.inf
     for first in RADIAL_TRIALS:
         for second in RADIAL_TRIALS:
-            trial = np.zeros(where.size)
-            trial[where["radial"]] = (first, second, 0.0, 0.0)
+            trial = np.zeros(unknowns.size)
+            trial[unknowns["radial"]] = (first, second, 0.0, 0.0)
             cost = score(problem, trial, sd, even, rounds=0)[0]
             if cost < least:
                 best, least = trial, cost
@@ -111,12 +119,12 @@ Start = tuple[Array, tuple[Array, ...]]
 
 
 def _start(problem: Problem, fits: tuple[Fit, Fit], hypothesis: Hypothesis) -> tuple[Start, float]:
-    """Where to begin the refit: unknowns (P,) and lambda, those of the background's fit or of everything at once or
+    """Where to begin the refit: unknowns (size,) and lambda, those of the background's fit or of everything at once or
     a departure from the former; and by how much the cost there lies below that of the background's fit."""
     base, free = fits
-    sd = hypothesis.prior(problem.where)
-    low, high = problem.where.bounds()
-    trials = [base.p + move for move in starts(hypothesis, problem.where)]
+    sd = hypothesis.prior(problem.unknowns)
+    low, high = problem.unknowns.bounds()
+    trials = [base.p + move for move in starts(hypothesis, problem.unknowns)]
     candidates = [(base.p, base.factors), (_calm(free, sd), free.factors), *((trial, base.factors) for trial in trials)]
     costs = [score(problem, np.clip(p, low, high), sd, factors)[0] for p, factors in candidates]
     best = int(np.argmin(costs))
@@ -124,64 +132,60 @@ def _start(problem: Problem, fits: tuple[Fit, Fit], hypothesis: Hypothesis) -> t
     return (np.clip(p, low, high), factors), costs[0] - costs[best] if best else -np.inf
 
 
-def relief(where: Layout, hypothesis: Hypothesis, fit: Fit) -> float:
+def relief(unknowns: Unknowns, hypothesis: Hypothesis, fit: Fit) -> float:
     """What widening its own prior can add to the evidence at most: the background, taken to where the fit is, would
     pay this for the effect. Whatever a refit gains beyond has come from a better way down, open to the background."""
-    at = _own(where, hypothesis)
-    narrow = where.prior()[at]
+    at = hypothesis.entries(unknowns)
+    narrow = unknowns.prior()[at]
     return 0.5 * float((fit.p[at] ** 2 * (narrow**-2.0 - fit.sd[at] ** -2.0)).sum())
 
 
-def relative_size(where: Layout, hypothesis: Hypothesis, fit: Fit) -> float:
+def relative_size(unknowns: Unknowns, hypothesis: Hypothesis, fit: Fit) -> float:
     """Rms of what a hypothesis makes wide, in standard deviations of the background, each unknown by how much of its
     prior variance the records have taken away: what they do not show has no size."""
-    at = _own(where, hypothesis)
+    at = hypothesis.entries(unknowns)
     told = np.clip(1.0 - (fit.std[at] / fit.sd[at]) ** 2, 1e-6, 1.0)
-    return float(np.sqrt(np.average((fit.p[at] / where.prior()[at]) ** 2, weights=told)))
-
-
-def _own(where: Layout, hypothesis: Hypothesis) -> NDArray[np.int64]:
-    """Indices of the unknowns that a hypothesis makes wide."""
-    groups = [where.members(group) for group in hypothesis.groups]
-    return np.concatenate([*groups, np.array(hypothesis.entries, dtype=np.int64)])
+    return float(np.sqrt(np.average((fit.p[at] / unknowns.prior()[at]) ** 2, weights=told)))
 
 
 def _level(problem: Problem, base: Fit, tried: list[Tried]) -> tuple[Fit, list[Tried]]:
-    """The background fitted again from the best refit, which may have found a way that it had missed, and the gains
-    over it of all that was tried."""
+    """The background fitted again from the best refit, which may have found a way that it had missed, and the log
+    Bayes factors over it of all that was tried."""
     refits = [one for one in tried if one.fit is not None]
     if refits:
-        best = max(refits, key=lambda one: one.gain)
+        best = max(refits, key=lambda one: one.log_bayes_factor)
         assert best.fit is not None
         again = refit(problem, base.sd, best.fit.p, best.fit.factors, most=STEPS)
         base = again if again.cost < base.cost else base
-    return base, [replace(one, gain=_gain(problem, one, base)) for one in tried]
+    return base, [replace(one, log_bayes_factor=_over(problem, one, base)) for one in tried]
 
 
-def _gain(problem: Problem, one: Tried, base: Fit) -> float:
+def _over(problem: Problem, one: Tried, base: Fit) -> float:
     if one.fit is None:
-        return one.gain
-    return min(one.gain - base.log_evidence, relief(problem.where, one.hypothesis, one.fit))
+        return one.log_bayes_factor
+    return min(one.log_bayes_factor - base.log_evidence, relief(problem.unknowns, one.hypothesis, one.fit))
 
 
-def _promising(hypotheses: Sequence[Hypothesis], gains: Array) -> set[int]:
+def _promising(listed: Sequence[Hypothesis], promised: Array) -> set[int]:
     """Numbers of the hypotheses to refit."""
-    chosen = {number for number, hypothesis in enumerate(hypotheses) if hypothesis.name in FROM_BEGINNING}
-    teeth = 0
-    for number in np.argsort(-gains):
-        if gains[number] < PROMISING or len(chosen) >= MOST:
+    chosen = {number for number, hypothesis in enumerate(listed) if _always(hypothesis)}
+    ranked: Counter[str] = Counter()
+    for number in np.argsort(-promised):
+        if promised[number] < PROMISING or len(chosen) >= MOST:
             break
-        if hypotheses[number].entries:
-            teeth += 1
-            if teeth > MOST_TEETH:
+        effect = listed[number].effect
+        if effect is not None and effect.most_refits is not None:
+            ranked[effect.name] += 1
+            if ranked[effect.name] > effect.most_refits:
                 continue
         chosen.add(int(number))
     return chosen
 
 
-def missing_by_row(problem: Problem, fit: Fit) -> Array:
-    """What a fit leaves unexplained, by row, the mesh last (rows + 1,): sum over blocks of bins times log lambda."""
-    total = np.zeros(len(ROWS) + 1)
+def missing_by_equation(problem: Problem, fit: Fit) -> Array:
+    """What a fit leaves unexplained, by equation, the mesh last (equations + 1,): sum over blocks of bins times log
+    lambda."""
+    total = np.zeros(len(PLACES))
     for blocks, factor in zip(problem.blocks, fit.factors, strict=True):
-        total[[*blocks.rows, len(ROWS)]] += (np.log(factor) * blocks.count).sum(axis=1)
+        total[blocks.with_mesh] += (np.log(factor) * blocks.count).sum(axis=1)
     return total

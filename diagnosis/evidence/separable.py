@@ -11,10 +11,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from gearbench.diagnosis.effects.effect import Hypothesis
+from gearbench.diagnosis.effects.library import hypotheses as all_hypotheses
 from gearbench.diagnosis.evidence.calibration import LIMITS, Limits
-from gearbench.diagnosis.evidence.fit import Fit, Problem
-from gearbench.diagnosis.evidence.hypotheses import Hypothesis, library
-from gearbench.diagnosis.forces.parameters import Layout
+from gearbench.diagnosis.evidence.fit import Fit
+from gearbench.diagnosis.evidence.problem import Problem
+from gearbench.diagnosis.forces.unknowns import Unknowns
+from gearbench.rig.contract import rank_of
 
 Array = NDArray[np.float64]
 
@@ -23,51 +26,50 @@ APART = 3.0  # nats by which the right effect should come out ahead of another
 
 def representatives(problem: Problem, without: Sequence[str] = ()) -> tuple[Hypothesis, ...]:
     """The library with one cracked tooth of each gear for all of them."""
-    first = problem.where["crack"].start
-    kept = (first, first + problem.machine.teeth[0])
-    return tuple(h for h in library(problem.where, tuple(without)) if not h.entries or h.entries[0] in kept)
+    return tuple(h for h in all_hypotheses(problem.model, without) if h.representative)
 
 
-def expected_gains(fit: Fit, where: Layout, hypotheses: Sequence[Hypothesis]) -> Array:
-    """Expected log evidence (truth, hypotheses) over the background's when one hypothesis after the other is true.
+def expected_factors(fit: Fit, unknowns: Unknowns, hypotheses: Sequence[Hypothesis]) -> Array:
+    """Expected log Bayes factors (truth, hypotheses) over the background when one hypothesis after the other is true.
 
     The truth's unknowns are drawn from its wide prior beyond its narrow one, the records' noise from what the fit takes
     for it: with I the information and C the posterior covariance under a prior, the mean of pull' C pull / 2 is
     trace(C (I W I + I)) / 2 for a truth of covariance W.
     """
-    information, narrow = fit.information, where.prior()
+    information, narrow = fit.information, unknowns.prior()
     plain, plain_evidence = _posterior(information, narrow)
     changes, evidences = [], []
     for hypothesis in hypotheses:
-        covariance, evidence = _posterior(information, hypothesis.prior(where))
+        covariance, evidence = _posterior(information, hypothesis.prior(unknowns))
         changes.append(information @ (covariance - plain) @ information)
         noise = 0.5 * float(np.sum((covariance - plain) * information))
         evidences.append(evidence - plain_evidence + noise - np.log(hypothesis.choices))
-    truths = np.stack([h.prior(where) ** 2 - narrow**2 for h in hypotheses])
+    truths = np.stack([h.prior(unknowns) ** 2 - narrow**2 for h in hypotheses])
     return np.asarray(0.5 * truths @ np.stack([np.diag(c) for c in changes]).T + np.array(evidences))
 
 
 def _posterior(information: Array, sd: Array) -> tuple[Array, float]:
-    """Posterior covariance (P, P) under prior standard deviations `sd` (P,), and the evidence's constant part."""
+    """Posterior covariance (size, size) under prior standard deviations `sd` (size,), and the evidence's constant
+    part."""
     scaled = information * sd[:, None] * sd[None, :] + np.eye(len(sd))
     covariance = np.linalg.inv(scaled) * sd[:, None] * sd[None, :]
     return covariance, -0.5 * float(np.linalg.slogdet(scaled)[1])
 
 
 def alike(
-    fit: Fit, where: Layout, hypotheses: Sequence[Hypothesis], limits: Limits = LIMITS
+    fit: Fit, unknowns: Unknowns, hypotheses: Sequence[Hypothesis], limits: Limits = LIMITS
 ) -> tuple[tuple[str, ...], ...]:
     """Effects that these records cannot tell apart, in groups, under the weights of a fit.
 
     An effect without weight is in no group: bins in which nothing is heard have none, and silence there tells.
     """
-    gains = expected_gains(fit, where, hypotheses)
-    effects = [h.effect for h in hypotheses]
-    needed = np.array([limits.of(effect) for effect in effects])
-    names = tuple(dict.fromkeys(effects))
+    factors = expected_factors(fit, unknowns, hypotheses)
+    effects = [h.effect.name for h in hypotheses if h.effect]
+    needed = np.array([limits.of(h.effect) for h in hypotheses if h.effect])
+    names = sorted(set(effects), key=rank_of)
     groups: dict[str, set[str]] = {name: {name} for name in names}
-    for truth in np.flatnonzero(np.diag(gains) > needed):
-        for other in np.flatnonzero(gains[truth] > np.maximum(gains[truth, truth] - APART, needed)):
+    for truth in np.flatnonzero(np.diag(factors) > needed):
+        for other in np.flatnonzero(factors[truth] > np.maximum(factors[truth, truth] - APART, needed)):
             joined = groups[effects[truth]] | groups[effects[other]]
             for name in joined:
                 groups[name] = joined

@@ -1,4 +1,4 @@
-"""Smooth functions of frequency and of mesh phase, from which row filters and shapes are made."""
+"""Smooth functions of frequency and of mesh phase, of which filters and shapes are made."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.diagnosis.forces.basis import hats, waves
-from gearbench.diagnosis.forces.nominal import Machine
+from gearbench.diagnosis.forces.nominal import NominalModel
 from gearbench.diagnosis.intake.measurements import Measurement
 
 Array = NDArray[np.float64]
@@ -21,16 +21,18 @@ CHANNELS = ("angle_driver", "angle_driven", "y_driver", "y_driven", "torque_driv
 
 @dataclass(frozen=True)
 class Condition:
-    """What the rows need of one condition; N samples of one row, `cycles` mesh periods, K bins up to `band` [Hz].
+    """What the force residuals need of one condition: N samples of one repetition, `cycles` mesh periods, K bins up to
+    `band` [Hz].
 
     `spectra` maps a channel to its full half-spectrum (N/2 + 1,) = rfft/N of the period mean, angles as departures
     u = rb (theta - nominal rotation) [m]; `noise` to the variance of one of its bins; `omega` (N/2 + 1,) [rad/s];
-    `phase` (N,) mesh phase [cycles]; `tooth` (2, N, n_o) tooth numbers of the pairs in contact, `share` (N, n_o) their
-    shares, `bending` (N, n_o, 2); `arms` (3, N) friction levers over base radius, for driver rotation, y and driven
-    rotation; `waves` (2 orders, N) of the mesh phase, `lobes` (2, 2, N) cosine and sine of both rotations;
-    `pitch_speed` rb speed [m/s]; `force_level` [N] and
+    `phase` (N,) mesh phase [cycles]; `tooth` (2, N, n_o) tooth numbers of the pairs in contact, `load_share` (N, n_o)
+    their shares of the load, `bending` (N, n_o, 2) the teeth's parts of their flexibility; `lever_arms` (3, N) of
+    friction over base radius, for driver rotation, y and driven rotation; `waves` (2 orders, N) of the mesh phase,
+    `lobes` (2, 2, N) cosine and sine of both rotations; `pitch_speed` rb speed [m/s]; `force_level` [N] and
     `stiffness_level` [N/m] of the mesh at the mean torque; `force_full` (N/2 + 1,) spectrum of the mesh force that a
-    nominal row gives, zero beyond the used bins; `hats_full` basis of smooth functions of frequency (knots, N/2 + 1).
+    nominal equation gives, zero beyond the used bins; `hats_full` basis of smooth functions of frequency
+    (knots, N/2 + 1).
     """
 
     name: str
@@ -43,9 +45,9 @@ class Condition:
     omega: Array
     phase: Array
     tooth: NDArray[np.int64]
-    share: Array
+    load_share: Array
     bending: Array
-    arms: Array
+    lever_arms: Array
     waves: Array
     lobes: Array
     pitch_speed: float
@@ -57,17 +59,17 @@ class Condition:
     hats_full: Array
 
 
-def prepare(measured: Measurement, machine: Machine, band: float) -> Condition:
+def prepare(measured: Measurement, model: NominalModel, band: float) -> Condition:
     """The condition of a measurement; `band` [Hz] is where the used bins end."""
     phase, rate = measured.phase, measured.sampling_rate
     samples = phase.size
-    spectra, noise = _spectra(measured, machine)
+    spectra, noise = _spectra(measured, model)
     omega = np.asarray(2 * np.pi * np.fft.rfftfreq(samples, 1 / rate), dtype=np.float64)
     bins = min(int(np.searchsorted(omega, 2 * np.pi * band, side="right")), samples // 2)
-    numbers, share = machine.law.pairs(phase)
-    rb1 = machine.base_radius[0]
+    numbers, share = model.law.pairs(phase)
+    rb1 = model.base_radius[0]
     mean = float(spectra["torque_driver"][0].real)
-    force = _force(machine, spectra, omega)
+    force = _force(model, spectra, omega)
     force[bins:] = 0.0
     return Condition(
         name=measured.name,
@@ -79,82 +81,84 @@ def prepare(measured: Measurement, machine: Machine, band: float) -> Condition:
         noise=noise,
         omega=omega,
         phase=phase,
-        tooth=np.stack([numbers % machine.teeth[0], numbers % machine.teeth[1]]),
-        share=share,
-        bending=machine.law.bending_of(phase),
-        arms=_arms(machine, measured.mesh_frequency, phase, spectra, omega),
+        tooth=np.stack([numbers % model.teeth[0], numbers % model.teeth[1]]),
+        load_share=share,
+        bending=model.law.bending_of(phase),
+        lever_arms=_lever_arms(model, measured.mesh_frequency, phase, spectra, omega),
         waves=waves(phase),
-        lobes=np.stack([(np.cos(turn), np.sin(turn)) for turn in (2 * np.pi * phase / z for z in machine.teeth)]),
-        pitch_speed=2 * np.pi * measured.mesh_frequency / machine.teeth[0] * rb1,
-        teeth=machine.teeth,
+        lobes=np.stack([(np.cos(turn), np.sin(turn)) for turn in (2 * np.pi * phase / z for z in model.teeth)]),
+        pitch_speed=2 * np.pi * measured.mesh_frequency / model.teeth[0] * rb1,
+        teeth=model.teeth,
         torque_mean=mean,
         force_level=abs(mean) / rb1,
-        stiffness_level=_stiffness(machine, abs(mean) / rb1),
+        stiffness_level=_stiffness(model, abs(mean) / rb1),
         force_full=force,
         hats_full=hats(omega / (2 * np.pi), band),
     )
 
 
-def _spectra(measured: Measurement, machine: Machine) -> tuple[dict[str, Complex], dict[str, float]]:
-    """Spectra of the row means, and the noise variance of one of their bins."""
-    stated = dict(zip(("angle", "y", "torque"), machine.noise, strict=True))
+def _spectra(measured: Measurement, model: NominalModel) -> tuple[dict[str, Complex], dict[str, float]]:
+    """Spectra of the means over the repetitions, and the noise variance of one of their bins."""
+    stated = dict(zip(("angle", "y", "torque"), model.noise, strict=True))
     spectra, noise = {}, {}
     for channel in CHANNELS:
         if channel not in measured.periods:
             continue
-        arc = machine.base_radius[channel == "angle_driven"] if channel.startswith("angle") else 1.0
+        arc = model.base_radius[channel == "angle_driven"] if channel.startswith("angle") else 1.0
         values = arc * measured.periods[channel]
         samples, count = values.shape[1], len(values)
-        rows = np.fft.rfft(values, axis=-1) / samples
-        spectra[channel] = rows.mean(axis=0)
+        each = np.fft.rfft(values, axis=-1) / samples
+        spectra[channel] = each.mean(axis=0)
         floor = (arc * stated[channel.split("_")[0]]) ** 2 / samples / count
         if count > 1:
             # White noise has the same variance in every bin: the median ignores what is not noise.
-            scatter = (np.abs(rows[:, 1:] - spectra[channel][1:]) ** 2).sum(axis=0) / (count - 1)
+            scatter = (np.abs(each[:, 1:] - spectra[channel][1:]) ** 2).sum(axis=0) / (count - 1)
             floor = max(float(np.median(scatter)) / np.log(2.0) / count, 1e-3 * floor)
         noise[channel] = max(floor, TINY)
     return spectra, noise
 
 
-def _force(machine: Machine, spectra: Mapping[str, Complex], omega: Array) -> Complex:
-    """Spectrum [N] of the mesh force by the nominal load row, or the drive row of a record without load torque."""
-    rb1, rb2 = machine.base_radius
+def _force(model: NominalModel, spectra: Mapping[str, Complex], omega: Array) -> Complex:
+    """Spectrum [N] of the mesh force by the nominal equation of the load, or of the drive for a record without it."""
+    rb1, rb2 = model.base_radius
     if "torque_driven" in spectra:
-        turning = machine.inertia[1] * omega**2 * spectra["angle_driven"] / rb2
+        turning = model.inertia[1] * omega**2 * spectra["angle_driven"] / rb2
         return np.asarray((spectra["torque_driven"] - turning) / rb2)
-    turning = (machine.inertia[0] + machine.rotor) * omega**2 * spectra["angle_driver"] / rb1
+    turning = (model.inertia[0] + model.rotor) * omega**2 * spectra["angle_driver"] / rb1
     return np.asarray((spectra["torque_driver"] + turning) / rb1)
 
 
-def _stiffness(machine: Machine, force: float) -> float:
+def _stiffness(model: NominalModel, force: float) -> float:
     """Secant stiffness [N/m] of the mesh at a force [N], mean over the cycle."""
-    mean = machine.law.force.mean(axis=0)
-    return force / float(np.interp(force, mean, machine.law.approach))
+    mean = model.law.force.mean(axis=0)
+    return force / float(np.interp(force, mean, model.law.approach))
 
 
-def _arms(machine: Machine, mesh_frequency: float, phase: Array, spectra: Mapping[str, Complex], omega: Array) -> Array:
-    """Friction levers over base radius (3, N), for driver rotation, supports and driven rotation.
+def _lever_arms(
+    model: NominalModel, mesh_frequency: float, phase: Array, spectra: Mapping[str, Complex], omega: Array
+) -> Array:
+    """Lever arms of friction over base radius (3, N), for driver rotation, supports and driven rotation.
 
     The direction of sliding is that of the measured motion: vibration is as fast as the rolling teeth slide near the
     pitch point, and turns part of Coulomb's friction into damping.
     """
-    law, n = machine.law, phase.size
+    law, n = model.law, phase.size
     numbers, share = law.pairs(phase)
     travel = (phase[:, None] - numbers) * law.base_pitch
     centre1, centre2 = law.pitch_roll
     rho1, rho2 = centre1 + travel, centre2 - travel
-    rb1, rb2 = machine.base_radius
+    rb1, rb2 = model.base_radius
 
     def rate(channel: str) -> Array:
         if channel not in spectra:
             return np.zeros(n)
         return np.asarray(np.fft.irfft(1j * omega * spectra[channel], n) * n)
 
-    turn1, turn2 = (2 * np.pi * mesh_frequency / z for z in machine.teeth)
+    turn1, turn2 = (2 * np.pi * mesh_frequency / z for z in model.teeth)
     speed1, speed2 = turn1 + rate("angle_driver") / rb1, turn2 + rate("angle_driven") / rb2
-    across = machine.cross_factor * (rate("y_driver") - rate("y_driven"))
+    across = model.cross_factor * (rate("y_driver") - rate("y_driven"))
     sliding = rho1 * speed1[:, None] - rho2 * speed2[:, None] + across[:, None]
-    weight = share * np.tanh(sliding / machine.transition)
+    weight = share * np.tanh(sliding / model.transition)
     m1, m2 = (weight * rho1).sum(axis=-1), (weight * rho2).sum(axis=-1)
-    factor = machine.cross_factor / machine.support_factor
+    factor = model.cross_factor / model.support_factor
     return np.stack([m1 / rb1, weight.sum(axis=-1) * factor, m2 / rb2])

@@ -1,14 +1,16 @@
-"""Derivatives of the force residuals to all unknowns, by the chain through the mesh and directly.
+"""Jacobian of the force residuals: derivatives to the departures by hand, taken to the unknowns that move them.
 
-Left out are friction's and the filters' modulation of a column, the change of the damping with the stiffness, and what
-the law's curvature does to its tangent: below 3 % of a column at the background's size, up to 40 % for a strongly bent
-law. Steps that do not help are refused, so that this costs steps, not truth. With all of it in, descents went further,
-into optima where supports and rows absorb friction, and verdicts on the calibration family became worse.
+Departures are linear in the unknowns, so no effect has a derivative of its own. Left out are friction's and the
+filters' modulation of a column, the change of the damping with the stiffness, and what the law's curvature does to its
+tangent: below 3 % of a column at the background's size, up to 40 % for a strongly bent law. Steps that do not help are
+refused, so that this costs steps, not truth. With all of it in, descents went further, into optima where supports and
+filters absorb friction, and verdicts on the calibration family became worse: differences of the residuals, which have
+all of it in, are what the tests compare with, not what the search uses.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,24 +18,28 @@ from numpy.typing import NDArray
 
 from gearbench.diagnosis.forces.basis import KNOTS
 from gearbench.diagnosis.forces.condition import Condition
-from gearbench.diagnosis.forces.nominal import Machine
-from gearbench.diagnosis.forces.parameters import Layout
-from gearbench.diagnosis.forces.residuals import (
-    LOSS_FACTOR,
+from gearbench.diagnosis.forces.departures import Departures
+from gearbench.diagnosis.forces.equations import DELAYED, SUPPORTS, Equation
+from gearbench.diagnosis.forces.mesh import (
     Mesh,
+    corrected,
+    mesh,
+    radial_impedance,
+    softened,
+    steady_rate,
+    stiffness_factor,
+)
+from gearbench.diagnosis.forces.nominal import NominalModel
+from gearbench.diagnosis.forces.residuals import (
+    LEVER_OF,
+    LOSS_FACTOR,
     Residuals,
     assemble,
-    carried,
-    corrected,
+    carried_force,
     coupling_compliance,
-    mesh,
-    modulation,
-    radial_impedance,
-    ripple_lines,
-    softened,
     support_force,
 )
-from gearbench.diagnosis.forces.unknowns import DELAYED, ROWS, SUPPORTS
+from gearbench.diagnosis.forces.unknowns import Unknowns
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -41,100 +47,135 @@ Complex = NDArray[np.complex128]
 BACKLASH_STEP = 1e-7  # [m]
 
 
-def rows_and_columns(
-    machine: Machine, condition: Condition, where: Layout, p: Array, used: NDArray[np.int64]
-) -> tuple[Residuals, Complex, Complex]:
-    """Residuals in the B `used` bins, their derivatives (4, B, unknowns) to the unknowns, and those (B, unknowns) of
-    the mesh force."""
-    spectra = corrected(condition, where, p)
-    state = mesh(machine, condition, where, p, spectra)
-    residuals = assemble(machine, condition, where, p, spectra, state)
-    out = np.zeros((len(ROWS), len(used), where.size), dtype=complex)
-    index, moved = _mesh_columns(machine, condition, where, p, spectra, state, used)
-    share = residuals.share
-    pressing = np.zeros((len(used), where.size), dtype=complex)
-    pressing[:, index] = moved.T
-    # One error of the mesh force shows in every row, as strongly as the row weighs it.
-    out[:, :, index] = -share[:, used, None] * moved.T
-    put = _Put(out, used)
-    _support_columns(machine, condition, where, p, spectra, put)
-    forces = carried(machine, condition, where, p, state.force)
-    _drive_columns(machine, condition, where, p, spectra, forces[0], share[0], put)
-    _row_columns(condition, where, state, forces, share, put)
-    return residuals.at(used), out, pressing
+@dataclass(frozen=True)
+class Linearised:
+    """Residuals in B used bins under `departures`, their Jacobian (4, B, unknowns), and that (B, unknowns) of the mesh
+    force."""
+
+    departures: Departures
+    residuals: Residuals
+    jacobian: Complex
+    mesh_jacobian: Complex
+
+
+def linearised(
+    model: NominalModel, condition: Condition, unknowns: Unknowns, p: Array, used: NDArray[np.int64]
+) -> Linearised:
+    """The residuals about the unknowns `p` (size,) in the B `used` bins."""
+    departures = unknowns.departures(p, condition)
+    spectra = corrected(condition, departures)
+    state = mesh(model, condition, departures, spectra)
+    residuals = assemble(model, condition, departures, spectra, state)
+    carried = carried_force(model, condition, departures, state.force)
+    at = _Point(model, condition, departures, spectra, state, carried, residuals)
+    out = np.zeros((len(Equation), len(used), unknowns.size), dtype=complex)
+    entries, moved = _mesh_columns(at, unknowns, used)
+    mesh_jacobian = np.zeros((len(used), unknowns.size), dtype=complex)
+    mesh_jacobian[:, entries] = moved.T
+    # One error of the mesh force shows in every equation, as strongly as it enters there.
+    out[:, :, entries] = -residuals.mesh_factor[:, used, None] * moved.T
+    put = _Put(out, used, unknowns)
+    _support_columns(at, put)
+    _drive_columns(at, put)
+    _friction_columns(at, put)
+    return Linearised(departures, residuals.at(used), out, mesh_jacobian)
+
+
+@dataclass(frozen=True)
+class _Point:
+    """Where the Jacobian is taken."""
+
+    model: NominalModel
+    condition: Condition
+    departures: Departures
+    spectra: Mapping[str, Complex]
+    mesh: Mesh
+    carried: Complex
+    residuals: Residuals
 
 
 @dataclass(frozen=True)
 class _Put:
-    """Adds a spectrum (K,) to one column of one row, at the used bins."""
+    """Adds a spectrum (K,) to the columns of all unknowns that move an element of a slot, in one equation."""
 
     out: Complex
     used: NDArray[np.int64]
+    unknowns: Unknowns
 
-    def __call__(self, row: int, entry: int, spectrum: Complex) -> None:
-        self.out[row, :, entry] += spectrum[self.used]
+    def __call__(self, equation: Equation, slot: str, element: int, spectrum: Complex) -> None:
+        for entry in self.unknowns.moving.get((slot, element), ()):
+            self.out[equation, :, entry] += spectrum[self.used]
 
 
-def _mesh_columns(
-    machine: Machine,
-    condition: Condition,
-    where: Layout,
-    p: Array,
-    spectra: Mapping[str, Complex],
-    state: Mesh,
-    used: NDArray[np.int64],
-) -> tuple[list[int], Complex]:
-    """What moves the mesh force: entries (n,) and spectra (n, B) of the derivatives of F_m, the same in all rows."""
-    n = condition.samples
+def _mesh_columns(at: _Point, unknowns: Unknowns, used: NDArray[np.int64]) -> tuple[list[int], Complex]:
+    """What moves the mesh force: entries (n,) and spectra (n, B) of the derivatives of F_m, the same everywhere."""
     listed: list[tuple[int, Array]] = []
+    for slot, derivatives in _mesh_slots(at):
+        for element, value in derivatives.items():
+            listed.extend((entry, value) for entry in unknowns.moving.get((slot, element), ()))
+    for one in unknowns.based("excess"):
+        assert one.basis is not None
+        start = unknowns[one.key].start
+        listed.extend((start + i, at.mesh.tangent * wave) for i, wave in enumerate(one.basis(at.condition)))
+    entries = [entry for entry, _ in listed]
+    values = np.fft.rfft(np.stack([value for _, value in listed]), axis=-1)[:, used] / at.condition.samples
+    return entries, np.asarray(values)
 
-    def put(key: str, *values: Array, start: int = 0) -> None:
-        first = where[key].start + start
-        listed.extend((first + i, value) for i, value in enumerate(values))
 
+def _mesh_slots(at: _Point) -> Iterator[tuple[str, dict[int, Array]]]:
+    """Derivatives (N,) of the mesh force in time to the elements of every slot that moves it."""
+    state, condition = at.mesh, at.condition
     viscous = state.viscosity * state.rate * state.touching
-    put("scale", state.elastic + 0.5 * viscous)
-    put("mesh-ratio", viscous)
-    put("dissipation", np.abs(state.rate) * state.rate * state.touching)
-    put("offset", state.tangent)
-    put("eccentricity-driver", *(state.tangent * condition.lobes[0]))
-    put("eccentricity-driven", *(state.tangent * condition.lobes[1]))
-    put("shape", *(state.elastic * condition.waves))
-    put("profile", *(state.tangent * condition.waves))
     level = np.maximum(np.abs(state.elastic), 1e-3 * condition.force_level) / condition.force_level
-    put("curvature", state.elastic * np.log(level))
-    put("backlash", _backlash(machine, condition, where, p, state))
-    impedance, spring, damper = radial_impedance(machine, condition, where, p)
-    softening = machine.transverse_factor**2 * condition.force_full / impedance**2
+    yield "scale", {0: state.elastic + 0.5 * viscous}
+    yield "mesh_ratio", {0: viscous}
+    yield "dissipation", {0: np.abs(state.rate) * state.rate * state.touching}
+    yield "offset", {0: state.tangent}
+    yield "shape", dict(enumerate(state.elastic * condition.waves))
+    yield "profile", dict(enumerate(state.tangent * condition.waves))
+    yield "curvature", {0: state.elastic * np.log(level)}
+    yield "backlash", {0: _backlash(at)}
+    yield "radial", dict(enumerate(_radial(at)))
+    yield "yielding", dict(enumerate(_yielding(at)))
+    yield "delay", dict(_delays(at))
+    pitch, loss = _teeth(condition, at.departures.loss, state)
+    yield "pitch", dict(enumerate(pitch))
+    yield "loss", dict(enumerate(loss))
+
+
+def _radial(at: _Point) -> Array:
+    condition, n = at.condition, at.condition.samples
+    impedance, spring, damper = radial_impedance(at.model, condition, at.departures)
+    softening = at.model.transverse_factor**2 * condition.force_full / impedance**2
     changes = np.concatenate([softening * spring[:, None], softening * damper])
-    put("radial", *(state.tangent * (np.fft.irfft(changes, n, axis=-1) * n)))
+    return np.asarray(at.mesh.tangent * (np.fft.irfft(changes, n, axis=-1) * n))
+
+
+def _yielding(at: _Point) -> Array:
+    condition, n = at.condition, at.condition.samples
     bins = np.zeros((2 * len(KNOTS), n // 2 + 1), dtype=complex)
     bins[: len(KNOTS)] = condition.hats_full * condition.force_full / condition.stiffness_level
     bins[len(KNOTS) :] = 1j * bins[: len(KNOTS)]
-    put("compliance", *(state.tangent * (np.fft.irfft(bins, n, axis=-1) * n)))
-    g = machine.support_factor
-    for channel, sign in zip(DELAYED, (1.0, -1.0, g, -g), strict=True):
-        if channel in spectra:
-            rate = 1j * condition.omega * spectra[channel]
+    return np.asarray(at.mesh.tangent * (np.fft.irfft(bins, n, axis=-1) * n))
+
+
+def _delays(at: _Point) -> Iterator[tuple[int, Array]]:
+    condition, state, n, g = at.condition, at.mesh, at.condition.samples, at.model.support_factor
+    for number, (channel, sign) in enumerate(zip(DELAYED, (1.0, -1.0, g, -g), strict=True)):
+        if channel in at.spectra:
+            rate = 1j * condition.omega * at.spectra[channel]
             faster = np.fft.irfft(1j * condition.omega * rate, n) * n
-            rate[0] = condition.pitch_speed if channel.startswith("angle") else 0.0
+            rate[0] = steady_rate(condition, channel)
             damping = state.viscosity * state.touching * faster
-            put(f"delay-{channel}", sign * (state.tangent * (np.fft.irfft(rate, n) * n) + damping))
-    pitch, crack = _tooth_columns(condition, p[where["crack"]], state)
-    put("pitch-driver", *pitch[: condition.teeth[0]])
-    put("pitch-driven", *pitch[condition.teeth[0] :])
-    put("crack", *crack)
-    index = [at for at, _ in listed]
-    values = np.fft.rfft(np.stack([value for _, value in listed]), axis=-1)[:, used] / n
-    return index, np.asarray(values)
+            yield number, sign * (state.tangent * (np.fft.irfft(rate, n) * n) + damping)
 
 
-def _tooth_columns(condition: Condition, loss: Array, state: Mesh) -> tuple[Array, Array]:
+def _teeth(condition: Condition, loss: Array, state: Mesh) -> tuple[Array, Array]:
     """Derivatives (z1 + z2, N) of the mesh force to each tooth's pitch error and to its loss of bending stiffness."""
     soft = softened(condition, loss)
-    left = (condition.share * soft).sum(axis=-1)
-    weaker = (condition.share * soft**2)[..., None] * condition.bending
-    both = np.stack([condition.share, condition.share], axis=-1)
+    left = (condition.load_share * soft).sum(axis=-1)
+    weaker = (condition.load_share * soft**2)[..., None] * condition.bending
+    both = np.stack([condition.load_share, condition.load_share], axis=-1)
     pitch = _of_teeth(condition, both * state.tangent[:, None, None])
     own = (1.0 - loss[:, None]) ** -2
     return pitch, own * _of_teeth(condition, weaker * (-state.elastic / left)[:, None, None])
@@ -151,99 +192,73 @@ def _of_teeth(condition: Condition, weights: Array) -> Array:
     return total
 
 
-def _backlash(machine: Machine, condition: Condition, where: Layout, p: Array, state: Mesh) -> Array:
-    present = max(machine.law.backlash + p[where["backlash"]][0], 0.0)
+def _backlash(at: _Point) -> Array:
+    law, state, phase = at.model.law, at.mesh, at.condition.phase
+    present = max(law.backlash + at.departures.backlash, 0.0)
     if not np.any(state.delta < -present):
-        return np.zeros(condition.samples)
-    wider = replace(machine.law, backlash=present + BACKLASH_STEP).evaluate(state.delta, condition.phase)[0]
-    now = replace(machine.law, backlash=present).evaluate(state.delta, condition.phase)[0]
-    return np.asarray(machine.scale * modulation(condition, where, p) * (wider - now) / BACKLASH_STEP)
+        return np.zeros(at.condition.samples)
+    wider = replace(law, backlash=present + BACKLASH_STEP).evaluate(state.delta, phase)[0]
+    now = replace(law, backlash=present).evaluate(state.delta, phase)[0]
+    factor = at.model.scale * stiffness_factor(at.condition, at.departures)
+    return np.asarray(factor * (wider - now) / BACKLASH_STEP)
 
 
-def _support_columns(
-    machine: Machine, condition: Condition, where: Layout, p: Array, spectra: Mapping[str, Complex], put: _Put
-) -> None:
-    n, k, g = condition.samples, condition.bins, machine.support_factor
-    s = 1j * condition.omega[:k]
-    for side, (row, channel, sign, name) in enumerate(SUPPORTS):
-        if channel not in spectra:
+def _support_columns(at: _Point, put: _Put) -> None:
+    """Both supports, and the direct part of a late displacement."""
+    model, departures, n, k = at.model, at.departures, at.condition.samples, at.condition.bins
+    g, s = model.support_factor, 1j * at.condition.omega[:k]
+    for one in SUPPORTS:
+        if one.channel not in at.spectra:
             continue
-        y = spectra[channel]
-        stiffness = p[where["stiffness"]][side]
-        values = support_force(machine, side, np.fft.irfft(y, n) * n, stiffness, p[where[name]][0])
-        spring, more = np.fft.rfft(np.stack(values), axis=-1)[:, :k] / n
-        damping = machine.damping[side] * np.exp(p[where["damping"]][side])
-        put(row, where["stiffness"].start + side, sign * spring / g)
-        put(row, where[name].start, sign * more / g)
-        put(row, where["damping"].start + side, sign * damping * s * y[:k] / g)
-        put(row, where["mass"].start + side, sign * machine.mass[side] * s**2 * y[:k] / g)
-        mass = machine.mass[side] * (1 + p[where["mass"]][side])
+        y, side, sign = at.spectra[one.channel], one.side, one.sign
+        values = support_force(model, side, np.fft.irfft(y, n) * n, departures)
+        spring, hardening = np.fft.rfft(np.stack(values), axis=-1)[:, :k] / n
+        damping = model.damping[side] * np.exp(departures.damping[side])
+        put(one.equation, "stiffness", side, sign * spring / g)
+        put(one.equation, "exponent", side, sign * hardening / g)
+        put(one.equation, "damping", side, sign * damping * s * y[:k] / g)
+        put(one.equation, "mass", side, sign * model.mass[side] * s**2 * y[:k] / g)
+        mass = model.mass[side] * (1 + departures.mass[side])
         moving = (mass * s**2 + damping * s) * y[:k] + spring
-        put(row, where[f"delay-{channel}"].start, sign * s * moving / g)
+        put(one.equation, "delay", DELAYED.index(one.channel), sign * s * moving / g)
 
 
-def _drive_columns(
-    machine: Machine,
-    condition: Condition,
-    where: Layout,
-    p: Array,
-    spectra: Mapping[str, Complex],
-    force: Complex,
-    share: Complex,
-    put: _Put,
-) -> None:
-    """Inertias, coupling, ripple and the direct part of a late driver angle. `force` (K,) is rb1's in the drive row."""
-    k = condition.bins
-    rb1, rb2 = machine.base_radius
-    s = 1j * condition.omega[:k]
-    turning = s**2 * spectra["angle_driver"][:k] / rb1
-    relative = p[where["inertia"]]
-    inertia = machine.inertia[0] * (1 + relative[0])
-    rotor = machine.rotor * (1 + relative[2])
-    shaft = inertia * turning + rb1 * force
-    start = where["inertia"].start
-    put(0, start, -share * machine.inertia[0] * turning / rb1)
-    soft = coupling_compliance(machine, condition, where, p)
-    put(0, start + 2, -machine.rotor * (turning + s**2 * soft * shaft) / rb1)
-    put(0, where["coupling"].start, -rotor * s**2 * (1 - 1j * LOSS_FACTOR * (s.imag > 0)) * shaft / rb1)
-    put(0, where["delay-angle_driver"].start, -(rotor + share * inertia) * s * turning / rb1)
-    for entry, at, unit in ripple_lines(condition, where):
-        line = np.zeros(k, dtype=complex)
-        line[at] = unit / rb1
-        put(0, entry, line)
-    if "torque_driven" in spectra:
-        moving = machine.inertia[1] * s**2 * spectra["angle_driven"][:k] / rb2
-        put(2, start + 1, moving / rb2)
-        put(2, where["delay-angle_driven"].start, (1 + relative[1]) * s * moving / rb2)
+def _drive_columns(at: _Point, put: _Put) -> None:
+    """Inertias, coupling, torque at the drive and the direct part of late angles."""
+    model, departures, k = at.model, at.departures, at.condition.bins
+    rb1, rb2 = model.base_radius
+    s = 1j * at.condition.omega[:k]
+    factor = at.residuals.mesh_factor[Equation.DRIVE]
+    turning = s**2 * at.spectra["angle_driver"][:k] / rb1
+    inertia = model.inertia[0] * (1 + departures.inertia[0])
+    rotor = model.rotor * (1 + departures.inertia[2])
+    shaft = inertia * turning + rb1 * at.carried[Equation.DRIVE]
+    soft = coupling_compliance(model, at.condition, departures)
+    late = DELAYED.index("angle_driver")
+    put(Equation.DRIVE, "inertia", 0, -factor * model.inertia[0] * turning / rb1)
+    put(Equation.DRIVE, "inertia", 2, -model.rotor * (turning + s**2 * soft * shaft) / rb1)
+    put(Equation.DRIVE, "coupling", 0, -rotor * s**2 * (1 - 1j * LOSS_FACTOR * (s.imag > 0)) * shaft / rb1)
+    put(Equation.DRIVE, "delay", late, -(rotor + factor * inertia) * s * turning / rb1)
+    for one in put.unknowns.based("torque"):
+        assert one.basis is not None
+        columns = one.basis(at.condition)[:, put.used] / rb1
+        put.out[Equation.DRIVE, :, put.unknowns[one.key]] += columns.T
+    if "torque_driven" in at.spectra:
+        moving = model.inertia[1] * s**2 * at.spectra["angle_driven"][:k] / rb2
+        put(Equation.LOAD, "inertia", 1, moving / rb2)
+        late = DELAYED.index("angle_driven")
+        put(Equation.LOAD, "delay", late, (1 + departures.inertia[1]) * s * moving / rb2)
 
 
-def _row_columns(
-    condition: Condition, where: Layout, state: Mesh, forces: Complex, share: Complex, put: _Put
-) -> None:
-    """Friction, and the smooth filters of single rows."""
-    k, n = condition.bins, condition.samples
-    rubbing = np.fft.rfft(state.force * condition.arms, axis=-1)[:, :k] / n
-    for row, name in enumerate(ROWS):
-        lever = (0, 1, 2, 1)[row]
-        put(row, where["friction"].start, -share[row] * rubbing[lever])
-        weighted = condition.hats_full[:, :k] * (share[row] * forces[lever])
-        at = where[f"filter-{name}"].start
+def _friction_columns(at: _Point, put: _Put) -> None:
+    """Friction, and the smooth filters of single equations."""
+    condition, k, n = at.condition, at.condition.bins, at.condition.samples
+    rubbing = np.fft.rfft(at.mesh.force * condition.lever_arms, axis=-1)[:, :k] / n
+    for equation in Equation:
+        factor = at.residuals.mesh_factor[equation]
+        put(equation, "friction", 0, -factor * rubbing[LEVER_OF[equation]])
+        weighted = condition.hats_full[:, :k] * (factor * at.carried[equation])
+        first = int(equation) * 2 * len(KNOTS)
         for knot, spectrum in enumerate(weighted):
-            put(row, at + knot, spectrum)
-            put(row, at + len(KNOTS) + knot, 1j * spectrum)
-
-
-def stiffening_slope(condition: Condition, where: Layout, p: Array) -> Array:
-    """Gradient (unknowns,) of `Mesh.stiffening`: the row's mean logarithm of the mesh stiffness's factor."""
-    gradient = np.zeros(where.size)
-    gradient[where["scale"]] = 1.0
-    loss = p[where["crack"]]
-    soft = softened(condition, loss)
-    left = (condition.share * soft).sum(axis=-1)
-    weaker = (condition.share * soft**2 / left[:, None])[..., None] * condition.bending
-    z1, z2 = condition.teeth
-    for side, (start, count) in enumerate(((0, z1), (z1, z2))):
-        total = np.bincount(condition.tooth[side].ravel(), weaker[..., side].ravel(), count) / condition.samples
-        at = slice(where["crack"].start + start, where["crack"].start + start + count)
-        gradient[at] = -total / (1.0 - loss[start : start + count]) ** 2
-    return gradient
+            put(equation, "filters", first + knot, spectrum)
+            put(equation, "filters", first + len(KNOTS) + knot, 1j * spectrum)

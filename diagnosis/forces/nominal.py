@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import cos, lcm, sin, tan
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.bench.nonlinear.law_table import mesh_law
+from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.geometry import body, pair
 from gearbench.lumped.linear.model import equivalent_mass
 from gearbench.lumped.nonlinear.law import MeshLaw
@@ -27,15 +28,18 @@ DEFAULT_SD = {
 }
 
 
+LOAD_MARGIN = 1.3  # of the largest torque, as the force in the mesh swings beyond it
+
+
 @dataclass(frozen=True)
-class Machine:
+class NominalModel:
     """Constants of the nominal rig, SI. Pairs are (driver, driven); `sd_*` are relative standard deviations."""
 
     teeth: tuple[int, int]
     base_radius: tuple[float, float]
     support_factor: float  # g: cos(working pressure angle), or 1 along the line of action
-    cross_factor: float  # share of the friction force along the support: sin(working pressure angle), or 0
-    transverse_factor: float  # share of a radial motion along the line of action, sin(working pressure angle)
+    cross_factor: float  # part of the friction force along the support: sin(working pressure angle), or 0
+    transverse_factor: float  # part of a radial motion along the line of action, sin(working pressure angle)
     mass: tuple[float, float]
     inertia: tuple[float, float]  # of the gears alone [kg m^2]
     rotor: float  # inertia beyond the drive's coupling [kg m^2]
@@ -66,12 +70,15 @@ class Machine:
         return lcm(*self.teeth)
 
 
-def machine(nominal: Case, load: float, mean: float) -> Machine:
-    """The machine of a nominal case whose mesh force law must reach `load` [N m] on the driver.
+def nominal_model(nominal: Case, load: float, mean: float) -> NominalModel:
+    """The model of a nominal case whose mesh force law must reach `load` [N m] on the driver.
 
     `mean` [N m] is a typical mean torque: a support that the case takes for linear is judged about its deflection
     there.
     """
+    # Solving it compiles loops on import, which not every user of this module wants.
+    from gearbench.bench.nonlinear.law_table import mesh_law
+
     rig = nominal.rig
     meshing = pair(rig)
     density = rig.material.density
@@ -88,7 +95,7 @@ def machine(nominal: Case, load: float, mean: float) -> Machine:
     alpha = meshing.working_pressure_angle
     inertias = (bodies[0].inertia, bodies[1].inertia)
     known = _Known(nominal)
-    return Machine(
+    return NominalModel(
         teeth=(rig.driver.teeth, rig.driven.teeth),
         base_radius=radii,
         support_factor=cos(alpha) if tangential else 1.0,
@@ -118,6 +125,11 @@ def machine(nominal: Case, load: float, mean: float) -> Machine:
         sd_mesh_ratio=known.one("rig.damping.mesh_ratio", rig.damping.mesh_ratio, "mesh_ratio"),
         noise=(rig.sensors.noise_angle, rig.sensors.noise_displacement, rig.sensors.noise_torque),
     )
+
+
+def table_load(measurements: Sequence[Measurement]) -> float:
+    """Driver torque [N m] that the table of the mesh force must reach for these measurements."""
+    return LOAD_MARGIN * max(float(np.abs(measured.mean("torque_driver")).max()) for measured in measurements)
 
 
 def _references(supports: tuple[Support, Support], force: float) -> tuple[float, float]:

@@ -1,82 +1,133 @@
-"""The layout of all unknowns for a rig and its conditions, with the priors of background and of effects.
+"""The unknowns of a diagnosis: what the nominal rig leaves open, background levels of every effect, free forms.
 
-The widths of the effects are those of rigs worth diagnosing; the widths of the background are a tenth of them, what
-good rigs have of everything. Both are documented numbers, not fitted ones.
+Every unknown is a departure from the nominal rig with a Gaussian prior around zero. Its standard deviation is `sd`
+while it is mere background (what the nominal uncertainty or a sound rig would have) and `wide` when the cause that it
+belongs to is taken to be at work.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import prod
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.diagnosis.forces.basis import KNOTS, SHAPE_ORDERS
 from gearbench.diagnosis.forces.condition import Condition
-from gearbench.diagnosis.forces.nominal import Machine
-from gearbench.diagnosis.forces.parameters import NUISANCE, Layout, block, layout
+from gearbench.diagnosis.forces.departures import SHAPES, TOOTH_SLOTS, Departures
 
 Array = NDArray[np.float64]
 
-RIPPLE_ORDERS = (6, 12, 18, 24)  # per driver revolution: what commutation and slots of usual motors leave
-ROWS = ("drive", "driver-support", "load", "driven-support")
-# Of both gears: row, channel, sign of the support's force in it, and the unknown of its exponent.
-SUPPORTS = ((1, "y_driver", -1.0, "bearing-driver"), (3, "y_driven", 1.0, "bearing-driven"))
-DELAYED = ("angle_driver", "angle_driven", "y_driver", "y_driven")
+# Of each unknown of a group (n), what it adds per unit to a slot over samples or bins: (n, N) or (n, K).
+Basis = Callable[[Condition], NDArray[Any]]
 
 
-def unknowns(machine: Machine, conditions: Sequence[Condition]) -> Layout:
-    """All unknowns of the force residuals of these conditions."""
-    z1, z2 = machine.teeth
-    complex_knots = [f"{part}@{knot:g}" for part in ("re", "im") for knot in KNOTS]
-    ripple = [
-        f"{condition.name}:{order}:{part}"
-        for condition in conditions
-        for order in RIPPLE_ORDERS
-        for part in ("cos", "sin")
-    ]
-    torque = float(np.mean([condition.torque_mean for condition in conditions]))
-    gear = 1.0 / (1.0 / max(machine.rotor, 1e-12) + 1.0 / machine.inertia[0])
-    quadratic = _quadratic(machine, conditions)
-    # Little at low frequencies, where it cannot be told from the mesh's own stiffness.
-    yielding = 0.01 + 0.07 * np.minimum(1.0, (np.array(KNOTS) / 0.4) ** 2)
+@dataclass(frozen=True)
+class Group:
+    """A named run of unknowns of one kind.
 
-    def softness(frequency: float) -> float:
-        return 1.0 / (gear * (2 * np.pi * frequency) ** 2)
+    `names` (n,), `unit` SI; `sd`, `wide` (n,) prior standard deviations; `low`, `high` bounds of every entry. They move
+    the elements `first` .. `first` + n - 1 of the slot `slot` of `Departures`, or all of it by their `basis`.
+    """
 
-    inertia = np.array((*machine.sd_inertia, machine.sd_rotor))
-    blocks = [
-        block("stiffness", NUISANCE, "1", ("driver", "driven"), np.array(machine.sd_stiffness)),
-        block("damping", NUISANCE, "1", ("driver", "driven"), np.array(machine.sd_damping), low=-3.0, high=3.0),
-        block("mass", NUISANCE, "1", ("driver", "driven"), np.array(machine.sd_mass)),
-        block("inertia", NUISANCE, "1", ("driver", "driven", "rotor"), inertia),
-        block("scale", NUISANCE, "1", ("mesh",), machine.sd_scale, low=-0.5, high=0.5),
-        block("mesh-ratio", NUISANCE, "1", ("mesh",), machine.sd_mesh_ratio, low=-3.0, high=3.0),
-        block("offset", NUISANCE, "m", ("excess",), 5e-6),
-        block("curvature", NUISANCE, "1", ("mesh",), 0.05, low=-0.3, high=0.3),
-        block("shape", NUISANCE, "1", 2 * SHAPE_ORDERS, 0.04),
-        block("profile", NUISANCE, "m", 2 * SHAPE_ORDERS, 0.5e-6),
-        block("compliance", NUISANCE, "1", complex_knots, np.tile(yielding, 2)),
-        block("radial", NUISANCE, "1", ("k1", "k2", "c1", "c2"), 0.6, low=-2.5, high=2.5),
-        *(block(f"filter-{row}", f"free-{row}", "1", complex_knots, 0.03, 1.0) for row in ROWS),
-        block("dissipation", "free-dissipation", "N s2/m2", ("quadratic",), quadratic, 20 * quadratic),
-        block("friction", "friction", "1", ("coefficient",), 0.004, 0.06),
-        block("eccentricity-driver", "eccentricity-driver", "m", ("cos", "sin"), 0.3e-6, 3e-6),
-        block("eccentricity-driven", "eccentricity-driven", "m", ("cos", "sin"), 0.3e-6, 3e-6),
-        block("pitch-driver", "pitch-driver", "m", z1, 0.25e-6, 2.5e-6),
-        block("pitch-driven", "pitch-driven", "m", z2, 0.25e-6, 2.5e-6),
-        block("crack", "tooth-contrast", "1", z1 + z2, 0.02, 0.35, low=-2.0, high=0.9),
-        block("coupling", "coupling", "rad/(N m)", ("compliance",), softness(6e3), softness(1.3e3), low=0.0),
-        block("bearing-driver", "bearing-driver", "1", ("exponent",), 0.03, 0.35, low=-0.8, high=2.0),
-        block("bearing-driven", "bearing-driven", "1", ("exponent",), 0.03, 0.35, low=-0.8, high=2.0),
-        *(block(f"delay-{c}", f"delay-{c}", "s", ("delay",), 4e-6, 60e-6) for c in DELAYED),
-        block("ripple", "torque-ripple", "N m", ripple, 0.0006 * torque, 0.006 * torque),
-        block("backlash", "backlash", "m", ("more",), 8e-6, 80e-6),
-    ]
-    return layout(blocks)
+    key: str
+    unit: str
+    names: tuple[str, ...]
+    sd: Array
+    wide: Array
+    slot: str
+    first: int = 0
+    basis: Basis | None = None
+    low: float = -np.inf
+    high: float = np.inf
 
 
-def _quadratic(machine: Machine, conditions: Sequence[Condition]) -> float:
-    """Force [N s2/m2] of rate times its size that equals a tenth of the mesh's linear damping at 30 mm/s."""
-    level = float(np.mean([condition.stiffness_level for condition in conditions]))
-    return 0.1 * 2 * machine.mesh_ratio * float(np.sqrt(level * machine.mesh_mass)) / 0.03
+def group(
+    key: str,
+    unit: str,
+    names: Sequence[str] | int,
+    sd: float | Array,
+    wide: float | None = None,
+    *,
+    slot: str,
+    first: int = 0,
+    basis: Basis | None = None,
+    low: float = -np.inf,
+    high: float = np.inf,
+) -> Group:
+    """A group; `names` may be a count, and priors are shared by all its entries unless given for each."""
+    listed = tuple(str(i) for i in range(names)) if isinstance(names, int) else tuple(names)
+    ones = np.ones(len(listed))
+    return Group(key, unit, listed, sd * ones, (sd if wide is None else wide) * ones, slot, first, basis, low, high)
+
+
+@dataclass(frozen=True)
+class Unknowns:
+    """All unknowns in the order of their vector (size,); `slices` by the groups' keys.
+
+    `moving` gives the entries that move an element of a slot, `teeth` the number of teeth of both gears.
+    """
+
+    groups: tuple[Group, ...]
+    slices: dict[str, slice]
+    size: int
+    teeth: int
+    moving: dict[tuple[str, int], tuple[int, ...]]
+
+    def __getitem__(self, key: str) -> slice:
+        return self.slices[key]
+
+    def group(self, key: str) -> Group:
+        """The group of that key."""
+        return next(one for one in self.groups if one.key == key)
+
+    def names(self) -> tuple[str, ...]:
+        """`key.name` of every unknown."""
+        return tuple(f"{one.key}.{name}" for one in self.groups for name in one.names)
+
+    def prior(self) -> Array:
+        """Prior standard deviations (size,) of the background alone."""
+        return np.concatenate([one.sd for one in self.groups])
+
+    def bounds(self) -> tuple[Array, Array]:
+        """Lower and upper bounds (size,)."""
+        low = np.concatenate([np.full(len(one.names), one.low) for one in self.groups])
+        high = np.concatenate([np.full(len(one.names), one.high) for one in self.groups])
+        return low, high
+
+    def based(self, slot: str) -> tuple[Group, ...]:
+        """The groups that move a slot by a basis."""
+        return tuple(one for one in self.groups if one.slot == slot and one.basis is not None)
+
+    def departures(self, p: Array, condition: Condition) -> Departures:
+        """The departures (size,) as the residuals of one condition take them."""
+        sizes = {slot: prod(shape) for slot, shape in SHAPES.items()} | dict.fromkeys(TOOTH_SLOTS, self.teeth)
+        values: dict[str, Any] = {slot: np.zeros(size) for slot, size in sizes.items()}
+        values["excess"] = np.zeros(condition.samples)
+        values["torque"] = np.zeros(condition.bins, dtype=complex)
+        for one in self.groups:
+            part = p[self.slices[one.key]]
+            if one.basis is None:
+                values[one.slot][one.first : one.first + len(part)] += part
+            else:
+                values[one.slot] = values[one.slot] + part @ one.basis(condition)
+        shaped = {
+            slot: values[slot].reshape(shape) if shape else float(values[slot][0]) for slot, shape in SHAPES.items()
+        }
+        return Departures(**(values | shaped))
+
+
+def unknowns_of(groups: Sequence[Group], teeth: int) -> Unknowns:
+    """Groups one after the other, for gears with that many teeth together."""
+    slices, start = {}, 0
+    moving: dict[tuple[str, int], tuple[int, ...]] = {}
+    for one in groups:
+        slices[one.key] = slice(start, start + len(one.names))
+        if one.basis is None:
+            for i in range(len(one.names)):
+                element = (one.slot, one.first + i)
+                moving[element] = (*moving.get(element, ()), start + i)
+        start += len(one.names)
+    return Unknowns(tuple(groups), slices, start, teeth, moving)

@@ -1,9 +1,9 @@
 """Intake: measured records become measurements, cut into hunting periods and held against the nominal rig.
 
 After one hunting period, H = lcm(z1, z2) teeth, the same two teeth meet again, so everything that turns
-with either shaft repeats; a row of a measurement is the shortest run that holds whole hunting periods and
-whole excitation periods. What does not fit the nominal rig is refused in one sentence; what costs power
-without making a verdict wrong is said in `Measurement.warnings`.
+with either shaft repeats; a repetition of a measurement is the shortest run that holds whole hunting periods and
+whole excitation periods. What does not fit the nominal rig is refused in one sentence; what hides
+small effects without making a verdict wrong is said in `Measurement.warnings`.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from gearbench.rig import Case
 
 Array = NDArray[np.float64]
 
-# How far the mesh phase may miss a whole number of hunting periods over one row [cycles].
+# How far the mesh phase may miss a whole number of hunting periods over one repetition [cycles].
 PHASE_DRIFT = 2e-3
 # A declared mesh period is taken at its word up to this part of itself; without one, the angles' own fit
 # may miss a whole number of teeth over the record by this many cycles.
@@ -45,17 +45,17 @@ DERIVED = ("mesh_phase", "dte", "force")
 
 @dataclass(frozen=True, eq=False)
 class Measurement:
-    """One record, realisation 0, cut into rows.
+    """One record, realisation 0, cut into repetitions.
 
-    `record` says all that replaying it needs: its periods are the rows, and attributes that it lacked are filled in
-    from the case.
-    `periods`: channel -> (P, N) in SI, one row per hunting period; the angles are their departures [rad]
+    `record` says all that replaying it needs: its periods are the repetitions, and attributes that it lacked are
+    filled in from the case.
+    `periods`: channel -> (P, N) in SI, one repetition per hunting period; the angles are their departures [rad]
     from steady rotation, `angle - 2 pi phase / teeth`, everything else as recorded; a channel that the
-    record lacks is absent. `phase` (N,): mesh phase [cycles] of the samples of the first row at steady
-    speed (each row adds `mesh_cycles`). `phase_known`: its origin is the geometry's; `zero_known`: the
+    record lacks is absent. `phase` (N,): mesh phase [cycles] of the samples of the first repetition at steady
+    speed (each repetition adds `mesh_cycles`). `phase_known`: its origin is the geometry's; `zero_known`: the
     angles' zero is unloaded contact, so that the mean of the transmission error means something.
-    `noise`: channel -> rms of one sample's departure from row to row (empty with one row); `drift`: the
-    largest change of a channel's level between rows beyond white noise, relative to its rms. `path`: its file.
+    `noise`: channel -> rms of one sample's departure between repetitions (empty with one); `drift`: the largest
+    change of a channel's level between repetitions beyond white noise, relative to its rms. `path`: its file.
     """
 
     name: str
@@ -74,34 +74,36 @@ class Measurement:
     path: Path | None = None
 
     @property
-    def rows(self) -> int:
-        """Number of rows P."""
+    def repetitions(self) -> int:
+        """Number of repetitions P."""
         return int(self.periods["torque_driver"].shape[0])
 
     def mean(self, channel: str) -> Array:
-        """Mean (N,) of a channel over the rows."""
+        """Mean (N,) of a channel over the repetitions."""
         return self.periods[channel].mean(axis=0)
 
 
-def intake(paths: Sequence[Path], nominal: Case) -> tuple[Measurement, ...]:
-    """The measurements in the records of `paths`, one each and in that order, held against the nominal rig.
+def intake(records: Sequence[str | Path | xr.Dataset], nominal: Case) -> tuple[Measurement, ...]:
+    """The measurements in the records (files or datasets), one each and in that order, held against the nominal rig.
 
     Raises DiagnosisError or RecordError, one sentence each, for what cannot be diagnosed.
     """
-    if not paths:
+    if not records:
         raise DiagnosisError("no RECORD is given: at least one is needed")
-    resolved = [Path(path).resolve() for path in paths]
-    for number, path in enumerate(resolved):
-        if path in resolved[:number]:
-            raise DiagnosisError(f"record {paths[number]} is given twice: each one counts once")
+    paths = [None if isinstance(record, xr.Dataset) else Path(record) for record in records]
+    resolved = [path.resolve() for path in paths if path]
+    for number, one in enumerate(resolved):
+        if one in resolved[:number]:
+            raise DiagnosisError(f"record {one} is given twice: each one counts once")
     facts = facts_of(nominal)
-    names = _names(resolved)
-    made = [
-        replace(measurement(read_record(path), name, nominal, source=str(path), facts=facts), path=Path(path))
-        for path, name in zip(paths, names, strict=True)
-    ]
-    _refuse_copies(made, paths)
-    check_same_rig([one.record for one in made], [str(path) for path in paths])
+    names = _names(records)
+    sources = [str(path) if path else name for path, name in zip(paths, names, strict=True)]
+    made = []
+    for record, path, name, source in zip(records, paths, names, sources, strict=True):
+        held = record if isinstance(record, xr.Dataset) else read_record(record)
+        made.append(replace(measurement(held, name, nominal, source=source, facts=facts), path=path))
+    _refuse_copies(made, sources)
+    check_same_rig([one.record for one in made], sources)
     return tuple(made)
 
 
@@ -116,17 +118,17 @@ def measurement(
     facts = facts or facts_of(nominal)
     condition, notes = check_against_nominal(record, name, source, facts)
     frequency = _mesh_frequency(record, source, facts)
-    samples, rows, cycles = _row(record, frequency, source, facts, notes)
+    samples, repetitions, cycles = _repetition(record, frequency, source, facts, notes)
     frequency = cycles * float(record.attrs["sampling_rate"]) / samples
     phase, known = _phase(record, frequency, facts, notes)
-    record = _completed(record, (samples, rows), frequency, float(phase[0]), facts)
-    whole = {str(key): record[key].values[0, : rows * samples] for key in record.data_vars if key not in DERIVED}
+    record = _completed(record, (samples, repetitions), frequency, float(phase[0]), facts)
+    whole = {str(key): record[key].values[0, : repetitions * samples] for key in record.data_vars if key not in DERIVED}
     whole, zero = _departures(whole, phase, source, facts, notes)
     whole = _usable(whole, record, source, notes)
-    periods = {key: values.reshape(rows, samples) for key, values in whole.items()}
-    drift = drift_of(periods, facts.base_radii, notes) if rows > 1 else 0.0
-    if rows == 1:
-        _one_row(record, notes)
+    periods = {key: values.reshape(repetitions, samples) for key, values in whole.items()}
+    drift = drift_of(periods, facts.base_radii, notes) if repetitions > 1 else 0.0
+    if repetitions == 1:
+        _one_repetition(record, notes)
     if record.sizes["realisation"] > 1:
         notes.append(f"of {record.sizes['realisation']} realisations only the first is used")
     return Measurement(
@@ -141,7 +143,7 @@ def measurement(
         cycles,
         known,
         zero,
-        {key: noise_of(values) for key, values in periods.items()} if rows > 1 else {},
+        {key: noise_of(values) for key, values in periods.items()} if repetitions > 1 else {},
         drift,
     )
 
@@ -159,32 +161,38 @@ def held_out_of(
     picked = [one for one in measurements if wanted in (one.name, one.condition)]
     if name is not None and len(picked) != 1:
         known = ", ".join(one.name for one in measurements)
-        raise DiagnosisError(f"--held-out {name} names {len(picked)} records, must name one of {known}")
+        raise DiagnosisError(f"held_out = {name} names {len(picked)} records, must name one of {known}")
     if not picked and len(measurements) >= 4:
         picked = [measurements[-1]]
     if name is not None and len(measurements) == 1:
-        raise DiagnosisError(f"--held-out {name} is the only record: nothing is left to diagnose from")
+        raise DiagnosisError(f"held_out = {name} is the only record: nothing is left to diagnose from")
     if len(picked) != 1 or len(measurements) == 1:
         return tuple(measurements), None
     return tuple(one for one in measurements if one is not picked[0]), picked[0]
 
 
-def _names(paths: Sequence[Path]) -> list[str]:
-    """Short names: file stems without `record-`, made distinct by a number."""
-    stems = [path.stem.removeprefix("record-") or path.stem for path in paths]
+def _names(records: Sequence[str | Path | xr.Dataset]) -> list[str]:
+    """Short names, made distinct by a number: file stems without `record-`, conditions of datasets."""
+    stems = []
+    for record in records:
+        if isinstance(record, xr.Dataset):
+            stems.append(str(record.attrs.get("condition") or "record"))
+        else:
+            stem = Path(record).resolve().stem
+            stems.append(stem.removeprefix("record-") or stem)
     return [
         stem if stems.count(stem) == 1 else f"{stem}-{1 + stems[:number].count(stem)}"
         for number, stem in enumerate(stems)
     ]
 
 
-def _refuse_copies(made: Sequence[Measurement], paths: Sequence[Path]) -> None:
-    seen: dict[bytes, Path] = {}
-    for one, path in zip(made, paths, strict=True):
+def _refuse_copies(made: Sequence[Measurement], sources: Sequence[str]) -> None:
+    seen: dict[bytes, str] = {}
+    for one, source in zip(made, sources, strict=True):
         content = b"".join(one.record[f"angle_{gear}"].values[0].tobytes() for gear in GEARS)
         if content in seen:
-            raise DiagnosisError(f"records {seen[content]} and {path} hold the same samples: each one counts once")
-        seen[content] = path
+            raise DiagnosisError(f"records {seen[content]} and {source} hold the same samples: each one counts once")
+        seen[content] = source
 
 
 def _mesh_frequency(record: xr.Dataset, source: str, facts: Facts) -> float:
@@ -197,11 +205,11 @@ def _mesh_frequency(record: xr.Dataset, source: str, facts: Facts) -> float:
     return cycles / duration if cycles and abs(frequency * duration - cycles) < PHASE_FIT else frequency
 
 
-def _row(
+def _repetition(
     record: xr.Dataset, frequency: float, source: str, facts: Facts, notes: list[str]
 ) -> tuple[int, int, int]:
-    """Samples of a row, rows, and mesh cycles of a row: the fewest excitation periods that hold whole
-    hunting periods."""
+    """Samples of a repetition, number of repetitions, and mesh cycles of one: the fewest excitation periods that hold
+    whole hunting periods."""
     rate = float(record.attrs["sampling_rate"])
     samples, periods = int(record.attrs["samples_per_period"]), int(record.attrs["periods"])
     hunting = lcm(*facts.teeth)
@@ -209,12 +217,16 @@ def _row(
         cycles = count * samples * frequency / rate
         turns = round(cycles / hunting)
         if turns >= 1 and abs(cycles - turns * hunting) <= PHASE_DRIFT:
-            rows = periods // count
-            if rows * count < periods:
-                notes.append(f"the last {periods - rows * count} of {periods} excitation periods fill no row: left out")
+            repetitions = periods // count
+            if repetitions * count < periods:
+                rest = periods - repetitions * count
+                notes.append(
+                    f"the last {rest} of {periods} excitation periods are left out: they hold no whole number of"
+                    " hunting periods"
+                )
             if turns > 1:
-                notes.append(f"a row holds {turns} hunting periods: the excitation repeats only after them")
-            return count * samples, rows, turns * hunting
+                notes.append(f"the excitation repeats only after {turns} hunting periods, which are taken as one")
+            return count * samples, repetitions, turns * hunting
     held = periods * samples * frequency / rate
     if held < hunting - PHASE_DRIFT:
         raise DiagnosisError(
@@ -254,9 +266,9 @@ def _phase(record: xr.Dataset, frequency: float, facts: Facts, notes: list[str])
 
 
 def _completed(
-    record: xr.Dataset, row: tuple[int, int], frequency: float, start: float, facts: Facts
+    record: xr.Dataset, repetition: tuple[int, int], frequency: float, start: float, facts: Facts
 ) -> xr.Dataset:
-    """The record with rows for periods, and those attributes filled in that the case or the angles tell."""
+    """The record with repetitions for periods, and those attributes filled in that the case or the angles tell."""
     known = {
         "teeth_driver": facts.teeth[0],
         "teeth_driven": facts.teeth[1],
@@ -269,9 +281,9 @@ def _completed(
         "mesh_phase": start,
     }
     filled = {key: value for key, value in known.items() if key not in record.attrs}
-    samples, rows = row
-    whole = record.isel(time=slice(0, samples * rows))
-    return whole.assign_attrs(filled | {"samples_per_period": samples, "periods": rows})
+    samples, repetitions = repetition
+    whole = record.isel(time=slice(0, samples * repetitions))
+    return whole.assign_attrs(filled | {"samples_per_period": samples, "periods": repetitions})
 
 
 def _departures(
@@ -289,7 +301,9 @@ def _departures(
                 f" {TOO_UNSTEADY:g}): the speed must be steady over the record"
             )
         if wander > UNSTEADY:
-            notes.append(f"{name} departs from steady rotation by {wander:.2g} tooth pitches: mesh orders smear")
+            notes.append(
+                f"{name} departs from steady rotation by {wander:.2g} tooth pitches: lines of the mesh orders widen"
+            )
         departures[name] = departure
     radii = facts.base_radii
     means = [float(departures[f"angle_{gear}"].mean()) for gear in GEARS]
@@ -298,7 +312,7 @@ def _departures(
     if not zero:
         notes.append(
             f"the angles' zero is not unloaded contact (mean transmission error {slack * 1e6:.3g} um): mean"
-            " deflections tell nothing"
+            " deflections are left out"
         )
         for gear in GEARS:
             departures[f"angle_{gear}"] = departures[f"angle_{gear}"] - departures[f"angle_{gear}"].mean()
@@ -325,13 +339,13 @@ def _usable(whole: dict[str, Array], record: xr.Dataset, source: str, notes: lis
         ("torque_driven", "the load side has no force balance of its own"),
     ):
         if name not in kept:
-            notes.append(f"there is no {name}: {loss}, which costs power")
+            notes.append(f"there is no {name}: {loss}, so that small effects stay hidden")
     if np.ptp(kept["torque_driver"]) <= 1e-9 * abs(float(kept["torque_driver"].mean())):
         notes.append("the torque is constant: without excitation only the operating response is seen")
     return kept
 
 
-def _one_row(record: xr.Dataset, notes: list[str]) -> None:
+def _one_repetition(record: xr.Dataset, notes: list[str]) -> None:
     averaged = int(record.attrs.get("periods_averaged", 1))
     if averaged > 1:
         notes.append(f"the record holds the mean over {averaged} blocks: {NOISE_IN_WORDS}")

@@ -1,4 +1,4 @@
-"""What a channel says about itself: noise and drift from row to row, clipping."""
+"""What a channel says about itself: noise and drift from repetition to repetition, clipping."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-NOISE_IN_WORDS = "noise and what does not turn with the shafts cannot be told from the rest, which costs power"
+NOISE_IN_WORDS = "noise cannot be told from what the rig does, so that small effects stay hidden"
 # A change counts as drift beyond this many standard deviations of what white noise does ...
 BEYOND_NOISE = 6.0
 # ... and this part of the channel's rms (its mean left out).
 LEVEL = 1e-3
-# Ratio of the scatter's rms in the noisiest half row to that in the quietest, beyond what chance makes of it.
+# Ratio of the scatter's rms in the noisiest half repetition to that in the quietest, beyond what chance makes of it.
 GROWTH = 1.2
 # Equal samples in a row, at an end of the range, that make a run; and how many such samples make clipping.
 RUN, FEWEST = 3, 6
@@ -22,35 +22,35 @@ RUN, FEWEST = 3, 6
 CROWD = 5.0
 
 
-def noise_of(rows: Array) -> float:
-    """Rms of one sample's random part from the differences of successive rows (P, N), P >= 2; white or not."""
-    change = np.diff(rows, axis=0)
+def noise_of(repetitions: Array) -> float:
+    """Rms of one sample's random part from the differences of successive repetitions (P, N), P >= 2; white or not."""
+    change = np.diff(repetitions, axis=0)
     return float(np.sqrt((change - change.mean(axis=1, keepdims=True)).var() / 2))
 
 
 def drift_of(periods: Mapping[str, Array], base_radii: tuple[float, float], notes: list[str]) -> float:
-    """Largest change of level of any channel over its rows, relative to its rms; 0 where noise explains it.
+    """Largest change of level of any channel over its repetitions, relative to its rms; 0 where noise explains it.
 
     Appends a sentence to `notes` for the channel that drifts most and for the one whose scatter grows most.
     """
     ratio = base_radii[0] / base_radii[1]
-    size = {name: float(rows.std()) for name, rows in periods.items()}
+    size = {name: float(repetitions.std()) for name, repetitions in periods.items()}
     if {"angle_driver", "angle_driven"} <= set(size):
         # A gear held at constant speed has no motion to measure its drift by: take the other one's.
         size["angle_driven"] = max(size["angle_driven"], size["angle_driver"] * ratio)
         size["angle_driver"] = max(size["angle_driver"], size["angle_driven"] / ratio)
     drifts, growths = {}, {}
-    for name, rows in periods.items():
+    for name, repetitions in periods.items():
         if size[name] > 0.0:
-            drifts[name] = _level_change(rows) / size[name]
-            growths[name] = _growth(rows, size[name])
+            drifts[name] = _level_change(repetitions) / size[name]
+            growths[name] = _growth(repetitions, size[name])
     worst = max(drifts, key=lambda name: drifts[name], default="")
     found = drifts.get(worst, 0.0)
     found = found if found > LEVEL else 0.0
     if found:
         notes.append(
             f"{worst} drifts: over the record its level changes by {100 * found:.2g} % of its rms, more than noise"
-            " explains; slow changes are no effect of the gears"
+            " explains; such slow changes do not come from the gears"
         )
     noisiest = max(growths, key=lambda name: growths[name], default="")
     if noisiest:
@@ -58,7 +58,7 @@ def drift_of(periods: Mapping[str, Array], base_radii: tuple[float, float], note
         if growths[noisiest] > limit:
             notes.append(
                 f"the scatter of {noisiest} changes {growths[noisiest]:.3g}-fold within the record (limit {limit:.3g}):"
-                " its noise is not steady, which costs power"
+                " its noise is not steady, so that small effects stay hidden"
             )
     return found
 
@@ -82,20 +82,20 @@ def clipped(values: Array) -> float:
     return total / values.size
 
 
-def _level_change(rows: Array) -> float:
-    """Spread of the row means beyond what white noise explains; 0 within it."""
-    means = rows.mean(axis=1)
+def _level_change(repetitions: Array) -> float:
+    """Spread of the repetition means beyond what white noise explains; 0 within it."""
+    means = repetitions.mean(axis=1)
     spread = float(np.ptp(means))
-    limit = BEYOND_NOISE * noise_of(rows) * np.sqrt(2.0 / rows.shape[1])
+    limit = BEYOND_NOISE * noise_of(repetitions) * np.sqrt(2.0 / repetitions.shape[1])
     return spread if spread > limit else 0.0
 
 
-def _growth(rows: Array, size: float) -> float:
-    """Ratio of the largest to the smallest rms of row differences over half rows; 1 for noise that is too
+def _growth(repetitions: Array, size: float) -> float:
+    """Ratio of the largest to the smallest rms of repetition differences over half repetitions; 1 for noise that is too
     small to matter."""
-    change = np.diff(rows, axis=0)
+    change = np.diff(repetitions, axis=0)
     change = change - change.mean(axis=1, keepdims=True)
-    half = rows.shape[1] // 2
+    half = repetitions.shape[1] // 2
     rms = np.sqrt((change[:, : 2 * half].reshape(-1, half) ** 2).mean(axis=1))
     return float(rms.max() / max(rms.min(), LEVEL * size)) if rms.max() > LEVEL * size else 1.0
 

@@ -1,6 +1,6 @@
 """Measured and replayed channels on equal terms: the same formulas, the same zeros, spectra line by line.
 
-What is compared, per row (one or more hunting periods) of N samples:
+What is compared, per repetition (one or more hunting periods) of N samples:
 
     dte              rb1 u1 - rb2 u2 + (y1 - y2) cos(alpha_w) [m], always from the channels as their sensors give them
                      (factor 1 for supports along the line of action; angles only, on both sides, where a y is missing)
@@ -13,7 +13,6 @@ The torque on the driver is what the replay is given, so it has no gap.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from itertools import pairwise
 from math import cos, pi, sqrt
 
@@ -36,34 +35,6 @@ BAND_ENDS = (200.0, 1000.0)
 EXCITED = 0.1
 
 
-@dataclass(frozen=True)
-class Channels:
-    """Channels of a measurement and of its replay, in the units of this module.
-
-    `measured`: channel -> (P, N), `simulated`: channel -> (N,), same keys. `zero_known`: channels whose mean means
-    something.
-    """
-
-    measured: Mapping[str, Array]
-    simulated: Mapping[str, Array]
-    zero_known: frozenset[str]
-
-    def gap(self, channel: str) -> Array:
-        """Mean over the rows of measured minus simulated, (N,)."""
-        return self.measured[channel].mean(axis=0) - self.simulated[channel]
-
-
-def compare(measurement: Measurement, replay: xr.Dataset) -> Channels:
-    """A measurement beside its replay (realisation 0 of one row). Raises DiagnosisError if they do not fit."""
-    rows = measured_channels(measurement)
-    simulated = simulated_channels(measurement, replay)
-    common = [name for name in CHANNELS if name in rows and name in simulated]
-    known = {"y_driver", "y_driven", "torque_driven"}
-    if measurement.zero_known:
-        known |= {"dte", "angle_driver", "angle_driven"}
-    return Channels({name: rows[name] for name in common}, {name: simulated[name] for name in common}, frozenset(known))
-
-
 def measured_channels(measurement: Measurement) -> dict[str, Array]:
     """Channel -> (P, N) in the units of this module."""
     return _channels(measurement.periods, measurement.record.attrs, _has_both_y(measurement))
@@ -74,7 +45,7 @@ def simulated_channels(measurement: Measurement, replay: xr.Dataset) -> dict[str
     samples = measurement.phase.size
     if replay.sizes["time"] != samples:
         raise DiagnosisError(
-            f"the replay of {measurement.name} has {replay.sizes['time']} samples; a row of it has {samples}"
+            f"the replay of {measurement.name} has {replay.sizes['time']} samples; a repetition of it has {samples}"
         )
     values = {str(name): replay[name].values[0] for name in replay.data_vars}
     for gear in ("driver", "driven"):
@@ -109,17 +80,17 @@ def line_energy(values: Array) -> Array:
     return energy
 
 
-def noise_of_mean(rows: Array) -> Array:
+def noise_of_mean(repetitions: Array) -> Array:
     """Rows (P, N) -> (P, N): independent parts of the error of their mean; squares add up over P to its variance.
 
     Departures from the mean over sqrt(P (P - 1)): E sum_p |part_p|^2 is the variance of the mean. P >= 2.
     """
-    count = len(rows)
-    return (rows - rows.mean(axis=0)).astype(np.float64) / sqrt(count * (count - 1))
+    count = len(repetitions)
+    return (repetitions - repetitions.mean(axis=0)).astype(np.float64) / sqrt(count * (count - 1))
 
 
 def frequencies(measurement: Measurement) -> Array:
-    """Frequencies (N // 2 + 1,) [Hz] of the lines of a row."""
+    """Frequencies (N // 2 + 1,) [Hz] of the lines of a repetition."""
     return np.fft.rfftfreq(measurement.phase.size, 1 / measurement.sampling_rate).astype(np.float64)
 
 

@@ -17,9 +17,9 @@ The whole is divided in several ways (kinds); the shares of each kind add up to 
     tooth      half the energy of an instant goes to the driver's tooth next to the pitch point, half to the driven's
     condition  the measured records
 
-Beside each share stand two floors, parts of the same whole: what measurement noise explains (scatter of the rows,
-unknown with one row) and what the uncertain parameters of the nominal rig explain, each moved by one standard
-deviation (first order, independent).
+Beside each share stand two floors, parts of the same whole: what measurement noise explains (scatter of the
+repetitions, unknown with one of them) and what the uncertain parameters of the nominal rig explain, each moved by one
+standard deviation (first order, independent).
 """
 
 from __future__ import annotations
@@ -82,17 +82,17 @@ def budget(
     for one in (simulated, *variants):
         if len(one) != len(measurements):
             raise DiagnosisError(f"{len(measurements)} measurements have {len(one)} simulations; each needs one")
-    rows = [measured_channels(one) for one in measurements]
-    units = _units(rows, simulated)
-    noisy = all(one.rows > 1 for one in measurements)
+    repetitions = [measured_channels(one) for one in measurements]
+    units = _units(repetitions, simulated)
+    noisy = all(one.repetitions > 1 for one in measurements)
     sums = {part: _Sums() for part in ("gap", "noise", "nominal")}
     meshing = pair(nominal.rig)
     for number, measurement in enumerate(measurements):
         cuts = _cuts(measurement, measurements, meshing)
         for channel, unit in units.items():
-            if channel not in rows[number] or channel not in simulated[number]:
+            if channel not in repetitions[number] or channel not in simulated[number]:
                 continue
-            measured, replay = rows[number][channel], simulated[number][channel]
+            measured, replay = repetitions[number][channel], simulated[number][channel]
             parts: dict[str, Array] = {"gap": (measured.mean(axis=0) - replay)[None]}
             if noisy:
                 parts["noise"] = noise_of_mean(measured)
@@ -151,13 +151,13 @@ def _shares(sums: Mapping[str, _Sums], noisy: bool, varied: bool) -> Iterator[Sh
             )
 
 
-def _units(rows: Sequence[Mapping[str, Array]], simulated: Sequence[Mapping[str, Array]]) -> dict[str, float]:
+def _units(repetitions: Sequence[Mapping[str, Array]], simulated: Sequence[Mapping[str, Array]]) -> dict[str, float]:
     """Rms [channel's unit] of each channel's measured fluctuation, all records pooled; constant channels left out."""
     units = {}
     for channel in BUDGET_CHANNELS:
         squares = [
             float(np.var(measured[channel].mean(axis=0)))
-            for measured, replay in zip(rows, simulated, strict=True)
+            for measured, replay in zip(repetitions, simulated, strict=True)
             if channel in measured and channel in replay
         ]
         if squares and np.mean(squares) > 0.0:
@@ -216,7 +216,7 @@ def _class_cut(measurement: Measurement) -> _Cut:
 
 
 def line_classes(measurement: Measurement) -> tuple[tuple[str, ...], Integers]:
-    """Class names and, for each line of a row, the index of its class (see identification.comb.residue_class).
+    """Class names and, for each line of a repetition, the index of its class (see identification.comb.residue_class).
 
     The comb is read off the measured torque. Without one, excited lines that carry no shaft order are "excited".
     """

@@ -4,17 +4,17 @@ For each channel and band the rms of measured minus simulated, with the 90 % con
 over repetitions of the experiment with other phases. Two kinds of lines make it:
 
 * lines of the rotation (multiples of a shaft order) come back in every repetition but for measurement noise: their
-  energy |D + n|^2 has variance 2 s |D|^2 + s^2, s the noise energy of the line (rows' scatter, averaged over the
+  energy |D + n|^2 has variance 2 s |D|^2 + s^2, s the noise energy of the line (repetitions' scatter, averaged over the
   band);
 * all others depend on the phases of the excitation and count as complex Gaussian, one draw each: variance |G|^4,
-  estimated by |G|^4 / 2 (E |G|^4 = 2 (E |G|^2)^2). With one row the rotation's lines count like these, since nothing
-  tells their noise.
+  estimated by |G|^4 / 2 (E |G|^4 = 2 (E |G|^2)^2). With one repetition the rotation's lines count like these, since
+  nothing tells their noise.
 
 The sum is taken as chi-square with the degrees of freedom of that mean and variance (Satterthwaite 1946), which gives
-low and high. The floor is the noise of the rows' mean with 2 (P - 1) degrees of freedom a line.
+low and high. The floor is the noise of the repetitions' mean with 2 (P - 1) degrees of freedom a line.
 
-Band [0, 0] is the difference of the mean values, with the standard error of the rows' means. It is given where zero
-means something: for angles and DTE only if their zero is unloaded contact (`Measurement.zero_known`), for
+Band [0, 0] is the difference of the mean values, with the standard error of the repetitions' means. It is given where
+zero means something: for angles and DTE only if their zero is unloaded contact (`Measurement.zero_known`), for
 displacements and torque always. Elsewhere the mean is left out on both sides.
 """
 
@@ -62,7 +62,7 @@ def gaps(
 ) -> tuple[Gap, ...]:
     """Gaps per channel (DTE first) and band on the held-out record, the nominal rig's beside those of better ones.
 
-    `simulate(case, record)` gives one steady row (default: the replay on the non-linear lumped model). For each
+    `simulate(case, record)` gives one steady repetition (default: the replay on the non-linear lumped model). For each
     channel: the whole band first, then its parts, then the mean (band [0, 0]) where it is known. Empty for a record
     whose mesh phase is arbitrary: a replay cannot be held against it. Raises what `simulate` raises, and
     DiagnosisError for a replay of another length.
@@ -74,20 +74,20 @@ def gaps(
         from gearbench.bench.nonlinear.replay import replay
 
         simulate = replay
-    rows = measured_channels(held_out)
+    repetitions = measured_channels(held_out)
     cases = [nominal, recalibrated, *([] if with_effect is None else [with_effect])]
     simulated = [simulated_channels(held_out, simulate(case, held_out.record)) for case in cases]
     parts = bands(held_out)
     shown = ((0.0, parts[-1][1]), *parts) if len(parts) > 1 else parts
     found = []
     for channel in CHANNELS:
-        if channel not in rows or any(channel not in values for values in simulated):
+        if channel not in repetitions or any(channel not in values for values in simulated):
             continue
-        residuals = [rows[channel].mean(axis=0) - values[channel] for values in simulated]
+        residuals = [repetitions[channel].mean(axis=0) - values[channel] for values in simulated]
         for band in shown:
-            found.append(_band_gap(held_out, channel, band, rows[channel], residuals))
+            found.append(_band_gap(held_out, channel, band, repetitions[channel], residuals))
         if zero_known(held_out, channel):
-            found.append(_mean_gap(held_out, channel, rows[channel], residuals))
+            found.append(_mean_gap(held_out, channel, repetitions[channel], residuals))
     return tuple(found)
 
 
@@ -132,24 +132,24 @@ def band_energy(energy: Array, repeats: Flags, noise: float | None) -> BandEnerg
 
 
 def _band_gap(
-    measurement: Measurement, channel: str, band: tuple[float, float], rows: Array, residuals: Sequence[Array]
+    measurement: Measurement, channel: str, band: tuple[float, float], repetitions: Array, residuals: Sequence[Array]
 ) -> Gap:
     frequency = frequencies(measurement)
     inside = (frequency > band[0] * (1 + 1e-12)) & (frequency <= band[1] * (1 + 1e-12))
     repeats = rotation_lines(measurement)[inside]
     noise, floor = None, None
-    if len(rows) > 1:
-        lines = line_energy(noise_of_mean(rows)).sum(axis=0)[inside]
+    if len(repetitions) > 1:
+        lines = line_energy(noise_of_mean(repetitions)).sum(axis=0)[inside]
         noise = float(lines.mean())
-        floor = BandEnergy(float(lines.sum()), 2 * (len(rows) - 1) * lines.size).rms()
+        floor = BandEnergy(float(lines.sum()), 2 * (len(repetitions) - 1) * lines.size).rms()
     ranges = [band_energy(line_energy(one)[inside], repeats, noise).rms() for one in residuals]
     return _gap(measurement, channel, band, ranges, floor)
 
 
-def _mean_gap(measurement: Measurement, channel: str, rows: Array, residuals: Sequence[Array]) -> Gap:
+def _mean_gap(measurement: Measurement, channel: str, repetitions: Array, residuals: Sequence[Array]) -> Gap:
     error, floor = 0.0, None
-    if len(rows) > 1:
-        error = float(rows.mean(axis=1).std(ddof=1) / np.sqrt(len(rows)))
+    if len(repetitions) > 1:
+        error = float(repetitions.mean(axis=1).std(ddof=1) / np.sqrt(len(repetitions)))
         floor = Range(value=error, low=0.0, high=_NORMAL * error)
     values = [abs(float(one.mean())) for one in residuals]
     reach = _NORMAL * error

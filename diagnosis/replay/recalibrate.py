@@ -7,7 +7,7 @@ Minimised over the parameters z (in standard deviations of their priors):
 
 A block is one record, channel, band, and either the rotation's lines or the others. Its variance is not known and
 has been maximised out of the likelihood, so a block that the model cannot explain loses its weight by itself: that
-is what makes the fit robust. s_b^2 is the noise of the rows' mean plus the square of a hundredth of the measured
+is what makes the fit robust. s_b^2 is the noise of the repetitions' mean plus the square of a hundredth of the measured
 level, below which no model is right (and where flanks separate now and then, J is too rough to descend). Neighbouring
 lines err alike: a block counts as n_b <= 8 independent ones.
 
@@ -86,8 +86,8 @@ def recalibrate(
 ) -> Recalibration:
     """The case with its parameters moved to where J is least near the start; never with a higher J.
 
-    `simulate(case, record)` replays one steady row. Raises DiagnosisError without parameters or records; what the
-    simulation of the case as given raises passes through, other failing rigs are steps not taken.
+    `simulate(case, record)` replays one steady repetition. Raises DiagnosisError without parameters or records; what
+    the simulation of the case as given raises passes through, other failing rigs are steps not taken.
     """
     if not parameters or not measurements:
         raise DiagnosisError("recalibration needs at least one parameter and one record")
@@ -108,13 +108,13 @@ class _Target:
         for number, one in enumerate(self.measurements):
             groups = _groups(one)
             kept = groups >= 0
-            for channel, rows in measured_channels(one).items():
+            for channel, repetitions in measured_channels(one).items():
                 if channel not in FITTED:
                     continue
-                spectrum = _spectrum(rows.mean(axis=0))[kept]
+                spectrum = _spectrum(repetitions.mean(axis=0))[kept]
                 noise = np.zeros(spectrum.size)
-                if len(rows) > 1:
-                    noise = (np.abs(_spectrum(noise_of_mean(rows))) ** 2).sum(axis=0)[kept]
+                if len(repetitions) > 1:
+                    noise = (np.abs(_spectrum(noise_of_mean(repetitions))) ** 2).sum(axis=0)[kept]
                 self.plan.append((number, channel, kept))
                 least = (ROUNDING**2) * float(np.mean(np.abs(spectrum) ** 2))
                 lines.append(spectrum)

@@ -7,30 +7,35 @@ gaps are told, the uncertain numbers of the rig are moved once more, to where th
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
-import xarray as xr
 
 from gearbench.diagnosis.intake.measurements import Measurement
-from gearbench.diagnosis.replay.adjustable import Adjustable, at_path, uncertain
+from gearbench.diagnosis.replay.adjustable import Adjustable, Simulate, at_path, uncertain
 from gearbench.diagnosis.replay.recalibrate import recalibrate
 from gearbench.rig import Case
 
-Simulate = Callable[[Case, xr.Dataset], xr.Dataset]
-
 EXCESS_SD = 5e-6  # of the excess material of all pairs, which shifts the zero of the transmission error [m]
-LOSING = 0.05  # part of a row without contact from which a record is too rough to follow downhill
+LOSING = 0.05  # part of the time without contact from which a record is too rough to follow downhill
 ITERATIONS = 5
+
+
+@dataclass(frozen=True)
+class Addition:
+    """An effect to be added to cases: `to(case)` is the case with it, `fields` the numbers that it moves there."""
+
+    to: Callable[[Case], Case]
+    fields: tuple[str, ...]
 
 
 def refined(
     nominal: Case,
-    add: Callable[[Case], Case] | None,
+    addition: Addition | None,
     measurements: Sequence[Measurement],
     simulate: Simulate,
 ) -> tuple[Case, Case | None]:
-    """The nominal case recalibrated, and recalibrated with the effect that `add` puts into a case (None: no effect).
+    """The nominal case recalibrated, and recalibrated with an effect added (None: no effect).
 
     Records whose flanks often separate are left out, unless all do: small changes make jumps there. Raises what the
     simulation of the nominal case raises.
@@ -38,18 +43,19 @@ def refined(
     parameters = (*uncertain(nominal), at_path("rig.mesh.error_mean", EXCESS_SD))
     chosen = [one for one in measurements if _apart(nominal, one, simulate) < LOSING] or list(measurements)
     plain = recalibrate(nominal, parameters, chosen, simulate, iterations=ITERATIONS).case
-    if add is None:
+    if addition is None:
         return plain, None
-    held = tuple(_about(parameter, nominal) for parameter in parameters)
-    return plain, recalibrate(add(plain), held, chosen, simulate, iterations=ITERATIONS).case
+    start = addition.to(plain)
+    held = tuple(_about(one, start if one.name in addition.fields else nominal) for one in parameters)
+    return plain, recalibrate(start, held, chosen, simulate, iterations=ITERATIONS).case
 
 
-def _about(parameter: Adjustable, nominal: Case) -> Adjustable:
-    """The parameter with its prior around the nominal value, whatever the case that it starts from."""
-    return replace(parameter, mean=parameter.get(nominal))
+def _about(parameter: Adjustable, case: Case) -> Adjustable:
+    """The parameter with its prior around the value of a case, whatever the case that it starts from."""
+    return replace(parameter, mean=parameter.get(case))
 
 
 def _apart(case: Case, measured: Measurement, simulate: Simulate) -> float:
-    """Part of the replayed row in which no flanks touch."""
-    row = simulate(case, measured.record)
-    return float(row.attrs.get("contact_lost_samples", 0)) / max(int(np.prod(row["time"].shape)), 1)
+    """Part of the replayed period in which no flanks touch."""
+    steady = simulate(case, measured.record)
+    return float(steady.attrs.get("contact_lost_samples", 0)) / max(int(np.prod(steady["time"].shape)), 1)

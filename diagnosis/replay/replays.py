@@ -5,20 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-import numpy as np
 import xarray as xr
 
+from gearbench.diagnosis.forces.nominal import table_load
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.geometry import pair
 from gearbench.lumped.nonlinear.law import MeshLaw
 from gearbench.rig import Case
 
-LOAD_MARGIN = 1.3  # of the largest torque, as the mesh's force swings beyond it
-
 
 def replays(law: MeshLaw) -> Callable[[Case, xr.Dataset], xr.Dataset]:
-    """`simulate(case, record)`: one steady row of the case's rig under the record's torque, on the non-linear lumped
-    model with this law. Rigs may differ in everything but what changes the teeth's shape."""
+    """`simulate(case, record)`: one steady repetition of the case's rig under the record's torque, on the non-linear
+    lumped model with this law. Rigs may differ in everything but what changes the teeth's shape."""
 
     def simulate(case: Case, record: xr.Dataset) -> xr.Dataset:
         # Its time loop is compiled on import, which not every user of this module wants.
@@ -34,8 +32,3 @@ def replays_of(nominal: Case, measurements: Sequence[Measurement]) -> Callable[[
     from gearbench.bench.nonlinear.law_table import mesh_law
 
     return replays(mesh_law(nominal.rig, nominal.simulation, table_load(measurements)))
-
-
-def table_load(measurements: Sequence[Measurement]) -> float:
-    """Driver torque [N m] that the table of the mesh force must reach for these measurements."""
-    return LOAD_MARGIN * max(float(np.abs(measured.mean("torque_driver")).max()) for measured in measurements)

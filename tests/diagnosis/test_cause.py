@@ -31,7 +31,7 @@ def test_torque_ripple_from_records_to_the_rig_that_has_it() -> None:
     assert found.probability["effect"] > 0.9 and sum(found.probability.values()) == pytest.approx(1.0)
     assert found.candidates[0].effects == ("torque-ripple",)
     assert "background" in steps and "torque-ripple" in steps
-    # What no row of a steady, complete model keeps.
+    # What no equation of a steady, complete model keeps.
     assert max(found.audits["unsteady"]) < 100 and max(found.audits["silent"][1:]) < 100
 
     parameters = found.effects[0].parameters

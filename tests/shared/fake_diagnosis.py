@@ -29,7 +29,7 @@ class Finding:
     indistinguishable: tuple[tuple[str, ...], ...] = ()
     advice: tuple[str, ...] = ()
     calls: list = field(default_factory=list)
-    add: None = None
+    addition: None = None
 
 
 def recalibrated(nominal: Case) -> Case:

@@ -20,7 +20,7 @@ from gearbench.challenge.scoring.judge import score_folder
 from gearbench.challenge.scoring.score import score
 from gearbench.commands.challenge import diagnose_case, read
 from gearbench.commands.checks import Check, Got
-from gearbench.commands.diagnosis_job import Diagnosis, diagnose, take_in
+from gearbench.diagnosis import Diagnosis, diagnose
 from gearbench.records import write_record
 from gearbench.rig import Friction, read_case
 
@@ -43,7 +43,7 @@ def hidden_friction() -> tuple[Diagnosis, float]:
             paths.append(Path(folder) / f"measured-{condition.name}.nc")
             write_record(simulate(real.under(condition)), paths[-1])
         before = time.process_time()
-        made = diagnose(take_in(paths, nominal, held_out="measured-held-out"))
+        made = diagnose(paths, nominal, held_out="measured-held-out")
         return made, time.process_time() - before
 
 
@@ -55,7 +55,7 @@ def said(made: Diagnosis) -> str:
 def search_time() -> Got:
     """Processor time of the diagnosis [s]."""
     made, spent = hidden_friction()
-    return Got(spent, f"says {said(made)}; {len(made.taken.measurements)} records and one held out")
+    return Got(spent, f"says {said(made)}; {len(made.inputs.measurements)} records and one held out")
 
 
 def search_right() -> Got:

@@ -15,11 +15,10 @@ import pytest
 from shared.fake_diagnosis import at_rest, friction_found, nothing_found, unknown_found
 from shared.measured import channels, nominal, written
 
-import gearbench.commands.diagnosis_job as job
-import gearbench.diagnosis.replay.refine as refine
 from gearbench.bench.results.compare_records import differences
 from gearbench.cli import run_command_line
-from gearbench.commands.diagnosis_job import take_in
+from gearbench.diagnosis import diagnosis as job
+from gearbench.diagnosis.diagnosis import take_in
 from gearbench.diagnosis.verdict import read_verdict
 from gearbench.records import read_record
 from gearbench.report.html import bar, items, page, table, text
@@ -81,13 +80,13 @@ def stand_in(monkeypatch: pytest.MonkeyPatch) -> dict:
         said["calls"] += 1
         return said["find"](case)
 
-    def as_found(nominal: Case, add: object, measurements: tuple, simulate: object) -> tuple:
+    def as_found(nominal: Case, addition: object, measurements: tuple, simulate: object) -> tuple:
         found = said["find"](nominal)
         return found.recalibrated, found.with_effect
 
-    monkeypatch.setattr(job, "default_search", lambda: search)
-    monkeypatch.setattr(refine, "refined", as_found)
-    monkeypatch.setattr(job, "default_replay", lambda taken: at_rest)
+    monkeypatch.setattr(job, "find_cause", search)
+    monkeypatch.setattr(job, "refined", as_found)
+    monkeypatch.setattr(job, "replays_of", lambda nominal, measurements: at_rest)
     return said
 
 
@@ -171,11 +170,12 @@ def test_the_report_is_one_page_that_opens_offline(done: tuple[Path, dict, str, 
     words = " ".join(" ".join(held.words).split())
     for expected in (
         "Friction between the flanks explains the gap.",
-        "effect of the library 97 %",
-        "0.0581 ± 0.0012",
+        "one of the known effects 97 %",
+        "coefficient of friction 0.0581 ± 0.0012",
+        "check oil, temperature",
         "which was held out of the search",
         "friction between the flanks and pitch errors -3.10",
-        "pitch errors / an error of the tooth profile",
+        "pitch errors / profile error",
         "Add a record at half the mean torque.",
         "record-light.nc",
         "SHA-256",
@@ -196,8 +196,8 @@ def test_the_place_and_the_probability_are_told_without_an_effect(
     records: list[Path], tmp_path: Path, asked: dict, capsys: pytest.CaptureFixture[str]
 ) -> None:
     for find, sentence in (
-        (nothing_found, "No further effect is needed"),
-        (unknown_found, "No effect of the library explains the gap. It arises at the drive."),
+        (nothing_found, "No effect is needed"),
+        (unknown_found, "None of the known effects explains the gap. It arises at the drive."),
     ):
         asked["find"] = find
         out = tmp_path / find.__name__
@@ -248,15 +248,15 @@ def test_one_period_without_y_and_held_out_is_diagnosed_and_the_loss_is_stated(t
     for words in ("y_driver", "two hunting periods", "another mean torque", "another speed", "held out"):
         assert words in advice
     words = " ".join(" ".join(page_of(tmp_path / "out")[1].words).split())
-    for expected in ("flatters it", "there is no y_driven", "one hunting period only", "costs power"):
+    for expected in ("fitted to this very record", "there is no y_driven", "one hunting period only", "stay hidden"):
         assert expected in words
 
 
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("--held-out", "heldout"), "--held-out heldout names 0 records, must name one of base, light, held-out"),
-        (("--without", "gremlins"), "--without gremlins is no effect of the library: backlash, friction"),
+        (("--held-out", "heldout"), "held_out = heldout names 0 records, must name one of base, light, held-out"),
+        (("--without", "gremlins"), "without = gremlins is no effect of the library: backlash, friction"),
         (("--set", "rig.driver.teeth=21"), "teeth_driver = 20, but the case has rig.driver.teeth = 21"),
         (("--rig", "nowhere.toml"), "nowhere.toml does not exist"),
     ],
@@ -293,6 +293,6 @@ def test_a_search_that_fails_leaves_no_product(
 
 
 def test_what_is_held_out_is_what_is_judged_by(records: list[Path]) -> None:
-    taken = take_in(records, nominal(), held_out="light")
-    assert [one.name for one in taken.measurements] == ["base", "held-out"]
-    assert taken.judged is taken.held_out and taken.judged.name == "light"
+    inputs = take_in(records, nominal(), held_out="light")
+    assert [one.name for one in inputs.measurements] == ["base", "held-out"]
+    assert inputs.judged is inputs.held_out and inputs.judged.name == "light"

@@ -5,24 +5,25 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gearbench.diagnosis.evidence.hypotheses import LIBRARY
+from gearbench.diagnosis.effects.library import LIBRARY
 from gearbench.diagnosis.intake.signals import CHANNELS
-from gearbench.diagnosis.verdict import PLACES, Effect, Gap, Probabilities, Range, Verdict
+from gearbench.diagnosis.verdict import Effect, Gap, Probabilities, Range, Verdict
 from gearbench.figures.diagnosis_gap import octave_bands
+from gearbench.rig.contract import PLACES
 from gearbench.words.diagnosis import CHANNELS as CHANNEL_WORDS
+from gearbench.words.diagnosis import PLACES as PLACE_WORDS
 from gearbench.words.diagnosis import (
-    EFFECTS,
     SHORT_CHANNELS,
     confidence,
     effects_in_words,
     headline,
     length,
     number,
+    parameter_in_words,
     percent,
     whole_band,
     with_std,
 )
-from gearbench.words.diagnosis import PLACES as PLACE_WORDS
 
 
 @pytest.mark.parametrize(
@@ -70,10 +71,19 @@ def test_only_certainty_is_called_certain(value: float, text: str) -> None:
 
 
 def test_every_effect_place_and_channel_has_words() -> None:
-    assert set(LIBRARY) <= set(EFFECTS) and set(PLACES) == set(PLACE_WORDS)
+    assert set(PLACES) == set(PLACE_WORDS)
+    for effect in LIBRARY:
+        assert effects_in_words([effect.name]) == effect.noun
+        assert effect.meaning.endswith(".") and effect.parameters
     assert set(CHANNELS) <= set(CHANNEL_WORDS) == set(SHORT_CHANNELS)
     assert effects_in_words([]) == "the nominal rig"
     assert effects_in_words(["friction", "tooth-crack"]) == "friction between the flanks and a cracked tooth"
+    assert effects_in_words(["profile-error"]) == "profile error"
+    assert parameter_in_words("friction", "coefficient") == "coefficient of friction"
+    assert parameter_in_words("sensor-delay", "angle_driver.delay") == "delay (angle of the driver)"
+    ripple = parameter_in_words("torque-ripple", "order_6.relative_amplitude")
+    assert ripple == "amplitude over the mean torque (order 6)"
+    assert parameter_in_words("profile-error", "driven.slope") == "slope (driven)"
 
 
 def gap(channel: str, band: tuple[float, float], nominal: float, with_effect: float | None) -> Gap:
@@ -97,17 +107,17 @@ def test_the_sentences_of_a_verdict() -> None:
     )
     assert headline(found) == "An elastic coupling and ripple of the driving torque explain the gap."
     assert confidence(found) == (
-        "Probability of an effect of the library: 90 %. It acts at the drive. On record r (not held out) the rms gap of"
+        "Probability of one of the known effects: 90 %. It acts at the drive. On record r (not held out) the rms gap of"
         " the transmission error goes from 4.00 to 0.250 um with the effect."
     )
     refused = Verdict(
         verdict="unknown", probability=Probabilities(effect=0.1, none=0.0, unknown=0.9), place="none", held_out="r",
         gap=(gap("dte", (0.0, 3000.0), 4e-6, None),),
     )
-    assert headline(refused) == "No effect of the library explains the gap."
+    assert headline(refused) == "None of the known effects explains the gap."
     assert confidence(refused) == (
-        "Probability of something else: 90 %. On the held-out record r the rms gap of the transmission error goes from"
-        " 4.00 to 2.00 um recalibrated."
+        "Probability of a cause that is not known: 90 %. On the held-out record r the rms gap of the transmission error"
+        " goes from 4.00 to 2.00 um recalibrated."
     )
 
 

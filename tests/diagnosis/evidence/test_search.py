@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from gearbench.diagnosis.effects.effect import Hypothesis, Wide
 from gearbench.diagnosis.evidence.fit import Fit, root_of
-from gearbench.diagnosis.evidence.hypotheses import Hypothesis
 from gearbench.diagnosis.evidence.search import relative_size, relief
-from gearbench.diagnosis.forces.parameters import NUISANCE, block, layout
+from gearbench.diagnosis.forces.unknowns import group, unknowns_of
 
-WHERE = layout([block("offset", NUISANCE, "m", 2, 1.0), block("lobe", "eccentricity", "m", 3, 0.1, 1.0)])
-LOBE = Hypothesis("eccentricity", "eccentricity", "mesh", ("eccentricity",))
+WHERE = unknowns_of([group("offset", "m", 2, 1.0, slot="offset"), group("lobe", "m", 3, 0.1, 1.0, slot="loss")], 0)
+LOBE = Hypothesis("eccentricity", "mesh", (Wide("lobe"),))
 
 
 def fit_of(columns: np.ndarray, data: np.ndarray, sd: np.ndarray) -> Fit:

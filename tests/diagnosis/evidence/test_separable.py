@@ -5,22 +5,26 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from gearbench.diagnosis.effects.eccentricity import ECCENTRICITY
+from gearbench.diagnosis.effects.effect import Hypothesis, Wide
+from gearbench.diagnosis.effects.friction import FRICTION
+from gearbench.diagnosis.effects.sensor_delay import SENSOR_DELAY
 from gearbench.diagnosis.evidence.fit import Fit
-from gearbench.diagnosis.evidence.hypotheses import Hypothesis
-from gearbench.diagnosis.evidence.separable import alike, expected_gains
-from gearbench.diagnosis.forces.parameters import NUISANCE, block, layout
+from gearbench.diagnosis.evidence.separable import alike, expected_factors
+from gearbench.diagnosis.forces.unknowns import group, unknowns_of
 
-SMALL = layout(
+SMALL = unknowns_of(
     [
-        block("offset", NUISANCE, "m", 2, 1.0),
-        block("lobe", "eccentricity", "m", 2, 0.1, 1.0),
-        block("rub", "friction", "1", 1, 0.1, 1.0),
-        block("lag", "sensor-delay", "s", 1, 0.1, 1.0),
-    ]
+        group("offset", "m", 2, 1.0, slot="offset"),
+        group("lobe", "m", 2, 0.1, 1.0, slot="loss"),
+        group("rub", "1", 1, 0.1, 1.0, slot="friction"),
+        group("lag", "s", 1, 0.1, 1.0, slot="delay"),
+    ],
+    teeth=0,
 )
-LOBE = Hypothesis("eccentricity", "eccentricity", "mesh", ("eccentricity",), (), 2)
-RUB = Hypothesis("friction", "friction", "mesh", ("friction",))
-LAG = Hypothesis("sensor-delay", "sensor-delay", "sensor", ("sensor-delay",))
+LOBE = Hypothesis("eccentricity", "mesh", (Wide("lobe"),), (), 2, effect=ECCENTRICITY)
+RUB = Hypothesis("friction", "mesh", (Wide("rub"),), effect=FRICTION)
+LAG = Hypothesis("sensor-delay", "sensor", (Wide("lag"),), effect=SENSOR_DELAY)
 
 
 def fit_of(columns: np.ndarray) -> Fit:
@@ -37,7 +41,7 @@ def log_likelihood(data: np.ndarray, columns: np.ndarray, sd: np.ndarray) -> np.
 
 
 @pytest.mark.parametrize("truth", [LOBE, RUB])
-def test_expected_gains_are_means_of_marginal_likelihoods(truth: Hypothesis) -> None:
+def test_expected_factors_are_means_of_marginal_likelihoods(truth: Hypothesis) -> None:
     rng = np.random.default_rng(3)
     columns = rng.standard_normal((12, SMALL.size)) * np.array([1, 1, 3, 3, 2, 2])
     beyond = np.sqrt(truth.prior(SMALL) ** 2 - SMALL.prior() ** 2)
@@ -48,16 +52,16 @@ def test_expected_gains_are_means_of_marginal_likelihoods(truth: Hypothesis) -> 
     wanted = [
         np.mean(log_likelihood(data, columns, h.prior(SMALL)) - plain) - np.log(h.choices) for h in listed
     ]
-    got = expected_gains(fit_of(columns), SMALL, listed)[listed.index(truth)]
+    got = expected_factors(fit_of(columns), SMALL, listed)[listed.index(truth)]
     assert got == pytest.approx(wanted, abs=0.15, rel=0.02)
 
 
-def test_what_moves_the_rows_alike_cannot_be_told_apart() -> None:
+def test_what_moves_the_residuals_alike_cannot_be_told_apart() -> None:
     columns = np.diag([1.0, 1.0, 30.0, 30.0, 30.0, 0.0])
     columns[:, 5] = columns[:, 4] + 1e-3
     assert alike(fit_of(columns), SMALL, (LOBE, RUB, LAG)) == (("friction", "sensor-delay"),)
 
 
-def test_what_moves_other_rows_or_none_is_told_apart() -> None:
+def test_what_moves_other_residuals_or_none_is_told_apart() -> None:
     assert alike(fit_of(np.diag([1.0, 1.0, 30.0, 30.0, 30.0, 30.0])), SMALL, (LOBE, RUB, LAG)) == ()
     assert alike(fit_of(np.diag([1.0, 1.0, 30.0, 30.0, 30.0, 0.01])), SMALL, (LOBE, RUB, LAG)) == ()

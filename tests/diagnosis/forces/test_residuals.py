@@ -9,94 +9,102 @@ import pytest
 from numpy.linalg import norm
 from shared.synthetic import measurement
 
-from gearbench.diagnosis.evidence.fit import Fit, Problem, stretch, stretch_slope
-from gearbench.diagnosis.evidence.hypotheses import predicted_evidence
+from gearbench.diagnosis.effects.library import all_unknowns
 from gearbench.diagnosis.forces.condition import Condition, prepare
 from gearbench.diagnosis.forces.covariance import Blocks, cost_of, cut, missing, split, whitened
-from gearbench.diagnosis.forces.jacobian import rows_and_columns, stiffening_slope
-from gearbench.diagnosis.forces.nominal import Machine, machine
-from gearbench.diagnosis.forces.parameters import Layout
-from gearbench.diagnosis.forces.residuals import Residuals, corrected, mesh, rows
-from gearbench.diagnosis.forces.unknowns import ROWS, unknowns
+from gearbench.diagnosis.forces.equations import PLACES, Equation
+from gearbench.diagnosis.forces.jacobian import linearised
+from gearbench.diagnosis.forces.mesh import corrected, mesh
+from gearbench.diagnosis.forces.nominal import NominalModel, nominal_model
+from gearbench.diagnosis.forces.residuals import Residuals, residuals
+from gearbench.diagnosis.forces.unknowns import Unknowns
+from gearbench.diagnosis.forces.volume import log_volume, log_volume_gradient, stiffening_gradient
 from gearbench.rig import read_case
 
 CASE = Path(__file__).resolve().parents[3] / "cases" / "gap_demo.toml"
 
 
+Prepared = tuple[NominalModel, Condition, Unknowns]
+
+
 @pytest.fixture(scope="module")
-def prepared() -> tuple[Machine, Condition, Layout]:
-    made = machine(read_case(CASE), 220.0, 100.0)
+def prepared() -> Prepared:
+    made = nominal_model(read_case(CASE), 220.0, 100.0)
     condition = prepare(measurement(), made, 3000.0)
-    return made, condition, unknowns(made, [condition])
+    return made, condition, all_unknowns(made, [condition])
 
 
 STEP = 1e-6  # prior standard deviations: no sample may cross a node of the mesh law, where its tangent has a kink
 EXACT = (
     *("stiffness", "damping", "mass", "inertia", "scale", "mesh-ratio", "dissipation", "friction", "coupling"),
-    *("bearing-driver", "bearing-driven", "ripple", *(f"filter-{row}" for row in ROWS)),
+    *("bearing-driver", "bearing-driven", "ripple", *(f"filter-{one.place}" for one in Equation)),
 )
 # Damping's dependence on the tangent stiffness is left out of the derivatives, and for some their second order.
 ROUGH = {"shape": 0.03, "curvature": 0.02, "crack": 0.02, "pitch-driver": 0.02, "pitch-driven": 0.02}
 
 
-def usual(where: Layout, seed: int = 2) -> np.ndarray:
+def usual(where: Unknowns, seed: int = 2) -> np.ndarray:
     """Unknowns (P,) of the background's size, without what the derivatives leave out on purpose: friction's and the
     filters' modulation of other columns."""
     p = 0.3 * where.prior() * np.random.default_rng(seed).standard_normal(where.size)
     p[where["coupling"]] = abs(p[where["coupling"]])
-    for key in ("friction", *(f"filter-{row}" for row in ROWS)):
+    for key in ("friction", *(f"filter-{one.place}" for one in Equation)):
         p[where[key]] = 0.0
     return p
 
 
-def test_columns_are_derivatives_of_the_residuals(prepared: tuple[Machine, Condition, Layout]) -> None:
+def test_the_jacobian_is_that_of_differences(prepared: Prepared) -> None:
     made, condition, where = prepared
     sd, p = where.prior(), usual(where)
-    _, columns, pressing = rows_and_columns(made, condition, where, p, np.arange(condition.bins))
+    at = linearised(made, condition, where, p, np.arange(condition.bins))
     for entry, name in enumerate(where.names()):
         step = np.zeros(where.size)
         step[entry] = STEP * sd[entry]
-        above, below = rows(made, condition, where, p + step), rows(made, condition, where, p - step)
+        above, below = (residuals(made, condition, where.departures(x, condition)) for x in (p + step, p - step))
         difference = (above.left - below.left) / (2 * step[entry])
         if name == "backlash.more":  # these flanks never separate
-            assert not difference.any() and not columns[:, :, entry].any()
+            assert not difference.any() and not at.jacobian[:, :, entry].any()
             continue
         key = name.split(".")[0]
         limit = 1e-5 if key in EXACT else ROUGH.get(key, 0.01)
-        assert norm(difference - columns[:, :, entry]) < limit * norm(difference), name
-        pressed = (above.force - below.force) / (2 * step[entry])
-        assert norm(pressed - pressing[:, entry]) <= limit * norm(pressed) + 1e-9 * norm(difference), name
+        assert norm(difference - at.jacobian[:, :, entry]) < limit * norm(difference), name
+        pressed = (above.mesh_force - below.mesh_force) / (2 * step[entry])
+        assert norm(pressed - at.mesh_jacobian[:, entry]) <= limit * norm(pressed) + 1e-9 * norm(difference), name
 
 
-def test_backlash_column_where_flanks_separate(prepared: tuple[Machine, Condition, Layout]) -> None:
+def test_backlash_column_where_flanks_separate(prepared: Prepared) -> None:
     made, condition, where = prepared
     p = usual(where)
     p[where["offset"]] = -60e-6  # the back flanks touch now and then
     p[where["backlash"]] = -made.law.backlash + 30e-6
     entry = where["backlash"].start
-    _, columns, _ = rows_and_columns(made, condition, where, p, np.arange(condition.bins))
+    at = linearised(made, condition, where, p, np.arange(condition.bins))
     step = np.zeros(where.size)
     step[entry] = 1e-10  # no sample may begin or cease to touch
-    state = mesh(made, condition, where, p, corrected(condition, where, p))
+    departures = where.departures(p, condition)
+    state = mesh(made, condition, departures, corrected(condition, departures))
     assert 0.05 < np.mean(state.elastic < 0.0) < 0.95
-    difference = (rows(made, condition, where, p + step).left - rows(made, condition, where, p - step).left) / 2e-10
-    assert norm(difference - columns[:, :, entry]) < 0.1 * norm(difference)
+    above, below = (residuals(made, condition, where.departures(x, condition)) for x in (p + step, p - step))
+    difference = (above.left - below.left) / 2e-10
+    assert norm(difference - at.jacobian[:, :, entry]) < 0.1 * norm(difference)
 
 
-def test_gradient_of_the_stretch(prepared: tuple[Machine, Condition, Layout]) -> None:
+def test_gradient_of_the_volume(prepared: Prepared) -> None:
     made, condition, where = prepared
-    relative = np.full((len(ROWS) + 1, condition.bins), 0.05)
+    relative = np.full((len(PLACES), condition.bins), 0.05)
     level = np.full(relative.shape, 1e3)
     blocks = cut(made, condition, level, relative, separates=False)
-    problem = Problem(made, (condition,), where, (blocks,))
 
     def value(unknowns: np.ndarray) -> float:
-        return stretch(problem, condition, blocks, unknowns, rows(made, condition, where, unknowns).stiffening)
+        departures = where.departures(unknowns, condition)
+        stiffening = residuals(made, condition, departures).stiffening
+        return log_volume(made, condition, blocks, departures, stiffening)
 
     p = usual(where)
     p[where["crack"]] = 0.1
     p[where["shape"]] = 0.0  # of second order in the stiffness, left out
-    gradient = stretch_slope(problem, condition, blocks, p, stiffening_slope(condition, where, p))
+    at = where.departures(p, condition)
+    gradient = log_volume_gradient(made, condition, blocks, where, at, stiffening_gradient(condition, where, at))
     keys = ("stiffness", "damping", "mass", "scale", "crack")
     for entry in (number for key in keys for number in range(*where[key].indices(where.size))):
         step = np.zeros(where.size)
@@ -133,7 +141,7 @@ def test_one_blocks_covariance_is_the_dense_one() -> None:
     assert cost_of(blocks, found, factor) == pytest.approx(wanted, rel=1e-12)
 
 
-def test_missing_part_is_found_in_the_row_that_has_it() -> None:
+def test_missing_part_is_found_in_the_equation_that_has_it() -> None:
     rng = np.random.default_rng(4)
     bins = 800
     numbers = np.repeat(np.arange(bins // 8), 8)
@@ -151,20 +159,3 @@ def test_missing_part_is_found_in_the_row_that_has_it() -> None:
     assert level[1] == pytest.approx(25.0, rel=0.25)
     assert max(level[[0, 2, 3, 4]]) < 1.7
     assert cost < cost_of(blocks, found, np.ones((5, 100)))
-
-
-def test_predicted_evidence_is_that_of_a_linear_model() -> None:
-    rng = np.random.default_rng(5)
-    columns, data = rng.standard_normal((40, 4)), rng.standard_normal(40) * 3
-    narrow, wide = np.full(4, 0.2), np.array([0.2, 3.0, 0.2, 1.0])
-
-    def exact(sd: np.ndarray) -> float:
-        covariance = np.eye(40) + columns @ np.diag(sd**2) @ columns.T
-        return -0.5 * float(data @ np.linalg.solve(covariance, data)) - 0.5 * float(np.linalg.slogdet(covariance)[1])
-
-    information = columns.T @ columns
-    precision = information + np.diag(1 / narrow**2)
-    p = np.linalg.solve(precision, columns.T @ data)
-    fit = Fit(p, narrow, precision, information, columns.T @ data, (), 0.0, 0.0, 1)
-    got = predicted_evidence(fit, wide) - predicted_evidence(fit, narrow)
-    assert got == pytest.approx(exact(wide) - exact(narrow), rel=1e-10)

@@ -1,5 +1,5 @@
 """Scatter between periods: white noise counts for nothing, and a rig that changes from one period to the next shows
-it in the row of what has changed. The two periods are simulated in time domain, each on a rig of its own."""
+it in the equation of what has changed. The two periods are simulated in time domain, each on a rig of its own."""
 
 from __future__ import annotations
 
@@ -13,12 +13,13 @@ import xarray as xr
 from gearbench.bench import simulate
 from gearbench.bench.nonlinear.replay import replay
 from gearbench.cases import case_files
+from gearbench.diagnosis.effects.library import all_unknowns
 from gearbench.diagnosis.forces.condition import prepare
 from gearbench.diagnosis.forces.covariance import BLOCK
-from gearbench.diagnosis.forces.nominal import Machine, machine
-from gearbench.diagnosis.forces.parameters import Layout
+from gearbench.diagnosis.forces.equations import PLACES
+from gearbench.diagnosis.forces.nominal import NominalModel, nominal_model
 from gearbench.diagnosis.forces.steadiness import excess_of, unsteadiness
-from gearbench.diagnosis.forces.unknowns import ROWS, unknowns
+from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.intake.measurements import Measurement, measurement
 from gearbench.rig import Case, Ripple, read_case
 
@@ -31,8 +32,8 @@ class Bench:
     nominal: Case
     record: xr.Dataset
     steady: Measurement
-    machine: Machine
-    where: Layout
+    model: NominalModel
+    unknowns: Unknowns
 
     def unsteadiness(self, later: Case | None = None, *, noise: float = 1.0, periods: int = 2) -> np.ndarray:
         """Of one period of the nominal rig and others of another one."""
@@ -43,9 +44,9 @@ class Bench:
         for channel, values in first.items():
             both = np.stack([values[0], *(second[channel][0] for _ in range(periods - 1))])
             seen[channel] = both + noise * NOISE[channel.split("_")[0]] * turn.standard_normal(both.shape)
-        p = np.zeros(self.where.size)
-        p[self.where["radial"]] = 30.0  # the lumped model has none
-        return unsteadiness(self.machine, [replace(self.steady, periods=seen)], self.where, p, BAND)
+        p = np.zeros(self.unknowns.size)
+        p[self.unknowns["radial"]] = 30.0  # the lumped model has none
+        return unsteadiness(self.model, [replace(self.steady, periods=seen)], self.unknowns, p, BAND)
 
     def changed(self, part: str, field: str, **update: object) -> Case:
         rig = self.nominal.rig
@@ -59,9 +60,9 @@ def bench() -> Bench:
     case = read_case(case_files()["gap_demo"], ["condition.0.multisine.amplitude_nm=20"])
     nominal = case.under(case.conditions[0])
     record = simulate(nominal)
-    made = machine(nominal, 220.0, 100.0)
+    made = nominal_model(nominal, 220.0, 100.0)
     steady = measurement(replay(nominal, record), "base", nominal)
-    where = unknowns(made, [prepare(steady, made, BAND)])
+    where = all_unknowns(made, [prepare(steady, made, BAND)])
     return Bench(nominal, record, steady, made, where)
 
 
@@ -84,14 +85,15 @@ CHANGES: dict[str, Callable[[Bench], Case]] = {
 
 
 @pytest.mark.parametrize("place", CHANGES)
-def test_a_rig_that_changes_shows_in_its_own_row(bench: Bench, place: str) -> None:
-    found = dict(zip((*ROWS, "mesh"), bench.unsteadiness(CHANGES[place](bench)), strict=True))
+def test_a_rig_that_changes_shows_in_its_own_equation(bench: Bench, place: str) -> None:
+    found = dict(zip(PLACES, bench.unsteadiness(CHANGES[place](bench)), strict=True))
     own = found.pop(place)
     assert own > 100 and own > 10 * max(found.values())
 
 
-def test_an_error_of_the_mesh_force_is_no_rows_own() -> None:
-    """What all rows share, each with its complex part of it, is the mesh's; what one adds is that row's."""
+def test_an_error_of_the_mesh_force_is_no_equations_own() -> None:
+    """What all equations have in common, each with its complex part of it, is the mesh's; what one adds is
+    that equation's."""
     turn = np.random.default_rng(5)
 
     def noise(*shape: int) -> np.ndarray:
@@ -110,7 +112,7 @@ def test_an_error_of_the_mesh_force_is_no_rows_own() -> None:
     assert both[[0, 1, 3]].max() < 0.02 * both[2]
 
 
-def test_rows_without_a_channel_are_left_out() -> None:
+def test_equations_without_a_channel_are_left_out() -> None:
     turn = np.random.default_rng(5)
     scatter = 10 * (turn.standard_normal((2, 4, 80)) + 1j * turn.standard_normal((2, 4, 80)))
     scatter[:, 1] = np.nan

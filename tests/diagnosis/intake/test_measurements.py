@@ -34,7 +34,7 @@ def refusal(values: Channels | None = None, **changes: object) -> str:
 
 def test_a_clean_record_is_cut_into_hunting_periods_without_a_word() -> None:
     made = taken(channels(noise=0.0))
-    assert (made.rows, made.mesh_cycles, made.mesh_frequency, made.condition) == (2, 60, MESH, "base")
+    assert (made.repetitions, made.mesh_cycles, made.mesh_frequency, made.condition) == (2, 60, MESH, "base")
     assert made.warnings == () and made.drift == 0.0 and made.phase_known and made.zero_known
     assert {rows.shape for rows in made.periods.values()} == {(2, SAMPLES)}
     # Rows repeat: the second one's angles have turned on by whole gears and are the same departures.
@@ -67,22 +67,22 @@ def test_phase_comes_from_the_channel_or_from_the_angles(start: float) -> None:
 
 def test_an_excitation_of_half_a_hunting_period_gives_rows_of_two() -> None:
     made = taken(samples_per_period=SAMPLES // 2, periods=4)
-    assert (made.rows, made.mesh_cycles, made.phase.size) == (2, 60, SAMPLES)
+    assert (made.repetitions, made.mesh_cycles, made.phase.size) == (2, 60, SAMPLES)
     odd = channels(samples=SAMPLES // 2, periods=3)
     made = taken(odd, samples_per_period=SAMPLES // 2, periods=3)
     assert made.record.sizes["time"] == made.record.attrs["samples_per_period"] == SAMPLES
-    assert made.rows == 1 and made.zero_known and any("fill no row" in one for one in made.warnings)
+    assert made.repetitions == 1 and made.zero_known and any("are left out" in one for one in made.warnings)
 
 
 def test_an_excitation_of_two_hunting_periods_gives_one_row_of_both() -> None:
     made = taken(samples_per_period=2 * SAMPLES, periods=1)
-    assert (made.rows, made.mesh_cycles) == (1, 120)
+    assert (made.repetitions, made.mesh_cycles) == (1, 120)
     assert any("2 hunting periods" in one for one in made.warnings)
 
 
 def test_without_a_declared_mesh_period_the_angles_tell_it() -> None:
     made = taken(mesh_period=None)
-    assert made.mesh_frequency == pytest.approx(MESH, rel=1e-12) and made.rows == 2
+    assert made.mesh_frequency == pytest.approx(MESH, rel=1e-12) and made.repetitions == 2
     assert made.record.attrs["mesh_period"] == pytest.approx(1 / MESH, rel=1e-12)
 
 
@@ -235,8 +235,8 @@ def test_missing_dead_and_silent_channels_are_said() -> None:
 def test_one_period_and_averaged_periods_are_said() -> None:
     single = {name: value[:SAMPLES] for name, value in channels().items()}
     made = taken(single, periods=1)
-    assert made.rows == 1 and made.noise == {} and "one hunting period only" in made.warnings[0]
-    assert "costs power" in made.warnings[0]
+    assert made.repetitions == 1 and made.noise == {} and "one hunting period only" in made.warnings[0]
+    assert "stay hidden" in made.warnings[0]
     made = taken(single, periods=1, periods_averaged=4)
     assert "mean over 4 blocks" in made.warnings[0]
 
@@ -281,7 +281,7 @@ def test_a_second_realisation_is_left_out_in_words() -> None:
     values = channels()
     two = {name: np.stack([value, value]) for name, value in values.items()}
     made = measurement(make_record(two, attributes()), "base", nominal())
-    assert made.rows == 2 and "2 realisations only the first" in made.warnings[0]
+    assert made.repetitions == 2 and "2 realisations only the first" in made.warnings[0]
 
 
 # ---- what is held out
@@ -310,7 +310,7 @@ def test_which_record_is_held_out(names: tuple[str, ...], wanted: str | None, he
 
 
 def test_held_out_of_an_unknown_or_the_only_record_is_refused() -> None:
-    with pytest.raises(DiagnosisError, match="--held-out x names 0 records, must name one of a, b"):
+    with pytest.raises(DiagnosisError, match="held_out = x names 0 records, must name one of a, b"):
         held_out_of(named("a", "b"), "x")
     with pytest.raises(DiagnosisError, match="only record"):
         held_out_of(named("a"), "a")

@@ -241,5 +241,5 @@ def test_a_replay_is_put_on_equal_terms() -> None:
     # A driven gear that runs ahead by 1 urad opens the mesh.
     ahead = simulated_channels(one, replay.assign(angle_driven=replay["angle_driven"] + 1e-6))
     assert np.allclose(ahead["dte"] - made["dte"], -1e-6 * MESHING.driven.base_radius, rtol=1e-6)
-    with pytest.raises(DiagnosisError, match="has 100 samples; a row of it has 12288"):
+    with pytest.raises(DiagnosisError, match="has 100 samples; a repetition of it has 12288"):
         simulated_channels(one, replay.isel(time=slice(0, 100)))

@@ -1,6 +1,6 @@
 """Unknowns as a rig: a rig simulated with them leaves no force residuals at them, and its fields are the stated ones.
 
-The truth is the non-linear lumped model in time domain, which knows nothing of rows and unknowns.
+The truth is the non-linear lumped model in time domain, which knows nothing of residuals and unknowns.
 """
 
 from __future__ import annotations
@@ -18,13 +18,14 @@ from numpy.linalg import norm
 from gearbench.bench import simulate
 from gearbench.bench.nonlinear.replay import replay
 from gearbench.cases import case_files
-from gearbench.diagnosis.evidence.apply import APPLY, Estimate, Unknowns, apply_effect, recalibrated
-from gearbench.diagnosis.evidence.hypotheses import LIBRARY, Hypothesis, library
+from gearbench.diagnosis.effects.effect import Effect, Estimate, Fitted, Hypothesis, added
+from gearbench.diagnosis.effects.library import LIBRARY, all_unknowns, hypotheses
+from gearbench.diagnosis.effects.recalibrated import recalibrated
 from gearbench.diagnosis.forces.condition import Condition, prepare
-from gearbench.diagnosis.forces.nominal import Machine, machine
-from gearbench.diagnosis.forces.parameters import Layout
-from gearbench.diagnosis.forces.residuals import rows
-from gearbench.diagnosis.forces.unknowns import ROWS, unknowns
+from gearbench.diagnosis.forces.equations import Equation
+from gearbench.diagnosis.forces.nominal import NominalModel, nominal_model
+from gearbench.diagnosis.forces.residuals import residuals
+from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.intake.measurements import measurement
 from gearbench.rig import Case, dump_case, read_case
 
@@ -40,43 +41,43 @@ class Bench:
 
     nominal: Case
     record: xr.Dataset
-    machine: Machine
-    where: Layout
+    model: NominalModel
+    unknowns: Unknowns
 
-    def unknowns(self, values: Mapping[str, object]) -> np.ndarray:
+    def values(self, values: Mapping[str, object]) -> np.ndarray:
         """Unknowns (P,) of these blocks, with radial supports as rigid as the lumped model has them."""
-        p = np.zeros(self.where.size)
-        p[self.where["radial"]] = 30.0
+        p = np.zeros(self.unknowns.size)
+        p[self.unknowns["radial"]] = 30.0
         for key, value in values.items():
-            p[self.where[key]] = value
+            p[self.unknowns[key]] = value
         return p
 
-    def found(self, p: np.ndarray) -> Unknowns:
-        return Unknowns(self.machine, self.where, p, np.full(p.size, 1e-3), {"base": 100.0})
+    def fitted(self, p: np.ndarray) -> Fitted:
+        return Fitted(self.model, self.unknowns, p, np.full(p.size, 1e-3), {"base": 100.0})
 
     def prepared(self, case: Case) -> Condition:
         """What sensors on that rig would show, prepared under the nominal one."""
         seen = measurement(replay(case, self.record), "base", self.nominal)
-        return prepare(seen, self.machine, BAND)
+        return prepare(seen, self.model, BAND)
 
     def residual(self, condition: Condition, p: np.ndarray) -> np.ndarray:
-        return rows(self.machine, condition, self.where, p).left
+        return residuals(self.model, condition, self.unknowns.departures(p, condition)).left
 
     def hypothesis(self, name: str) -> Hypothesis:
-        return next(h for h in library(self.where) if h.name == name)
+        return next(h for h in hypotheses(self.model) if h.name == name)
 
     def applied(self, name: str, p: np.ndarray) -> tuple[Case, tuple[Estimate, ...]]:
-        found = self.found(p)
-        return apply_effect(recalibrated(self.nominal, found), self.hypothesis(name), found)
+        fitted = self.fitted(p)
+        return added(recalibrated(self.nominal, fitted), self.hypothesis(name), fitted)
 
 
 def bench(name: str) -> Bench:
     case = read_case(case_files()["gap_demo"], [*QUIET, SETTINGS[name]])
     nominal = case.under(next(c for c in case.conditions if c.name == name))
     record = simulate(nominal)
-    made = machine(nominal, 1.3 * float(np.abs(record["torque_driver"].values).max()), 100.0)
+    made = nominal_model(nominal, 1.3 * float(np.abs(record["torque_driver"].values).max()), 100.0)
     condition = prepare(measurement(record, "base", nominal), made, BAND)
-    return Bench(nominal, record, made, unknowns(made, [condition]))
+    return Bench(nominal, record, made, all_unknowns(made, [condition]))
 
 
 @pytest.fixture(scope="module")
@@ -110,17 +111,17 @@ EFFECTS: dict[str, tuple[dict[str, object], float]] = {
 @pytest.mark.parametrize("name", EFFECTS)
 def test_a_rig_with_the_effect_leaves_no_residual_at_its_unknowns(base: Bench, name: str) -> None:
     values, ratio = EFFECTS[name]
-    p = base.unknowns(values)
+    p = base.values(values)
     condition = base.prepared(base.applied(name, p)[0])
-    before, after = base.residual(condition, base.unknowns({})), base.residual(condition, p)
+    before, after = base.residual(condition, base.values({})), base.residual(condition, p)
     assert norm(before) > ratio * norm(after)
 
 
 def test_backlash_where_flanks_separate() -> None:
     light = bench("light")
-    p = light.unknowns({"backlash": 60e-6})
+    p = light.values({"backlash": 60e-6})
     condition = light.prepared(light.applied("backlash", p)[0])
-    assert norm(light.residual(condition, light.unknowns({}))) > 15 * norm(light.residual(condition, p))
+    assert norm(light.residual(condition, light.values({}))) > 15 * norm(light.residual(condition, p))
 
 
 @pytest.mark.parametrize(
@@ -132,11 +133,11 @@ def test_backlash_where_flanks_separate() -> None:
         ("bearing-nonlinearity driven", {"driven-support"}),
     ],
 )
-def test_an_effect_outside_the_mesh_shows_in_its_own_row(base: Bench, name: str, place: set[str]) -> None:
-    p = base.unknowns(EFFECTS[name][0])
+def test_an_effect_outside_the_mesh_shows_in_its_own_equation(base: Bench, name: str, place: set[str]) -> None:
+    p = base.values(EFFECTS[name][0])
     condition = base.prepared(base.applied(name, p)[0])
-    size = norm(base.residual(condition, base.unknowns({})), axis=1)
-    loud = {row for row, value in zip(ROWS, size, strict=True) if value > 0.1 * size.max()}
+    size = norm(base.residual(condition, base.values({})), axis=1)
+    loud = {one.place for one in Equation if size[one] > 0.1 * size.max()}
     assert loud == place
 
 
@@ -153,18 +154,18 @@ def test_a_recalibrated_rig_leaves_no_residual(base: Bench) -> None:
         "shape": 0.02 * turn.standard_normal(12),
         "profile": 0.3e-6 * turn.standard_normal(12),
     }
-    p = base.unknowns(values)
-    condition = base.prepared(recalibrated(base.nominal, base.found(p)))
+    p = base.values(values)
+    condition = base.prepared(recalibrated(base.nominal, base.fitted(p)))
     after = norm(base.residual(condition, p))
-    assert norm(base.residual(condition, base.unknowns({}))) > 200 * after
+    assert norm(base.residual(condition, base.values({}))) > 200 * after
     for key in values:  # each of them counts
-        without = base.unknowns({other: value for other, value in values.items() if other != key})
+        without = base.values({other: value for other, value in values.items() if other != key})
         assert norm(base.residual(condition, without)) > 2 * after, key
 
 
 def test_fields_and_estimates_of_effects(base: Bench) -> None:
     def field(name: str, values: dict[str, object]) -> tuple[Case, dict[str, Estimate]]:
-        case, estimates = base.applied(name, base.unknowns(values))
+        case, estimates = base.applied(name, base.values(values))
         return case, {estimate.name: estimate for estimate in estimates}
 
     case, found = field("friction", {"friction": 0.05})
@@ -198,7 +199,7 @@ def test_fields_and_estimates_of_effects(base: Bench) -> None:
     case, found = field("bearing-nonlinearity driver", {"bearing-driver": 0.5})
     assert case.rig.support.driver.exponent == pytest.approx(0.5) and case.rig.support.driven.exponent == 0.0
     # About the deflection under 100 N m, where the secant stiffness is the stated 1e8 N/m.
-    force = 100.0 / base.machine.base_radius[0] * cos(radians(20.0))
+    force = 100.0 / base.model.base_radius[0] * cos(radians(20.0))
     assert case.rig.support.driver.reference_deflection == pytest.approx(force / 1e8, rel=1e-3)
 
     case, found = field("sensor-delay y_driven", {"delay-y_driven": -30e-6})
@@ -207,7 +208,7 @@ def test_fields_and_estimates_of_effects(base: Bench) -> None:
 
 
 def test_fields_of_drive_effects(base: Bench) -> None:
-    case, listed = base.applied("coupling", base.unknowns({"coupling": 1 / 5e4}))
+    case, listed = base.applied("coupling", base.values({"coupling": 1 / 5e4}))
     found = {estimate.name: estimate for estimate in listed}
     coupling = case.rig.drive.coupling
     assert coupling is not None and coupling.inertia == pytest.approx(2e-3)
@@ -217,7 +218,7 @@ def test_fields_of_drive_effects(base: Bench) -> None:
     # A loss factor of 0.05 at resonance.
     assert coupling.damping * 2 * pi * resonance / 5e4 == pytest.approx(0.05)
 
-    case, listed = base.applied("torque-ripple", base.unknowns({"ripple": (3.0, 4.0, 0, 0, 0, -2.0, 0, 0)}))
+    case, listed = base.applied("torque-ripple", base.values({"ripple": (3.0, 4.0, 0, 0, 0, -2.0, 0, 0)}))
     ripple = case.rig.drive.ripple
     assert ripple is not None and ripple.orders == (6, 12, 18, 24)
     assert ripple.amplitude == pytest.approx((5.0, 0.0, 2.0, 0.0))
@@ -237,10 +238,29 @@ def test_applied_rigs_can_be_written_and_read(base: Bench, tmp_path: Path) -> No
         ("bearing-nonlinearity driver", {"bearing-driver": -0.95}),
         ("backlash", {"backlash": -200e-6}),
     ):
-        case, _ = base.applied(name, base.unknowns(values))
+        case, _ = base.applied(name, base.values(values))
         path.write_text(dump_case(case), encoding="utf-8")
         assert dump_case(read_case(path)) == dump_case(case), name
 
 
-def test_every_effect_of_the_library_can_be_applied() -> None:
-    assert set(APPLY) == set(LIBRARY)
+def leaves(value: object, path: str) -> dict[str, object]:
+    """Numbers and tuples of a rig by their dotted paths."""
+    if not hasattr(type(value), "model_fields"):
+        return {path: value}
+    inner = [leaves(getattr(value, name), f"{path}.{name}") for name in type(value).model_fields]
+    return {key: item for one in inner for key, item in one.items()}
+
+
+@pytest.mark.parametrize("effect", LIBRARY, ids=lambda effect: effect.name)
+def test_an_effect_moves_the_fields_that_it_says(base: Bench, effect: Effect) -> None:
+    p = 0.5 * base.unknowns.prior()
+    plain = recalibrated(base.nominal, base.fitted(p))
+    before = leaves(plain.rig, "rig")
+    moved: set[str] = set()
+    for hypothesis in effect.hypotheses(base.model):
+        wide = hypothesis.prior(base.unknowns)
+        values = np.where(wide > base.unknowns.prior(), 0.4 * wide, p)
+        after = leaves(added(plain, hypothesis, base.fitted(values))[0].rig, "rig")
+        moved |= {key for key in {*before, *after} if before.get(key) != after.get(key)}
+    fields = {key: [one for one in effect.fields if f"{key}.".startswith(f"{one}.")] for key in moved}
+    assert all(fields.values()) and {one for found in fields.values() for one in found} == set(effect.fields)

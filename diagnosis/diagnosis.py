@@ -1,0 +1,146 @@
+"""One diagnosis from records to values: intake, cause, how far the gap shrinks, where it is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import xarray as xr
+
+from gearbench.diagnosis.advice import advice_of
+from gearbench.diagnosis.cause import Finding, find_cause
+from gearbench.diagnosis.effects.library import LIBRARY
+from gearbench.diagnosis.errors import DiagnosisError
+from gearbench.diagnosis.intake.measurements import Measurement, held_out_of, intake
+from gearbench.diagnosis.intake.signals import simulated_channels
+from gearbench.diagnosis.replay.adjustable import Simulate, uncertain, variants
+from gearbench.diagnosis.replay.budget import budget
+from gearbench.diagnosis.replay.gap import gaps
+from gearbench.diagnosis.replay.refine import refined
+from gearbench.diagnosis.replay.replays import replays_of
+from gearbench.diagnosis.verdict import Gap, Probabilities, Share, Verdict
+from gearbench.rig import Case
+from gearbench.rig.contract import rank_of
+
+# What the next step is called.
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """Records taken in: those to diagnose from, the one that is held out, and what is asked."""
+
+    nominal: Case
+    measurements: tuple[Measurement, ...]
+    held_out: Measurement | None
+    without: tuple[str, ...] = ()
+
+    @property
+    def all(self) -> tuple[Measurement, ...]:
+        """All measurements, the held-out one last."""
+        return (*self.measurements, *([self.held_out] if self.held_out else []))
+
+    @property
+    def judged(self) -> Measurement:
+        """The measurement on which the gap is told: the held-out one, else the first."""
+        return self.held_out or self.measurements[0]
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """The verdict, and the rigs that it compares."""
+
+    inputs: Inputs
+    verdict: Verdict
+    recalibrated: Case
+    with_effect: Case | None
+
+    @property
+    def updated(self) -> Case:
+        """The rig to go on with: with the effect, if one was found."""
+        return self.with_effect or self.recalibrated
+
+    @property
+    def stages(self) -> dict[str, Case]:
+        """The rigs from the nominal one on, by stage."""
+        stages = {"nominal": self.inputs.nominal, "recalibrated": self.recalibrated}
+        return stages if self.with_effect is None else {**stages, "with_effect": self.with_effect}
+
+
+def diagnose(
+    records: Sequence[str | Path | xr.Dataset],
+    nominal: Case,
+    *,
+    held_out: str | None = None,
+    without: Sequence[str] = (),
+    progress: Progress | None = None,
+    quick: bool = False,
+) -> Diagnosis:
+    """Where measured records and the nominal rig differ, what causes it, and how far the gap shrinks with it.
+
+    `records`: one of each condition, files or datasets. `held_out` names the record that the result is judged by and
+    not found from (absent: the one named "held-out", or of four or more the last); `without` leaves effects out of the
+    library; `progress` is told the name of every step as it begins. `quick` leaves out the division of the gap by
+    channel, band and so on, and takes the rigs as the search found them: each saves as long as the search takes.
+
+    Raises DiagnosisError or RecordError, one sentence each, for records that cannot be diagnosed.
+    """
+    return diagnosed(take_in(records, nominal, held_out=held_out, without=without), progress, quick=quick)
+
+
+def take_in(
+    records: Sequence[str | Path | xr.Dataset],
+    nominal: Case,
+    *,
+    held_out: str | None = None,
+    without: Sequence[str] = (),
+) -> Inputs:
+    """Read and check the records. Raises DiagnosisError or RecordError, one sentence each."""
+    names = sorted((effect.name for effect in LIBRARY), key=rank_of)
+    for name in without:
+        if name not in names:
+            raise DiagnosisError(f"without = {name} is no effect of the library: {', '.join(names)}")
+    rest, out = held_out_of(intake(records, nominal), held_out)
+    return Inputs(nominal, rest, out, tuple(dict.fromkeys(without)))
+
+
+def diagnosed(inputs: Inputs, progress: Progress | None = None, *, quick: bool = False) -> Diagnosis:
+    """The diagnosis of records that were taken in; arguments as in `diagnose`."""
+    said = progress or (lambda step: None)
+    simulate = replays_of(inputs.nominal, inputs.all)
+    said("cause")
+    finding = find_cause(inputs.measurements, inputs.nominal, held_out=inputs.held_out, without=inputs.without)
+    said("how far the gap shrinks")
+    plain, improved = finding.recalibrated, finding.with_effect
+    if not quick and inputs.judged.phase_known:
+        plain, improved = refined(inputs.nominal, finding.addition, inputs.measurements, simulate)
+    shrunk = gaps(inputs.nominal, plain, improved, inputs.judged, simulate=simulate)
+    where = finding.where
+    if not quick:
+        said("where the gap is")
+        where += _budget(inputs, simulate)
+    return Diagnosis(inputs, _verdict(inputs, finding, where, shrunk), plain, improved)
+
+
+def _budget(inputs: Inputs, simulate: Simulate) -> tuple[Share, ...]:
+    nominal, measurements = inputs.nominal, inputs.measurements
+    simulated = [simulated_channels(one, simulate(nominal, one.record)) for one in measurements]
+    moved = variants(nominal, measurements, uncertain(nominal), simulate)
+    return budget(measurements, simulated, nominal, moved)
+
+
+def _verdict(inputs: Inputs, finding: Finding, where: tuple[Share, ...], shrunk: tuple[Gap, ...]) -> Verdict:
+    advice = (*finding.advice, *advice_of(inputs.measurements, inputs.held_out))
+    return Verdict(
+        verdict=finding.verdict,
+        probability=Probabilities(**finding.probability),
+        effects=finding.effects,
+        candidates=finding.candidates,
+        place=finding.place,
+        where=where,
+        gap=shrunk,
+        held_out=inputs.held_out.name if inputs.held_out else None,
+        indistinguishable=finding.indistinguishable,
+        advice=tuple(dict.fromkeys(advice)),
+    )

@@ -1,0 +1,76 @@
+"""An elastic coupling between the drive's rotor and the driver, which the nominal rig takes for stiffer or rigid."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import pi
+
+import numpy as np
+
+from gearbench.diagnosis.effects.effect import Added, Effect, Estimate, Fitted, Hypothesis, Wide, changed
+from gearbench.diagnosis.forces.condition import Condition
+from gearbench.diagnosis.forces.nominal import NominalModel
+from gearbench.diagnosis.forces.residuals import LOSS_FACTOR
+from gearbench.diagnosis.forces.unknowns import Group, group
+from gearbench.rig import Rig
+from gearbench.rig.drive import Coupling
+
+KEY = "coupling"
+# [Hz] resonance of the rotor against the driver: a stiff one lies at twice the end of the usual band or above, one
+# worth a diagnosis inside it (truth rigs: 7.5 to 11 kHz and 0.9 to 3 kHz).
+RIGID, ELASTIC = 6e3, 1.3e3
+# Compliances to begin from, as squares of 6 kHz over the resonance: 3000 Hz to a seventh of 6 kHz.
+RATIOS = (2.0, 2.7, 3.6, 4.8, 6.5)
+
+
+def unknowns(model: NominalModel, conditions: Sequence[Condition]) -> tuple[Group, ...]:
+    """Compliance beyond the nominal one; it cannot be negative."""
+    reduced = 1.0 / (1.0 / max(model.rotor, 1e-12) + 1.0 / model.inertia[0])
+
+    def compliance(resonance: float) -> float:
+        return 1.0 / (reduced * (2 * np.pi * resonance) ** 2)
+
+    return (
+        group(KEY, "rad/(N m)", ("compliance",), compliance(RIGID), compliance(ELASTIC), slot="coupling", low=0.0),
+    )
+
+
+def hypotheses(model: NominalModel) -> tuple[Hypothesis, ...]:
+    """The drive has one coupling."""
+    return (Hypothesis("coupling", "drive", (Wide(KEY),)),)
+
+
+def starts(group: Group) -> tuple[float, ...]:
+    """Compliances that move the resonance through the band."""
+    return tuple(group.sd[0] * ratio**2 for ratio in RATIOS)
+
+
+def add(rig: Rig, hypothesis: Hypothesis, fitted: Fitted) -> Added:
+    """Gives the drive a coupling of the whole compliance and the loss factor that the residuals assume."""
+    model = fitted.model
+    total = model.compliance + float(fitted.of(KEY)[0])
+    std = float(fitted.std_of(KEY)[0])
+    rotor = model.rotor * (1 + fitted.of("inertia")[2])
+    reduced = 1 / (1 / rotor + 1 / (model.inertia[0] * (1 + fitted.of("inertia")[0])))
+    stiffness = 1 / total
+    resonance = np.sqrt(stiffness / reduced) / (2 * pi)
+    damping = LOSS_FACTOR * stiffness / (2 * pi * resonance)
+    coupling = Coupling(inertia=float(rotor), stiffness=float(stiffness), damping=float(damping))
+    return changed(rig, "drive", coupling=coupling), (
+        Estimate("stiffness", stiffness, stiffness * std / total, "N m/rad"),
+        Estimate("resonance", float(resonance), float(0.5 * resonance * std / total), "Hz"),
+    )
+
+
+COUPLING = Effect(
+    name="coupling",
+    noun="an elastic coupling",
+    meaning="The motor's rotor swings against the driver: the torque measured at the motor is not the one at the gear."
+    " Check the coupling's stiffness.",
+    parameters={"stiffness": "torsional stiffness", "resonance": "resonance of rotor against driver"},
+    fields=("rig.drive.coupling.stiffness", "rig.drive.coupling.damping"),
+    hypotheses_of=hypotheses,
+    add=add,
+    unknowns=unknowns,
+    starts=starts,
+)

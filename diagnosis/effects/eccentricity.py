@@ -1,0 +1,82 @@
+"""Run-out of a gear: its teeth turn about an axis beside its own, once per revolution."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+from math import atan2, cos, hypot, pi, sin
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.diagnosis.effects.effect import (
+    SIDES,
+    Added,
+    Effect,
+    Estimate,
+    Fitted,
+    Hypothesis,
+    Wide,
+    changed,
+    of_gears,
+)
+from gearbench.diagnosis.forces.condition import Condition
+from gearbench.diagnosis.forces.nominal import NominalModel
+from gearbench.diagnosis.forces.unknowns import Group, group
+from gearbench.rig import Rig
+
+# Groups by gear.
+KEYS = {side: f"eccentricity-{side}" for side in SIDES}
+# [m] Half of the run-out: truth rigs of severity 1 have 5 um, of which either part is some 3 um; sound gears a tenth.
+SD, WIDE = 0.3e-6, 3e-6
+
+
+def _turning(side: int, condition: Condition) -> NDArray[np.float64]:
+    """Cosine and sine (2, N) of a gear's rotation."""
+    return condition.lobes[side]
+
+
+def unknowns(model: NominalModel, conditions: Sequence[Condition]) -> tuple[Group, ...]:
+    """Cosine and sine part of the excess material along the line of action, for either gear."""
+    return tuple(
+        group(key, "m", ("cos", "sin"), SD, WIDE, slot="excess", basis=partial(_turning, number))
+        for number, key in enumerate(KEYS.values())
+    )
+
+
+def hypotheses(model: NominalModel) -> tuple[Hypothesis, ...]:
+    """One gear of the two."""
+    return tuple(
+        Hypothesis(f"eccentricity {side}", "mesh", (Wide(key),), (side,), len(KEYS)) for side, key in KEYS.items()
+    )
+
+
+def add(rig: Rig, hypothesis: Hypothesis, fitted: Fitted) -> Added:
+    """Adds what was fitted to the run-out of both gears; estimates are given of the gear in question."""
+    out: list[Estimate] = []
+    for side, key in KEYS.items():
+        gear = getattr(rig, side)
+        cosine = fitted.of(key)[0] + 0.5 * gear.runout * cos(gear.runout_phase)
+        sine = fitted.of(key)[1] + 0.5 * gear.runout * sin(gear.runout_phase)
+        size, phase = hypot(cosine, sine), atan2(sine, cosine)
+        std = float(np.sqrt((fitted.std_of(key) ** 2).mean()))
+        rig = changed(rig, side, runout=2 * size, runout_phase=phase)
+        if side in hypothesis.on:
+            angle = min(std / max(size, 1e-12), pi)
+            out.append(Estimate(f"{side}.runout", 2e6 * size, 2e6 * std, "um"))
+            out.append(Estimate(f"{side}.runout_phase", phase * 180 / pi, angle * 180 / pi, "deg", sized=False))
+    return rig, tuple(out)
+
+
+ECCENTRICITY = Effect(
+    name="eccentricity",
+    noun="run-out of a gear",
+    meaning="The teeth stand farther out on one side of the gear than on the other: check how it is seated on its"
+    " shaft, and the shaft's own run-out.",
+    parameters={"runout": "run-out", "runout_phase": "angle at which the teeth stand out most"},
+    fields=of_gears("rig.{}.runout") + of_gears("rig.{}.runout_phase"),
+    hypotheses_of=hypotheses,
+    add=add,
+    unknowns=unknowns,
+    model_error=0.04,  # rms on the calibration family (benchmarks/diagnosis.md)
+)

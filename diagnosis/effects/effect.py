@@ -1,0 +1,185 @@
+"""What an effect is to the diagnosis: its unknowns, where it may be, how it is put into a rig, and its words.
+
+A file of this folder makes one `Effect`; a line in `library` adds it to what is searched for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import hypot
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.diagnosis.forces.condition import Condition
+from gearbench.diagnosis.forces.nominal import NominalModel
+from gearbench.diagnosis.forces.unknowns import Group, Unknowns
+from gearbench.rig import Case, Rig
+from gearbench.rig.contract import Place
+
+Array = NDArray[np.float64]
+
+SIDES = ("driver", "driven")
+SUPPORT_PLACES: dict[str, Place] = {"driver": "driver-support", "driven": "driven-support"}
+# Relative error that the simplicity of the model leaves at least: four rigs of each effect do not tell less.
+LEAST_MODEL_ERROR = 0.02
+
+
+@dataclass(frozen=True)
+class Wide:
+    """A prior that is made wide: of a whole group of unknowns, or of the entry `at` in it; `sd` in the group's unit,
+    None: the group's own wide one."""
+
+    key: str
+    at: int | None = None
+    sd: float | None = None
+
+    def entries(self, unknowns: Unknowns) -> NDArray[np.int64]:
+        """Indices of the unknowns whose priors are wide."""
+        whole = np.arange(*unknowns[self.key].indices(unknowns.size))
+        return whole if self.at is None else whole[[self.at]]
+
+    def into(self, unknowns: Unknowns, sd: Array) -> None:
+        """Put the wide standard deviations into `sd` (size,)."""
+        entries = self.entries(unknowns)
+        if self.sd is not None:
+            sd[entries] = self.sd
+        else:
+            sd[entries] = unknowns.group(self.key).wide[entries - unknowns[self.key].start]
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """An effect (None: a free form) at a place, by the priors that it makes `wide`.
+
+    `name` tells it from others of the same effect, `on` says which gears or channels it is about, `choices` out of how
+    many like it it was picked. Of those that differ by a tooth's number only one for each gear is `representative`.
+    """
+
+    name: str
+    place: Place
+    wide: tuple[Wide, ...]
+    on: tuple[str, ...] = ()
+    choices: int = 1
+    representative: bool = True
+    effect: Effect | None = None
+
+    def entries(self, unknowns: Unknowns) -> NDArray[np.int64]:
+        """Indices of the unknowns whose priors are wide."""
+        return np.concatenate([one.entries(unknowns) for one in self.wide])
+
+    def prior(self, unknowns: Unknowns) -> Array:
+        """Prior standard deviations (size,) under this hypothesis."""
+        return widened(unknowns, self.wide)
+
+
+def widened(unknowns: Unknowns, wide: Sequence[Wide]) -> Array:
+    """Prior standard deviations (size,) of the background with some made wide."""
+    sd = unknowns.prior()
+    for one in wide:
+        one.into(unknowns, sd)
+    return sd
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """Values and standard deviations (size,) of the unknowns of one fit to the records of a nominal model."""
+
+    model: NominalModel
+    unknowns: Unknowns
+    p: Array
+    std: Array
+    torque_mean: Mapping[str, float]  # by condition [N m]
+
+    def of(self, key: str) -> Array:
+        """Values of a group."""
+        return self.p[self.unknowns[key]]
+
+    def std_of(self, key: str) -> Array:
+        """Standard deviations of a group."""
+        return self.std[self.unknowns[key]]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """One parameter of an effect as its users read it; `sized`: the simplicity of the model limits how well it is
+    known, as it does not limit a tooth's number or a phase."""
+
+    name: str
+    value: float
+    std: float
+    unit: str
+    sized: bool = True
+
+
+Added = tuple[Rig, tuple[Estimate, ...]]
+
+
+def no_unknowns(model: NominalModel, conditions: Sequence[Condition]) -> tuple[Group, ...]:
+    """Of an effect that makes priors of the background wide."""
+    return ()
+
+
+def no_starts(group: Group) -> tuple[float, ...]:
+    """Of an effect whose influence is nearly linear: the search finds it from zero."""
+    return ()
+
+
+@dataclass(frozen=True)
+class Effect:
+    """An effect that a simulation may leave out.
+
+    Words: `name` as verdicts have it, `noun` as a sentence does, `meaning` what it is and where to look, `parameters`
+    the last part of a parameter's name in an engineer's words. Rig: `fields`, dotted from the case, that `add(rig,
+    hypothesis, fitted)` moves when it puts what was fitted into a rig. Model: `unknowns(model, conditions)` with bounds
+    and priors, `hypotheses_of(model)` where it may be, and `starts(group)`, values of the group of a hypothesis to
+    begin the search from besides zero. Search: it is refitted whatever the background's quadratic predicts (`always`),
+    in `most_refits` of its hypotheses at most. Decision: `limit` of its evidence and `least_size`, if they are not
+    those of all effects. `model_error`: relative error of a rightly named one beyond that of the fit.
+    """
+
+    name: str
+    noun: str
+    meaning: str
+    parameters: Mapping[str, str]
+    fields: tuple[str, ...]
+    hypotheses_of: Callable[[NominalModel], tuple[Hypothesis, ...]]
+    add: Callable[[Rig, Hypothesis, Fitted], Added]
+    unknowns: Callable[[NominalModel, Sequence[Condition]], tuple[Group, ...]] = no_unknowns
+    starts: Callable[[Group], tuple[float, ...]] = no_starts
+    always: bool = False
+    most_refits: int | None = None
+    limit: float | None = None
+    least_size: float | None = None
+    model_error: float = LEAST_MODEL_ERROR
+
+    def hypotheses(self, model: NominalModel) -> tuple[Hypothesis, ...]:
+        """The effect in every place where it may be."""
+        return tuple(replace(one, effect=self) for one in self.hypotheses_of(model))
+
+    def stated(self, estimate: Estimate) -> float:
+        """Standard deviation to state for a parameter: the fit's and, for a size, the model's error."""
+        return hypot(estimate.std, self.model_error * estimate.value) if estimate.sized else estimate.std
+
+
+def added(case: Case, hypothesis: Hypothesis, fitted: Fitted) -> tuple[Case, tuple[Estimate, ...]]:
+    """The case with the effect of the hypothesis, which has one, put into its rig, and its parameters."""
+    assert hypothesis.effect is not None
+    rig, estimates = hypothesis.effect.add(case.rig, hypothesis, fitted)
+    return with_rig(case, rig), estimates
+
+
+def with_rig(case: Case, rig: Rig) -> Case:
+    """The case with another rig."""
+    return case.model_copy(update={"rig": rig})
+
+
+def changed(rig: Rig, part: str, **update: object) -> Rig:
+    """The rig with fields of one of its parts replaced."""
+    return rig.model_copy(update={part: getattr(rig, part).model_copy(update=update)})
+
+
+def of_gears(path: str) -> tuple[str, ...]:
+    """A path with {} for either gear: `rig.{}.runout`."""
+    return tuple(path.format(side) for side in SIDES)

@@ -1,0 +1,77 @@
+"""Pitch errors: every tooth of a gear stands a little before or behind its place."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from gearbench.diagnosis.effects.effect import (
+    SIDES,
+    Added,
+    Effect,
+    Estimate,
+    Fitted,
+    Hypothesis,
+    Wide,
+    changed,
+    of_gears,
+)
+from gearbench.diagnosis.forces.condition import Condition
+from gearbench.diagnosis.forces.nominal import NominalModel
+from gearbench.diagnosis.forces.unknowns import Group, group
+from gearbench.rig import Rig
+
+# Groups by gear.
+KEYS = {side: f"pitch-{side}" for side in SIDES}
+# [m] of each tooth: 3 um rms is severity 1 of the truth rigs of `challenge`; sound gears have a tenth.
+SD, WIDE = 0.25e-6, 2.5e-6
+
+
+def unknowns(model: NominalModel, conditions: Sequence[Condition]) -> tuple[Group, ...]:
+    """Excess material of every tooth."""
+    first = dict(zip(SIDES, (0, model.teeth[0]), strict=True))
+    counts = dict(zip(SIDES, model.teeth, strict=True))
+    return tuple(
+        group(key, "m", counts[side], SD, WIDE, slot="pitch", first=first[side]) for side, key in KEYS.items()
+    )
+
+
+def hypotheses(model: NominalModel) -> tuple[Hypothesis, ...]:
+    """Either gear, or both."""
+    chosen = {"driver": SIDES[:1], "driven": SIDES[1:], "both": SIDES}
+    return tuple(
+        Hypothesis(f"pitch-error {name}", "mesh", tuple(Wide(KEYS[side]) for side in sides), sides, len(chosen))
+        for name, sides in chosen.items()
+    )
+
+
+def add(rig: Rig, hypothesis: Hypothesis, fitted: Fitted) -> Added:
+    """Adds what was fitted to the pitch errors of both gears; estimates are given of the gears in question."""
+    out: list[Estimate] = []
+    for side, key in KEYS.items():
+        gear = getattr(rig, side)
+        present = np.array(gear.pitch_error) if gear.pitch_error else np.zeros(gear.teeth)
+        total = present + fitted.of(key)
+        rig = changed(rig, side, pitch_error=tuple(float(v) for v in total))
+        if side in hypothesis.on:
+            std = float(np.sqrt((fitted.std_of(key) ** 2).mean() / 2))
+            out.append(Estimate(f"{side}.rms", float(np.std(total)) * 1e6, std * 1e6, "um"))
+    return rig, tuple(out)
+
+
+PITCH_ERROR = Effect(
+    name="pitch-error",
+    noun="pitch errors",
+    meaning="The teeth are not evenly spaced: measure the pitch of the gear, or turn the gears to other pairings and"
+    " see whether the pattern moves.",
+    parameters={"rms": "rms of the pitch errors"},
+    fields=of_gears("rig.{}.pitch_error"),
+    hypotheses_of=hypotheses,
+    add=add,
+    unknowns=unknowns,
+    # Where flanks separate a rig's structure imitates them: up to 52 nats on controls of the calibration family, 84 and
+    # more on rigs that have them (benchmarks/diagnosis.md).
+    limit=60.0,
+    model_error=0.23,  # rms on the calibration family
+)

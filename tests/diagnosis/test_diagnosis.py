@@ -1,0 +1,75 @@
+"""`diagnose` as the library has it: what it takes, what it says while it works, what it hands back."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import xarray as xr
+from shared.fake_diagnosis import at_rest, friction_found
+from shared.measured import channels, nominal, record, written
+
+from gearbench.diagnosis import Diagnosis, DiagnosisError, diagnose
+from gearbench.diagnosis import diagnosis as module
+from gearbench.diagnosis.diagnosis import take_in
+from gearbench.rig import Case
+
+
+@pytest.fixture(autouse=True)
+def stand_in(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Stand in for the search, the refinement and the replay."""
+
+    def refined(case: Case, *rest: object) -> tuple[Case, Case | None]:
+        return friction_found(case).recalibrated, friction_found(case).with_effect
+
+    monkeypatch.setattr(module, "find_cause", lambda measurements, case, **asked: friction_found(case))
+    monkeypatch.setattr(module, "refined", refined)
+    monkeypatch.setattr(module, "replays_of", lambda case, measurements: at_rest)
+
+
+def sets() -> list[xr.Dataset]:
+    return [
+        record(channels(), condition="base"),
+        record(channels(torque=40.0, seed=2), condition="light", torque_mean=40.0),
+        record(channels(torque=80.0, seed=3), condition="held-out", torque_mean=80.0),
+    ]
+
+
+def test_datasets_and_files_are_diagnosed_alike(tmp_path: Path) -> None:
+    made = diagnose(sets(), nominal())
+    assert isinstance(made, Diagnosis) and made.verdict.verdict == "effect"
+    assert [one.name for one in made.inputs.measurements] == ["base", "light"]
+    assert made.inputs.held_out is not None and made.verdict.held_out == "held-out"
+    assert list(made.stages) == ["nominal", "recalibrated", "with_effect"]
+    assert made.updated.rig.friction.coefficient == 0.0581
+    files = [
+        written(tmp_path, "record-base"),
+        written(tmp_path, "record-light", channels(torque=40.0, seed=2)),
+        written(tmp_path, "record-held-out", channels(torque=80.0, seed=3)),
+    ]
+    assert diagnose(files, nominal()).verdict == made.verdict
+
+
+def test_steps_are_told_and_quick_leaves_the_division_out() -> None:
+    steps: list[str] = []
+    whole = diagnose(sets(), nominal(), progress=steps.append)
+    assert steps == ["cause", "how far the gap shrinks", "where the gap is"]
+    quick = diagnose(sets(), nominal(), quick=True)
+    assert {share.kind for share in quick.verdict.where} == {"place"}
+    assert {share.kind for share in whole.verdict.where} > {"place", "channel", "tooth"}
+    assert quick.verdict.effects == whole.verdict.effects
+
+
+def test_what_is_asked_is_checked() -> None:
+    with pytest.raises(DiagnosisError, match="without = gremlins is no effect of the library: backlash, friction"):
+        diagnose(sets(), nominal(), without=["gremlins"])
+    with pytest.raises(DiagnosisError, match="held_out = x names 0 records"):
+        diagnose(sets(), nominal(), held_out="x")
+    with pytest.raises(DiagnosisError, match="at least one is needed"):
+        diagnose([], nominal())
+    assert take_in(sets(), nominal(), without=["friction", "friction"]).without == ("friction",)
+
+
+def test_two_datasets_without_a_condition_get_names_of_their_own() -> None:
+    bare = [one.assign_attrs(condition="") for one in sets()]
+    assert [one.name for one in take_in(bare, nominal()).all] == ["record-1", "record-2", "record-3"]
