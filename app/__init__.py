@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from gearbench.bench import Comparison, compare, simulate, static
     from gearbench.cases import read_case
+    from gearbench.diagnosis import diagnose
     from gearbench.identification import (
         IdentificationSettings,
         dte,
@@ -42,6 +43,7 @@ _HOMES = {
     "Comparison": "gearbench.bench",
     "IdentificationSettings": "gearbench.identification",
     "compare": "gearbench.bench",
+    "diagnose": "gearbench.diagnosis",
     "dte": "gearbench.identification",
     "dump_case": "gearbench.rig",
     "force": "gearbench.identification",
@@ -77,6 +79,7 @@ __all__ = [
     "Comparison",
     "IdentificationSettings",
     "compare",
+    "diagnose",
     "dte",
     "dump_case",
     "force",
