@@ -85,6 +85,11 @@ def diagnose(
     channel, band and so on, and takes the rigs as the search found them: each saves as long as the search takes.
 
     Raises DiagnosisError or RecordError, one sentence each, for records that cannot be diagnosed.
+
+    >>> import gearbench as gb
+    >>> found = gb.diagnose(["none.nc"], gb.read_case("gap_demo"))
+    Traceback (most recent call last):
+    gearbench.records.errors.RecordError: record none.nc does not exist
     """
     return diagnosed(take_in(records, nominal, held_out=held_out, without=without), progress, quick=quick)
 
