@@ -21,13 +21,13 @@ from gearbench.fem.contact.law import Curve, Law, elastic_pair, make_law
 from gearbench.fem.gear.body import CondensedGear, condense, rounded
 from gearbench.fem.gear.crack import CrackedTooth
 from gearbench.geometry.mesh.sector import Element
-from gearbench.kernels.compiled import cache_folder
+from gearbench.kernels.folders import cache_folder
 from gearbench.rig import Gear, Material, Rig, sound_gear
 from gearbench.rig.value import Value
 
 Arrays = Mapping[str, Any]  # of numpy arrays
 
-SOURCES = ("gearbench.geometry", "gearbench.fem")
+SOURCES = ("gearbench.geometry", "gearbench.fem", "gearbench.kernels")
 LIBRARIES = ("numpy", "scipy", "scikit-fem", "gmsh")
 
 

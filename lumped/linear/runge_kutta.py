@@ -11,16 +11,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from gearbench.kernels.compiled import ROUNDING, compiled
 from gearbench.lumped.errors import LumpedError
 from gearbench.lumped.linear.model import STATES, Lumped
 
 Array = NDArray[np.float64]
 
-# Only what cannot change a result beyond rounding: fused multiply-add, free order of sums, signs of zero.
-FASTMATH = {"contract", "reassoc", "nsz", "arcp"}
 OUTPUTS = ("x", "y1", "y2", "mesh_force")
 
 
@@ -78,7 +76,7 @@ def integrate(
     return final, out
 
 
-@njit(nogil=True, cache=True, fastmath=FASTMATH)
+@compiled(fastmath=ROUNDING)
 def _run(
     state: Array,
     mesh: Array,

@@ -9,17 +9,15 @@ from __future__ import annotations
 from math import copysign, sqrt, tanh
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from gearbench.kernels.compiled import ROUNDING, compiled
 from gearbench.lumped.errors import LumpedError
 from gearbench.lumped.nonlinear.model import COORDINATES, Constants, NonLinear, Rubbing
 from gearbench.lumped.nonlinear.tables import BACK, EXCESS, EXCESS_RATE, GAIN, POSITION, RIPPLE
 
 Array = NDArray[np.float64]
 
-# Only what cannot change a result beyond rounding: fused multiply-add, free order of sums, signs of zero.
-FASTMATH = {"contract", "reassoc", "nsz", "arcp"}
 OUTPUTS = ("u1", "y1", "y2", "u2", "w", "mesh_force", "load_force")
 
 
@@ -57,7 +55,7 @@ def integrate(
     return final, out
 
 
-@njit(nogil=True, cache=True, fastmath=FASTMATH, error_model="numpy")
+@compiled(fastmath=ROUNDING)
 def _pressed(depth: float, rate: float, position: float, gain: float, secant: Array, p: Constants) -> float:
     """Force [N] of flanks pressed by depth > 0 [m] and closing at rate [m/s]; never negative."""
     last = secant.shape[1] - 1
@@ -73,7 +71,7 @@ def _pressed(depth: float, rate: float, position: float, gain: float, secant: Ar
     return max(gain * depth * stiffness + p.damping_factor * sqrt(gain * tangent) * rate, 0.0)
 
 
-@njit(nogil=True, cache=True, fastmath=FASTMATH, error_model="numpy")
+@compiled(fastmath=ROUNDING)
 def _mesh(travel: float, rate: float, table: Array, i: int, secant: Array, p: Constants) -> float:
     """Mesh force [N] at dte `travel` [m] and its rate [m/s]; negative on the back flanks."""
     depth = travel + table[i, EXCESS]
@@ -89,7 +87,7 @@ def _mesh(travel: float, rate: float, table: Array, i: int, secant: Array, p: Co
     return 0.0
 
 
-@njit(nogil=True, cache=True, fastmath=FASTMATH, error_model="numpy")
+@compiled(fastmath=ROUNDING)
 def _spring(y: float, stiffness: float, exponent: float, reference: float) -> float:
     """Force [N] of a support."""
     if exponent == 0.0:
@@ -97,7 +95,7 @@ def _spring(y: float, stiffness: float, exponent: float, reference: float) -> fl
     return stiffness * reference * copysign((abs(y) / reference) ** (1.0 + exponent), y)
 
 
-@njit(nogil=True, cache=True, fastmath=FASTMATH, error_model="numpy")
+@compiled(fastmath=ROUNDING)
 def _friction(va: float, vb: float, vc: float, vd: float, position: float, r: Rubbing) -> tuple[float, float, float]:
     """Friction on driver rotation, supports and driven rotation per normal force, at the rates of u1, y1, y2, u2."""
     row = int(position)
@@ -118,7 +116,7 @@ def _friction(va: float, vb: float, vc: float, vd: float, position: float, r: Ru
     return m1, s * r.slide, m2
 
 
-@njit(nogil=True, cache=True, fastmath=FASTMATH, error_model="numpy")
+@compiled(fastmath=ROUNDING)
 def _rates(a, b, c, d, e, va, vb, vc, vd, ve, table, i, force, secant, p, r, free):  # type: ignore[no-untyped-def]
     """Accelerations of u1, y1, y2, u2, w, the mesh force and the force at the load's base circle."""
     f = _mesh(a - d + p.factor * (b - c), va - vd + p.factor * (vb - vc), table, i, secant, p)
@@ -141,7 +139,7 @@ def _rates(a, b, c, d, e, va, vb, vc, vd, ve, table, i, force, secant, p, r, fre
     )
 
 
-@njit(nogil=True, cache=True, fastmath=FASTMATH, error_model="numpy")
+@compiled(fastmath=ROUNDING)
 def _run(
     state: Array, table: Array, force: Array, first: int, secant: Array, p: Constants, r: Rubbing | None, free: float,
     h: float, substeps: int, out: Array,

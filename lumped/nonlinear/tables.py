@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from math import cos, floor, pi, sin
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from gearbench.kernels.compiled import compiled
 from gearbench.lumped.nonlinear.model import NonLinear
 
 Array = NDArray[np.float64]
@@ -102,7 +102,7 @@ def _series(cosines: tuple[float, ...], sines: tuple[float, ...]) -> Array:
     return np.array([cosines, sines], dtype=float).reshape(2, -1).T.copy()
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _wave(series: Array, phase: float) -> float:
     """Sum of a series in mesh orders at a phase [cycles]."""
     total = 0.0
@@ -112,7 +112,7 @@ def _wave(series: Array, phase: float) -> float:
     return total
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _fill(
     out: Array, first_phase: float, step: float, offsets: Integers, share: Array, bending: Array,
     excess1: Array, excess2: Array, growth1: Array, growth2: Array, base: Array, series: Array, errors: Array,
