@@ -22,6 +22,7 @@ from gearbench.bench.record.attributes import lost_contact, rig_attributes
 from gearbench.bench.record.sensors import Signal, check_delays, measured
 from gearbench.geometry import Pair, body, pair
 from gearbench.lumped.nonlinear.model import LIMITS
+from gearbench.lumped.nonlinear.step import columns
 from gearbench.lumped.stiffness.potential_energy import outside_foundation_fit
 from gearbench.records import make_record, provenance
 from gearbench.rig import Case, Rig, dump_case
@@ -61,15 +62,16 @@ def simulate_nonlinear(case: Case, progress: ProgressReport | None = None) -> xr
 
 def signals_of(setup: Setup, torque: Array, outputs: Array) -> dict[str, Signal]:
     """True channels from torques (R, samples) [N m] and outputs (R, samples, 7) of the integrator."""
+    seen = columns(outputs)
     r1, r2 = setup.model.base_radii
     rate = 2 * np.pi * setup.cycles_per_sample * setup.sampling_rate
     return {
         "torque_driver": Signal(torque),
-        "torque_driven": Signal(outputs[..., 6] * r2),
-        "angle_driver": Signal(outputs[..., 0] / r1, rate / setup.model.rig.driver.teeth),
-        "angle_driven": Signal(outputs[..., 3] / r2, rate / setup.model.rig.driven.teeth),
-        "y_driver": Signal(outputs[..., 1]),
-        "y_driven": Signal(outputs[..., 2]),
+        "torque_driven": Signal(seen.load_force * r2),
+        "angle_driver": Signal(seen.u1 / r1, rate / setup.model.rig.driver.teeth),
+        "angle_driven": Signal(seen.u2 / r2, rate / setup.model.rig.driven.teeth),
+        "y_driver": Signal(seen.y1),
+        "y_driven": Signal(seen.y2),
     }
 
 
@@ -115,7 +117,7 @@ def _record(case: Case, meshing: Pair, plan: Schedule, setup: Setup, runs: list[
         samples=samples,
         samples_per_period=plan.samples_per_period,
     )
-    lost = int(np.resize(outputs[:, :, 5] == 0, (len(runs), samples)).sum())
+    lost = int(np.resize(columns(outputs).mesh_force == 0, (len(runs), samples)).sum())
     settings = {"model": "lumped", "mesh": "non-linear", "substeps": setup.substeps}
     warnings = [lost_contact(lost, len(runs) * samples) or ""]
     if case.simulation.mesh_stiffness == "potential-energy":

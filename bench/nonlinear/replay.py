@@ -17,6 +17,7 @@ from gearbench.bench.record.attributes import lost_contact
 from gearbench.bench.record.sensors import Signal, check_delays, delayed, measured
 from gearbench.geometry import pair
 from gearbench.lumped.nonlinear.law import MeshLaw
+from gearbench.lumped.nonlinear.step import columns
 from gearbench.records import make_record
 from gearbench.rig import Case, Experiment, Sensors
 
@@ -54,7 +55,7 @@ def replay(case: Case, record: xr.Dataset, law: MeshLaw | None = None, realisati
     signals = signals_of(setup, np.resize(torque, len(outputs))[None], outputs[None])
     seen = measured(signals, rig, rate, seed=0, samples=len(outputs), samples_per_period=samples)
     unsettled = None if residual <= TOLERANCE else f"the DTE still changes by {residual:.3g} from period to period"
-    lost = int((outputs[:, 5] == 0).sum())
+    lost = int((columns(outputs).mesh_force == 0).sum())
     attributes = {
         **attributes_of(case.rig, meshing),
         "sampling_rate": rate,

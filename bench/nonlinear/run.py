@@ -16,9 +16,9 @@ from gearbench.bench.refusals.effects import refuse_unknown
 from gearbench.geometry import Pair
 from gearbench.lumped import choose_substeps
 from gearbench.lumped.nonlinear.law import MeshLaw
-from gearbench.lumped.nonlinear.model import NonLinear, nonlinear_model
-from gearbench.lumped.nonlinear.step import integrate
-from gearbench.lumped.nonlinear.tables import EXCESS, GAIN, Motion, tables
+from gearbench.lumped.nonlinear.model import COORDINATES, Coordinates, NonLinear, nonlinear_model
+from gearbench.lumped.nonlinear.step import columns, integrate
+from gearbench.lumped.nonlinear.tables import Motion, Table, tables
 from gearbench.rig import Experiment, Gear, Rig, Simulation
 
 Array = NDArray[np.float64]
@@ -39,7 +39,7 @@ class Setup:
     cycles_per_sample: float
     block_samples: int
     repeats: bool
-    table: Array | None
+    table: Table | None
     first_phase: float = 0.0
 
     @property
@@ -56,8 +56,8 @@ class Setup:
         """Mesh phase [cycles] of a sample."""
         return self.first_phase + sample * self.cycles_per_sample
 
-    def table_for(self, start: int, samples: int) -> Array:
-        """Tables of `samples` samples from sample `start`."""
+    def table_for(self, start: int, samples: int) -> Table:
+        """Table of `samples` samples from sample `start`."""
         return tables(
             self.model,
             Motion(
@@ -80,7 +80,7 @@ class Setup:
             parts.append(out)
         return state, np.concatenate(parts)
 
-    def _integrate(self, table: Array, force: Array, state: Array, first_entry: int) -> tuple[Array, Array]:
+    def _integrate(self, table: Table, force: Array, state: Array, first_entry: int) -> tuple[Array, Array]:
         return integrate(
             self.model,
             table,
@@ -94,20 +94,21 @@ class Setup:
 
     def dte(self, outputs: Array) -> Array:
         """DTE [m] of outputs (samples, 7)."""
-        return np.asarray(outputs[:, 0] - outputs[:, 3] + self.model.factor * (outputs[:, 1] - outputs[:, 2]))
+        seen = columns(outputs)
+        return np.asarray(seen.u1 - seen.u2 + self.model.factor * (seen.y1 - seen.y2))
 
     def at_rest(self, mean_force: float, start: int) -> Array:
         """Static equilibrium under the mean force [N] at sample `start`."""
-        first = self.table_for(start, 1)[0]
+        table = self.table_for(start, 1)
         phase = self.phase_at(start)
-        state = self.model.equilibrium(mean_force, float(first[EXCESS]), float(first[GAIN]), phase)
+        state = self.model.equilibrium(mean_force, float(table.excess[0]), float(table.gain[0]), phase)
         return state + self._common_motion(phase)
 
     def _common_motion(self, phase: float) -> Array:
         """Motion of both gears together under ripple: nothing holds it back, so it must begin right."""
-        out, ripple = np.zeros(10), self.model.rig.drive.ripple
+        ripple, moved, moving = self.model.rig.drive.ripple, 0.0, 0.0
         if ripple is None or not self.model.free:
-            return out
+            return np.zeros(2 * COORDINATES)
         total = sum(self.model.masses[:3])
         radius, z1 = self.model.base_radii[0], self.model.rig.driver.teeth
         speed = 2 * np.pi * self.mesh_frequency / z1
@@ -115,9 +116,10 @@ class Setup:
             turn = 2 * np.pi * order * phase / z1 + angle
             rate = order * speed
             push = size / radius / total
-            out[[0, 3, 4]] -= push * np.cos(turn) / rate**2
-            out[[5, 8, 9]] += push * np.sin(turn) / rate
-        return out
+            moved -= push * np.cos(turn) / rate**2
+            moving += push * np.sin(turn) / rate
+        common = (Coordinates(u1=size, y1=0.0, y2=0.0, u2=size, w=size) for size in (moved, moving))
+        return np.concatenate([*common])
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from gearbench.fem.contact.curve import LOAD_RANGE
 from gearbench.geometry import Pair, pair
 from gearbench.lumped.nonlinear.law import MeshLaw
 from gearbench.lumped.nonlinear.model import COORDINATES, NonLinear, nonlinear_model
-from gearbench.lumped.nonlinear.tables import EXCESS, GAIN, Motion, tables
+from gearbench.lumped.nonlinear.tables import Motion, tables
 from gearbench.rig import Case
 from gearbench.rig.neutral import sound_gear
 
@@ -52,8 +52,8 @@ def static_nonlinear(case: Case, loads: Loads, phase: Array) -> xr.Dataset:
         most *= STIFFEST * meshing.face_width * radius
     law = mesh_law(case.rig, case.simulation, most)
     model = nonlinear_model(case.rig, meshing, law)
-    table = tables(model, Motion(cycles=1.0, entries=len(phase), step=1.0))[:-1]
-    excess, gain = table[:, EXCESS], table[:, GAIN]
+    table = tables(model, Motion(cycles=1.0, entries=len(phase), step=1.0))
+    excess, gain = table.excess[:-1], table.gain[:-1]
     shape = (len(values), len(phase))
     if unit == "N m":
         force = np.broadcast_to(values[:, None] / radius, shape)
@@ -83,7 +83,7 @@ def linearised_matrices(case: Case, meshing: Pair, phases: int) -> tuple[Array, 
     force = case.experiment.torque_mean / meshing.driver.base_radius
     law = mesh_law(rig, case.simulation, 2 * case.experiment.torque_mean)
     model = nonlinear_model(rig, meshing, law)
-    gain = tables(model, Motion(cycles=1.0, entries=phases, step=1.0))[:-1, GAIN]
+    gain = tables(model, Motion(cycles=1.0, entries=phases, step=1.0)).gain[:-1]
     phase = np.arange(phases) / phases
     tangent = gain * law.evaluate(deflection(law, force / gain, phase), phase)[1]
     seen = _relative(model)
