@@ -1,51 +1,86 @@
-"""Compilation of the inner loops.
+"""Compilation of the inner loops of all packages.
 
-Numba renews a cached function when its own file changes, not when a function that it calls in another file does. Each
-state of these sources therefore has a cache folder of its own: machine code can never be older than what it calls.
+Machine code is kept on disk under what it depends on (see `identity`): it can never be older than what it calls or than
+a constant it reads, and an edit costs only the functions that it concerns their compilation.
 """
 
 from __future__ import annotations
 
-import hashlib
-import os
 from collections.abc import Callable
-from functools import lru_cache
+from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numba
+from numba.core import types
+from numba.core.caching import FunctionCache
 
+from gearbench.kernels.folders import code_folder
+from gearbench.kernels.identity import identity
+
+CONFIG: Any = numba.config
 # Division by zero gives infinity, as in numpy; nobody calls these through C function pointers.
 OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+# For `fastmath`: only what cannot change a result beyond rounding, which is fused multiply-add, free order of sums,
+# signs of zero, reciprocals.
+ROUNDING = {"contract", "reassoc", "nsz", "arcp"}
 
 
-def cache_folder() -> Path:
-    """GEARBENCH_CACHE, or `gearbench` in the user's cache folder."""
-    if own := os.environ.get("GEARBENCH_CACHE"):
-        return Path(own)
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "gearbench"
+def compiled(function: Callable[..., Any] | None = None, /, **options: Any) -> Any:
+    """`numba.njit` that releases the interpreter lock and keeps its machine code on disk.
 
-
-@lru_cache(maxsize=1)
-def sources_digest() -> str:
-    """Hash of the Python sources of this package."""
-    digest = hashlib.sha256()
-    for source in sorted(Path(__file__).parent.glob("*.py")):
-        digest.update(source.name.encode() + b"\0" + source.read_bytes() + b"\0")
-    return digest.hexdigest()
-
-
-def compiled(function: Callable[..., Any]) -> Any:
-    """`numba.njit` that releases the interpreter lock and keeps its machine code in this state's folder.
-
-    Where that folder cannot be written the function is compiled anew in every process.
+    Used as `@compiled`, or with options of `numba.njit` beside OPTIONS as `@compiled(fastmath=ROUNDING)`. What the
+    function reads from its module must be defined above it and be numbers, arrays, tuples or compiled; else TypeError.
+    Where the folder cannot be written the function is compiled anew in every process.
     """
-    config: Any = numba.config
-    before = config.CACHE_DIR
-    config.CACHE_DIR = str(cache_folder() / f"compiled-{sources_digest()[:16]}")
+    if function is None:
+        return partial(compiled, **options)
+    chosen = OPTIONS | options
+    key = identity(function, chosen)
+    dispatcher: Any = numba.njit(function, **chosen)
+    if not CONFIG.DISABLE_JIT:
+        with suppress(OSError, RuntimeError):
+            dispatcher._cache = _kept(function, code_folder(f"{function.__module__}.{function.__qualname__}", key))
+    return dispatcher
+
+
+def _kept(function: Callable[..., Any], folder: Path) -> FunctionCache:
+    """The function's cache in this folder and nowhere else. Raises RuntimeError where it cannot be written."""
+    before = CONFIG.CACHE_DIR
+    CONFIG.CACHE_DIR = str(folder)
     try:
-        return numba.njit(function, cache=True, **OPTIONS)
-    except RuntimeError:
-        return numba.njit(function, **OPTIONS)
+        cache = _Cache(function)
     finally:
-        config.CACHE_DIR = before
+        CONFIG.CACHE_DIR = before
+    if not Path(cache.cache_path).is_relative_to(folder):
+        raise RuntimeError(f"{folder} cannot be written")
+    return cache
+
+
+class _Cache(FunctionCache):
+    """Numba's cache of one function. It tells apart named tuples whose fields have changed places, and costs time but
+    never the result where it is damaged or cannot be written."""
+
+    def _index_key(self, sig: Any, codegen: Any) -> Any:
+        return *super()._index_key(sig, codegen), _fields(sig)
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        try:
+            return super().load_overload(sig, target_context)
+        except Exception:  # unpickling damaged files raises anything
+            with suppress(OSError):
+                self.flush()
+            return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        with suppress(OSError):
+            super().save_overload(sig, data)
+
+
+def _fields(kind: Any) -> tuple[Any, ...]:
+    """Names of the fields of all named tuples in a signature or a type of it."""
+    if isinstance(kind, (tuple, types.Tuple, types.UniTuple, types.NamedTuple, types.NamedUniTuple)):
+        return (*getattr(kind, "fields", ()), *(inner for one in kind for inner in _fields(one)))
+    inner = getattr(kind, "dtype", getattr(kind, "type", None))
+    return _fields(inner) if isinstance(inner, types.Type) else ()

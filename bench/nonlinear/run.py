@@ -24,9 +24,9 @@ from gearbench.bench.record.channels import dte_of, force_of, turned_by
 from gearbench.bench.refusals.effects import refuse_unknown
 from gearbench.geometry import Pair, pair
 from gearbench.lumped.nonlinear.law import MeshLaw
-from gearbench.lumped.nonlinear.model import LIMITS, NonLinear, nonlinear_model
-from gearbench.lumped.nonlinear.step import integrate
-from gearbench.lumped.nonlinear.tables import EXCESS, GAIN, Motion, tables
+from gearbench.lumped.nonlinear.model import COORDINATES, LIMITS, Coordinates, NonLinear, nonlinear_model
+from gearbench.lumped.nonlinear.step import columns, integrate
+from gearbench.lumped.nonlinear.tables import Motion, Table, tables
 from gearbench.lumped.stiffness.potential_energy import outside_foundation_fit
 from gearbench.rig import Case, Experiment, Rig
 
@@ -34,28 +34,6 @@ Array = NDArray[np.float64]
 
 MOST_ENTRIES = 2**20  # half steps tabulated at once
 HEADROOM = 2.0  # largest tabulated over largest applied load: resonances load the flanks more than the torque does
-
-
-class Outputs(NamedTuple):
-    """What the integrator hands out, each (...): coordinates [m], forces of mesh and at the load's base circle [N]."""
-
-    u1: Array
-    y1: Array
-    y2: Array
-    u2: Array
-    w: Array
-    mesh_force: Array
-    load_force: Array
-
-
-def columns(outputs: Array) -> Outputs:
-    """Outputs (..., 7) by name."""
-    return Outputs(*np.moveaxis(outputs, -1, 0))
-
-
-def excess_and_gain(table: Array) -> tuple[Array, Array]:
-    """Excess [m] and gain of the force out of the table's rows (..., columns)."""
-    return table[..., EXCESS], table[..., GAIN]
 
 
 class State(NamedTuple):
@@ -79,7 +57,7 @@ class Setup:
     cycles_per_sample: float
     block_samples: int
     warnings: tuple[str, ...]
-    table: Array | None = None
+    table: Table | None = None
     first_phase: float = 0.0
 
     keep: ClassVar[Keep] = "one"
@@ -118,8 +96,8 @@ class Setup:
         """Mesh phase [cycles] of a sample."""
         return self.first_phase + sample * self.cycles_per_sample
 
-    def table_for(self, start: int, samples: int) -> Array:
-        """Tables of `samples` samples from sample `start`."""
+    def table_for(self, start: int, samples: int) -> Table:
+        """Table of `samples` samples from sample `start`."""
         return tables(
             self.model,
             Motion(
@@ -153,7 +131,7 @@ class Setup:
             parts.append(out)
         return State(after, values), np.concatenate(parts)
 
-    def _integrate(self, table: Array, force: Array, state: Array, first_entry: int) -> tuple[Array, Array]:
+    def _integrate(self, table: Table, force: Array, state: Array, first_entry: int) -> tuple[Array, Array]:
         return integrate(
             self.model,
             table,
@@ -188,16 +166,16 @@ class Setup:
 
     def at_rest(self, mean_force: float, sample: int) -> State:
         """Static equilibrium under the mean force [N] at a sample."""
-        excess, gain = excess_and_gain(self.table_for(sample, 1)[0])
+        table = self.table_for(sample, 1)
         phase = self.phase_at(sample)
-        state = self.model.equilibrium(mean_force, float(excess), float(gain), phase)
+        state = self.model.equilibrium(mean_force, float(table.excess[0]), float(table.gain[0]), phase)
         return State(sample, state + self._common_motion(phase))
 
     def _common_motion(self, phase: float) -> Array:
         """Motion of both gears together under ripple: nothing holds it back, so it must begin right."""
-        out, ripple = np.zeros(10), self.model.rig.drive.ripple
+        ripple, moved, moving = self.model.rig.drive.ripple, 0.0, 0.0
         if ripple is None or not self.model.free:
-            return out
+            return np.zeros(2 * COORDINATES)
         total = sum(self.model.masses[:3])
         radius, z1 = self.model.base_radii[0], self.model.rig.driver.teeth
         speed = 2 * np.pi * self.mesh_frequency / z1
@@ -205,9 +183,10 @@ class Setup:
             turn = 2 * np.pi * order * phase / z1 + angle
             rate = order * speed
             push = size / radius / total
-            out[[0, 3, 4]] -= push * np.cos(turn) / rate**2
-            out[[5, 8, 9]] += push * np.sin(turn) / rate
-        return out
+            moved -= push * np.cos(turn) / rate**2
+            moving += push * np.sin(turn) / rate
+        common = (Coordinates(u1=size, y1=0.0, y2=0.0, u2=size, w=size) for size in (moved, moving))
+        return np.concatenate([*common])
 
 
 def turning_inertia(rig: Rig, meshing: Pair) -> float:

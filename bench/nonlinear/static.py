@@ -7,7 +7,6 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from gearbench.bench.nonlinear.law_table import mesh_law
-from gearbench.bench.nonlinear.run import excess_and_gain
 from gearbench.bench.record.static import Loads, load_key, static_dataset
 from gearbench.bench.refusals.effects import refuse_unknown
 from gearbench.bench.refusals.load_range import check_dte
@@ -53,8 +52,8 @@ def static_nonlinear(case: Case, loads: Loads, phase: Array) -> xr.Dataset:
         most *= STIFFEST * meshing.face_width * radius
     law = mesh_law(case.rig, case.simulation, most)
     model = nonlinear_model(case.rig, meshing, law)
-    table = tables(model, Motion(cycles=1.0, entries=len(phase), step=1.0))[:-1]
-    excess, gain = excess_and_gain(table)
+    table = tables(model, Motion(cycles=1.0, entries=len(phase), step=1.0))
+    excess, gain = table.excess[:-1], table.gain[:-1]
     shape = (len(values), len(phase))
     if unit == "N m":
         force = np.broadcast_to(values[:, None] / radius, shape)
@@ -84,7 +83,7 @@ def linearised_matrices(case: Case, meshing: Pair, phases: int) -> tuple[Array, 
     force = case.experiment.torque_mean / meshing.driver.base_radius
     law = mesh_law(rig, case.simulation, 2 * case.experiment.torque_mean)
     model = nonlinear_model(rig, meshing, law)
-    _, gain = excess_and_gain(tables(model, Motion(cycles=1.0, entries=phases, step=1.0))[:-1])
+    gain = tables(model, Motion(cycles=1.0, entries=phases, step=1.0)).gain[:-1]
     phase = np.arange(phases) / phases
     tangent = gain * law.evaluate(deflection(law, force / gain, phase), phase)[1]
     seen = _relative(model)

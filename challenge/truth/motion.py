@@ -11,7 +11,6 @@ from __future__ import annotations
 from math import cos, floor, pi, sin, sqrt, tanh
 
 import numpy as np
-from numba import njit
 
 from gearbench.challenge.errors import ChallengeError
 from gearbench.challenge.truth.packing import (
@@ -66,9 +65,10 @@ from gearbench.challenge.truth.packing import (
     pack,
 )
 from gearbench.challenge.truth.plant import DEGREES, OUTPUTS, STATES, Array, Plant
+from gearbench.kernels.compiled import ROUNDING, compiled
 
-# Only what cannot change a result beyond rounding.
-FASTMATH = {"contract", "reassoc", "nsz", "arcp"}
+# Python's error model orders the operations as they were in every record made so far: with numpy's, last digits differ.
+_compiled = compiled(fastmath=ROUNDING, error_model="python")
 
 
 def integrate(
@@ -101,7 +101,7 @@ def derivative(plant: Plant, time: float, torque: float, state: Array) -> tuple[
     return rate, seen
 
 
-@njit(nogil=True, cache=True, fastmath=FASTMATH)
+@_compiled
 def _pair_force(
     c: Array, mesh: Mesh, number: int, v: float, sweep: float, dte: float, rate: float, scale: float
 ) -> float:
@@ -133,7 +133,7 @@ def _pair_force(
     return max(elastic + damping * tangent * closing, 0.0)
 
 
-@njit(nogil=True, cache=True, fastmath=FASTMATH)
+@_compiled
 def _sliding(c: Array, speed: float) -> float:
     """Regularised sign of a sliding speed."""
     if c[FRICTION_SHAPE] == 0:
@@ -141,7 +141,7 @@ def _sliding(c: Array, speed: float) -> float:
     return speed / sqrt(speed * speed + c[FRICTION_SPEED] * c[FRICTION_SPEED])
 
 
-@njit(nogil=True, cache=True, fastmath=FASTMATH)
+@_compiled
 def _working(
     c: Array, mesh: Mesh, s: Array, turn: float, speed1: float, speed2: float, dte: float, rate: float, scale: float
 ) -> tuple[float, float, float, float]:
@@ -164,7 +164,7 @@ def _working(
     return normal, rubbing, moment1, moment2
 
 
-@njit(nogil=True, cache=True, fastmath=FASTMATH)
+@_compiled
 def _back(c: Array, mesh: Mesh, turn: float, speed1: float, dte: float, rate: float, scale: float) -> float:
     """Normal force of the back flanks, whose contacts run from tip to root and pass the pitch point half a pitch
     later; `dte` closes them and is counted from their contact."""
@@ -177,7 +177,7 @@ def _back(c: Array, mesh: Mesh, turn: float, speed1: float, dte: float, rate: fl
     return force
 
 
-@njit(nogil=True, cache=True, fastmath=FASTMATH)
+@_compiled
 def _supports(c: Array, s: Array, progress: float, force: Array) -> None:
     """Forces (4,) of the supports on the gears' centres, with opposite sign."""
     for i in range(4):
@@ -190,7 +190,7 @@ def _supports(c: Array, s: Array, progress: float, force: Array) -> None:
         force[i] = k * y + c[SUPPORT_DAMPING + i] * (s[DEGREES + 4 + i] - lift_rate)
 
 
-@njit(nogil=True, cache=True, fastmath=FASTMATH)
+@_compiled
 def _drive(c: Array, time: float, torque: float, s: Array, rate: Array) -> float:
     """Torque on the driver from the coupling; sets the rates of the rotor and of the coupling's twist."""
     if c[TONE] != 0.0:
@@ -215,7 +215,7 @@ def _drive(c: Array, time: float, torque: float, s: Array, rate: Array) -> float
     return passed
 
 
-@njit(nogil=True, cache=True, fastmath=FASTMATH)
+@_compiled
 def _derivative(c: Array, mesh: Mesh, time: float, torque: float, s: Array, rate: Array, seen: Array) -> None:
     d = DEGREES
     progress = max(time, 0.0) / c[DRIFT + 3]
@@ -279,7 +279,7 @@ def _derivative(c: Array, mesh: Mesh, time: float, torque: float, s: Array, rate
     seen[4], seen[5], seen[6] = shaft, force, dte
 
 
-@njit(nogil=True, cache=True, fastmath=FASTMATH)
+@_compiled
 def _run(c: Array, mesh: Mesh, torque: Array, s: Array, h: float, first: int, stride: int, out: Array) -> None:
     """Advance the state `s` in place and fill `out`."""
     k1, k2, k3, k4 = np.empty(STATES), np.empty(STATES), np.empty(STATES), np.empty(STATES)

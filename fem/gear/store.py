@@ -20,7 +20,7 @@ from gearbench.fem.gear.body import CondensedGear, condense, rounded
 from gearbench.fem.gear.crack import CrackedTooth
 from gearbench.files import write_whole
 from gearbench.geometry.mesh.sector import Element
-from gearbench.kernels.compiled import cache_folder
+from gearbench.kernels.folders import cache_folder
 from gearbench.rig import Gear, Material, sound_gear
 from gearbench.rig.value import Value
 

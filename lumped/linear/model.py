@@ -16,6 +16,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import cos
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -28,6 +29,19 @@ from gearbench.rig import Rig, Simulation
 Array = NDArray[np.float64]
 
 STATES = 6
+
+
+class Parameters(NamedTuple):
+    """Numbers of the equations of motion; 1: driver, 2: driven gear."""
+
+    mesh_mass: float  # m_e [kg]
+    support_factor: float  # g
+    mass1: float  # [kg]
+    mass2: float
+    stiffness1: float  # of the supports [N/m]
+    stiffness2: float
+    damping1: float  # [N s/m]
+    damping2: float
 
 
 @dataclass(frozen=True)
@@ -44,10 +58,10 @@ class Lumped:
     error: tuple[complex, ...] = ()  # e = Re sum_n error[n-1] exp(2 pi j n phase) [m]
 
     @property
-    def parameters(self) -> Array:
-        """m_e, g, m1, m2, k1, k2, c1, c2: the constants that the integrator needs."""
+    def parameters(self) -> Parameters:
+        """The constants that the integrator needs."""
         pairs = (self.masses, self.support_stiffness, self.support_damping)
-        return np.array([self.mesh_mass, self.support_factor, *(value for pair in pairs for value in pair)])
+        return Parameters(self.mesh_mass, self.support_factor, *(value for pair in pairs for value in pair))
 
     @property
     def input_vector(self) -> Array:

@@ -9,31 +9,49 @@ band-limited excitation stays exact.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from gearbench.kernels.compiled import ROUNDING, compiled
 from gearbench.lumped.errors import LumpedError
-from gearbench.lumped.linear.model import STATES, Lumped
+from gearbench.lumped.linear.model import STATES, Lumped, Parameters
 
 Array = NDArray[np.float64]
 
-# Only what cannot change a result beyond rounding: fused multiply-add, free order of sums, signs of zero.
-FASTMATH = {"contract", "reassoc", "nsz", "arcp"}
-OUTPUTS = ("x", "y1", "y2", "mesh_force")
+
+class Mesh(NamedTuple):
+    """The mesh on the half-step grid, arrays (entries,): entry 2 n belongs to the start of step n; it repeats."""
+
+    stiffness: Array  # [N/m]
+    damping: Array  # [N s/m]
+    force: Array  # k e + c e' [N] of the static transmission error
+
+
+class Outputs(NamedTuple):
+    """What is seen at the start of each sample; arrays (samples,)."""
+
+    x: Array  # coordinates [m]
+    y1: Array
+    y2: Array
+    mesh_force: Array  # [N]
+
+
+class Coordinates(NamedTuple):
+    """The coordinates [m] of the model, or their rates or accelerations."""
+
+    x: float
+    y1: float
+    y2: float
 
 
 @dataclass(frozen=True)
 class Tables:
-    """What the integrator reads, on the half-step grid: entry 2 n belongs to the start of step n.
+    """What the integrator reads; `step` is in s."""
 
-    `mesh` (entries, 3) holds stiffness [N/m], damping [N s/m] and the force k e + c e' [N] of the static
-    transmission error, and repeats; `parameters` are those of `Lumped.parameters`; `step` is in s.
-    """
-
-    mesh: Array
-    parameters: Array
+    mesh: Mesh
+    parameters: Parameters
     step: float
 
 
@@ -50,8 +68,7 @@ def tabulate(model: Lumped, *, cycles: int, steps: int, step: float) -> Tables:
     c = model.mesh_damping(k)
     error, slope = model.transmission_error(phase)
     frequency = cycles / (steps * step)
-    mesh = np.stack([k, c, k * error + c * slope * frequency], axis=1)
-    return Tables(np.ascontiguousarray(mesh), model.parameters, step)
+    return Tables(Mesh(k, c, k * error + c * slope * frequency), model.parameters, step)
 
 
 def integrate(
@@ -60,53 +77,66 @@ def integrate(
     """Run `samples` x `substeps` steps from step number `first_step` and `state` (6,).
 
     `force` (entries,) [N] is the generalised force on the half-step grid; it repeats. Returns the final
-    state and the outputs (samples, 4) = x, y1, y2 [m] and mesh force [N] at the start of each sample.
+    state and the samples (samples, 4), named by `columns`.
     Pure: inputs stay as they are. Releases the GIL. Raises LumpedError for odd or empty tables and states
     that have overflowed.
     """
-    for name, size in (("mesh", tables.mesh.shape[0]), ("force", force.size)):
+    for name, size in (("mesh", tables.mesh.stiffness.size), ("force", force.size)):
         if size == 0 or size % 2:
             raise LumpedError(f"the {name} table has {size} entries; the half-step grid needs an even number")
-    final = np.array(state, dtype=float)
-    if final.shape != (STATES,):
-        raise LumpedError(f"the state has shape {final.shape}, not ({STATES},)")
-    out = np.empty((samples, len(OUTPUTS)))
+    state = np.asarray(state, dtype=float)
+    if state.shape != (STATES,):
+        raise LumpedError(f"the state has shape {state.shape}, not ({STATES},)")
+    out = np.empty((samples, len(Outputs._fields)))
     excitation = np.ascontiguousarray(force, dtype=float)
-    _run(final, tables.mesh, excitation, tables.parameters, tables.step, substeps, first_step, out)
+    place, rate = Coordinates(*state[: STATES // 2]), Coordinates(*state[STATES // 2 :])
+    place, rate = _run(
+        place, rate, tables.mesh, excitation, tables.parameters, tables.step, substeps, first_step,
+        columns(out),
+    )  # fmt: skip
+    final = np.array([*place, *rate])
     if not np.isfinite(final).all():
         raise LumpedError(f"the integration overflowed: steps of {tables.step:.3g} s are too long")
     return final, out
 
 
-@njit(nogil=True, cache=True, fastmath=FASTMATH)
+def columns(samples: Array) -> Outputs:
+    """The columns of samples (..., 4) by their names."""
+    return Outputs(*np.moveaxis(samples, -1, 0))
+
+
+@compiled(fastmath=ROUNDING)
 def _run(
-    state: Array,
-    mesh: Array,
+    q: Coordinates,
+    rate: Coordinates,
+    mesh: Mesh,
     force: Array,
-    parameters: Array,
+    p: Parameters,
     h: float,
     substeps: int,
     first: int,
-    out: Array,
-) -> None:
-    """Advance `state` in place and fill `out`; x, y, z are the coordinates, u, v, w their rates."""
-    a, g = 1.0 / parameters[0], parameters[1]
-    g1, g2 = g / parameters[2], g / parameters[3]
-    s1, s2 = parameters[4] / parameters[2], parameters[5] / parameters[3]
-    d1, d2 = parameters[6] / parameters[2], parameters[7] / parameters[3]
+    out: Outputs,
+) -> tuple[Coordinates, Coordinates]:
+    """Fill `out` from the coordinates q and their rates; returns those at the end. In the loop x, y, z are the
+    coordinates, u, v, w their rates."""
+    a, g = 1.0 / p.mesh_mass, p.support_factor
+    g1, g2 = g / p.mass1, g / p.mass2
+    s1, s2 = p.stiffness1 / p.mass1, p.stiffness2 / p.mass2
+    d1, d2 = p.damping1 / p.mass1, p.damping2 / p.mass2
     half, sixth = 0.5 * h, h / 6.0
-    last_mesh, last_force = mesh.shape[0], force.size
+    stiffness, damping, rest = mesh.stiffness, mesh.damping, mesh.force
+    last_mesh, last_force = len(stiffness), force.size
     i, j = (2 * first) % last_mesh, (2 * first) % last_force
-    x, y, z, u, v, w = state[0], state[1], state[2], state[3], state[4], state[5]
-    for sample in range(out.shape[0]):
-        out[sample, 0], out[sample, 1], out[sample, 2] = x, y, z
-        out[sample, 3] = mesh[i, 0] * (x + g * (y - z)) + mesh[i, 1] * (u + g * (v - w)) - mesh[i, 2]
+    x, y, z, u, v, w = q.x, q.y1, q.y2, rate.x, rate.y1, rate.y2
+    for sample in range(len(out.x)):
+        out.x[sample], out.y1[sample], out.y2[sample] = x, y, z
+        out.mesh_force[sample] = stiffness[i] * (x + g * (y - z)) + damping[i] * (u + g * (v - w)) - rest[i]
         for _ in range(substeps):
             # Stage a, start of the step: accelerations au, av, aw from the mesh force fm.
-            fm = mesh[i, 0] * (x + g * (y - z)) + mesh[i, 1] * (u + g * (v - w)) - mesh[i, 2]
+            fm = stiffness[i] * (x + g * (y - z)) + damping[i] * (u + g * (v - w)) - rest[i]
             au, av, aw = a * (force[j] - fm), -g1 * fm - d1 * v - s1 * y, g2 * fm - d2 * w - s2 * z
             # Stages b and c, middle of the step.
-            k, c, e, f = mesh[i + 1, 0], mesh[i + 1, 1], mesh[i + 1, 2], force[j + 1]
+            k, c, e, f = stiffness[i + 1], damping[i + 1], rest[i + 1], force[j + 1]
             xb, yb, zb = x + half * u, y + half * v, z + half * w
             ub, vb, wb = u + half * au, v + half * av, w + half * aw
             fm = k * (xb + g * (yb - zb)) + c * (ub + g * (vb - wb)) - e
@@ -120,7 +150,7 @@ def _run(
             j = j + 2 if j + 2 < last_force else 0
             xd, yd, zd = x + h * uc, y + h * vc, z + h * wc
             ud, vd, wd = u + h * cu, v + h * cv, w + h * cw
-            fm = mesh[i, 0] * (xd + g * (yd - zd)) + mesh[i, 1] * (ud + g * (vd - wd)) - mesh[i, 2]
+            fm = stiffness[i] * (xd + g * (yd - zd)) + damping[i] * (ud + g * (vd - wd)) - rest[i]
             du, dv, dw = a * (force[j] - fm), -g1 * fm - d1 * vd - s1 * yd, g2 * fm - d2 * wd - s2 * zd
             x += sixth * (u + 2.0 * (ub + uc) + ud)
             y += sixth * (v + 2.0 * (vb + vc) + vd)
@@ -128,4 +158,4 @@ def _run(
             u += sixth * (au + 2.0 * (bu + cu) + du)
             v += sixth * (av + 2.0 * (bv + cv) + dv)
             w += sixth * (aw + 2.0 * (bw + cw) + dw)
-    state[0], state[1], state[2], state[3], state[4], state[5] = x, y, z, u, v, w
+    return Coordinates(x, y, z), Coordinates(u, v, w)

@@ -51,7 +51,6 @@ from gearbench.rig import Rig
 
 Array = NDArray[np.float64]
 
-COORDINATES = 5  # u1, y1, y2, u2, w
 # Of friction's decay rate, what a step resolves like a mode: Runge-Kutta then is stable up to 0.7 of the largest
 # tabulated force. Beyond it, sliding turns round at every step; the force stays bounded.
 RESOLVED = 0.125
@@ -63,6 +62,19 @@ LIMITS = (
     "back flanks are free of friction, pitch errors and cracks",
     "mesh phase is that of the steady rotation",
 )
+
+
+class Coordinates(NamedTuple):
+    """The coordinates [m] of a model, or their rates or accelerations."""
+
+    u1: float
+    y1: float
+    y2: float
+    u2: float
+    w: float
+
+
+COORDINATES = len(Coordinates._fields)
 
 
 class Constants(NamedTuple):
@@ -220,7 +232,7 @@ class NonLinear:
         y1, y2 = self.support_deflection(force)
         u1 = high - excess - self.factor * (y1 - y2)
         twist = force / self.shaft[0] if self.elastic_shaft else 0.0
-        return np.array([u1, y1, y2, 0.0, u1 + twist, 0.0, 0.0, 0.0, 0.0, 0.0])
+        return np.array([*Coordinates(u1, y1, y2, 0.0, u1 + twist), *Coordinates(0.0, 0.0, 0.0, 0.0, 0.0)])
 
     def linearised(self, stiffness: float, force: float) -> Array:
         """State matrix (2 x COORDINATES, 2 x COORDINATES) at a mesh stiffness [N/m], supports at rest under `force`.

@@ -8,19 +8,60 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import cos, floor, pi, sin
+from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from gearbench.kernels.compiled import compiled
 from gearbench.lumped.nonlinear.model import NonLinear
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-# Columns of the table.
-POSITION, EXCESS, EXCESS_RATE, GAIN, RIPPLE, BACK = range(6)
-COLUMNS = 6
+
+class Table(NamedTuple):
+    """What the mesh is at each half step; arrays (entries + 1,)."""
+
+    position: Array  # in rows of the force table, which are phases
+    excess: Array  # a [m]
+    excess_rate: Array  # a' [m/s]
+    gain: Array  # of the force
+    ripple: Array  # [N]
+    back: Array  # excess on the back flanks [m]
+
+
+class Series(NamedTuple):
+    """Amplitudes (orders,) of a series in mesh orders 1, 2, ..."""
+
+    cosine: Array
+    sine: Array
+
+
+class Runout(NamedTuple):
+    """Of driver and driven gear (2,): eccentricity [m], and the rotations [rad] at which working and back flanks stand
+    proud most."""
+
+    eccentricity: Array
+    phase: Array
+    phase_back: Array
+
+
+class Waves(NamedTuple):
+    """Torque ripple (waves,): orders in mesh cycles, force on the driver's base circle [N], phase [rad]."""
+
+    order: Array
+    force: Array
+    phase: Array
+
+
+class Correction(NamedTuple):
+    """What is common to all pairs: scale and series of the stiffness, mean [m] and series [m] of the error."""
+
+    scale: float
+    stiffness: Series
+    mean_error: float
+    error: Series
 
 
 @dataclass(frozen=True)
@@ -41,8 +82,7 @@ class Motion:
         return self.cycles / (self.entries * 0.5 * self.step)
 
 
-@dataclass(frozen=True)
-class Teeth:
+class Teeth(NamedTuple):
     """What differs from tooth to tooth: excess1 (z1,), excess2 (z2,) [m]; growth1, growth2: growth of the teeth's
     bending compliance."""
 
@@ -65,63 +105,67 @@ def teeth_of(model: NonLinear) -> Teeth:
     return Teeth(excess[0], excess[1], growth[0], growth[1])
 
 
-def tables(model: NonLinear, motion: Motion) -> Array:
-    """Table (entries + 1, COLUMNS): row of the force table; excess a [m] and a' [m/s]; gain of the force; ripple [N];
-    excess on the back flanks [m]."""
+def tables(model: NonLinear, motion: Motion) -> Table:
+    """The table of a model in a motion."""
     rig, law = model.rig, model.law
     share, bending = law.closed
-    series = _series(rig.mesh.stiffness_cos, rig.mesh.stiffness_sin)
-    errors = _series(rig.mesh.error_cos, rig.mesh.error_sin)
-    # Run-out moves whole gears, and the normals of working and back flanks are pi - 2 alpha_w apart: by so much of its
-    # rotation the driver's back flanks are earlier, those of the driven gear, which turns the other way, later.
-    turn = pi - 2 * model.working_pressure_angle
-    gears = ((rig.driver, turn), (rig.driven, -turn))
-    runout = np.array([[g.runout / 2, g.runout_phase, g.runout_phase - t] for g, t in gears])
-    ripple = rig.drive.ripple
-    waves = np.zeros((0, 3))
-    if ripple is not None:
-        size = np.array(ripple.amplitude) / model.base_radii[0]
-        waves = np.column_stack([np.array(ripple.orders) / rig.driver.teeth, size, ripple.phase])
+    mesh = rig.mesh
+    correction = Correction(
+        mesh.stiffness_scale,
+        _series(mesh.stiffness_cos, mesh.stiffness_sin),
+        mesh.error_mean,
+        _series(mesh.error_cos, mesh.error_sin),
+    )
     # One entry before and one behind, for the rate of the excess.
-    out = np.empty((motion.entries + 3, COLUMNS))
+    table = Table(*np.empty((len(Table._fields), motion.entries + 3)))
     step = motion.cycles / motion.entries
-    base = np.array([rig.mesh.stiffness_scale, rig.mesh.error_mean])
-    teeth = teeth_of(model)
     _fill(
-        out, motion.first_phase, step, law.offsets, share, bending,
-        teeth.excess1, teeth.excess2, teeth.growth1, teeth.growth2, base, series, errors, runout, waves,
+        table, motion.first_phase, step, law.offsets, share, bending,
+        teeth_of(model), correction, _runout(model), _waves(model),
     )  # fmt: skip
-    rate = (out[2:, EXCESS] - out[:-2, EXCESS]) / motion.step
-    out = out[1:-1]
-    out[:, EXCESS_RATE] = rate
-    return np.ascontiguousarray(out)
+    rate = (table.excess[2:] - table.excess[:-2]) / motion.step
+    return Table(*(column[1:-1] for column in table))._replace(excess_rate=rate)
 
 
-def _series(cosines: tuple[float, ...], sines: tuple[float, ...]) -> Array:
-    """Amplitudes (orders, 2) of mesh orders 1, 2, ..."""
-    return np.array([cosines, sines], dtype=float).reshape(2, -1).T.copy()
+def _runout(model: NonLinear) -> Runout:
+    """Run-out moves whole gears, and the normals of working and back flanks are pi - 2 alpha_w apart: by so much of its
+    rotation the driver's back flanks are earlier, those of the driven gear, which turns the other way, later."""
+    gears, turn = (model.rig.driver, model.rig.driven), pi - 2 * model.working_pressure_angle
+    phase = np.array([gear.runout_phase for gear in gears])
+    return Runout(np.array([gear.runout / 2 for gear in gears]), phase, phase - np.array([turn, -turn]))
 
 
-@njit(nogil=True, cache=True)
-def _wave(series: Array, phase: float) -> float:
+def _waves(model: NonLinear) -> Waves:
+    ripple = model.rig.drive.ripple
+    if ripple is None:
+        return Waves(np.zeros(0), np.zeros(0), np.zeros(0))
+    order = np.array(ripple.orders) / model.rig.driver.teeth
+    return Waves(order, np.array(ripple.amplitude) / model.base_radii[0], np.array(ripple.phase, dtype=float))
+
+
+def _series(cosines: tuple[float, ...], sines: tuple[float, ...]) -> Series:
+    return Series(np.array(cosines, dtype=float), np.array(sines, dtype=float))
+
+
+@compiled(inline="always")  # a call would count references to the arrays
+def _wave(series: Series, phase: float) -> float:
     """Sum of a series in mesh orders at a phase [cycles]."""
     total = 0.0
-    for n in range(series.shape[0]):
+    for n in range(len(series.cosine)):
         angle = 2 * pi * (n + 1) * phase
-        total += series[n, 0] * cos(angle) + series[n, 1] * sin(angle)
+        total += series.cosine[n] * cos(angle) + series.sine[n] * sin(angle)
     return total
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _fill(
-    out: Array, first_phase: float, step: float, offsets: Integers, share: Array, bending: Array,
-    excess1: Array, excess2: Array, growth1: Array, growth2: Array, base: Array, series: Array, errors: Array,
-    runout: Array, waves: Array,
+    out: Table, first_phase: float, step: float, offsets: Integers, share: Array, bending: Array,
+    teeth: Teeth, correction: Correction, runout: Runout, waves: Waves,
 ) -> None:  # fmt: skip
-    """Fill the table; entry n belongs to the phase first_phase + (n - 1) step."""
+    """Fill the table but for `excess_rate`; entry n belongs to the phase first_phase + (n - 1) step."""
     rows = share.shape[0] - 1
-    z1, z2 = len(excess1), len(excess2)
-    for n in range(out.shape[0]):
+    z1, z2 = len(teeth.excess1), len(teeth.excess2)
+    for n in range(len(out.position)):
         phase = first_phase + (n - 1) * step
         whole = floor(phase)
         cycle = phase - whole
@@ -135,24 +179,24 @@ def _fill(
                 continue
             tooth = int(whole) + offsets[o]
             one, two = tooth % z1, tooth % z2
-            excess += part * (excess1[one] + excess2[two])
-            if growth1[one] != 0.0 or growth2[two] != 0.0:
+            excess += part * (teeth.excess1[one] + teeth.excess2[two])
+            if teeth.growth1[one] != 0.0 or teeth.growth2[two] != 0.0:
                 b1 = bending[row, o, 0] + weight * (bending[row + 1, o, 0] - bending[row, o, 0])
                 b2 = bending[row, o, 1] + weight * (bending[row + 1, o, 1] - bending[row, o, 1])
-                grown = b1 * growth1[one] + b2 * growth2[two]
+                grown = b1 * teeth.growth1[one] + b2 * teeth.growth2[two]
                 softness += part * grown / (1.0 + grown)
         turned, turned_back = 0.0, 0.0
         for i in range(2):
-            if runout[i, 0] != 0.0:
+            if runout.eccentricity[i] != 0.0:
                 angle = 2 * pi * phase / (z1 if i == 0 else z2)
-                turned += runout[i, 0] * cos(angle - runout[i, 1])
-                turned_back += runout[i, 0] * cos(angle - runout[i, 2])
-        every = base[1] + _wave(errors, cycle) + turned
+                turned += runout.eccentricity[i] * cos(angle - runout.phase[i])
+                turned_back += runout.eccentricity[i] * cos(angle - runout.phase_back[i])
+        every = correction.mean_error + _wave(correction.error, cycle) + turned
         ripple = 0.0
-        for i in range(waves.shape[0]):
-            ripple += waves[i, 1] * cos(2 * pi * waves[i, 0] * phase + waves[i, 2])
-        out[n, POSITION] = position
-        out[n, EXCESS] = excess + every
-        out[n, GAIN] = base[0] * (1.0 + _wave(series, cycle)) * (1.0 - softness)
-        out[n, RIPPLE] = ripple
-        out[n, BACK] = turned_back
+        for i in range(len(waves.force)):
+            ripple += waves.force[i] * cos(2 * pi * waves.order[i] * phase + waves.phase[i])
+        out.position[n] = position
+        out.excess[n] = excess + every
+        out.gain[n] = correction.scale * (1.0 + _wave(correction.stiffness, cycle)) * (1.0 - softness)
+        out.ripple[n] = ripple
+        out.back[n] = turned_back

@@ -13,8 +13,8 @@ from shared.hat_mesh import ALPHA, BACKLASH, BENDING, RADII, hat, hat_law, stiff
 
 from gearbench.geometry import pair
 from gearbench.lumped.nonlinear.model import nonlinear_model
-from gearbench.lumped.nonlinear.step import integrate
-from gearbench.lumped.nonlinear.tables import BACK, EXCESS, GAIN, Motion, tables
+from gearbench.lumped.nonlinear.step import columns, integrate
+from gearbench.lumped.nonlinear.tables import Motion, tables
 from gearbench.rig import (
     Coupling,
     Crack,
@@ -65,14 +65,14 @@ def test_errors_common_to_all_pairs_follow_the_mesh_orders() -> None:
 def test_a_cracked_tooth_softens_the_mesh_while_it_carries_and_never_else() -> None:
     model = make_model(make_rig(driven={"crack": Crack(tooth=3, stiffness_loss=0.5)}))
     phase = np.arange(60 * 32) / 32
-    gain = tables(model, Motion(60.0, phase.size, 1.0))[:-1, GAIN]
+    gain = tables(model, Motion(60.0, phase.size, 1.0)).gain[:-1]
     share = hat(phase - 3) + hat(phase - 33)
     # Its pair: compliance 1/k grows by its bending part when that doubles.
     left = 1 / (1 + BENDING[1])
     np.testing.assert_allclose(gain, 1 - share * (1 - left), rtol=1e-12)
     assert gain[share == 0].min() == 1.0
     both = make_rig(driver={"crack": Crack(tooth=3, stiffness_loss=0.5)})
-    gain = tables(make_model(both), Motion(60.0, phase.size, 1.0))[:-1, GAIN]
+    gain = tables(make_model(both), Motion(60.0, phase.size, 1.0)).gain[:-1]
     softest = np.flatnonzero(gain < gain.min() + 1e-12) / 32
     np.testing.assert_array_equal(softest, [3.0, 23.0, 43.0])
     assert gain.min() == pytest.approx(1 / (1 + BENDING[0]), rel=1e-12)
@@ -80,7 +80,7 @@ def test_a_cracked_tooth_softens_the_mesh_while_it_carries_and_never_else() -> N
 
 def test_corrections_scale_and_shape_the_stiffness() -> None:
     mesh = MeshCorrection(stiffness_scale=0.8, stiffness_cos=(0.1, 0.0), stiffness_sin=(0.0, -0.05))
-    gain = tables(make_model(make_rig(mesh=mesh)), Motion(2.0, 64, 1.0))[:-1, GAIN]
+    gain = tables(make_model(make_rig(mesh=mesh)), Motion(2.0, 64, 1.0)).gain[:-1]
     phase = np.arange(64) / 32
     expected = 0.8 * (1 + 0.1 * np.cos(2 * pi * phase) - 0.05 * np.sin(4 * pi * phase))
     np.testing.assert_allclose(gain, expected, rtol=1e-12)
@@ -121,17 +121,17 @@ def test_gears_that_come_apart_fly_freely_until_the_back_flanks_touch() -> None:
     time, out = run(model, lambda t: np.full(t.shape, push), state, mesh_frequency=50.0, cycles=0.5, steps=20000)
     rise = push / model.masses[0]
     flight = time < 2 * 0.02 / rise
-    np.testing.assert_allclose(out[flight, 0], (-0.02 * time + 0.5 * rise * time**2)[flight], atol=1e-15)
-    assert not out[flight, 5].any()
-    assert out[flight, 0].min() == pytest.approx(-(0.02**2) / (2 * rise), rel=1e-3)
+    np.testing.assert_allclose(out.u1[flight], (-0.02 * time + 0.5 * rise * time**2)[flight], atol=1e-15)
+    assert not out.mesh_force[flight].any()
+    assert out.u1[flight].min() == pytest.approx(-(0.02**2) / (2 * rise), rel=1e-3)
     # Faster, it reaches the other side of the backlash.
     state[5] = -0.2
     _, out = run(model, lambda t: np.full(t.shape, push), state, mesh_frequency=50.0, cycles=0.05, steps=20000)
-    hit = int(np.argmax(out[:, 5] < 0))
-    dte = out[:, 0] + cos(ALPHA) * (out[:, 1] - out[:, 2])
+    hit = int(np.argmax(out.mesh_force < 0))
+    dte = out.u1 + cos(ALPHA) * (out.y1 - out.y2)
     assert hit > 0
     assert dte[hit] == pytest.approx(-BACKLASH, rel=1e-3)
-    assert not out[:hit, 5].any()
+    assert not out.mesh_force[:hit].any()
 
 
 @pytest.mark.parametrize("exponent", [-0.4, 0.0, 0.6])
@@ -142,8 +142,8 @@ def test_a_support_deflects_by_its_power_law(exponent: float) -> None:
     state = 0.0 * model.equilibrium(FORCE, 0.0, 1.0, 0.0)
     _, out = run(model, lambda t: np.full(t.shape, FORCE), state, mesh_frequency=10.0, cycles=8.0, steps=80000)
     expected = 5e-6 * (FORCE * cos(ALPHA) / (1e8 * 5e-6)) ** (1 / (1 + exponent))
-    assert out[-1, 2] == pytest.approx(expected, rel=1e-4)
-    assert out[-1, 1] == pytest.approx(-expected, rel=1e-4)
+    assert out.y2[-1] == pytest.approx(expected, rel=1e-4)
+    assert out.y1[-1] == pytest.approx(-expected, rel=1e-4)
     assert model.support_deflection(FORCE) == pytest.approx((-expected, expected), rel=1e-12)
     # Small vibrations see the slope of the force, whose stiffness per deflection grows with its exponent.
     slope = (1 + exponent) * FORCE * cos(ALPHA) / expected
@@ -170,8 +170,8 @@ def test_run_out_moves_whole_gears_so_that_back_flanks_feel_it_at_another_angle(
     for gear, (name, teeth) in enumerate((("driver", 20), ("driven", 30))):
         table = tables(make_model(make_rig(**{name: {"runout": 20e-6, "runout_phase": 0.7}})), Motion(60.0, 480, 1.0))
         rotation = 2 * pi * phase / teeth - 0.7
-        for flank, column in enumerate((EXCESS, BACK)):
-            np.testing.assert_allclose(table[:-1, column], 10e-6 * moved(rotation, gear, flank), atol=1e-18)
+        for flank, column in enumerate((table.excess, table.back)):
+            np.testing.assert_allclose(column[:-1], 10e-6 * moved(rotation, gear, flank), atol=1e-18)
 
 
 def test_run_out_opens_and_closes_the_back_flanks_too() -> None:
@@ -186,7 +186,7 @@ def test_run_out_opens_and_closes_the_back_flanks_too() -> None:
 
     state[0] = -BACKLASH + excess
     _, out = run(model, force, state, mesh_frequency=1e-3, cycles=1e-4, steps=20000)
-    dte = out[-1, 0] + cos(ALPHA) * (out[-1, 1] - out[-1, 2])
+    dte = out.u1[-1] + cos(ALPHA) * (out.y1[-1] - out.y2[-1])
     assert dte == pytest.approx(-BACKLASH + excess - 50.0 / float(stiffness(0.5)), rel=1e-3)
 
 
@@ -203,7 +203,7 @@ def test_run_out_opens_and_closes_the_back_flanks_too() -> None:
 def test_a_neutral_effect_leaves_every_table_as_it_was(values: dict[str, Any]) -> None:
     motion = Motion(60.0, 7680, 1e-5, 0.3)
     plain, neutral = (tables(make_model(rig), motion) for rig in (make_rig(), make_rig(**values)))
-    assert plain.tobytes() == neutral.tobytes()
+    assert [column.tobytes() for column in plain] == [column.tobytes() for column in neutral]
 
 
 def test_damping_never_holds_the_flanks_together() -> None:
@@ -212,10 +212,10 @@ def test_damping_never_holds_the_flanks_together() -> None:
     state = np.zeros(10)
     state[0], state[5] = 0.2e-6, -0.05  # barely touching and leaving fast: the damper alone would pull
     time, out = run(model, lambda t: np.zeros(t.shape), state, mesh_frequency=50.0, cycles=0.01, steps=20000)
-    dte = out[:, 0] + cos(ALPHA) * (out[:, 1] - out[:, 2])
+    dte = out.u1 + cos(ALPHA) * (out.y1 - out.y2)
     assert dte[-1] < -5e-6
-    assert out[:, 5].min() == 0.0
-    np.testing.assert_allclose(out[:, 0], 0.2e-6 - 0.05 * time, atol=1e-15)
+    assert out.mesh_force.min() == 0.0
+    np.testing.assert_allclose(out.u1, 0.2e-6 - 0.05 * time, atol=1e-15)
 
 
 @pytest.mark.parametrize("cycle", [0.1, 0.45, 0.8])
@@ -227,9 +227,10 @@ def test_back_flanks_carry_with_the_stiffness_of_their_own_phase(cycle: float) -
     motion = Motion(cycles=1e-6, entries=80000, step=5e-6, first_phase=cycle)
     state = np.r_[-BACKLASH, np.zeros(9)]
     table = tables(model, motion)
-    _, out = integrate(model, table, np.full(2, -push), state, step=5e-6, substeps=1, mesh_frequency=5e-6)
-    dte = out[-1, 0] + cos(ALPHA) * (out[-1, 1] - out[-1, 2])
-    assert out[-1, 5] == pytest.approx(-push, rel=1e-6)
+    _, samples = integrate(model, table, np.full(2, -push), state, step=5e-6, substeps=1, mesh_frequency=5e-6)
+    out = columns(samples)
+    dte = out.u1[-1] + cos(ALPHA) * (out.y1[-1] - out.y2[-1])
+    assert out.mesh_force[-1] == pytest.approx(-push, rel=1e-6)
     assert dte == pytest.approx(-BACKLASH - push / float(stiffness(0.3 - cycle)), rel=1e-6)
 
 

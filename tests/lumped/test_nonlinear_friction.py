@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from shared.effect_rig import FORCE, GEARS, MASSES, make_model, make_rig, run, steady_dte
 from shared.hat_mesh import ALPHA, BASE_PITCH, PHASES, PITCH_ROLL, RADII, hat, hat_law
 
-from gearbench.lumped.nonlinear.model import NonLinear
-from gearbench.lumped.nonlinear.step import integrate
+from gearbench.lumped.nonlinear.model import COORDINATES, Coordinates, NonLinear
+from gearbench.lumped.nonlinear.step import columns, integrate
 from gearbench.lumped.nonlinear.tables import Motion, tables
 from gearbench.rig import Friction, Load, Rig
 
@@ -29,16 +29,15 @@ def test_friction_takes_what_its_sliding_dissipates(boundary: str) -> None:
     model = make_model(rig, hat_law(swing=0.0, bend=0.0))
     state = model.equilibrium(FORCE, 0.0, 1.0, 0.0)
     _, out = run(model, lambda t: np.full(t.shape, FORCE), state, mesh_frequency=frequency, cycles=60.0, steps=60000)
-    last = out[-30000:]
     speeds = 2 * pi * frequency / 20, 2 * pi * frequency / 30
-    power = speeds[0] * FORCE * RADII[0] - speeds[1] * RADII[1] * last[:, 6].mean()
+    power = speeds[0] * FORCE * RADII[0] - speeds[1] * RADII[1] * out.load_force[-30000:].mean()
     # Normal force times mu times sliding speed of both pairs, over one cycle; the gears hardly vibrate.
     phase = (np.arange(4000) + 0.5) / 4000
     loss = np.zeros_like(phase)
     for number in (0, 1):
         speed = (phase - number) * BASE_PITCH * sum(speeds)
         loss += hat(phase - number) * mu * speed * np.tanh(speed / v0)
-    normal = last[:, 5].reshape(-1, 1000).mean(axis=0)
+    normal = out.mesh_force[-30000:].reshape(-1, 1000).mean(axis=0)
     force = np.interp(phase, np.arange(1000) / 1000, normal, period=1.0)
     assert power == pytest.approx(float((force * loss).mean()), rel=1e-3)
     assert power > 0
@@ -75,7 +74,8 @@ def kick(model: NonLinear, state: Array, frequency: float, phase: float) -> tupl
     step = 1e-9
     table = tables(model, Motion(cycles=frequency * step, entries=2, step=step, first_phase=phase))
     end, out = integrate(model, table, np.full(2, FORCE), state, step=step, substeps=1, mesh_frequency=frequency)
-    return (end - state)[5:9] / step, float(out[0, 5])
+    rate = Coordinates(*(end - state)[COORDINATES:])
+    return np.array([rate.u1, rate.y1, rate.y2, rate.u2]) / step, float(columns(out).mesh_force[0])
 
 
 @pytest.mark.parametrize("direction", ["tangential", "line-of-action"])
@@ -115,8 +115,8 @@ def reaction(model: NonLinear, swing: float, frequency: float, line: float) -> t
         steps=max(4 * 4000, round(8e5 / frequency)),
     )
     last = slice(-(len(time) // 4), None)
-    assert out[last, 5].min() > 0
-    return time[last] * frequency % 1.0, out[last, 6] / out[last, 5] - 1
+    assert out.mesh_force[last].min() > 0
+    return time[last] * frequency % 1.0, out.load_force[last] / out.mesh_force[last] - 1
 
 
 @pytest.mark.parametrize(
@@ -149,13 +149,13 @@ def test_vibration_turns_dry_friction_into_a_smaller_mean_force(away: float) -> 
     force = FORCE + 700 * np.sin(2 * pi * np.arange(2 * steps) / (2 * steps))
     state = model.equilibrium(FORCE, 0.0, 1.0, away)
     _, out = integrate(model, tables(model, motion), force, state, step=step, substeps=1, mesh_frequency=frequency)
-    last = out[swings // 2 * steps :]
-    assert last[:, 5].min() > 0
+    last = columns(out[swings // 2 * steps :])
+    assert last.mesh_force.min() > 0
     middle = away + 0.75 * motion.cycles
     lever = mu * (PITCH_ROLL[1] - middle * BASE_PITCH) / RADII[1]
     drift = middle * BASE_PITCH * SPEEDS_PER_HERTZ * frequency
-    swing = (PITCH_ROLL[0] + middle * BASE_PITCH) / RADII[0] * float(np.ptp(np.gradient(last[:, 0], step))) / 2
-    mean = float((last[:, 6] / last[:, 5] - 1).mean()) / lever
+    swing = (PITCH_ROLL[0] + middle * BASE_PITCH) / RADII[0] * float(np.ptp(np.gradient(last.u1, step))) / 2
+    mean = float((last.load_force / last.mesh_force - 1).mean()) / lever
     assert drift < 0.7 * swing
     assert mean == pytest.approx(2 / pi * asin(drift / swing), rel=0.03)
     assert mean < 0.6  # 1 without vibration

@@ -13,8 +13,8 @@ from shared.hat_mesh import ALPHA, RADII, hat_law
 from gearbench.lumped import equivalent_mass
 from gearbench.lumped.nonlinear.law import MeshLaw
 from gearbench.lumped.nonlinear.model import NonLinear
-from gearbench.lumped.nonlinear.step import integrate
-from gearbench.lumped.nonlinear.tables import EXCESS, GAIN, Motion, tables
+from gearbench.lumped.nonlinear.step import Outputs, columns, integrate
+from gearbench.lumped.nonlinear.tables import Motion, tables
 from gearbench.rig import Damping, Gear, Rig, Support, Supports
 
 Array = NDArray[np.float64]
@@ -47,13 +47,13 @@ def make_model(rig: Rig, law: MeshLaw | None = None) -> NonLinear:
 
 def run(
     model: NonLinear, force: Callable[[Array], Array], state: Array, *, mesh_frequency: float, cycles: float, steps: int
-) -> tuple[Array, Array]:
-    """Time [s] and outputs (steps, 7) of a run from mesh phase 0 under a force over time."""
+) -> tuple[Array, Outputs]:
+    """Time [s] and outputs (steps,) of a run from mesh phase 0 under a force over time."""
     step = cycles / mesh_frequency / steps
     table = tables(model, Motion(cycles=cycles, entries=2 * steps, step=step))
     excitation = force(np.arange(2 * steps) * step / 2)
     _, out = integrate(model, table, excitation, state, step=step, substeps=1, mesh_frequency=mesh_frequency)
-    return np.arange(steps) * step, out
+    return np.arange(steps) * step, columns(out)
 
 
 def steady_dte(rig: Rig, *, frequency: float = 4.0, swing: float = 0.0) -> tuple[Array, Array]:
@@ -62,10 +62,10 @@ def steady_dte(rig: Rig, *, frequency: float = 4.0, swing: float = 0.0) -> tuple
     state = model.equilibrium(FORCE, *first_entry(model), 0.0)
     steps = 60 * 20000
     time, out = run(model, lambda t: np.full(t.shape, FORCE), state, mesh_frequency=frequency, cycles=60.0, steps=steps)
-    dte = out[:, 0] - out[:, 3] + cos(ALPHA) * (out[:, 1] - out[:, 2])
+    dte = out.u1 - out.u2 + cos(ALPHA) * (out.y1 - out.y2)
     return time[::100] * frequency, dte[::100]
 
 
 def first_entry(model: NonLinear) -> tuple[float, float]:
-    row = tables(model, Motion(1.0, 2, 1.0))[0]
-    return float(row[EXCESS]), float(row[GAIN])
+    table = tables(model, Motion(1.0, 2, 1.0))
+    return float(table.excess[0]), float(table.gain[0])

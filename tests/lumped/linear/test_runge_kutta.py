@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from gearbench.lumped import Lumped, LumpedError, PairStiffness, tabulated_stiffness
-from gearbench.lumped.linear.runge_kutta import Tables, integrate, tabulate
+from gearbench.lumped.linear.runge_kutta import Mesh, Tables, columns, integrate, tabulate
 
 MESH = 100.0  # mesh frequency [Hz]
 
@@ -106,7 +106,7 @@ def test_constant_stiffness_answers_a_sine_with_its_transfer_function() -> None:
     ys = 0.94**2 * (1 / (2.0 * s**2 + 900 * s + 3.2e8) + 1 / (2.6 * s**2 + 1500 * s + 4.5e8))
     assert response == pytest.approx(yx / (1 + z * (yx + ys)), rel=2e-4)
     # The mesh force is what accelerates the rest: F - m_e x'' at the line.
-    force = 2 * np.mean(out[:, 3] * np.exp(-1j * angle[::2])) / 50
+    force = 2 * np.mean(columns(out).mesh_force * np.exp(-1j * angle[::2])) / 50
     assert force == pytest.approx(z * response, rel=1e-6)
 
 
@@ -145,7 +145,7 @@ def test_equilibrium_stays_under_its_force() -> None:
     start = model.equilibrium(1500.0)
     state, out = integrate(tables, np.full(2, 1500.0), start, samples=500, substeps=2)
     np.testing.assert_allclose(state, start, atol=1e-15)
-    np.testing.assert_allclose(out[:, 3], 1500.0, rtol=1e-9)
+    np.testing.assert_allclose(columns(out).mesh_force, 1500.0, rtol=1e-9)
 
 
 def test_slow_mesh_follows_stiffness_and_transmission_error() -> None:
@@ -223,7 +223,7 @@ def test_odd_and_empty_tables_are_refused(entries: int) -> None:
     tables = tabulate(model, cycles=1, steps=2, step=1e-6)
     with pytest.raises(LumpedError, match=f"force table has {entries} entries"):
         integrate(tables, np.zeros(entries), np.zeros(6), samples=1, substeps=1)
-    broken = Tables(np.zeros((entries, 3)), tables.parameters, tables.step)
+    broken = Tables(Mesh(*np.zeros((3, entries))), tables.parameters, tables.step)
     with pytest.raises(LumpedError, match=f"mesh table has {entries} entries"):
         integrate(broken, np.zeros(2), np.zeros(6), samples=1, substeps=1)
 

@@ -17,8 +17,9 @@ from shared.hat_mesh import ALPHA, BASE_PITCH, BEND, BENDING, PHASES, PITCH_ROLL
 from gearbench.lumped import Lumped, LumpedError, tabulated_stiffness
 from gearbench.lumped.linear.runge_kutta import integrate as integrate_linear
 from gearbench.lumped.linear.runge_kutta import tabulate
-from gearbench.lumped.nonlinear.step import integrate
-from gearbench.lumped.nonlinear.tables import EXCESS, GAIN, Motion, tables
+from gearbench.lumped.nonlinear.model import COORDINATES
+from gearbench.lumped.nonlinear.step import columns, integrate
+from gearbench.lumped.nonlinear.tables import Motion, tables
 from gearbench.rig import Coupling, Crack, Drive, Friction, Load, MeshCorrection, Rig, Ripple, Support, Supports
 
 Array = NDArray[np.float64]
@@ -143,19 +144,20 @@ def test_a_rig_with_every_effect_follows_the_plain_equations(boundary: str) -> N
     def torque(t: Any) -> Any:
         return 100.0 + 20 * np.sin(2 * pi * 700 * t) + 10 * np.sin(2 * pi * 1900 * t + 1)
 
-    first = tables(model, Motion(cycles=1.0, entries=2, step=1.0))[0]
-    state = model.equilibrium(float(torque(0.0)) / RADII[0], float(first[EXCESS]), float(first[GAIN]), 0.0)
+    first = tables(model, Motion(cycles=1.0, entries=2, step=1.0))
+    state = model.equilibrium(float(torque(0.0)) / RADII[0], float(first.excess[0]), float(first.gain[0]), 0.0)
     frequency, cycles, steps = 100.0, 3.0, 19200
     time, out = run(model, lambda t: torque(t) / RADII[0], state, mesh_frequency=frequency, cycles=cycles, steps=steps)
-    assert out[:, 5].min() > 0
+    assert out.mesh_force.min() > 0
+    motion = np.stack(out[:COORDINATES], axis=1)
     # Whole phases are kinks of the hats: the reference does not step over them.
     plain = plain_equations(rig, frequency, torque)
     for n in range(int(cycles)):
         part = slice(n * 6400, (n + 1) * 6400)
         span = (n / frequency, (n + 1) / frequency)
         found = solve_ivp(plain, span, state, "DOP853", dense_output=True, rtol=1e-9, atol=1e-14, max_step=2e-4)
-        error = np.abs(found.sol(time[part]).T[:, :5] - out[part, :5]).max(axis=0)
-        assert np.all(error <= 1e-6 * np.ptp(out[:, :5], axis=0)), error
+        error = np.abs(found.sol(time[part]).T[:, :COORDINATES] - motion[part]).max(axis=0)
+        assert np.all(error <= 1e-6 * np.ptp(motion, axis=0)), error
         state = found.y[:, -1]
 
 
@@ -182,13 +184,15 @@ def test_without_effects_it_is_the_linear_model(boundary: str) -> None:
     )
     start = np.array([*state[:3], 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     table = tables(model, Motion(cycles, 2 * steps, step))
-    _, out = integrate(model, table, force, start, step=step, substeps=1, mesh_frequency=frequency)
-    np.testing.assert_allclose(out[:, 0] - out[:, 3], expected[:, 0], rtol=1e-9)
-    np.testing.assert_allclose(out[:, 1:3], expected[:, 1:3], rtol=1e-9)
-    np.testing.assert_allclose(out[:, 5], expected[:, 3], rtol=1e-9)
+    _, samples = integrate(model, table, force, start, step=step, substeps=1, mesh_frequency=frequency)
+    out = columns(samples)
+    np.testing.assert_allclose(out.u1 - out.u2, expected[:, 0], rtol=1e-9)
+    np.testing.assert_allclose(out.y1, expected[:, 1], rtol=1e-9)
+    np.testing.assert_allclose(out.y2, expected[:, 2], rtol=1e-9)
+    np.testing.assert_allclose(out.mesh_force, expected[:, 3], rtol=1e-9)
     if boundary == "torque":
         # Nothing turns both gears the same way.
-        common = out[:, 0] * model.masses[0] + out[:, 3] * model.masses[1]
+        common = out.u1 * model.masses[0] + out.u2 * model.masses[1]
         assert np.ptp(common) < 1e-14
 
 
