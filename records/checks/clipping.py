@@ -18,7 +18,7 @@ RUN, FEWEST = 3, 6
 # A coarsely quantised signal lingers at its extremes: there, the last level must hold that many times as many.
 CROWD = 5.0
 # A signal that spends this part of its time at its ends, such as a binary one, is made so and not clipped.
-MADE_SO = 0.45
+MADE_SO = 0.95
 # A load torque that stands below this part of its largest value is the one of separated teeth.
 SEPARATED = 1e-3
 CHANNELS = ("torque_driver", "torque_driven", "y_driver", "y_driven", "dte", "force")

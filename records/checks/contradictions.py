@@ -1,4 +1,4 @@
-"""Channels that contradict one another in the mesh force: shifted in time, reversed, of another unit, swapped, dead."""
+"""Channels that contradict one another in the mesh force: swapped, of another unit, reversed, late, dead."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.records.checks.finding import Finding
-from gearbench.records.checks.look import Complexes, Look
+from gearbench.records.checks.look import GEARS, Complexes, Look
 from gearbench.records.checks.mesh_force import Accounts, accounts_of
 
 Array = NDArray[np.float64]
@@ -16,13 +16,14 @@ Array = NDArray[np.float64]
 # Accounts of the force agree when their misfit is below AGREE, and a suspicion is taken for true when under it they
 # agree and misfit by EXPLAINED times less than without.
 AGREE, EXPLAINED = 0.25, 1 / 3
-# Factors other than 1 that a channel may have: reversed, or of another unit.
-FACTORS = {-1.0: "reversed", 1e3: "1000 times too large", 1e-3: "1000 times too small", 180 / pi: "in degrees"}
+# Factors that both torques may have, and the misfit that they cause at least.
+FACTORS = {1e3: "1000 times too large", 1e-3: "1000 times too small"}
+WRONG_UNIT = 0.5
 # Delays that are looked for [samples], steps to the shortest period in the band, and the error that counts.
 LONGEST, STEPS, MATTERS = 100, 8, 0.02
 # Misfit below which no delay is looked for.
 SUSPICIOUS = 0.03
-# Mass of a gear from the motion of its centre, over J / rb^2 of its rotation (0.2 .. 4 in practice, less with a flywheel).
+# Mass of a gear from the motion of its centre, over J / rb^2 of its rotation: 0.2 to 4 for gears, less with flywheels.
 MASS = (1 / 200, 200.0)
 # Parts of the force's rms by which stiffness, damping or mass must show to be taken at their word.
 SHOWS = 0.3
@@ -37,9 +38,7 @@ def gears_not_swapped(look: Look) -> list[Finding]:
         gear: {name: -part if name.startswith("angle_") else part for name, part in parts.items()}
         for gear, parts in accounts.gears.items()
     }
-    relation = ("driver", "driven")
-    before = float(accounts.misfit(relation)[0])
-    after = float(Accounts(other, accounts.centres, accounts.omega).misfit(relation)[0])
+    before, after = _worst(accounts), _worst(Accounts(other, accounts.centres, accounts.omega))
     if not _explains(before, after):
         return []
     return [
@@ -50,30 +49,26 @@ def gears_not_swapped(look: Look) -> list[Finding]:
     ]
 
 
-def factors_are_one(look: Look) -> list[Finding]:
-    """No torque or angle is reversed or of another unit: Newton's second law of both gears gives one mesh force."""
+def torques_fit_inertias(look: Look) -> list[Finding]:
+    """Torques and accelerations of both gears are of one unit: m_e theta'' is a force, not a thousandth of it."""
     accounts = accounts_of(look)
-    if accounts is None:
+    if accounts is None or len(accounts.gears) < 2:
         return []
-    best: tuple[float, str, str] | None = None
-    before = 0.0
-    for name in _suspects(accounts, ("torque_", "angle_")):
-        relations = [relation for relation in accounts.relations() if name in accounts.channels(relation)]
-        now = max(float(accounts.misfit(relation)[0]) for relation in relations)
-        for factor, words in FACTORS.items():
-            turn = np.full((1, accounts.omega.size), 1 / factor, dtype=complex)
-            after = max(float(accounts.misfit(relation, name, turn)[0]) for relation in relations)
-            if _explains(now, after) and (best is None or after < best[0]):
-                best, before = (after, name, words), now
-    if best is None:
-        return []
-    return [
-        Finding(
-            f"{best[1]} is {best[2]}, or the inertia of its gear is: the forces on the teeth that torques, angles and"
-            f" displacements give contradict one another by {before:.2g} of their rms, then by {best[0]:.2g}"
-            f" (limit {AGREE:g})"
-        )
-    ]
+    before = _worst(accounts)
+    for factor, words in FACTORS.items():
+        scaled = {
+            gear: {name: part / factor if name.startswith("torque_") else part for name, part in parts.items()}
+            for gear, parts in accounts.gears.items()
+        }
+        after = _worst(Accounts(scaled, accounts.centres, accounts.omega))
+        if before > WRONG_UNIT and _explains(before, after):
+            return [
+                Finding(
+                    f"the torques are {words} for the accelerations of gears of these inertias: the forces on the teeth"
+                    f" contradict one another by {before:.2g} of their rms, then by {after:.2g} (limit {AGREE:g})"
+                )
+            ]
+    return []
 
 
 def clocks_agree(look: Look) -> list[Finding]:
@@ -128,8 +123,8 @@ def displacements_fit(look: Look) -> list[Finding]:
         return []
     found = []
     for centre in accounts.centres:
-        fits = [(gear, accounts.support(gear, centre)) for gear in accounts.gears]
-        gear, (values, parts, left) = min(fits, key=lambda fit: fit[1][2])
+        fits = [accounts.support(gear, centre) for gear in accounts.gears]
+        values, parts, left = min(fits, key=lambda fit: fit[2])
         if left > AGREE:
             continue
         largest = int(np.argmax(parts))
@@ -167,8 +162,7 @@ def load_torque_alive(look: Look) -> list[Finding]:
     dead = [gear for gear in torque if swings[gear] <= 1e-9 * max(swings.values())]
     if len(dead) != 1:
         return []
-    accounts = accounts_of(look)
-    if accounts is not None and len(accounts.gears) == 2 and accounts.misfit(("driver", "driven"))[0] < AGREE:
+    if accounts_agree(look):
         return []
     return [
         Finding(
@@ -179,6 +173,16 @@ def load_torque_alive(look: Look) -> list[Finding]:
             error=1.0,
         )
     ]
+
+
+def accounts_agree(look: Look) -> bool:
+    """Whether both gears give one force on the teeth, so that the torques are those at the gears."""
+    accounts = accounts_of(look)
+    return accounts is not None and len(accounts.gears) == 2 and float(accounts.misfit(GEARS)[0]) < AGREE
+
+
+def _worst(accounts: Accounts) -> float:
+    return max(float(accounts.misfit(relation)[0]) for relation in accounts.relations())
 
 
 def _suspects(accounts: Accounts, kinds: tuple[str, ...]) -> list[str]:

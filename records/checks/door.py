@@ -11,9 +11,9 @@ from gearbench.records.checks.clipping import not_clipped
 from gearbench.records.checks.contradictions import (
     clocks_agree,
     displacements_fit,
-    factors_are_one,
     gears_not_swapped,
     load_torque_alive,
+    torques_fit_inertias,
 )
 from gearbench.records.checks.derived import (
     centres_alive,
@@ -43,7 +43,7 @@ CHECKS: tuple[Check, ...] = (
     centres_alive,
     swings_fit_the_teeth,
     gears_not_swapped,
-    factors_are_one,
+    torques_fit_inertias,
     displacements_fit,
     force_feeds_the_rig,
     stored_as_channels_have_it,

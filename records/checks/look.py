@@ -120,6 +120,11 @@ class Look:
         except TransmissionError:
             return self.channel("dte")
 
+    @property
+    def stored_or_own_dte(self) -> Array | None:
+        """DTE (samples,) [m] as identification takes it: stored, else from the channels."""
+        return self.channel("dte") if "dte" in self.record else self.dte
+
     @cached_property
     def force(self) -> Array | None:
         """Force (samples,) [N] as the torques have it, else as stored; None if it cannot be computed."""

@@ -40,7 +40,7 @@ class Accounts:
     def channels(self, relation: tuple[str, str]) -> set[str]:
         """Channels that a relation rests on."""
         first, second = relation
-        return {*self.gears[first], *(self.gears[second] if second in self.gears else {second})}
+        return {*self.gears[first], *self.gears.get(second, {second: None})}
 
     def misfit(self, relation: tuple[str, str], channel: str = "", turn: Complexes | None = None) -> Array:
         """Disagreement (D,) of two accounts relative to their rms, after `channel` is multiplied by `turn` (D, lines).

@@ -20,7 +20,7 @@ def periods_repeat(look: Look) -> list[Finding]:
     if joint is None:
         return []
     found = []
-    for name, values in (("the dte", look.channel("dte") if "dte" in look.record else look.dte), ("the force", look.force)):
+    for name, values in (("the dte", look.stored_or_own_dte), ("the force", look.force)):
         if values is None:
             continue
         rows = values.reshape(-1, joint)
