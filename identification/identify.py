@@ -92,13 +92,13 @@ def identify(
     """
     settings = settings or IdentificationSettings()
     report = progress or (lambda fraction, message: None)
-    report(0.0, "records")
-    doubts, cost = _doubts(records)
-    report(0.02, "spectra")
+    report(0.0, "spectra")
     sidebands = settings.harmonics if settings.harmonics is not None else LADDER[-1]
     spectra, excited, notes = record_spectra(
         records, top=settings.band[1] if settings.band else None, sidebands=sidebands
     )
+    report(0.05, "what the records say about themselves")
+    doubts, cost = _doubts(records)
     band = settings.band or excited
     lines = output_lines(spectra, band, excited, settings.step)
     transient = settings.transient == "estimate" or (settings.transient == "auto" and not spectra.steady)

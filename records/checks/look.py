@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from gearbench.records.attributes import numeric_attribute
 from gearbench.records.transmission_error import (
     AngleOnlyWarning,
     TransmissionError,
@@ -36,9 +37,8 @@ class Look:
     record: xr.Dataset
 
     def number(self, name: str) -> float | None:
-        """A numeric attribute, None where the record lacks it."""
-        value = self.record.attrs.get(name)
-        return None if value is None else float(value)
+        """A numeric attribute, None where the record lacks it. Raises RecordError for text."""
+        return numeric_attribute(self.record.attrs, name)
 
     def channel(self, name: str) -> Array | None:
         """Channel (samples,) of the first realisation, None where the record lacks it."""
