@@ -21,6 +21,9 @@ FACTORS = {1e3: "1000 times too large", 1e-3: "1000 times too small"}
 WRONG_UNIT = 0.5
 # Delays that are looked for [samples], steps to the shortest period in the band, and the error that counts.
 LONGEST, STEPS, MATTERS = 100, 8, 0.02
+# A delay is believed when it leaves no more than EXACT, or FLOOR times the misfit of accounts without that channel: what
+# lies between a torque and its gear, such as a soft coupling, looks like a delay in part only.
+EXACT, FLOOR = 0.06, 3.0
 # Misfit below which no delay is looked for.
 SUSPICIOUS = 0.03
 # Mass of a gear from the motion of its centre, over J / rb^2 of its rotation: 0.2 to 4 for gears, less with flywheels.
@@ -98,7 +101,9 @@ def clocks_agree(look: Look) -> list[Finding]:
         fine = coarse + step * np.linspace(-1.0, 1.0, 41)
         found = worst(fine)
         after, delay = float(found.min()), float(fine[int(np.argmin(found))])
-        if _explains(now, after) and (best is None or after < best[0]):
+        others = [relation for relation in accounts.relations() if relation not in relations]
+        floor = max((float(accounts.misfit(relation)[0]) for relation in others), default=0.0)
+        if after < max(EXACT, FLOOR * floor) and _explains(now, after) and (best is None or after < best[0]):
             best = (after, name, delay)
     if best is None:
         return []
