@@ -20,8 +20,8 @@ STORED_MEAN = 0.2
 # Response of the DTE to the force at excited lines [m/N], as an rms ratio: no gear train is as soft as 1e4 N/m, ...
 SOFTEST = 1e-4
 # ... no mesh stiffer than 50 N/(um mm) (ISO 6336-1 has 20 for steel) on a face WIDEST modules wide; above its
-# resonances a rig answers by its mass, some ten times less.
-STIFFEST, WIDEST, BY_MASS = 50e9, 40.0, 0.1
+# resonances a rig answers by its mass, up to a thousand times less.
+STIFFEST, WIDEST, BY_MASS = 50e9, 40.0, 1e-3
 # A DTE that swings by more than this part of the module is no mesh's, and neither is a gear centre that does.
 OF_MODULE = 1.0
 # Where teeth or base radii are not known: the largest swing [m].
