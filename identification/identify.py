@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
+from math import sqrt
 from typing import Any, Literal
 
 import numpy as np
@@ -21,6 +22,7 @@ from gearbench.identification.response.modes import itf_modes
 from gearbench.identification.spectra.joint import Spectra
 from gearbench.identification.spectra.records import record_spectra
 from gearbench.identification.truth.periodic import itf_from_htf
+from gearbench.records.checks import check_record
 
 Progress = Callable[[float, str], None]
 
@@ -74,8 +76,10 @@ def identify(
 ) -> xr.Dataset:
     """Frequency response (schema gearbench-frf/1, kind "identified") of records that are realisations of one condition.
 
-    Reports `progress(fraction, message)`. Raises SpectraError, TransmissionError or LpmError (all
-    ValueError) with one sentence when the records do not fit together or cannot support the request.
+    Reports `progress(fraction, message)`. Raises RecordError for a record that contradicts itself, SpectraError,
+    TransmissionError or LpmError (all ValueError) with one sentence when the records do not fit together or cannot
+    support the request. What is doubtful about a record but may be right is among the warnings and in the expected
+    error.
 
     >>> import gearbench as gb
     >>> record = gb.simulate(gb.read_case("quick_lumped", ["experiment.realisations=2"]))
@@ -93,6 +97,8 @@ def identify(
     spectra, excited, notes = record_spectra(
         records, top=settings.band[1] if settings.band else None, sidebands=sidebands
     )
+    report(0.05, "what the records say about themselves")
+    doubts, cost = _doubts(records)
     band = settings.band or excited
     lines = output_lines(spectra, band, excited, settings.step)
     transient = settings.transient == "estimate" or (settings.transient == "auto" and not spectra.steady)
@@ -107,9 +113,21 @@ def identify(
     )
     result = local_polynomial(spectra, lines, window, progress=lambda part, message: report(0.2 + 0.7 * part, message))
     report(0.9, "modes")
-    frf = _dataset(spectra, settings, window, result, notes)
+    frf = _dataset(spectra, settings, window, result, [*doubts, *notes], cost)
     report(1.0, "identified")
     return frf
+
+
+def _doubts(records: Sequence[xr.Dataset]) -> tuple[list[str], float]:
+    """What is doubtful about the records, and the rms error that it may leave: records count alike, doubts about one
+    are independent."""
+    sentences, power = [], 0.0
+    for number, record in enumerate(records, start=1):
+        source = f"record {number} of {len(records)}" if len(records) > 1 else ""
+        for finding in check_record(record, source):
+            sentences.append(f"{source}: {finding.sentence}" if source else finding.sentence)
+            power += finding.error**2 / len(records)
+    return sentences, sqrt(power)
 
 
 def output_lines(
@@ -144,12 +162,13 @@ def _dataset(
     window: Window,
     result: LpmResult,
     notes: list[str],
+    cost: float,
 ) -> xr.Dataset:
     frequency = np.asarray(result.lines * spectra.spacing, dtype=float)
     response = itf_from_htf(result.htf, settings.phases)
     variance = result.itf_variance(settings.phases)
     modes = itf_modes(frequency, response, variance, modes=settings.modes)
-    accuracy = expected_accuracy(result, _relative_noise(spectra, result))
+    accuracy = expected_accuracy(result, _relative_noise(spectra, result), cost)
     rule = record_rule(spectra, window.harmonics, window.order, *modes, accuracy.truncation)
     warnings = [*notes, *_warnings(accuracy, rule, spectra)]
     attributes: dict[str, Any] = {
@@ -166,6 +185,7 @@ def _dataset(
         "residual": result.residual,
         "variance_error": accuracy.variance,
         "truncation_error": accuracy.truncation,
+        "record_error": accuracy.record,
         "expected_error": accuracy.expected,
         "expected_error_bound": accuracy.bound,
         "variance_sampled": result.variance_sampled,
@@ -209,9 +229,10 @@ def _relative_noise(spectra: Spectra, result: LpmResult) -> float | None:
 def _warnings(accuracy: Accuracy, rule: RecordRule | None, spectra: Spectra) -> list[str]:
     notes = []
     if accuracy.expected > DOUBTFUL:
+        doubtful = f", doubtful channels {accuracy.record:.0%}" if accuracy.record else ""
         notes.append(
             f"expected error of the ITF: {accuracy.expected:.0%} (variance {accuracy.variance:.0%}, missing branches"
-            f" {accuracy.truncation:.0%}); nothing has been smoothed"
+            f" {accuracy.truncation:.0%}{doubtful}); nothing has been smoothed"
         )
     if rule is not None:
         lacking = accuracy.truncation > MISSING and rule.harmonics < rule.harmonics_needed

@@ -19,13 +19,12 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from gearbench.records.attributes import SAMPLING_ATTRIBUTES, check_attributes, numeric_attribute
 from gearbench.records.channels import REDUCED_CHANNELS, RIG_CHANNELS, unit_of_channel
 from gearbench.records.errors import RecordError
 
 SCHEMA = "gearbench-record/1"
 
-# Without these the record cannot be cut into periods.
-SAMPLING_ATTRIBUTES = ("sampling_rate", "samples_per_period", "periods")
 # Without these the DTE and the generalised force cannot be computed from angles and torques
 # (docs/physics.md, "Axes, signs, zeros").
 RIG_ATTRIBUTES = ("base_radius_driver", "base_radius_driven", "driven_boundary")
@@ -106,14 +105,7 @@ def _check_sampling(attrs: Mapping[str, Any]) -> None:
     for name in SAMPLING_ATTRIBUTES:
         if name not in attrs:
             raise RecordError(f"attribute {name} is missing; a record needs {', '.join(SAMPLING_ATTRIBUTES)}")
-        try:
-            value = float(attrs[name])
-        except (TypeError, ValueError):
-            raise RecordError(f"attribute {name} = {attrs[name]!r} is not a number") from None
-        if not np.isfinite(value) or value <= 0:
-            raise RecordError(f"attribute {name} = {value:g} must be positive and finite")
-        if name != "sampling_rate" and value != round(value):
-            raise RecordError(f"attribute {name} = {value:g} must be a whole number")
+    check_attributes(attrs)
 
 
 def _check_channel_sets(record: xr.Dataset) -> None:
@@ -143,6 +135,7 @@ def _check_channel(record: xr.Dataset, name: str) -> None:
         raise RecordError(f"channel {name} has dimensions {channel.dims}, not ('realisation', 'time')")
     if channel.dtype != np.float64:
         raise RecordError(f"channel {name} is {channel.dtype}, not float64")
+    numeric_attribute(channel.attrs, "period_scatter")
     unit = unit_of_channel(name)
     if channel.attrs.get("units") != unit:
         raise RecordError(f"channel {name} has units {channel.attrs.get('units')!r}, not {unit!r}")

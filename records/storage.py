@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import gc
+import sys
+import traceback
 from pathlib import Path
 
 import xarray as xr
@@ -25,8 +28,23 @@ def read_dataset(path: str | Path, what: str = "file", error: type[ValueError] =
     try:
         # Units such as "s" must stay text: no decoding of times, masks or scales.
         return xr.load_dataset(source, engine="h5netcdf", decode_cf=False)
-    except (OSError, ValueError, KeyError, RuntimeError) as reason:
-        raise error(f"{source} is truncated or no NetCDF-4 file ({reason})") from reason
+    except Exception as reason:  # damaged metadata raises whatever its reader trips over
+        words = " ".join(str(reason).split()) or type(reason).__name__
+        _forget(reason)
+    raise error(f"{source} is truncated or no NetCDF-4 file ({words[:200]})")
+
+
+def _forget(reason: BaseException) -> None:
+    """Let go of a file that could not be opened. Half made, it would print a traceback when it is collected later."""
+    hook, sys.unraisablehook = sys.unraisablehook, lambda unraisable: None
+    try:
+        link: BaseException | None = reason
+        while link is not None:
+            traceback.clear_frames(link.__traceback__)
+            link = link.__cause__ or link.__context__
+        gc.collect()
+    finally:
+        sys.unraisablehook = hook
 
 
 def write_record(record: xr.Dataset, path: str | Path) -> None:

@@ -28,7 +28,7 @@ USER_ERRORS = (
     ("gearbench.identification.spectra.joint", "SpectraError"),
     ("gearbench.identification.lpm.local_solve", "LpmError"),
     ("gearbench.identification.response.frf", "FrfError"),
-    ("gearbench.identification.spectra.transmission_error", "TransmissionError"),
+    ("gearbench.records.transmission_error", "TransmissionError"),
     ("gearbench.bench.errors", "BenchError"),
     ("gearbench.challenge.errors", "ChallengeError"),
     ("gearbench.diagnosis.errors", "DiagnosisError"),

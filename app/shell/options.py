@@ -66,10 +66,16 @@ def check_picture(path: Path, inputs: Sequence[Path | str] = (), option: str = "
 
 
 def load_case(name: str, settings: Sequence[str] | None) -> Case:
-    """The case in a file or, where there is no such file, the shipped case of that name."""
+    """The case in a file or, where there is no such file, the shipped case of that name; values that smell of another
+    unit are questioned on stderr."""
     import gearbench as gb
+    from gearbench.rig.casefile.smells import smells
+    from gearbench.shell.failure import say
 
-    return gb.read_case(name, settings or ())
+    case = gb.read_case(name, settings or ())
+    for question in smells(case):
+        say(f"warning: {question}")
+    return case
 
 
 def print_json(summary: Any) -> None:
@@ -93,10 +99,21 @@ def _finite(value: Any) -> Any:
 
 
 def expand_lists(arguments: Sequence[str], options: Sequence[str]) -> list[str]:
-    """Spell `--option 1 2 3` as `--option 1 --option 2 --option 3` for the given options."""
+    """Spell `--option 1 2 3` as `--option 1 --option 2 --option 3` for the given options.
+
+    Raises InputError for `--option 1,2,3`, which says how several are given.
+    """
+    from gearbench.shell.failure import InputError
+
     expanded: list[str] = []
     current = ""
     for argument in arguments:
+        option, equals, text = argument.partition("=")
+        listed = text if equals and option in options else argument if current else ""
+        parts = [part.strip() for part in listed.split(",")]
+        if len(parts) > 1 and all(_is_number(part) for part in parts):
+            option = option if equals else current
+            raise InputError(f"{option} {listed} must be numbers with spaces between them: {option} {' '.join(parts)}")
         if argument.startswith("--"):
             current = argument if argument in options else ""
             expanded.append(argument)

@@ -18,6 +18,7 @@ from gearbench.bench.results.compare_records import differences
 from gearbench.bench.results.measures import mesh_orders, mode_range, synchronous_mean
 from gearbench.records import SCHEMA as RECORD_SCHEMA
 from gearbench.records import read_dataset, read_record
+from gearbench.records.checks import check_record
 
 Array = NDArray[np.float64]
 
@@ -54,13 +55,15 @@ class Row(NamedTuple):
 
 @dataclass(frozen=True)
 class Results:
-    """What a run left, as far as it is there. `shift` [cycles] is added to every mesh phase."""
+    """What a run left, as far as it is there. `shift` [cycles] is added to every mesh phase; `doubts`: what the record
+    makes one doubt about itself."""
 
     name: str
     record: xr.Dataset | None = None
     static: xr.Dataset | None = None
     frf: xr.Dataset | None = None
     shift: float = 0.0
+    doubts: tuple[str, ...] = ()
 
     @property
     def phase_known(self) -> bool:
@@ -70,12 +73,13 @@ class Results:
 
 
 def load_results(path: Path) -> Results:
-    """Results in a run's folder, or a single record, static.nc or frf.nc. Raises BenchError."""
+    """Results in a run's folder, or a single record, static.nc or frf.nc. Raises BenchError, and RecordError for a
+    record that contradicts itself."""
     if path.is_dir():
         found = {kind: _read(path / name) for kind, name in _FILES.items() if (path / name).is_file()}
         if not found:
             raise BenchError(f"{path} holds none of {', '.join(_FILES.values())}: it is not the folder of a run")
-        return Results(path.name, found.get("record"), found.get("static"), found.get("frf"))
+        return _results(path.name, found, str(path / _FILES["record"]))
     if not path.is_file():
         raise BenchError(f"{path} does not exist")
     return results_of(path.stem, _read(path), str(path))
@@ -83,12 +87,18 @@ def load_results(path: Path) -> Results:
 
 def results_of(name: str, result: xr.Dataset, where: str = "") -> Results:
     """A single record, static result or frequency response as results of that name. Raises BenchError, which calls
-    it `where`."""
+    it `where`, and RecordError for a record that contradicts itself."""
     schema = str(result.attrs.get("schema", "none"))
     if schema not in _SCHEMAS:
         raise BenchError(f"{where or name} has schema {schema}, which is not one of {', '.join(_SCHEMAS)}")
-    found = {_SCHEMAS[schema]: result}
-    return Results(name, found.get("record"), found.get("static"), found.get("frf"))
+    return _results(name, {_SCHEMAS[schema]: result}, where or name)
+
+
+def _results(name: str, found: dict[str, xr.Dataset], where: str) -> Results:
+    """Results of a name, their record checked; `where` is what a refusal calls it."""
+    record = found.get("record")
+    doubts = () if record is None else tuple(finding.sentence for finding in check_record(record, where))
+    return Results(name, record, found.get("static"), found.get("frf"), doubts=doubts)
 
 
 def _read(path: Path) -> xr.Dataset:

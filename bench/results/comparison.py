@@ -23,7 +23,8 @@ _CONDITIONS = (
 
 class Comparison(NamedTuple):
     """The results compared, `b` shifted in mesh phase onto `a` where one has an arbitrary origin; a row for each
-    quantity and phase or band; notes: that shift, and operating conditions in which the records differ."""
+    quantity and phase or band; notes: doubts about the records, that shift, and operating conditions in which the
+    records differ."""
 
     a: Results
     b: Results
@@ -40,7 +41,8 @@ def compare(a: str | Path | xr.Dataset, b: str | Path | xr.Dataset) -> Compariso
     """Two results side by side, quantity by quantity, over mesh phase or frequency band.
 
     `a` and `b`: the folder of a run, or a record, a static result or a frequency response, as a file or a dataset.
-    Raises BenchError for what is none of these, or where both hold nothing in common.
+    Raises BenchError for what is none of these, or where both hold nothing in common, and RecordError for a record that
+    contradicts itself.
 
     >>> import gearbench as gb
     >>> case = gb.read_case("quick_lumped")
@@ -51,7 +53,8 @@ def compare(a: str | Path | xr.Dataset, b: str | Path | xr.Dataset) -> Compariso
     """
     one, two = (_loaded(name, given) for name, given in (("a", a), ("b", b)))
     two, shifted = align(one, two)
-    notes = tuple(note for note in (shifted, *conditions_that_differ(one, two)) if note)
+    doubts = [f"{side}: {doubt}" for side, result in (("a", one), ("b", two)) for doubt in result.doubts]
+    notes = tuple(note for note in (*doubts, shifted, *conditions_that_differ(one, two)) if note)
     return Comparison(one, two, tuple(rows_of(one, two)), notes)
 
 

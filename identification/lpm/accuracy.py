@@ -6,6 +6,7 @@ These are estimates from the identification itself, reported beside every result
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import hypot
 
 import numpy as np
 
@@ -25,12 +26,13 @@ class Accuracy:
     """Expected relative rms error of the ITF and what it is made of (all relative to the ITF's rms).
 
     `variance`: from the residuals; `truncation`: branches beyond L, extrapolated from the decay of the
-    identified ones and no more than what the residual leaves room for; `expected`: both together; `bound`:
-    with the whole residual taken as missing response.
+    identified ones and no more than what the residual leaves room for; `record`: what doubtful channels of the
+    records may cost; `expected`: all three together; `bound`: with the whole residual taken as missing response.
     """
 
     variance: float
     truncation: float
+    record: float
     expected: float
     bound: float
 
@@ -51,11 +53,12 @@ class RecordRule:
         return self.needed / self.duration
 
 
-def expected_accuracy(result: LpmResult, noise: float | None) -> Accuracy:
+def expected_accuracy(result: LpmResult, noise: float | None, record: float = 0.0) -> Accuracy:
     """Expected error of an identified ITF.
 
     `noise`: rms of the measurement noise over the rms response if it is known from repeated periods, else
-    None.
+    None. `record`: what the findings about the records may cost; a wrong channel biases the response whatever is fitted
+    to it, independently of variance and truncation, so that squares add.
     """
     power = np.sum(np.abs(result.htf) ** 2, axis=0).sum()
     spread = float(result.itf_covariance[0].real.sum())
@@ -66,8 +69,9 @@ def expected_accuracy(result: LpmResult, noise: float | None) -> Accuracy:
     return Accuracy(
         float(variance),
         float(truncation),
-        float(np.hypot(variance, truncation)),
-        float(np.hypot(variance, missing)),
+        record,
+        hypot(variance, truncation, record),
+        hypot(variance, missing, record),
     )
 
 

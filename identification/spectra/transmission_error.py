@@ -1,30 +1,24 @@
-"""Dynamic transmission error (DTE) and generalised force of a record (docs/physics.md, "Axes, signs, zeros")."""
+"""Dynamic transmission error (DTE) and generalised force of a record: as stored, else from its channels
+(docs/physics.md, "Axes, signs, zeros")."""
 
 from __future__ import annotations
 
-import warnings
-
-import numpy as np
 import xarray as xr
 
-DIRECTIONS = ("tangential", "line-of-action")
+from gearbench.records.transmission_error import (
+    AngleOnlyWarning,
+    TransmissionError,
+    dte_of_channels,
+    force_of_torques,
+)
 
-
-class TransmissionError(ValueError):
-    """A record from which DTE or force cannot be computed; the sentence names the channel or attribute."""
-
-
-class AngleOnlyWarning(UserWarning):
-    """The DTE leaves the motion of the gear centres out because the record does not hold it."""
+__all__ = ["AngleOnlyWarning", "TransmissionError", "dte", "force"]
 
 
 def dte(record: xr.Dataset) -> xr.DataArray:
     """DTE [m] (realisation, time); a `dte` channel of the record is passed through.
 
-    rb1 theta1 - rb2 theta2 + (y1 - y2) cos(alpha_w) + (x1 - x2) sin(alpha_w); with supports along the line
-    of action the factor of y is 1 and there is no x term. Without y channels the DTE holds the angles only:
-    its attribute `angle_only` is then 1 and an AngleOnlyWarning is issued. Raises TransmissionError where
-    something is missing.
+    Else from angles and displacements (`dte_of_channels`), which raises TransmissionError where something is missing.
 
     >>> import gearbench as gb
     >>> record = gb.simulate(gb.read_case("quick_lumped", ["experiment.realisations=1"]))
@@ -32,43 +26,13 @@ def dte(record: xr.Dataset) -> xr.DataArray:
     >>> bool(abs(found - record["dte"]).max() < 1e-12)
     True
     """
-    if "dte" in record:
-        return record["dte"]
-    angles = [_channel(record, f"angle_{gear}", "dte") for gear in ("driver", "driven")]
-    radii = [_number(record, f"base_radius_{gear}", "dte") for gear in ("driver", "driven")]
-    result = radii[0] * angles[0] - radii[1] * angles[1]
-    attributes = {"units": "m", "angle_only": 0}
-    present = [name for name in ("y_driver", "y_driven") if name in record]
-    if not present:
-        attributes["angle_only"] = 1
-        warnings.warn(
-            "the record has no y_driver and y_driven: its dte holds the angles only and misses the motion of the"
-            " gear centres, which biases what is identified from it",
-            AngleOnlyWarning,
-            stacklevel=2,
-        )
-    else:
-        direction = str(record.attrs.get("support_direction", "tangential"))
-        if direction not in DIRECTIONS:
-            raise TransmissionError(
-                f"attribute support_direction = {direction!r} must be one of {', '.join(DIRECTIONS)}"
-            )
-        along = direction == "line-of-action"
-        angle = 0.0 if along else _number(record, "working_pressure_angle", "dte")
-        result = result + np.cos(angle) * _difference(record, "y")
-        if not along and ("x_driver" in record or "x_driven" in record):
-            result = result + np.sin(angle) * _difference(record, "x")
-    result.attrs.update(attributes)
-    return result.rename("dte")
+    return record["dte"] if "dte" in record else dte_of_channels(record)
 
 
 def force(record: xr.Dataset) -> xr.DataArray:
     """Generalised force F [N] (realisation, time); a `force` channel of the record is passed through.
 
-    Driven speed prescribed (driven_boundary "speed"): T1 / rb1. Both gears free ("torque"): m_e (rb1 T1 /
-    J1 + rb2 T2 / J2) with m_e = J1 J2 / (J1 rb2^2 + J2 rb1^2), T2 positive against the driven rotation.
-    Raises TransmissionError for other boundaries (shaft torque is not gear torque while a coupling is
-    unmodelled) and where something is missing.
+    Else from the torques (`force_of_torques`), which raises TransmissionError where something is missing.
 
     >>> import gearbench as gb
     >>> record = gb.simulate(gb.read_case("quick_lumped", ["experiment.realisations=1"]))
@@ -76,46 +40,4 @@ def force(record: xr.Dataset) -> xr.DataArray:
     >>> f"{float(found.mean()):.0f} {found.attrs['units']}"
     '3433 N'
     """
-    if "force" in record:
-        return record["force"]
-    torque = _channel(record, "torque_driver", "force")
-    radius = _number(record, "base_radius_driver", "force")
-    if "driven_boundary" not in record.attrs:
-        raise TransmissionError("the record lacks attribute driven_boundary, which force needs")
-    boundary = str(record.attrs["driven_boundary"])
-    if boundary == "speed":
-        result = torque / radius
-    elif boundary == "torque":
-        torque_driven = _channel(record, "torque_driven", "force")
-        radius_driven = _number(record, "base_radius_driven", "force")
-        inertia = _number(record, "inertia_driver", "force")
-        inertia_driven = _number(record, "inertia_driven", "force")
-        mass = inertia * inertia_driven / (inertia * radius_driven**2 + inertia_driven * radius**2)
-        result = mass * (radius * torque / inertia + radius_driven * torque_driven / inertia_driven)
-    else:
-        raise TransmissionError(
-            f"attribute driven_boundary = {boundary!r}: the force on the mesh follows from the torques for 'speed' and"
-            " 'torque' only; behind a coupling the shaft torque is not the gear torque"
-        )
-    result.attrs["units"] = "N"
-    return result.rename("force")
-
-
-def _channel(record: xr.Dataset, name: str, purpose: str) -> xr.DataArray:
-    if name not in record:
-        raise TransmissionError(f"the record lacks channel {name}, which {purpose} needs")
-    return record[name]
-
-
-def _difference(record: xr.Dataset, axis: str) -> xr.DataArray:
-    first, second = (_channel(record, f"{axis}_{gear}", "dte") for gear in ("driver", "driven"))
-    return first - second
-
-
-def _number(record: xr.Dataset, name: str, purpose: str) -> float:
-    if name not in record.attrs:
-        raise TransmissionError(f"the record lacks attribute {name}, which {purpose} needs")
-    value = float(record.attrs[name])
-    if not np.isfinite(value) or value <= 0:
-        raise TransmissionError(f"attribute {name} = {value:g} must be positive")
-    return value
+    return record["force"] if "force" in record else force_of_torques(record)

@@ -12,6 +12,7 @@ from typing import Any, Literal, Union, get_args, get_origin
 
 from pydantic.fields import FieldInfo
 
+from gearbench.rig.casefile.meanings import meant
 from gearbench.rig.errors import CaseError
 from gearbench.rig.value import SYMBOLS, Value, fields_of, format_number, key_of, to_si, unit_of
 
@@ -128,6 +129,11 @@ class Reader:
         if matching:
             right = stems[max(matching, key=len)]
             return f"{place} is not a known key: it is spelt {right}"
+        meaning = meant(key)
+        if meaning in known:
+            return f"{place} is not a known key: did you mean {meaning}?"
+        if meaning and (homes := _homes(self.root, meaning, "")):
+            return f"{place} is not a known key: did you mean {' or '.join(homes)}?"
         close = difflib.get_close_matches(key, known, n=1, cutoff=0.7)
         if close:
             return f"{place} is not a known key: did you mean {close[0]}?"

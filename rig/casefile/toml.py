@@ -68,7 +68,10 @@ def include_gear(document: Table, side: str, folder: Path) -> None:
 
 
 def apply_settings(document: Table, settings: Sequence[str], folder: Path) -> None:
-    """Apply `dotted.key=value` settings in order, in place; a gear file is read when a key enters it."""
+    """Apply `dotted.key=value` settings in order, in place; a gear file is read when a key enters it.
+
+    A gear file that a setting names may lie in the case file's folder or in the present one.
+    """
     for setting in settings:
         keys, value = parse_setting(setting)
         if keys[0] == "rig" and len(keys) > 2 and keys[1] in ("driver", "driven"):
@@ -76,6 +79,8 @@ def apply_settings(document: Table, settings: Sequence[str], folder: Path) -> No
         table: Any = document
         for depth, key in enumerate(keys[:-1]):
             table = _enter(table, key, ".".join(keys[: depth + 1]), setting)
+        if keys[0] == "rig" and len(keys) == 2 and keys[1] in ("driver", "driven") and isinstance(value, str):
+            value = _from_the_callers_folder(value, folder)
         if isinstance(table, list):
             table[_position(table, keys[-1], ".".join(keys), setting)] = value
         else:
@@ -86,6 +91,11 @@ def apply_settings(document: Table, settings: Sequence[str], folder: Path) -> No
                 own = table.get(side)
                 if isinstance(own, dict):
                     own.pop(keys[2], None)
+
+
+def _from_the_callers_folder(name: str, folder: Path) -> str:
+    """A gear file that a setting names: beside the case file or, where there is none, as the caller would find it."""
+    return str(Path(name).resolve()) if name and not (folder / name).exists() and Path(name).exists() else name
 
 
 def _enter(table: Any, key: str, where: str, setting: str) -> Any:

@@ -1,0 +1,115 @@
+"""Clipped channels, and what clipping costs."""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.records.checks.finding import Finding
+from gearbench.records.checks.look import Look
+
+Array = NDArray[np.float64]
+
+# Equal samples in a row, at an end of the range, that make a run; and how many such samples make clipping.
+RUN, FEWEST = 3, 6
+# A coarsely quantised signal lingers at its extremes: there, the last level must hold that many times as many.
+CROWD = 5.0
+# A signal that spends this part of its time at its ends, such as a binary one, is made so and not clipped.
+MADE_SO = 0.95
+# A load torque that stands below this part of its largest value is the one of separated teeth.
+SEPARATED = 1e-3
+CHANNELS = ("torque_driver", "torque_driven", "y_driver", "y_driven", "dte", "force")
+
+
+def not_clipped(look: Look) -> list[Finding]:
+    """No channel stands at the ends of its range; all realisations are looked at."""
+    found = []
+    for name in CHANNELS:
+        if name not in look.record:
+            continue
+        rows = look.record[name].values
+        shares = [clipped_ends(values) for values in rows]
+        if name == "torque_driven":  # at zero, the teeth have separated
+            shares = [
+                (high, 0.0 if abs(values.min()) < SEPARATED * values.max() else low)
+                for values, (high, low) in zip(rows, shares, strict=True)
+            ]
+        row = max(range(len(rows)), key=lambda number: sum(shares[number]))
+        worst = shares[row]
+        if not 0.0 < sum(worst) < MADE_SO:
+            continue
+        error = lost_by_clipping(rows[row]) * _share(look, name)
+        found.append(
+            Finding(
+                f"{name} is clipped at {sum(worst):.2g} of its samples (limit 0): what it lost there is missing from"
+                f" the response, about {error:.0%} of it",
+                refused=False,
+                error=error,
+            )
+        )
+    return found
+
+
+def clipped_ends(values: Array) -> tuple[float, float]:
+    """Parts of the samples (n,) that stand clipped at the upper and the lower end of the range; 0 where none do."""
+    if np.ptp(values) == 0.0:
+        return 0.0, 0.0
+    high, low = (_clipped_at(values, end) for end in (float(values.max()), float(values.min())))
+    return high, low
+
+
+def lost_by_clipping(values: Array) -> float:
+    """Rms of what clipping took off (n,) over the rms fluctuation of what is left.
+
+    A run of m samples at an end, entered with the slope a and left with the slope b (per sample), hides an arc of
+    height (a + b) m / 8, whose mean square over the run is 8/15 of the height's square (a parabola).
+    """
+    lost = 0.0
+    for share, end in zip(clipped_ends(values), (float(values.max()), float(values.min())), strict=True):
+        if share == 0.0:
+            continue
+        edges = np.flatnonzero(np.diff(np.concatenate(([False], values == end, [False])).astype(int)))
+        first, last = edges[::2], edges[1::2]  # runs are first .. last - 1
+        inner = (first > 1) & (last < values.size - 1)
+        first, last = first[inner], last[inner]
+        slopes = np.abs(values[first - 1] - values[first - 2]) + np.abs(values[last] - values[last + 1])
+        # The flank's last step is cut short by the end itself: of the run, half a step a side is flank.
+        lost += float(np.sum((last - first) * 8 / 15 * (slopes * (last - first + 1) / 8) ** 2))
+    return sqrt(lost / values.size) / float(values.std())
+
+
+def _share(look: Look, name: str) -> float:
+    """Which part of force or DTE a channel makes: relative fluctuations."""
+    if name in ("force", "dte"):
+        return 1.0
+    values, whole = look.channel(name), look.dte
+    if name.startswith("torque"):
+        radius = look.number(f"base_radius_{name.removeprefix('torque_')}")
+        if name == "torque_driven" and look.record.attrs.get("driven_boundary") == "speed":
+            return 0.0
+        if values is None or radius is None or look.force is None or not look.force.std() > 0:
+            return 1.0
+        return min(1.0, float(values.std()) / radius / float(look.force.std()))
+    if values is None or whole is None or not whole.std() > 0:
+        return 1.0
+    return float(values.std() / whole.std())
+
+
+def _clipped_at(values: Array, end: float) -> float:
+    at_end = values == end
+    count = int(at_end.sum())
+    if count < FEWEST or _longest_run(at_end) < RUN:
+        return 0.0
+    levels, counts = np.unique(values, return_counts=True)
+    if levels.size < values.size / 4:  # quantised: equal samples are the rule
+        beside = counts[1:4] if end == levels[0] else counts[-4:-1]
+        if count < CROWD * max(1.0, float(beside.mean())):
+            return 0.0
+    return count / values.size
+
+
+def _longest_run(flags: NDArray[np.bool_]) -> int:
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], flags, [False])).astype(int)))
+    return int((edges[1::2] - edges[::2]).max()) if edges.size else 0

@@ -1,0 +1,240 @@
+"""Channels that contradict one another in the mesh force: swapped, of another unit, reversed, late, dead."""
+
+from __future__ import annotations
+
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.records.checks.finding import Finding
+from gearbench.records.checks.look import GEARS, Complexes, Look
+from gearbench.records.checks.mesh_force import Accounts, accounts_of
+
+Array = NDArray[np.float64]
+
+# Accounts of the force agree when their misfit is below AGREE, and a suspicion is taken for true when under it they
+# agree and misfit by EXPLAINED times less than without.
+AGREE, EXPLAINED = 0.25, 1 / 3
+# Factors that both torques may have, and the misfit that they cause at least.
+FACTORS = {1e3: "1000 times too large"}
+WRONG_UNIT = 0.5
+# Delays that are looked for [samples], steps to the shortest period in the band, and the error that counts.
+LONGEST, STEPS, MATTERS = 100, 8, 0.02
+# A delay is believed when it leaves no more than EXACT, or FLOOR times the misfit of accounts without that channel: what
+# lies between a torque and its gear, such as a soft coupling, looks like a delay in part only.
+EXACT, FLOOR = 0.06, 3.0
+# Misfit below which no delay is looked for.
+SUSPICIOUS = 0.08
+# Friction pushes the centres too, a little out of step.
+SUSPICIOUS_Y = 0.15
+# Mass of a gear from the motion of its centre, over J / rb^2 of its rotation: 0.2 to 4 for gears, less with flywheels.
+MASS = (1 / 200, 200.0)
+# Parts of the force's rms by which stiffness, damping or mass must show to be taken at their word.
+SHOWS = 0.3
+
+
+def gears_not_swapped(look: Look) -> list[Finding]:
+    """The driver's inertia takes from its torque, the driven gear's adds to it; swapped, it is the other way round."""
+    accounts = accounts_of(look)
+    if accounts is None or len(accounts.gears) < 2:
+        return []
+    other = {
+        gear: {name: -part if name.startswith("angle_") else part for name, part in parts.items()}
+        for gear, parts in accounts.gears.items()
+    }
+    before, after = _worst(accounts), _worst(Accounts(other, accounts.centres, accounts.omega))
+    if not _explains(before, after):
+        return []
+    return [
+        Finding(
+            "driver and driven are swapped: torques and angular accelerations balance only if the driven gear is taken"
+            f" to drive (misfit of the two forces on the teeth {before:.2g}, then {after:.2g}; limit {AGREE:g})"
+        )
+    ]
+
+
+def torques_fit_inertias(look: Look) -> list[Finding]:
+    """Torques and accelerations of both gears are of one unit: m_e theta'' is a force, not a thousandth of it."""
+    accounts = accounts_of(look)
+    if accounts is None or len(accounts.gears) < 2:
+        return []
+    before = _worst(accounts)
+    for factor, words in FACTORS.items():
+        scaled = {
+            gear: {name: part / factor if name.startswith("torque_") else part for name, part in parts.items()}
+            for gear, parts in accounts.gears.items()
+        }
+        after = _worst(Accounts(scaled, accounts.centres, accounts.omega))
+        if before > WRONG_UNIT and after < EXACT:
+            return [
+                Finding(
+                    f"the torques are {words} for the accelerations of gears of these inertias: the forces on the teeth"
+                    f" contradict one another by {before:.2g} of their rms, then by {after:.2g} (limit {EXACT:g})"
+                )
+            ]
+    return []
+
+
+def clocks_agree(look: Look) -> list[Finding]:
+    """No channel lags behind the others: a delay of one of them does not make the mesh forces agree.
+
+    The error of a lag tau in a channel that makes the part c(w) of force or DTE: rms of |1 - e^(j w tau)| |c| over the
+    excited lines, weighted with the DTE.
+    """
+    accounts = accounts_of(look)
+    if accounts is None:
+        return []
+    top = float(accounts.omega[-1]) / (2 * pi)
+    step = min(1 / (STEPS * top), 1 / look.rate)
+    delays = np.arange(-np.ceil(LONGEST / look.rate / step), np.ceil(LONGEST / look.rate / step) + 1) * step
+    best: tuple[float, str, float] | None = None
+    for name in _suspects(accounts, ("torque_", "angle_", "y_")):
+        relations = [relation for relation in accounts.relations() if name in accounts.channels(relation)]
+        now = max(float(accounts.misfit(relation)[0]) for relation in relations)
+        if now < (SUSPICIOUS_Y if name.startswith("y_") else SUSPICIOUS):
+            continue
+
+        def worst(at: Array, name: str = name, relations: list[tuple[str, str]] = relations) -> Array:
+            turn = np.exp(1j * np.outer(at, accounts.omega))
+            return np.asarray(np.max([accounts.misfit(relation, name, turn) for relation in relations], axis=0))
+
+        coarse = float(delays[int(np.argmin(worst(delays)))])
+        fine = coarse + step * np.linspace(-1.0, 1.0, 41)
+        found = worst(fine)
+        after, delay = float(found.min()), float(fine[int(np.argmin(found))])
+        others = [relation for relation in accounts.relations() if relation not in relations]
+        floor = max((float(accounts.misfit(relation)[0]) for relation in others), default=0.0)
+        if after < max(EXACT, FLOOR * floor) and _explains(now, after) and (best is None or after < best[0]):
+            best = (after, name, delay)
+    if best is None:
+        return []
+    error = _error_of_delay(look, best[1], best[2])
+    if error < MATTERS and abs(best[2]) < 0.1 / look.rate:
+        return []
+    words = "lags behind" if best[2] > 0 else "leads"
+    return [
+        Finding(
+            f"{best[1]} {words} the other channels by {1e6 * abs(best[2]):.3g} us ({abs(best[2]) * look.rate:.2g}"
+            f" samples), which the balance of forces at the gears shows; it costs about {error:.0%} of the response",
+            refused=False,
+            error=error,
+        )
+    ]
+
+
+def displacements_fit(look: Look) -> list[Finding]:
+    """Mesh force over displacement is a support: springs, dampers and masses are positive, the mass is a gear's."""
+    accounts = accounts_of(look)
+    if accounts is None:
+        return []
+    found = []
+    for centre in accounts.centres:
+        fits = [accounts.support(gear, centre) for gear in accounts.gears]
+        values, parts, left = min(fits, key=lambda fit: fit[2])
+        if left > AGREE:
+            continue
+        largest = int(np.argmax(parts))
+        if values[largest] < 0 and all(values[parts > SHOWS] < 0):
+            found.append(
+                Finding(
+                    f"y_{centre} moves against the force of the teeth (support stiffness {values[0]:.3g} N/m, damping"
+                    f" {values[1]:.3g} N s/m, mass {values[2]:.3g} kg; all must be positive): is the sensor the wrong"
+                    " way round? y is positive along the pitch-point velocity"
+                )
+            )
+            continue
+        radius, inertia = look.number(f"base_radius_{centre}"), look.number(f"inertia_{centre}")
+        if radius is None or inertia is None or parts[2] < max(5 * left / np.sqrt(accounts.omega.size), 1e-3):
+            continue
+        ratio = float(values[2]) * radius**2 / inertia
+        if ratio > 0 and not MASS[0] <= ratio <= MASS[1]:
+            found.append(
+                Finding(
+                    f"y_{centre} moves under the force of the teeth like a gear of {values[2]:.3g} kg, but its inertia"
+                    f" is that of {inertia / radius**2:.3g} kg at the base radius (limit a factor {MASS[1]:g}): is"
+                    f" y_{centre} in mm or um?"
+                )
+            )
+    return found
+
+
+def load_torque_alive(look: Look) -> list[Finding]:
+    """A torque that stays constant while the other one swings and both gears turn freely is a dead channel, unless the
+    gears' accelerations confirm it."""
+    if look.record.attrs.get("driven_boundary") != "torque":
+        return []
+    torque = {gear: look.channel(f"torque_{gear}") for gear in ("driver", "driven")}
+    swings = {gear: 0.0 if values is None else float(np.ptp(values)) for gear, values in torque.items()}
+    dead = [gear for gear in torque if swings[gear] <= 1e-9 * max(swings.values())]
+    if len(dead) != 1:
+        return []
+    if accounts_agree(look):
+        return []
+    return [
+        Finding(
+            f"torque_{dead[0]} is constant, while the other torque swings by {max(swings.values()):.3g} N m and both"
+            " gears turn freely: a dead channel, or a load that does not answer; the accelerations of the gears do not"
+            " confirm it",
+            refused=False,
+            error=1.0,
+        )
+    ]
+
+
+def accounts_agree(look: Look) -> bool:
+    """Whether both gears give one force on the teeth, so that the torques are those at the gears."""
+    accounts = accounts_of(look)
+    return accounts is not None and len(accounts.gears) == 2 and float(accounts.misfit(GEARS)[0]) < AGREE
+
+
+def _worst(accounts: Accounts) -> float:
+    return max(float(accounts.misfit(relation)[0]) for relation in accounts.relations())
+
+
+def _suspects(accounts: Accounts, kinds: tuple[str, ...]) -> list[str]:
+    names = set().union(*(accounts.channels(relation) for relation in accounts.relations()))
+    return sorted(name for name in names if name.startswith(kinds))
+
+
+def _explains(before: float, after: float) -> bool:
+    return after < AGREE and after < EXPLAINED * before
+
+
+def _error_of_delay(look: Look, name: str, delay: float) -> float:
+    force, error = look.force, look.dte
+    if force is None or error is None:
+        return 0.0
+    driving, response = look.spectrum(force), look.spectrum(error)
+    lines = look.excited(driving)
+    if not lines.any():
+        return 0.0
+    part, whole = _part(look, name), driving if name.startswith("torque_") else response
+    if part is None:
+        return 0.0
+    turned = np.abs(1 - np.exp(1j * look.omega * delay)) * np.abs(part) / np.maximum(np.abs(whole), 1e-300)
+    turned = np.minimum(turned, 2.0) * np.abs(response)
+    return float(np.linalg.norm(turned[lines]) / np.linalg.norm(response[lines]))
+
+
+def _part(look: Look, name: str) -> Complexes | None:
+    """What a channel contributes to force or DTE (lines,); None where it does not."""
+    quantity, gear = name.split("_")
+    radius = look.number(f"base_radius_{gear}")
+    values = look.swing(gear) if quantity == "angle" else look.channel(name)
+    if values is None or radius is None:
+        return None
+    if quantity == "angle":
+        return look.spectrum(values) * radius
+    if quantity == "y":
+        return look.spectrum(values) * (look.support_factor or 1.0)
+    if look.record.attrs.get("driven_boundary") == "speed":
+        return look.spectrum(values) / radius if gear == "driver" else None
+    radii = [look.number(f"base_radius_{one}") for one in ("driver", "driven")]
+    inertias = [look.number(f"inertia_{one}") for one in ("driver", "driven")]
+    if None in radii or None in inertias:
+        return None
+    r1, r2, j1, j2 = (float(one or 0.0) for one in (*radii, *inertias))
+    mass = j1 * j2 / (j1 * r2**2 + j2 * r1**2)
+    share = mass * (r1 / j1 if gear == "driver" else r2 / j2)
+    return look.spectrum(values) * share

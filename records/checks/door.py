@@ -1,0 +1,83 @@
+"""The checks in their order, and what becomes of what they find."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import xarray as xr
+
+from gearbench.records.checks.angles import angles_keep_mesh_period, angles_roll, angles_unwrapped, radii_fit_teeth
+from gearbench.records.checks.clipping import not_clipped
+from gearbench.records.checks.contradictions import (
+    clocks_agree,
+    displacements_fit,
+    gears_not_swapped,
+    load_torque_alive,
+    torques_fit_inertias,
+)
+from gearbench.records.checks.derived import (
+    centres_alive,
+    dte_alive,
+    response_is_a_gears,
+    stored_as_channels_have_it,
+    swings_fit_the_teeth,
+)
+from gearbench.records.checks.finding import Finding
+from gearbench.records.checks.look import Look
+from gearbench.records.checks.passive import force_feeds_the_rig
+from gearbench.records.checks.periods import periods_repeat
+from gearbench.records.checks.torques import load_balances, torque_as_declared
+from gearbench.records.errors import RecordError
+
+Check = Callable[[Look], list[Finding]]
+
+# What is said first explains most: a record in degrees fails later checks too.
+CHECKS: tuple[Check, ...] = (
+    radii_fit_teeth,
+    angles_unwrapped,
+    angles_roll,
+    angles_keep_mesh_period,
+    torque_as_declared,
+    load_balances,
+    dte_alive,
+    centres_alive,
+    swings_fit_the_teeth,
+    gears_not_swapped,
+    torques_fit_inertias,
+    displacements_fit,
+    force_feeds_the_rig,
+    stored_as_channels_have_it,
+    response_is_a_gears,
+    load_torque_alive,
+    not_clipped,
+    clocks_agree,
+    periods_repeat,
+)
+
+
+def check_record(record: xr.Dataset, source: str = "") -> tuple[Finding, ...]:
+    """What must be said of a record that `validate_record` has passed: findings that are not refused.
+
+    Each check uses the attributes and channels that are there and is silent where it cannot know. Raises RecordError
+    with the sentence of the first finding that is refused; `source` is what the sentence calls the record.
+
+    >>> import gearbench as gb
+    >>> from gearbench.records.checks import check_record
+    >>> record = gb.simulate(gb.read_case("quick_lumped", ["experiment.realisations=1"]))
+    >>> check_record(record)
+    ()
+    >>> record["y_driver"] = -record["y_driver"].assign_attrs(units="m")
+    >>> try:
+    ...     check_record(record)
+    ... except gb.records.RecordError as error:
+    ...     print(str(error)[:46])
+    y_driver moves against the force of the teeth
+    """
+    look = Look(record)
+    found: list[Finding] = []
+    for check in CHECKS:
+        for finding in check(look):
+            if finding.refused:
+                raise RecordError(f"{source}: {finding.sentence}" if source else finding.sentence)
+            found.append(finding)
+    return tuple(found)

@@ -1,0 +1,143 @@
+"""A record as the checks see it: what is known of it, the first realisation's channels and their spectra."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from functools import cached_property
+from math import cos, pi
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from gearbench.records.attributes import numeric_attribute
+from gearbench.records.transmission_error import (
+    AngleOnlyWarning,
+    TransmissionError,
+    dte_of_channels,
+    force_of_torques,
+)
+
+Array = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+GEARS = ("driver", "driven")
+# Lines of a spectrum that the checks use at most, evenly spread: more would not tell more.
+MOST_LINES = 800
+# A line is excited when its force exceeds this part of the strongest line's, the mean apart.
+EXCITED = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class Look:
+    """A record that `validate_record` has passed. How it is wired does not change from realisation to realisation, so
+    that the first one tells it."""
+
+    record: xr.Dataset
+
+    def number(self, name: str) -> float | None:
+        """A numeric attribute, None where the record lacks it. Raises RecordError for text."""
+        return numeric_attribute(self.record.attrs, name)
+
+    def channel(self, name: str) -> Array | None:
+        """Channel (samples,) of the first realisation, None where the record lacks it."""
+        return np.asarray(self.record[name].values[0]) if name in self.record else None
+
+    @property
+    def rate(self) -> float:
+        """Sampling rate [Hz]."""
+        return float(self.record.attrs["sampling_rate"])
+
+    @property
+    def samples(self) -> int:
+        """Samples of a realisation."""
+        return int(self.record.sizes["time"])
+
+    @cached_property
+    def mesh_period(self) -> float | None:
+        """Declared mesh period [s], from the attribute or the channel mesh_phase; None if unknown."""
+        declared = self.number("mesh_period")
+        phase = self.channel("mesh_phase")
+        if declared is None and phase is not None and phase[-1] > phase[0]:
+            declared = (phase.size - 1) / (float(phase[-1] - phase[0]) * self.rate)
+        return declared
+
+    @cached_property
+    def zero_known(self) -> bool:
+        """Whether the angles count from unloaded contact, so that the mean of the DTE means something."""
+        return str(self.record.attrs.get("mesh_phase_origin", "geometry")) == "geometry"
+
+    @cached_property
+    def support_factor(self) -> float | None:
+        """Part of y that acts along the line of action."""
+        if str(self.record.attrs.get("support_direction", "tangential")) == "line-of-action":
+            return 1.0
+        angle = self.number("working_pressure_angle")
+        return None if angle is None else cos(angle)
+
+    def speed(self, gear: str) -> float:
+        """Mean speed [rad/s] of a gear by a linear fit to its angle."""
+        values = self.record[f"angle_{gear}"].values[0]
+        steps = np.arange(values.size) - 0.5 * (values.size - 1)
+        return float(steps @ (values - values.mean()) / (steps @ steps)) * self.rate
+
+    def swing(self, gear: str) -> Array | None:
+        """Departure (samples,) [rad] of a gear's angle from steady rotation at the declared mesh period."""
+        values, teeth = self.channel(f"angle_{gear}"), self.number(f"teeth_{gear}")
+        if values is None or teeth is None or self.mesh_period is None:
+            return None
+        ramp = 2 * pi / (teeth * self.mesh_period * self.rate) * np.arange(values.size)
+        return np.asarray(values - ramp)
+
+    @cached_property
+    def lines(self) -> NDArray[np.int64]:
+        """Lines up to the highest excited one (without excitation: to a quarter of the rate), the mean left out."""
+        driving = self.channel("torque_driver")
+        driving = self.channel("force") if driving is None else driving
+        assert driving is not None  # or the record would not be one
+        size = np.abs(np.fft.rfft(driving - driving.mean()))
+        top = int(np.flatnonzero(size >= EXCITED * size.max())[-1])
+        if size.max() <= 1e-9 * np.abs(driving).sum():
+            top = self.samples // 4
+        step = max(1, top // MOST_LINES)
+        # An odd step meets even and odd lines, and with a comb its lines of either kind.
+        return np.arange(1, max(top, 2) + 1, step + 1 - step % 2)
+
+    @cached_property
+    def omega(self) -> Array:
+        """Angular frequencies [rad/s] of `lines`."""
+        return np.asarray(2 * pi * self.lines * self.rate / self.samples)
+
+    @cached_property
+    def dte(self) -> Array | None:
+        """DTE (samples,) [m] as the channels have it, else as stored; None if it cannot be computed."""
+        first = self.record.isel(realisation=[0])
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", AngleOnlyWarning)
+                return np.asarray(dte_of_channels(first).values[0])
+        except TransmissionError:
+            return self.channel("dte")
+
+    @property
+    def stored_or_own_dte(self) -> Array | None:
+        """DTE (samples,) [m] as identification takes it: stored, else from the channels."""
+        return self.channel("dte") if "dte" in self.record else self.dte
+
+    @cached_property
+    def force(self) -> Array | None:
+        """Force (samples,) [N] as the torques have it, else as stored; None if it cannot be computed."""
+        try:
+            return np.asarray(force_of_torques(self.record.isel(realisation=[0])).values[0])
+        except TransmissionError:
+            return self.channel("force")
+
+    def excited(self, force: Complexes) -> NDArray[np.bool_]:
+        """Which of `lines` the force excites; none where it is constant."""
+        size = np.abs(force)
+        return np.asarray((size >= EXCITED * size.max()) & (size > 0))
+
+    def spectrum(self, values: Array) -> Complexes:
+        """DFT of values (samples,) on `lines`, divided by the number of samples."""
+        return np.asarray(np.fft.rfft(values)[self.lines] / values.size)

@@ -1,0 +1,116 @@
+"""The mesh force as each gear and each support feels it: four accounts of one force.
+
+    F1 = (T1 - J1 theta1'') / rb1      F2 = (T2 + J2 theta2'') / rb2      (Newton's second law of each gear)
+    f F = -(k1 + c1 d/dt + m1 d^2/dt^2) y1 = (k2 + c2 d/dt + m2 d^2/dt^2) y2       (supports; k, c, m unknown)
+
+They hold line by line whatever mesh and excitation are, so that they tell channels apart that contradict one another.
+A rotor behind a soft coupling, ripple of the drive, or strong noise break them too: nothing is concluded from accounts
+that disagree, only from those that agree once one channel is taken for what it is suspected to be.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.records.checks.look import GEARS, Complexes, Look
+
+Array = NDArray[np.float64]
+
+# Signs by which the mesh force acts on y (physics, section 1).
+SIGNS = {"driver": -1.0, "driven": 1.0}
+
+
+@dataclass(frozen=True, eq=False)
+class Accounts:
+    """`gears`: gear -> channel -> its part (lines,) of the force [N]; `centres`: gear -> y (lines,) [m]; `omega`
+    (lines,) [rad/s]."""
+
+    gears: dict[str, dict[str, Complexes]]
+    centres: dict[str, Complexes]
+    omega: Array
+
+    def relations(self) -> list[tuple[str, str]]:
+        """Pairs of accounts: gear against gear, and gear against centre ("y_driver")."""
+        pairs = [("driver", "driven")] if len(self.gears) == 2 else []
+        return pairs + [(gear, f"y_{centre}") for gear in self.gears for centre in self.centres]
+
+    def channels(self, relation: tuple[str, str]) -> set[str]:
+        """Channels that a relation rests on."""
+        first, second = relation
+        return {*self.gears[first], *self.gears.get(second, {second: None})}
+
+    def misfit(self, relation: tuple[str, str], channel: str = "", turn: Complexes | None = None) -> Array:
+        """Disagreement (D,) of two accounts relative to their rms, after `channel` is multiplied by `turn` (D, lines).
+
+        Gear against gear: |F1 - F2| over the mean of both. Gear against centre: what the best k, c, m leave of F.
+        """
+        turn = np.ones((1, self.omega.size), dtype=complex) if turn is None else turn
+        first = self._force(relation[0], channel, turn)
+        if relation[1] in self.gears:
+            second = self._force(relation[1], channel, turn)
+            scale = 0.5 * (np.linalg.norm(first, axis=1) + np.linalg.norm(second, axis=1))
+            return np.asarray(np.linalg.norm(first - second, axis=1) / scale)
+        gear = relation[1].removeprefix("y_")
+        if channel == relation[1]:  # a turned y is a force turned the other way
+            first = first * np.conj(turn / np.abs(turn))
+        columns = self._columns(gear)
+        basis = _orthonormal(columns)
+        inside = (first @ basis.conj()).real
+        total = np.linalg.norm(first, axis=1)
+        return np.asarray(np.sqrt(np.maximum(total**2 - (inside**2).sum(axis=1), 0.0)) / total)
+
+    def support(self, gear: str, centre: str) -> tuple[Array, Array, float]:
+        """k, c, m (3,) of a centre's support [N/m, N s/m, kg] by least squares, the part of the force's rms that each
+        explains (3,), and what they leave of it."""
+        columns = self._columns(centre)
+        force = self._force(gear, "", np.ones((1, self.omega.size), dtype=complex))[0]
+        stacked = np.vstack([columns.real, columns.imag])
+        scale = np.linalg.norm(stacked, axis=0)
+        target = np.concatenate([force.real, force.imag])
+        found = np.linalg.lstsq(stacked / scale, target, rcond=None)[0]
+        left = float(np.linalg.norm(target - stacked / scale @ found) / np.linalg.norm(target))
+        return found / scale, np.abs(found) / np.linalg.norm(target), left
+
+    def _force(self, gear: str, channel: str, turn: Complexes) -> Complexes:
+        parts = [part * turn if name == channel else part[None, :] for name, part in self.gears[gear].items()]
+        return np.asarray(sum(parts) * np.ones_like(turn))
+
+    def _columns(self, centre: str) -> Complexes:
+        y = SIGNS[centre] * self.centres[centre]
+        return np.stack([y, 1j * self.omega * y, -(self.omega**2) * y], axis=1)
+
+
+def accounts_of(look: Look) -> Accounts | None:
+    """The accounts that a record allows; None where there are not two of them."""
+    held = look.record.attrs.get("driven_boundary") == "speed"
+    gears: dict[str, dict[str, Complexes]] = {}
+    for gear, sign in zip(GEARS, (1.0, -1.0), strict=True):
+        torque, swing = look.channel(f"torque_{gear}"), look.swing(gear)
+        radius, inertia = look.number(f"base_radius_{gear}"), look.number(f"inertia_{gear}")
+        if torque is None or radius is None:
+            continue
+        parts = {f"torque_{gear}": look.spectrum(torque) / radius}
+        if swing is not None and inertia is not None:
+            parts[f"angle_{gear}"] = sign * inertia / radius * look.omega**2 * look.spectrum(swing)
+        elif not (held and gear == "driven"):  # a gear that turns steadily needs no inertia
+            continue
+        if any(np.any(part) for part in parts.values()):
+            gears[gear] = parts
+    centres = {}
+    for gear in GEARS:
+        y = look.channel(f"y_{gear}")
+        if y is not None and np.ptp(y) > 0.0:
+            centres[gear] = look.spectrum(y)
+    accounts = Accounts(gears, centres, look.omega)
+    return accounts if accounts.relations() else None
+
+
+def _orthonormal(columns: Complexes) -> Complexes:
+    """Columns (lines, 3) made orthonormal under the real scalar product Re(a* b)."""
+    stacked = np.vstack([columns.real, columns.imag])
+    q, _ = np.linalg.qr(stacked / np.maximum(np.linalg.norm(stacked, axis=0), np.finfo(float).tiny))
+    half = len(columns)
+    return np.asarray(q[:half] + 1j * q[half:])

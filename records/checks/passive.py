@@ -1,0 +1,62 @@
+"""A torque that shakes a rig feeds it: no rig gives back what it was never given."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.records.checks.contradictions import accounts_agree, clocks_agree
+from gearbench.records.checks.finding import Finding
+from gearbench.records.checks.look import GEARS, Look
+
+# Cosine between force and rate of the transmission error over the excited lines. At the gears themselves a passive rig
+# has it at 0 or above; the gear centres, on which the force does not work, may bring dte a little below.
+LIMIT = -0.1
+
+
+def force_feeds_the_rig(look: Look) -> list[Finding]:
+    """The excitation does positive work on the transmission error: mean of F d/dt over the excited lines >= 0.
+
+    Behind a soft coupling the torque of the drive may well work against the gear. So a negative cosine counts where the
+    balance of both gears says that the torques are theirs, or where the means are opposed too; where the zero of the
+    dte is arbitrary it is only said. A delay that is found elsewhere explains it.
+    """
+    force = look.force
+    if force is None or float(np.ptp(force)) <= 1e-9 * float(np.abs(force).max()):
+        return []
+    rolled = _rolled(look)
+    error, name = (rolled, "angles") if rolled is not None else (look.channel("dte"), "dte")
+    cosine = 0.0 if error is None else _cosine(look, force, error)
+    if error is None or cosine >= LIMIT or clocks_agree(look):
+        return []
+    whole = look.stored_or_own_dte
+    opposed = whole is not None and look.zero_known and float(whole.mean()) * float(force.mean()) < 0
+    certain = opposed or accounts_agree(look)
+    if not certain and (look.zero_known or name == "angles"):
+        return []
+    return [
+        Finding(
+            f"the {name} move against the torque that shakes them: the cosine between force and rate is {cosine:.2f}"
+            f" (limit {LIMIT:g}), as if the rig fed the drive: are driver and driven swapped, is a sign reversed, or a"
+            " channel shifted in time?",
+            refused=certain,
+            error=0.0 if certain else 1.0,
+        )
+    ]
+
+
+def _cosine(look: Look, force: NDArray[np.float64], error: NDArray[np.float64]) -> float:
+    driving = look.spectrum(force)
+    lines = look.excited(driving)
+    driving, rate = driving[lines], (1j * look.omega * look.spectrum(error))[lines]
+    size = float(np.linalg.norm(driving) * np.linalg.norm(rate))
+    return float(np.vdot(driving, rate).real) / size if size > 0 else 0.0
+
+
+def _rolled(look: Look) -> NDArray[np.float64] | None:
+    """rb1 theta1 - rb2 theta2 (samples,) [m]."""
+    angles = [look.channel(f"angle_{gear}") for gear in GEARS]
+    radii = [look.number(f"base_radius_{gear}") for gear in GEARS]
+    if angles[0] is None or angles[1] is None or radii[0] is None or radii[1] is None:
+        return None
+    return np.asarray(radii[0] * angles[0] - radii[1] * angles[1])
