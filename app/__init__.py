@@ -18,7 +18,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from gearbench.bench import Comparison, compare, simulate, static
+    from gearbench.bench import Comparison, compare, convert, simulate, static
     from gearbench.cases import read_case
     from gearbench.identification import (
         IdentificationSettings,
@@ -42,6 +42,7 @@ _HOMES = {
     "Comparison": "gearbench.bench",
     "IdentificationSettings": "gearbench.identification",
     "compare": "gearbench.bench",
+    "convert": "gearbench.bench",
     "dte": "gearbench.identification",
     "dump_case": "gearbench.rig",
     "force": "gearbench.identification",
@@ -77,6 +78,7 @@ __all__ = [
     "Comparison",
     "IdentificationSettings",
     "compare",
+    "convert",
     "dte",
     "dump_case",
     "force",

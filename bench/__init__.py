@@ -6,10 +6,11 @@ model. `stress`: fields and root stress. `results`: frequency responses of cases
 models for other programs.
 """
 
+from gearbench.bench.convert import convert
 from gearbench.bench.errors import BenchError
 from gearbench.bench.results.compare import Results, Row
 from gearbench.bench.results.comparison import Comparison, compare
 from gearbench.bench.simulate import simulate
 from gearbench.bench.static import static
 
-__all__ = ["BenchError", "Comparison", "Results", "Row", "compare", "simulate", "static"]
+__all__ = ["BenchError", "Comparison", "Results", "Row", "compare", "convert", "simulate", "static"]

@@ -34,6 +34,7 @@ MAY_IMPORT: dict[str, set[str]] = {
 ROOMS: dict[str, tuple[str, ...]] = {
     "rig": ("casefile",),
     "geometry": ("tooth", "pair", "mesh", "export"),
+    "records": ("formats", "conversion"),
     "fem": ("gear", "contact", "motion", "stress"),
     "lumped": ("stiffness", "linear", "nonlinear"),
     "identification": ("excitation", "spectra", "lpm", "truth", "response"),
