@@ -22,6 +22,8 @@ def read_tdms(path: Path) -> Source:
             file = TdmsFile.read(path)
     except Exception as reason:  # the reader has no error of its own
         raise RecordError(f"{path} is truncated or no TDMS file ({reason})") from reason
+    if file.file_status.incomplete_final_segment:
+        raise RecordError(f"{path} is truncated: its last segment is incomplete")
     groups = file.groups()
     names = [{channel.name for channel in group.channels()} for group in groups if group.channels()]
     # Groups that share no name are one run, those that share all are runs; in between names say their group.

@@ -107,6 +107,10 @@ def _head(path: Path, lines: list[str], layout: _Layout) -> tuple[list[str], lis
     while last and not last[-1]:
         last.pop()  # a separator at the end of every line
     before = layout.cells(texts[-2]) if len(texts) > 1 else []
+    while before and not before[-1]:
+        before.pop()
+    if 1 < len(last) < len(before) and _are_units(last):
+        last += [""] * (len(before) - len(last))
     if len(before) == len(last) and len(last) > 1 and _are_units(last):
         return before, [unit.strip("[]()") or None for unit in last]
     names: list[str] = []
