@@ -46,12 +46,14 @@ def common_clock(signals: Sequence[Signal], attributes: Mapping[str, float | str
     skipped = float(attributes.get("start", 0.0))
     begin, end = max(clock.start for clock in clocks), min(clock.end for clock in clocks)
     begin, held = _span(begin + skipped, end, rate, reference)
-    wanted = int(attributes.get("periods", max(held // samples, 1)))
-    if held < wanted * samples and reference is not None:
+    asked = attributes.get("periods")
+    if reference is not None and (asked is None or held < int(asked) * samples):
         first, more = _span(reference.start + skipped, reference.end, rate, reference)
-        if more >= wanted * samples and all(_repeats(clock, first, more, rate, samples / rate) for clock in clocks):
+        whole = more // samples > held // samples
+        if whole and all(_repeats(clock, first, more, rate, samples / rate) for clock in clocks):
             notes.append("channels that begin later or end earlier go on with the excitation period")
             begin, held = first, more
+    wanted = int(asked) if asked is not None else max(held // samples, 1)
     if held < wanted * samples:
         raise RecordError(
             f"the channels share {held} samples at {rate:.9g} Hz, less than the {wanted} x {samples} that {wanted}"
@@ -70,6 +72,14 @@ def _rate(signals: Sequence[Signal], attributes: Mapping[str, float | str], note
     uniform = [signal.clock.rate for signal in signals if signal.clock.time is None]
     rate = float(attributes.get("sampling_rate", max(uniform or [signal.clock.rate for signal in signals])))
     if "samples_per_period" in attributes:
+        # Samples of which clock? Where there are several, only a declared rate tells.
+        one_clock = len(uniform) == len(signals) and max(uniform) - min(uniform) <= 1e-9 * rate
+        if "sampling_rate" not in attributes and not one_clock:
+            given = ", ".join(f"{name} {clock}" for name, clock in _clocks_in_words(signals))
+            raise RecordError(
+                f"the channels have different clocks ({given}): say sampling_rate_hz beside samples_per_period, or"
+                " excitation_period_s in its place"
+            )
         return rate, int(attributes["samples_per_period"])
     period = float(attributes["excitation_period"])
     samples = round(period * rate)
@@ -80,6 +90,10 @@ def _rate(signals: Sequence[Signal], attributes: Mapping[str, float | str], note
         return rate, samples
     notes.append(f"the clock is {exact:.9g} Hz, so that an excitation period has {samples} samples")
     return exact, samples
+
+
+def _clocks_in_words(signals: Sequence[Signal]) -> list[tuple[str, str]]:
+    return [(one.name, f"{one.clock.rate:.9g} Hz" if one.clock.time is None else "single times") for one in signals]
 
 
 def _reference(clocks: Sequence[Clock], rate: float) -> Clock | None:

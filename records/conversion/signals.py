@@ -124,7 +124,8 @@ def _clock(
     column: Column, spec: ChannelSpec, source: Source, attributes: Mapping[str, float | str], notes: list[str]
 ) -> Clock:
     """The clock of a column: its own, the map's, or the file's."""
-    chosen = spec.time or (None if column.time is not None or column.rate else attributes.get("time"))
+    own = column.time is not None or column.rate or spec.sampling_rate
+    chosen = spec.time or (None if own else attributes.get("time"))
     if chosen is not None:
         times = find_column(source, str(chosen), "time")
         unit = unit_of(times.unit or "s", f"column {times.name}")
@@ -147,6 +148,7 @@ def _clock(
                 f"column {column.name} has neither times nor a sampling rate: give [record] time or sampling_rate_hz"
             )
         _check_equal(column, source)
+        notes.append(f"the file has no clock: its samples are taken at {float(declared):.9g} Hz, as declared")
         return Clock(column.start, float(declared), column.samples)
     return Clock(column.start, _exact_rate(rate, column.rate_tolerance, declared, notes), column.samples)
 
