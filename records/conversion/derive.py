@@ -182,12 +182,15 @@ def say_locations(work: Assembly) -> None:
             work.details[name]["delay_corrected"] = spec.delay
         if spec.pulses_per_revolution is not None:
             work.details[name]["pulses_per_revolution"] = spec.pulses_per_revolution
-        if name not in ("torque_driver", "torque_driven") or spec.location in ("gear", "outermost"):
-            continue
-        where = "its location is not given" if spec.location is None else f"its location is {spec.location!r}"
+    places = {
+        name: spec.location or "not given"
+        for name, spec in work.channel_map.channels.items()
+        if name in ("torque_driver", "torque_driven") and spec.location not in ("gear", "outermost")
+    }
+    if places:
         work.notes.append(
-            f"{name} is recorded as the torque at the outermost inertia, unchanged, and {where}: shaft torque is not"
-            " gear torque while a coupling is unmodelled"
+            f"{' and '.join(places)} (location: {', '.join(places.values())}) stand for torques at the outermost"
+            " inertia, unchanged: shaft torque is not gear torque while a coupling is unmodelled"
         )
 
 
