@@ -18,7 +18,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from gearbench.bench import Comparison, compare, simulate, static
+    from gearbench.bench import Comparison, compare, convert, simulate, static
     from gearbench.cases import read_case
     from gearbench.diagnosis import diagnose
     from gearbench.identification import (
@@ -43,6 +43,7 @@ _HOMES = {
     "Comparison": "gearbench.bench",
     "IdentificationSettings": "gearbench.identification",
     "compare": "gearbench.bench",
+    "convert": "gearbench.bench",
     "diagnose": "gearbench.diagnosis",
     "dte": "gearbench.identification",
     "dump_case": "gearbench.rig",
@@ -79,6 +80,7 @@ __all__ = [
     "Comparison",
     "IdentificationSettings",
     "compare",
+    "convert",
     "diagnose",
     "dte",
     "dump_case",

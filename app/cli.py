@@ -15,6 +15,7 @@ from gearbench.commands.cases import cases
 from gearbench.commands.challenge import challenge
 from gearbench.commands.check import check
 from gearbench.commands.compare import compare
+from gearbench.commands.convert import convert
 from gearbench.commands.diagnose import diagnose
 from gearbench.commands.identify import identify
 from gearbench.commands.mesh import mesh
@@ -35,7 +36,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
-for command in (run, simulate, static, identify, compare, diagnose, check, mesh, cases, schema, validate):
+for command in (run, simulate, static, convert, identify, compare, diagnose, check, mesh, cases, schema, validate):
     app.command()(command)
 app.add_typer(challenge)
 

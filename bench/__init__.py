@@ -3,7 +3,8 @@
 `models`: the list of models; `protocol`: what a model is; `experiment`: one experiment, whatever the model. `plan`:
 schedule, torque, settling and workers. `record`: what a record says of its rig, sensors. `refusals`: what cannot be
 asked for, found before work begins. `linear`, `nonlinear`, `elastic`: the models. `stress`: fields and root stress.
-`results`: frequency responses of cases, single numbers, comparisons. `export`: models for other programs.
+`results`: frequency responses of cases, single numbers, comparisons. `export`: models for other programs. `conversion`:
+measured files become records.
 """
 
 from __future__ import annotations
@@ -14,18 +15,20 @@ from typing import TYPE_CHECKING, Any
 from gearbench.bench.errors import BenchError
 
 if TYPE_CHECKING:
+    from gearbench.bench.conversion import convert
     from gearbench.bench.experiment import simulate
     from gearbench.bench.results.compare import Results, Row
     from gearbench.bench.results.comparison import Comparison, compare
     from gearbench.bench.statics import static
 
-__all__ = ["BenchError", "Comparison", "Results", "Row", "compare", "simulate", "static"]
+__all__ = ["BenchError", "Comparison", "Results", "Row", "compare", "convert", "simulate", "static"]
 
 _HOMES = {
     "Comparison": "gearbench.bench.results.comparison",
     "Results": "gearbench.bench.results.compare",
     "Row": "gearbench.bench.results.compare",
     "compare": "gearbench.bench.results.comparison",
+    "convert": "gearbench.bench.conversion",
     "simulate": "gearbench.bench.experiment",
     "static": "gearbench.bench.statics",
 }

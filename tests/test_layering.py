@@ -33,7 +33,7 @@ MAY_IMPORT: dict[str, set[str]] = {
 # that is not named here has no rooms.
 ROOMS: dict[str, tuple[str, ...]] = {
     "rig": ("casefile",),
-    "records": ("checks",),
+    "records": ("checks", "formats", "conversion"),
     "geometry": ("tooth", "pair", "mesh", "export"),
     "fem": ("gear", "contact", "motion", "stress"),
     "lumped": ("stiffness", "linear", "nonlinear"),

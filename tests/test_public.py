@@ -21,6 +21,7 @@ ROOT = Path(__file__).resolve().parent.parent
 # What users may rely on: every public name; of functions the parameters. A change here is a change of the interface.
 FUNCTIONS: dict[str, tuple[str, ...]] = {
     "compare": ("a", "b"),
+    "convert": ("files", "channel_map", "case", "condition", "progress"),
     "diagnose": ("records", "nominal", "held_out", "without", "progress", "quick"),
     "dte": ("record",),
     "dump_case": ("case",),

@@ -1,0 +1,95 @@
+"""HDF5 and NetCDF-4, and the HDF5 that MATLAB writes with -v7.3: arrays anywhere in the tree are columns."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gearbench.records.errors import RecordError
+from gearbench.records.formats.source import Column, Source, make_column
+
+if TYPE_CHECKING:
+    import h5py
+
+_UNIT_NAMES = ("units", "unit", "Unit", "Units", "UNIT")
+_RATE_NAMES = ("sampling_rate", "sample_rate", "fs")
+
+
+def read_hdf(path: Path) -> Source:
+    """Arrays of an HDF5 or NetCDF-4 file, named by their path with dots; attributes of the root and single values
+    are facts. Texts, references and compound types are no columns and are never decoded. Raises RecordError."""
+    import h5py
+
+    columns: list[Column] = []
+    facts: dict[str, float | str] = {}
+    skipped: dict[str, str] = {}
+
+    def visit(name: str, item: Any) -> None:
+        if name.startswith("#"):  # where MATLAB keeps what its cells point to
+            return
+        if (isinstance(item, h5py.Dataset) and item.attrs.get("CLASS") != b"DIMENSION_SCALE") or _is_signal(item):
+            _take(name.replace("/", "."), item, columns, facts, skipped)
+
+    try:
+        with h5py.File(path, "r") as file:
+            facts.update(_attributes(file))
+            file.visititems(visit)
+            matlab = any("MATLAB_class" in item.attrs for item in file.values())
+    except RecordError:
+        raise
+    except Exception as reason:  # damaged trees end in errors of many kinds
+        raise RecordError(f"{path} is truncated or no HDF5 file ({_first_line(reason)})") from reason
+    return Source(path, "MAT 7.3" if matlab else "HDF5", tuple(columns), facts, skipped)
+
+
+def _is_signal(item: Any) -> bool:
+    """A scale with values of its own, as `time` is; NetCDF-4 stores sizes without a variable as scales too."""
+    name = str(item.attrs.get("NAME", b""))
+    return item.attrs.get("CLASS") == b"DIMENSION_SCALE" and "not a netCDF variable" not in name
+
+
+def _take(
+    name: str, item: h5py.Dataset, columns: list[Column], facts: dict[str, float | str], skipped: dict[str, str]
+) -> None:
+    kind = _text(item.attrs.get("MATLAB_class", b""))
+    if item.attrs.get("MATLAB_empty", 0):
+        skipped[name] = "is empty"
+    elif kind == "char":
+        facts[name] = "".join(map(chr, np.ravel(item[()]).astype(int)))
+    elif kind in ("cell", "struct", "table", "string") or item.dtype.kind not in "fiub":
+        skipped[name] = f"is of type {kind or item.dtype}, not an array of real numbers"
+    elif item.size == 1:
+        facts[name] = float(np.ravel(item[()])[0])
+    elif item.size == 0:
+        skipped[name] = "is empty"
+    else:
+        rate = next((float(item.attrs[key]) for key in _RATE_NAMES if _is_number(item.attrs.get(key))), None)
+        unit = next((_text(item.attrs[key]) for key in _UNIT_NAMES if key in item.attrs), None)
+        try:
+            columns.append(make_column(name, item[()], unit=unit or None, rate=rate))
+        except RecordError as reason:
+            skipped[name] = str(reason)
+
+
+def _attributes(file: h5py.File) -> dict[str, float | str]:
+    found: dict[str, float | str] = {}
+    for key, value in file.attrs.items():
+        if isinstance(value, str | bytes):
+            found[key] = _text(value)
+        elif _is_number(value):
+            found[key] = float(np.ravel(value)[0])
+    return found
+
+
+def _is_number(value: object) -> bool:
+    return value is not None and np.size(value) == 1 and np.asarray(value).dtype.kind in "fiu"  # type: ignore[arg-type]
+
+
+def _text(value: object) -> str:
+    return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
+
+
+def _first_line(reason: Exception) -> str:
+    return str(reason).splitlines()[0][:200] if str(reason) else type(reason).__name__

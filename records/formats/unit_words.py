@@ -1,0 +1,98 @@
+"""Words for units, as measuring programs write them: what they measure, and their size in SI."""
+
+from __future__ import annotations
+
+import difflib
+from dataclasses import dataclass
+from math import pi
+
+from gearbench.records.errors import RecordError
+
+_G = 9.80665  # standard gravity [m/s^2]
+_DEG = pi / 180
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit: value in SI = factor x (number + zero)."""
+
+    word: str
+    quantity: str
+    factor: float
+    zero: float = 0.0
+
+
+# Quantity -> its SI unit first, then others with their size in it. Case counts (Nm and nm, mN and MN).
+_WORDS: dict[str, dict[str, float]] = {
+    "time": {"s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0},
+    "angle": {
+        "rad": 1.0, "mrad": 1e-3, "urad": 1e-6, "deg": _DEG, "degree": _DEG, "degrees": _DEG, "Grad": _DEG,
+        "mdeg": 1e-3 * _DEG, "arcmin": _DEG / 60, "arcsec": _DEG / 3600, "rev": 2 * pi, "revs": 2 * pi,
+        "turn": 2 * pi, "turns": 2 * pi, "Umdr": 2 * pi, "U": 2 * pi,
+    },
+    "angular speed": {
+        "rad/s": 1.0, "deg/s": _DEG, "rpm": pi / 30, "RPM": pi / 30, "rev/min": pi / 30, "1/min": pi / 30,
+        "r/min": pi / 30, "U/min": pi / 30, "min^-1": pi / 30, "rev/s": 2 * pi, "rps": 2 * pi,
+    },
+    "angular acceleration": {"rad/s^2": 1.0, "deg/s^2": _DEG},
+    "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "micron": 1e-6, "nm": 1e-9, "in": 0.0254, "mil": 2.54e-5},
+    "speed": {"m/s": 1.0, "mm/s": 1e-3, "um/s": 1e-6, "in/s": 0.0254},
+    "acceleration": {
+        "m/s^2": 1.0, "mm/s^2": 1e-3, "um/s^2": 1e-6, "g": _G, "gn": _G, "mg": 1e-3 * _G, "in/s^2": 0.0254,
+    },
+    "force": {"N": 1.0, "kN": 1e3, "mN": 1e-3, "MN": 1e6, "lbf": 4.4482216152605, "kgf": _G},
+    "torque": {
+        "N m": 1.0, "kN m": 1e3, "mN m": 1e-3, "N mm": 1e-3, "N cm": 1e-2, "MN m": 1e6, "lbf ft": 1.3558179483314,
+        "ft lbf": 1.3558179483314, "lbf in": 0.1129848290276, "in lbf": 0.1129848290276, "kgf m": _G,
+    },
+    "temperature": {"K": 1.0, "degC": 1.0, "C": 1.0, "degF": 5 / 9},
+    "mesh cycles": {"cycles": 1.0},
+    "count": {"pulses": 1.0, "pulse": 1.0, "counts": 1.0, "count": 1.0, "ticks": 1.0, "Impulse": 1.0},
+    "quadrature count": {"quadrature counts": 1.0},
+    "pulse time": {"pulse times s": 1.0, "pulse times ms": 1e-3, "pulse times us": 1e-6},
+    "level": {"quadrature levels": 1.0, "V": 1.0, "TTL": 1.0},
+    "number": {"1": 1.0},
+}  # fmt: skip
+_ZEROS = {"degC": 273.15, "C": 273.15, "degF": 459.67}
+# What writers use instead of a word's letters, in the order of replacement.
+_SPELLINGS = (
+    ("\u00b5", "u"), ("\u03bc", "u"), ("\u00c2", ""), ("\u00b0", "deg"), ("\u00b2", "^2"), ("**", "^"),
+    ("\u22c5", " "), ("\u00b7", " "), ("*", " "), ("\u00b9", "1"), ("\u207b", "^-"),
+)  # fmt: skip
+
+
+def _key(word: str) -> str:
+    """A word without what writers do differently: blanks, dots and hyphens between factors."""
+    for old, new in _SPELLINGS:
+        word = word.replace(old, new)
+    word = word.strip().strip("[]()").replace("s2", "s^2").replace("s^-2", "/s^2").replace("s^-1", "/s")
+    word = word.replace("//", "/").replace("min^-1", "1/min").replace("min-1", "1/min")
+    return word.replace(" ", "").replace(".", "").replace("-", "").replace("_", "")
+
+
+_UNITS = {
+    _key(word): Unit(word, quantity, factor, _ZEROS.get(word, 0.0))
+    for quantity, words in _WORDS.items()
+    for word, factor in words.items()
+}
+
+
+def is_unit(word: str) -> bool:
+    """Whether the word is a known unit."""
+    return _key(word) in _UNITS
+
+
+def unit_of(word: str, where: str) -> Unit:
+    """The unit that a word means; `where` begins the sentence of the RecordError for an unknown one."""
+    key = _key(word)
+    if key in _UNITS:
+        return _UNITS[key]
+    words = [known for words in _WORDS.values() for known in words]
+    near = difflib.get_close_matches(word, words, n=1, cutoff=0.5)
+    hint = f"; did you mean {near[0]!r}?" if near else f"; units are {', '.join(words)}"
+    raise RecordError(f"{where} has the unit {word!r}, which is not known{hint}")
+
+
+def si_word(quantity: str) -> str:
+    """The SI unit of a quantity."""
+    return next(iter(_WORDS[quantity]))
