@@ -1,6 +1,7 @@
 """What comes back from a rig: the record, its channels, its file and its provenance.
 
-`formats`: files of measuring programs, one importer each. `conversion`: from their columns to a record.
+`checks`: what a record alone tells of its own faults. `formats`: files of measuring programs, one importer each.
+`conversion`: from their columns to a record.
 """
 
 from gearbench.records.channels import unit_of_channel

@@ -1,4 +1,7 @@
-"""Dynamic transmission error (DTE) and generalised force from the channels of a record (physics, section 1)."""
+"""Dynamic transmission error (DTE) and generalised force from the channels of a record.
+
+Formulas: docs/physics.md, "Axes, signs, zeros".
+"""
 
 from __future__ import annotations
 

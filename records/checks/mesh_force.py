@@ -19,7 +19,7 @@ from gearbench.records.checks.look import GEARS, Complexes, Look
 
 Array = NDArray[np.float64]
 
-# Signs by which the mesh force acts on y (physics, section 1).
+# Signs by which the mesh force acts on y (docs/physics.md, "Axes, signs, zeros").
 SIGNS = {"driver": -1.0, "driven": 1.0}
 
 
