@@ -67,8 +67,7 @@ def summary_lines(summary: dict[str, Any]) -> Iterator[str]:
     yield (
         f"{', '.join(summary['files'])}: {', '.join(summary['channels'])}; {summary['realisations']} realisation(s) of"
         f" {summary['periods']} period(s) of {summary['samples_per_period']} samples at"
-        f" {summary['sampling_rate_hz']:g} Hz"
-        + (f", mesh {mesh:.6g} Hz" if mesh else "")
+        f" {summary['sampling_rate_hz']:g} Hz" + (f", mesh {mesh:.6g} Hz" if mesh else "")
     )
     for warning in summary["warnings"]:
         yield f"warning: {warning}"

@@ -144,7 +144,7 @@ def parse_map(table: Mapping[str, Any]) -> ChannelMap:
         for name, entry in _table(table.get("channel", {}), "channel").items()
     }
     if not channels:
-        raise RecordError("the table channel is empty: [channel.NAME] with column = \"...\" names each one")
+        raise RecordError('the table channel is empty: [channel.NAME] with column = "..." names each one')
     return ChannelMap(channels, attributes)
 
 

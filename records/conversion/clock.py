@@ -18,7 +18,11 @@ UNIFORM = 1e-3
 LONGEST_GAP = 4.0
 # Half the width of the interpolation kernel [samples of the slower clock], and its Kaiser shape (100 dB).
 HALF_WIDTH, KAISER = 32, 10.0
+# What varies by less than this part of a signal's size is rounding.
+ROUNDING = 1e-11
 _CHUNK = 8192
+# So many samples of the way back tell the error.
+_TRIED = 20_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,14 +118,16 @@ def resampled(
     repeat = _whole_samples(period, clock.rate, values.shape[1])
     positions = first + np.arange(samples, dtype=np.float64) * (clock.rate / rate)
     cut = min(1.0, rate / clock.rate)
-    out = _convolved(swing, positions, cut, repeat, lambda part: progress(0.5 * part))
+    out = _convolved(swing, positions, cut, repeat, progress)
     # There and back: positions of the old samples on the new clock.
     inside = np.arange(max(0, ceil(first)), min(values.shape[1], int(first + samples * clock.rate / rate)))
-    middle = inside[len(inside) // 20 : len(inside) - len(inside) // 20]
+    edge = max(len(inside) // 20, (len(inside) - _TRIED) // 2)
+    middle = inside[edge : len(inside) - edge]
     at = (middle - first) * rate / clock.rate
-    back = _convolved(out, at, min(1.0, clock.rate / rate), None, lambda part: progress(0.5 + 0.5 * part))
+    back = _convolved(out, at, min(1.0, clock.rate / rate), None, lambda part: None)
     size = float(swing[:, middle].std())
-    error = float(np.sqrt(np.mean((back - swing[:, middle]) ** 2))) / size if size > 0 else 0.0
+    there = size > ROUNDING * float(np.abs(values).max())
+    error = float(np.sqrt(np.mean((back - swing[:, middle]) ** 2))) / size if there else 0.0
     return out + slope * positions / clock.rate, error
 
 
@@ -149,6 +155,8 @@ def _convolved(
     values: Array, positions: Array, cut: float, repeat: int | None, progress: Callable[[float], None]
 ) -> Array:
     """Values (runs, n) between their samples, at positions in samples; `cut`: pass band over the Nyquist frequency."""
+    from scipy.special import i0
+
     half = ceil(HALF_WIDTH / cut)
     taps = np.arange(-half + 1, half + 1)
     out = np.empty((values.shape[0], positions.size))
@@ -156,7 +164,7 @@ def _convolved(
         part = positions[begin : begin + _CHUNK]
         base = np.floor(part).astype(np.int64)
         distance = (part - base)[:, np.newaxis] - taps
-        window = np.i0(KAISER * np.sqrt(np.clip(1 - (distance / half) ** 2, 0.0, None)))
+        window = i0(KAISER * np.sqrt(np.clip(1 - (distance / half) ** 2, 0.0, None)))
         weights = np.sinc(cut * distance) * window
         weights /= weights.sum(axis=1, keepdims=True)
         index = base[:, np.newaxis] + taps

@@ -73,7 +73,7 @@ def _rate(signals: Sequence[Signal], attributes: Mapping[str, float | str], note
     rate = float(attributes.get("sampling_rate", max(uniform or [signal.clock.rate for signal in signals])))
     if "samples_per_period" in attributes:
         # Samples of which clock? Where there are several, only a declared rate tells.
-        one_clock = len(uniform) == len(signals) and max(uniform) - min(uniform) <= 1e-9 * rate
+        one_clock = bool(uniform) and max(uniform) - min(uniform) <= 1e-9 * rate
         if "sampling_rate" not in attributes and not one_clock:
             given = ", ".join(f"{name} {clock}" for name, clock in _clocks_in_words(signals))
             raise RecordError(

@@ -39,6 +39,7 @@ from gearbench.records.record import make_record
 
 Progress = Callable[[float, str], None]
 
+
 def read_sources(paths: Sequence[str | Path]) -> Source:
     """Several files as one: with the same columns they are runs, with different ones parts of one measurement.
 
@@ -86,9 +87,7 @@ def convert_sources(
     if missing:
         raise RecordError(f"the record needs {', '.join(missing)}: give them in [record] of the channel map, or a case")
     notes: list[str] = []
-    signals = [
-        signal_of(name, spec, source, attributes, notes) for name, spec in channel_map.channels.items()
-    ]
+    signals = [signal_of(name, spec, source, attributes, notes) for name, spec in channel_map.channels.items()]
     runs = {signal.name: signal.values.shape[0] for signal in signals}
     if len(set(runs.values())) > 1:
         raise RecordError(f"channels differ in their number of runs: {runs}")

@@ -46,9 +46,7 @@ class Assembly:
         return None if teeth is None else float(teeth)
 
 
-def put_on_clock(
-    work: Assembly, signal: Signal, mesh_period: float | None, progress: Callable[[float], None]
-) -> None:
+def put_on_clock(work: Assembly, signal: Signal, mesh_period: float | None, progress: Callable[[float], None]) -> None:
     """Bring a signal onto the record's clock, and say what that did to it."""
     common, said = work.common, work.details.setdefault(signal.name, {})
     work.channels[signal.name], error = resampled(
@@ -187,10 +185,13 @@ def say_locations(work: Assembly) -> None:
         for name, spec in work.channel_map.channels.items()
         if name in ("torque_driver", "torque_driven") and spec.location not in ("gear", "outermost")
     }
+    lonely = {"y_driver", "y_driven"} & set(work.channels)
+    if len(lonely) == 1 and "dte" not in work.channels:
+        work.notes.append(f"only {lonely.pop()} of y_driver and y_driven is there, and identify needs both for the DTE")
     if places:
         work.notes.append(
-            f"{' and '.join(places)} (location: {', '.join(places.values())}) stand for torques at the outermost"
-            " inertia, unchanged: shaft torque is not gear torque while a coupling is unmodelled"
+            f"{' and '.join(places)} (location: {', '.join(places.values())}): recorded unchanged, as at the outermost"
+            " inertia: shaft torque is not gear torque while a coupling is unmodelled"
         )
 
 

@@ -183,9 +183,7 @@ def _pulses(name: str, spec: ChannelSpec, column: Column, unit: Unit, where: str
     return Signal(name, spec.sign * angle[np.newaxis], clock, turns=True, absolute=False)
 
 
-def _encoder(
-    name: str, spec: ChannelSpec, columns: Sequence[Column], clock: Clock, unit: Unit, where: str
-) -> Signal:
+def _encoder(name: str, spec: ChannelSpec, columns: Sequence[Column], clock: Clock, unit: Unit, where: str) -> Signal:
     """Angle from counts, or from one or two sampled tracks."""
     pulses = _per_turn(spec, where)
     values = columns[0].values

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gearbench.records.errors import RecordError
-from gearbench.records.formats.source import Column, Source, make_column
+from gearbench.records.formats.source import Column, Source, first_line, make_column
 
 if TYPE_CHECKING:
     import h5py
@@ -40,7 +40,7 @@ def read_hdf(path: Path) -> Source:
     except RecordError:
         raise
     except Exception as reason:  # damaged trees end in errors of many kinds
-        raise RecordError(f"{path} is truncated or no HDF5 file ({_first_line(reason)})") from reason
+        raise RecordError(f"{path} is truncated or no HDF5 file ({first_line(reason)})") from reason
     return Source(path, "MAT 7.3" if matlab else "HDF5", tuple(columns), facts, skipped)
 
 
@@ -89,7 +89,3 @@ def _is_number(value: object) -> bool:
 
 def _text(value: object) -> str:
     return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
-
-
-def _first_line(reason: Exception) -> str:
-    return str(reason).splitlines()[0][:200] if str(reason) else type(reason).__name__

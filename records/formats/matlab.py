@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import warnings
 from pathlib import Path
 from typing import Any
@@ -9,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from gearbench.records.errors import RecordError
-from gearbench.records.formats.source import Column, Source, make_column
+from gearbench.records.formats.source import Column, Source, first_line, make_column
 
 _DEEPEST = 5
 
@@ -19,12 +21,13 @@ def read_mat(path: Path) -> Source:
     objects, tables and sparse matrices are no columns. Raises RecordError."""
     from scipy.io import loadmat
 
+    _try_apart(path)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of objects, which are said to be skipped
             variables = loadmat(path, appendmat=False)
     except Exception as reason:  # damaged files end in errors of many kinds
-        raise RecordError(f"{path} is truncated or no MAT-file ({str(reason).splitlines()[0][:200]})") from reason
+        raise RecordError(f"{path} is truncated or no MAT-file ({first_line(reason)})") from reason
     columns: list[Column] = []
     facts: dict[str, float | str] = {}
     skipped: dict[str, str] = {}
@@ -34,6 +37,14 @@ def read_mat(path: Path) -> Source:
     if "__function_workspace__" in variables and not columns:
         skipped["objects"] = "are MATLAB objects"
     return Source(path, "MAT", tuple(columns), facts, skipped)
+
+
+def _try_apart(path: Path) -> None:
+    """Read the file in a process of its own first: SciPy's reader crashes on some damaged files instead of failing."""
+    code = "import sys; from scipy.io import loadmat; loadmat(sys.argv[1], appendmat=False)"
+    done = subprocess.run([sys.executable, "-P", "-W", "ignore", "-c", code, str(path)], capture_output=True)
+    if done.returncode < 0:
+        raise RecordError(f"{path} is truncated or no MAT-file (its reader crashes on it)")
 
 
 def _take(name: str, value: Any, into: tuple[list[Column], dict[str, float | str], dict[str, str]], deep: int) -> None:

@@ -79,6 +79,12 @@ def make_column(name: str, values: NDArray, **known: object) -> Column:
     return Column(name, np.ascontiguousarray(data, dtype=np.float64), **known)  # type: ignore[arg-type]
 
 
+def first_line(reason: Exception) -> str:
+    """The first line of a reader's complaint, or its kind."""
+    lines = str(reason).splitlines()
+    return lines[0][:200] if lines else type(reason).__name__
+
+
 def stacked(columns: Iterable[Column]) -> tuple[Column, ...]:
     """Columns of one name become the runs of one column, in their order. Raises RecordError where they differ."""
     groups: dict[str, list[Column]] = {}

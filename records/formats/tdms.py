@@ -3,25 +3,29 @@
 from __future__ import annotations
 
 import warnings
+from logging import CRITICAL
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from gearbench.records.errors import RecordError
-from gearbench.records.formats.source import Column, Source, make_column, stacked
+from gearbench.records.formats.source import Column, Source, first_line, make_column, stacked
 
 
 def read_tdms(path: Path) -> Source:
     """Channels of a TDMS file with `unit_string` and `wf_increment`. Raises RecordError."""
     from nptdms import TdmsFile
+    from nptdms.log import log_manager
 
+    # What the reader logs of damaged files is said here in one sentence.
+    log_manager.set_level(CRITICAL)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error", UserWarning)  # of a file that ends early
             file = TdmsFile.read(path)
     except Exception as reason:  # the reader has no error of its own
-        raise RecordError(f"{path} is truncated or no TDMS file ({reason})") from reason
+        raise RecordError(f"{path} is truncated or no TDMS file ({first_line(reason)})") from reason
     if file.file_status.incomplete_final_segment:
         raise RecordError(f"{path} is truncated: its last segment is incomplete")
     groups = file.groups()

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from gearbench.records.errors import RecordError
-from gearbench.records.formats.source import Column, Source, make_column, stacked
+from gearbench.records.formats.source import Column, Source, first_line, make_column, stacked
 
 _DIRECTIONS = {0: "", 1: "+X", -1: "-X", 2: "+Y", -2: "-Y", 3: "+Z", -3: "-Z"} | {
     sign * (axis + 3): f"{'+' if sign > 0 else '-'}R{name}"
@@ -33,7 +33,7 @@ def read_uff(path: Path) -> Source:
             kinds = [int(kind) for kind in file.get_set_types()]
             sets = [(number, file.read_sets(number)) for number, kind in enumerate(kinds) if kind == 58]
     except Exception as reason:  # the reader raises plain exceptions
-        raise RecordError(f"{path} is truncated or no universal file ({reason})") from reason
+        raise RecordError(f"{path} is truncated or no universal file ({first_line(reason)})") from reason
     if not sets:
         raise RecordError(f"{path} holds no dataset 58; it has {', '.join(map(str, kinds)) or 'no dataset at all'}")
     places: dict[str, set[str]] = {}

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from gearbench.records.errors import RecordError
-from gearbench.records.formats.source import Source, make_column
+from gearbench.records.formats.source import Source, first_line, make_column
 
 
 def read_wav(path: Path) -> Source:
@@ -23,7 +23,7 @@ def read_wav(path: Path) -> Source:
             warnings.simplefilter("ignore", wavfile.WavFileWarning)
             rate, data = wavfile.read(path)
     except Exception as reason:  # the reader has no error of its own
-        raise RecordError(f"{path} is truncated or no WAV file ({reason})") from reason
+        raise RecordError(f"{path} is truncated or no WAV file ({first_line(reason)})") from reason
     if data.size == 0:
         raise RecordError(f"{path} is a WAV file without samples")
     _check_length(path, data.nbytes)

@@ -114,6 +114,8 @@ def test_runs_as_records(tmp_path: Path) -> None:
     assert run_command_line(["convert", "m.uff", "m.nc", "--map", "map.toml", "--runs", "records"]) == 0
     first, second = gb.read_record("m-1.nc"), gb.read_record("m-2.nc")
     np.testing.assert_allclose(second["torque_driver"] - first["torque_driver"], 1.0)
+    assert first.attrs["sampling_rate"] == 2048.0  # the file prints 1 / 2048 with six digits
+    assert "prints its sampling rate with few digits" in first.attrs["warnings"]
     assert not (tmp_path / "m.nc").exists()
 
 

@@ -219,6 +219,12 @@ def test_truncated_files_are_refused(tmp_path: Path, suffix: str) -> None:
     assert "\n" not in str(caught.value)
 
 
+def test_a_file_that_crashes_its_reader_is_refused(tmp_path: Path) -> None:
+    """Bytes of the file are changed at random; read in our own process it would end that without a word."""
+    with pytest.raises(RecordError, match="truncated or no MAT-file"):
+        read_source(OCTAVE / "crash.mat")
+
+
 def test_nothing_is_unpickled(tmp_path: Path) -> None:
     """Object arrays are what pickles hide in: they are skipped by type, and never decoded."""
     scipy.io.savemat(tmp_path / "m.mat", {"a": np.array([SIGNAL, "text"], dtype=object)})

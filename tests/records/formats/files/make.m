@@ -12,3 +12,4 @@ bench.torque_driver = M1(1:64);
 bench.labels = {"a", "b"};
 save ("-v6", "octave_v6.mat", "bench");
 save ("-text", "octave_text.mat", "bench");
+% crash.mat is not of Octave: a MAT-file by SciPy with some bytes changed at random, which crashes SciPy's reader.
