@@ -7,6 +7,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from gearbench.bench.elastic.rig import elastic_rig
+from gearbench.bench.elastic.wedging import wedging
 from gearbench.bench.plan.schedule import ProgressReport
 from gearbench.bench.refusals.effects import ELASTIC_KEYS, cycles_to_repeat, refuse_effects
 from gearbench.bench.refusals.load_range import check_dte, check_torque
@@ -37,6 +38,7 @@ def static_reduced(case: Case, loads: Loads, phase: Array, progress: ProgressRep
         dte=values.tolist() if unit == "m" else None,
         progress=lambda done: report(done, "static equilibrium"),
     )
+    wedged = wedging(elastic.law, cycle, elastic.pair.backlash_normal)
     return static_dataset(
         loads,
         phase,
@@ -50,6 +52,7 @@ def static_reduced(case: Case, loads: Loads, phase: Array, progress: ProgressRep
             "model": "reduced",
             "base_radius_driver": elastic.pair.driver.base_radius,
             "stress_state": case.rig.material.state,
+            **({"warnings": wedged} if wedged else {}),
             "repeats_after_mesh_cycles": cycles_to_repeat(case.rig),
             "unknowns_driver": elastic.gears[0].unknowns,
             "unknowns_driven": elastic.gears[1].unknowns,

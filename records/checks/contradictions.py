@@ -21,8 +21,8 @@ FACTORS = {1e3: "1000 times too large"}
 WRONG_UNIT = 0.5
 # Delays that are looked for [samples], steps to the shortest period in the band, and the error that counts.
 LONGEST, STEPS, MATTERS = 100, 8, 0.02
-# A delay is believed when it leaves no more than EXACT, or FLOOR times the misfit of accounts without that channel: what
-# lies between a torque and its gear, such as a soft coupling, looks like a delay in part only.
+# A delay is believed when it leaves no more than EXACT, or FLOOR times the misfit of accounts without that channel:
+# what lies between a torque and its gear, such as a soft coupling, looks like a delay in part only.
 EXACT, FLOOR = 0.06, 3.0
 # Misfit below which no delay is looked for.
 SUSPICIOUS = 0.08
