@@ -109,6 +109,7 @@ def static(
     lines = [*_lines(summary), *methods_lines(loaded, tables)]
     if roots:
         lines += root_lines(max(roots, key=lambda one: float(one["torque_nm"])))
+    lines += [f"warning: {warning}" for warning in summary["warnings"]]
     for line in [*lines, str(out), *map(str, written)]:
         typer.echo(line)
 
@@ -189,4 +190,5 @@ def static_summary(result: Any, path: Path) -> dict[str, Any]:
         "model": result.attrs["model"],
         "unit": "um" if unit == "m" else unit,
         "loads": rows,
+        "warnings": [line for line in str(result.attrs.get("warnings", "")).splitlines() if line],
     }

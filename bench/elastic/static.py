@@ -7,6 +7,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from gearbench.bench.elastic.rig import elastic_rig
+from gearbench.bench.elastic.wedging import wedging
 from gearbench.bench.plan.schedule import ProgressReport, cycles_to_repeat
 from gearbench.bench.record.static import Loads, load_key, static_dataset
 from gearbench.bench.refusals.effects import ELASTIC_KEYS, refuse_effects
@@ -36,6 +37,7 @@ def static_reduced(case: Case, loads: Loads, phase: Array, report: ProgressRepor
         dte=values.tolist() if unit == "m" else None,
         progress=lambda done: report(done, "static equilibrium"),
     )
+    wedged = wedging(elastic.law, cycle, elastic.pair.backlash_normal)
     return static_dataset(
         loads,
         phase,
@@ -49,6 +51,7 @@ def static_reduced(case: Case, loads: Loads, phase: Array, report: ProgressRepor
             "model": "reduced",
             "base_radius_driver": elastic.pair.driver.base_radius,
             "stress_state": case.rig.material.state,
+            **({"warnings": wedged} if wedged else {}),
             "repeats_after_mesh_cycles": cycles_to_repeat(case.rig),
             "unknowns_driver": elastic.gears[0].unknowns,
             "unknowns_driven": elastic.gears[1].unknowns,

@@ -64,7 +64,8 @@ def lost_by_clipping(values: Array) -> float:
     """Rms of what clipping took off (n,) over the rms fluctuation of what is left.
 
     A run of m samples at an end, entered with the slope a and left with the slope b (per sample), hides an arc of
-    height (a + b) m / 8, whose mean square over the run is 8/15 of the height's square (a parabola).
+    height (a + b) m / 8, whose mean square over the run is 8/15 of the height's square (a parabola). The slopes are
+    those one step before the end, where a concave flank is steeper: an upper bound for runs of few samples.
     """
     lost = 0.0
     for share, end in zip(clipped_ends(values), (float(values.max()), float(values.min())), strict=True):

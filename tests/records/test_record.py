@@ -200,3 +200,24 @@ def test_provenance_is_json_with_the_digest_of_the_sources() -> None:
     assert content["settings"] == {"substeps": 4}
     assert content["sources"] == source_digest()
     assert len(content["sources"]) == 64
+
+
+def test_damaged_metadata_is_one_sentence_and_nothing_after_it(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "record.nc"
+    write_record(_record(), path)
+    whole = bytearray(path.read_bytes())
+    generator = np.random.default_rng(3)
+    refused = 0
+    for _ in range(60):
+        damaged = whole.copy()
+        for place in generator.integers(0, min(len(whole), 12_000), 20):
+            damaged[place] = generator.integers(256)
+        path.write_bytes(damaged)
+        try:
+            read_record(path)
+        except RecordError:
+            refused += 1
+    assert refused > 10
+    assert capfd.readouterr().err == ""
