@@ -17,14 +17,14 @@ UNTOLD = 0.01
 def wedging(law: Law, cycle: StaticCycle, backlash: float) -> str | None:
     """A sentence where the back flanks carry too, with the normal backlash [m] that would free them; else None.
 
-    `backlash` [m]: the normal backlash of the pair. At each position the back flanks overlap by so much at the
-    transmission error of the working ones; that much more backlash and they no longer touch.
+    `backlash` [m]: the normal backlash of the pair. Where the working flanks just touch, the back flanks overlap; that
+    much more backlash and they touch nowhere, nor under load, which turns the driver on and opens them.
     """
     working = cycle.load_share.sum(axis=2)
     jammed = np.argwhere((working < 1 - UNTOLD) & (working > 0))
     if not len(jammed):
         return None
-    deepest = max(_overlap(law, float(cycle.phase[j]), float(cycle.transmission_error[i, j])) for i, j in jammed)
+    deepest = max(_overlap(law, float(cycle.phase[j]), float(cycle.unloaded[j])) for j in np.unique(jammed[:, 1]))
     return (
         f"the teeth wedge: at {len(jammed)} of {working.size} positions they touch on both flanks, where the working"
         f" ones carry only {working[tuple(jammed.T)].min():.2g} to {working[tuple(jammed.T)].max():.2g} of the tooth"
