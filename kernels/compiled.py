@@ -15,15 +15,17 @@ from typing import Any
 
 import numba
 
+from gearbench.kernels.trust import trusted
+
 # Division by zero gives infinity, as in numpy; nobody calls these through C function pointers.
 OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 
 
 def cache_folder() -> Path:
-    """GEARBENCH_CACHE, or `gearbench` in the user's cache folder."""
+    """GEARBENCH_CACHE, or `gearbench` in the user's cache folder. Raises CacheError where others can write to it."""
     if own := os.environ.get("GEARBENCH_CACHE"):
-        return Path(own)
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "gearbench"
+        return trusted(Path(own))
+    return trusted(Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "gearbench")
 
 
 @lru_cache(maxsize=1)
