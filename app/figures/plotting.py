@@ -70,7 +70,7 @@ def phase_axis(axes: Any, period: float = 1.0, label: str = PHASE) -> None:
 
 
 def explain_gaps(axes: Any, phase: Array, values: Array, words: str) -> None:
-    """Say on a curve that breaks off why: `words` at its longest gap, where some but not all of `values` (n,) are NaN."""
+    """Say on a curve that breaks off why: `words` at its longest gap, where some of `values` (n,) are NaN."""
     missing = ~np.isfinite(values)
     if not missing.any() or missing.all():
         return
