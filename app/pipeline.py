@@ -139,7 +139,8 @@ def run_experiment(job: Job) -> dict[str, Any]:
     for figure in FIGURES:
         job.picture(figure.name, partial(figure.draw, drawn))
     about = ABOUT | {figure.name: figure.about for figure in FIGURES} | {"summary.json": "the numbers of this summary"}
-    numbers["files"] = {job.name(base): words for base, words in about.items() if job.output.has(job.name(base))}
+    held = {*job.output.files(), job.name("summary.json")}
+    numbers["files"] = {job.name(base): words for base, words in about.items() if job.name(base) in held}
     _write_summary(job, numbers)
     return numbers
 

@@ -1,5 +1,6 @@
 """Files that appear under their name only when they are complete: the one writer of all packages."""
 
-from gearbench.files.whole import FileError, write_text, write_whole
+from gearbench.files.deferred import DeferredFile
+from gearbench.files.whole import FileError, remove_strays, write_text, write_whole
 
-__all__ = ["FileError", "write_text", "write_whole"]
+__all__ = ["DeferredFile", "FileError", "remove_strays", "write_text", "write_whole"]

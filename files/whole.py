@@ -3,9 +3,15 @@
 from __future__ import annotations
 
 import os
+import re
 import secrets
+import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
+
+_STRAY = re.compile(r"\.gearbench-[0-9a-f]{16}(\.\w+)?")
+_DAY = 86_400.0  # s
 
 
 class FileError(OSError):
@@ -15,14 +21,16 @@ class FileError(OSError):
 def write_whole(path: str | Path, write: Callable[[Path], object]) -> Path:
     """Let `write` fill a temporary file of the same suffix beside `path`, then give it that name; the path.
 
-    What fails or is interrupted leaves neither the temporary file behind nor the old one changed. The file has the
-    permissions of any new file of this process (its umask). Raises FileError for a missing folder and for whatever the
+    What fails or is interrupted leaves neither the temporary file behind nor the old one changed; what a killed process
+    left in the folder is removed by the first writer a day later. The file has the permissions of any new file of this
+    process (its umask). Raises FileError for a missing folder and for whatever the
     system refuses; errors of `write` that are none of the system's pass.
     """
     target = Path(path)
     if not target.parent.is_dir():
         raise FileError(f"{target} cannot be written: the folder {target.parent} must exist")
-    temporary = target.with_name(f".{secrets.token_hex(8)}{target.suffix}")
+    remove_strays(target.parent, older=_DAY)
+    temporary = target.with_name(f".gearbench-{secrets.token_hex(8)}{target.suffix}")
     try:
         os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
         write(temporary)
@@ -34,6 +42,17 @@ def write_whole(path: str | Path, write: Callable[[Path], object]) -> Path:
     finally:
         temporary.unlink(missing_ok=True)
     return target
+
+
+def remove_strays(folder: str | Path, older: float = 0.0) -> None:
+    """Remove the temporary files of `write_whole` that nobody has written to for `older` seconds.
+
+    Only who is alone in the folder may ask for 0: it takes the files of writers at work too.
+    """
+    with suppress(OSError), os.scandir(folder) as entries:
+        for entry in entries:
+            if _STRAY.fullmatch(entry.name) and entry.stat(follow_symlinks=False).st_mtime <= time.time() - older:
+                os.unlink(entry.path)
 
 
 def write_text(path: str | Path, text: str) -> Path:

@@ -7,14 +7,16 @@ import shutil
 from contextlib import suppress
 from pathlib import Path
 
+from gearbench.kernels.trust import trusted
+
 KEPT = 4  # states of a compiled function whose machine code stays on disk
 
 
 def cache_folder() -> Path:
-    """GEARBENCH_CACHE, or `gearbench` in the user's cache folder."""
+    """GEARBENCH_CACHE, or `gearbench` in the user's cache folder. Raises CacheError where others can write to it."""
     if own := os.environ.get("GEARBENCH_CACHE"):
-        return Path(own)
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "gearbench"
+        return trusted(Path(own))
+    return trusted(Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "gearbench")
 
 
 def code_folder(name: str, identity: str) -> Path:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import xarray as xr
 
-from gearbench.files import write_whole
+from gearbench.files import DeferredFile, write_whole
 from gearbench.records.errors import RecordError
 from gearbench.records.record import validate_record
 
@@ -17,14 +17,24 @@ from gearbench.records.record import validate_record
 def write_dataset(dataset: xr.Dataset, path: str | Path) -> None:
     """Write as NetCDF-4, uncompressed; `path` is replaced in one step. Raises FileError."""
     encoding = {str(name): {"_FillValue": None} for name in dataset.variables}
-    write_whole(path, lambda temporary: dataset.to_netcdf(temporary, engine="h5netcdf", encoding=encoding))
+
+    def write(temporary: Path) -> None:
+        with DeferredFile(temporary) as file:
+            try:
+                dataset.to_netcdf(file, engine="h5netcdf", encoding=encoding)
+            except Exception:
+                file.check()
+                raise
+        file.check()
+
+    write_whole(path, write)
 
 
 def read_dataset(path: str | Path, what: str = "file", error: type[ValueError] = RecordError) -> xr.Dataset:
     """Read into memory. Raises `error` for a missing or broken file; `what` it should be stands in the sentence."""
     source = Path(path)
     if not source.is_file():
-        raise error(f"{what} {source} does not exist")
+        raise error(f"{what} {source} {'is not a plain file' if source.exists() else 'does not exist'}")
     try:
         # Units such as "s" must stay text: no decoding of times, masks or scales.
         return xr.load_dataset(source, engine="h5netcdf", decode_cf=False)

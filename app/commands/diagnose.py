@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from gearbench.shell.options import JsonOption, SetOption, load_case, print_json
-from gearbench.shell.output import Output, claimed, fingerprint
+from gearbench.shell.output import Output, claimed, digest_of, fingerprint
 from gearbench.shell.progress import Progress
 
 if TYPE_CHECKING:
@@ -94,7 +94,7 @@ def write_report(diagnosis: Diagnosis, output: Output) -> None:
 
     wanted = ["report.html", *(f"{name}.png" for name in PICTURES)]
     mark = output.mark()
-    if mark.get("complete") and all(output.has(name) for name in mark.get("files", [])) and output.has(wanted[0]):
+    if mark.get("complete") and all(output.has(name) for name in output.files()) and output.has(wanted[0]):
         return
     report = report_of(diagnosis)
     for name, (draw, _) in report.pictures.items():
@@ -131,7 +131,7 @@ def _sources(inputs: Inputs) -> tuple[Source, ...]:
     for one in inputs.all:
         assert one.path is not None
         used = "judging" if one is inputs.held_out else "finding"
-        made.append(Source(one.name, one.path.name, _digest(one.path), used, one.warnings))
+        made.append(Source(one.name, one.path.name, digest_of(one.path), used, one.warnings))
     return tuple(made)
 
 
@@ -155,15 +155,7 @@ def _identity(inputs: Inputs) -> str:
 
     held_out = inputs.held_out.name if inputs.held_out else ""
     parts = [dump_case(inputs.nominal), source_digest(), held_out, ",".join(sorted(inputs.without))]
-    return fingerprint(*parts, *(f"{one.path.name} {_digest(one.path)}" for one in inputs.all if one.path))
-
-
-def _digest(path: Path) -> str:
-    digest = hashlib.sha256()
-    with path.open("rb") as stream:
-        while block := stream.read(2**20):
-            digest.update(block)
-    return digest.hexdigest()
+    return fingerprint(*parts, *(f"{one.path.name} {digest_of(one.path)}" for one in inputs.all if one.path))
 
 
 def _write_case(case: Case, path: Path) -> None:

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.figures.frf import draw_itf
-from gearbench.figures.plotting import BLUE, ORANGE, figure, save
+from gearbench.figures.frf import NO_MODE, draw_itf
+from gearbench.figures.plotting import BLUE, ORANGE, closed, explain_gaps, figure, phase_axis, save
 from gearbench.words.summary import ENOUGH
 
 if TYPE_CHECKING:
@@ -45,9 +45,9 @@ def draw_comparison(output: Output, one: Results, two: Results) -> list[str]:
             title = "DTE of the record, mean over its mesh periods"
             pairs.setdefault("dte", (title, "DTE [um]", []))[2].append((_name(result), curve))
         if result.frf is not None and result.frf.sizes.get("mode", 0):
-            curve = on_phases(
-                result.frf["phase"].values, result.frf["natural_frequency"].values[0], _FINE, result.shift
-            )
+            phase, natural = result.frf["phase"].values, result.frf["natural_frequency"].values[0]
+            curve = on_phases(phase, natural, _FINE, result.shift)
+            curve[on_phases(phase, np.isnan(natural).astype(float), _FINE, result.shift) > 0.0] = np.nan
             entry = pairs.setdefault("natural_frequency", ("First natural frequency", "frequency [Hz]", []))
             entry[2].append((_name(result), curve))
     written = []
@@ -91,12 +91,13 @@ def _draw_curves(path: Path, title: str, unit: str, curves: list[tuple[str, Arra
     with figure(panels, 1, (8.0, 4.4 + 1.6 * (panels - 1)), sharex=True, squeeze=False) as (drawing, axes):
         for number, (colour, (name, curve)) in enumerate(zip((BLUE, ORANGE), curves, strict=True)):
             panel = axes[number % panels, 0]
-            panel.plot(phase, curve, color=colour, label=f"{'ab'[number]}: {name}")
+            panel.plot(*closed(phase, curve), color=colour, label=f"{'ab'[number]}: {name}")
             panel.set_ylabel(unit)
             panel.margins(y=0.25)
             panel.legend(loc="upper center", ncols=2)
-        axes[-1, 0].set_xlim(0, 1)
-        axes[-1, 0].set_xlabel("mesh phase [cycles]; 0: contact at the pitch point")
+        phase_axis(axes[-1, 0])
+        for number, (_, curve) in enumerate(curves):
+            explain_gaps(axes[number % panels, 0], *closed(phase, curve), NO_MODE)
         axes[0, 0].set_title(title if panels == 1 else f"{title} (mind the two scales)")
         save(drawing, path)
 

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import NDArray
 
-from gearbench.figures.plotting import BLUE, GREEN, GREY, ORANGE, figure, save, shade
+from gearbench.figures.plotting import BLUE, GREEN, GREY, ORANGE, closed, explain_gaps, figure, phase_axis, save, shade
 from gearbench.geometry.pair.zones import Span
 
 Array = NDArray[np.float64]
@@ -27,6 +27,7 @@ _TITLES = {
     "frozen": "Frozen coefficients (not the truth)",
     "linearised": "Linearised model, frozen at each phase",
 }
+NO_MODE = "no mode found here: no peak stands out"
 _PIXELS = 700  # a map needs no more rows or columns than this
 
 
@@ -48,7 +49,7 @@ def draw_itf(path: Path, results: Mapping[str, xr.Dataset], warning: str = "") -
             frf = results[name]
             image = panel.pcolormesh(*_coarse(frf, values), norm=norm, cmap="viridis", rasterized=True)
             panel.set_title(_TITLES.get(name, name))
-            panel.set_xlabel("mesh phase [cycles]")
+            phase_axis(panel, label="mesh phase [cycles]")
             panel.grid(False)
         axes[0, 0].set_ylabel("frequency [Hz]")
         bar = drawing.colorbar(
@@ -71,15 +72,16 @@ def draw_natural_frequencies(
     """Natural frequencies against mesh phase, with the zones of fewest pairs in contact shaded."""
     with figure(size=(8.0, 4.8)) as (drawing, axes):
         shade(axes, zones, label)
+        phase_axis(axes)
         for name, frf in results.items():
-            phase = frf["phase"].values
             for number, values in enumerate(frf["natural_frequency"].values):
                 style = {"color": _COLOURS.get(name, GREY), "lw": 1.4 if name != "identified" else 0.9}
                 marker = {"marker": "o", "ms": 2.6} if name == "identified" else {}
                 title = _TITLES.get(name, name) if number == 0 else None
-                axes.plot(phase, values, **style, **marker, label=title)
-        axes.set_xlim(0, 1)
-        axes.set_xlabel("mesh phase [cycles]; 0: contact at the pitch point")
+                phase, curve = closed(frf["phase"].values, values)
+                axes.plot(phase, curve, **style, **marker, label=title)
+                if name == "identified" and number == 0:
+                    explain_gaps(axes, phase, curve, NO_MODE)
         axes.set_ylabel("natural frequency [Hz]")
         _zoom_on_found(axes, results)
         axes.set_title("Natural frequencies over one mesh period")
@@ -110,4 +112,5 @@ def _coarse(frf: xr.Dataset, values: Array) -> tuple[Array, Array, Array]:
     """Phases, frequencies and values of a map, thinned to what a picture shows: cells are not averaged."""
     rows = slice(None, None, max(1, len(values) // _PIXELS))
     columns = slice(None, None, max(1, values.shape[1] // _PIXELS))
-    return frf["phase"].values[columns], frf["frequency"].values[rows], values[rows, columns]
+    phase, shown = closed(frf["phase"].values[columns], values[rows, columns])
+    return phase, frf["frequency"].values[rows], shown

@@ -27,8 +27,7 @@ def draw_pair(path: Path, rig: Rig, meshing: Pair, mesh: PairMesh | None) -> Non
             f"Gear pair z = {rig.driver.teeth}/{rig.driven.teeth}, m = {rig.driver.module * 1e3:g} mm, mesh phase 0"
         )
         largest = 1e3 * max(meshing.driver.tip_radius, meshing.driven.tip_radius)
-        whole.set_ylim(-1.75 * largest, 1.1 * largest)
-        whole.legend(loc="lower center", ncols=3)
+        whole.set_ylim(-1.1 * largest, 1.1 * largest)
         reach = 2.2e3 * meshing.driver.module
         pitch = meshing.pitch_radii[0] * 1e3
         if mesh is None:
@@ -40,11 +39,12 @@ def draw_pair(path: Path, rig: Rig, meshing: Pair, mesh: PairMesh | None) -> Non
         _draw_line_of_action(near, meshing)
         near.set_xlim(pitch - reach, pitch + reach)
         near.set_ylim(-reach, reach)
-        near.legend(loc="lower left", frameon=True, framealpha=0.95)
         for axes in (whole, near):
             axes.set_aspect("equal")
             axes.set_xlabel("x [mm]")
             axes.set_ylabel("y [mm]")
+            # Below the axes: inside there are teeth everywhere.
+            axes.legend(loc="upper center", bbox_to_anchor=(0.5, 0.0), borderaxespad=4.2, ncols=3)
         save(drawing, path)
 
 

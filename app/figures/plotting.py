@@ -7,11 +7,16 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from gearbench.files import write_whole
 
+Array = NDArray[np.float64]
+
+PHASE = "mesh phase [cycles]; 0: contact at the pitch point"
 BLUE, ORANGE, GREEN, GREY = "#0b5c9e", "#d1600a", "#2d7d46", "#6b6b6b"
 SINGLE_ZONE = "#f3e3c3"
 
@@ -46,6 +51,43 @@ def save(drawing: Figure, path: Path) -> None:
     """Write a picture in the format of the suffix, without a date: the same picture gives the same file."""
     undated = {"Date": None} if path.suffix == ".svg" else {"Software": None}
     write_whole(path, lambda temporary: drawing.savefig(temporary, metadata=undated))
+
+
+def closed(phase: Array, values: Array, period: float = 1.0) -> tuple[Array, Array]:
+    """Rising phases (n,) of one period from about 0 on and values (..., n), continued to cover both its ends."""
+    first = -1 if phase[0] > 0.0 else len(phase)  # the last one, a period earlier, where they begin after 0
+    return (
+        np.concatenate((phase[first:] - period, phase, phase[:1] + period)),
+        np.concatenate((values[..., first:], values, values[..., :1]), axis=-1),
+    )
+
+
+def phase_axis(axes: Any, period: float = 1.0, label: str = PHASE) -> None:
+    """Mesh phase as abscissa: from 0 to the end of the period, with a tick at both."""
+    axes.set_xlim(0.0, period)
+    axes.set_xticks(np.linspace(0.0, period, 6 if period <= 1.0 else min(int(np.ceil(period)), 8) + 1))
+    axes.set_xlabel(label)
+
+
+def explain_gaps(axes: Any, phase: Array, values: Array, words: str) -> None:
+    """Say on a curve that breaks off why: `words` at its longest gap, where some of `values` (n,) are NaN."""
+    missing = ~np.isfinite(values)
+    if not missing.any() or missing.all():
+        return
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], missing, [False])).astype(int)))
+    starts, stops = edges[::2], edges[1::2] - 1
+    for start, stop in zip(starts, stops, strict=True):
+        axes.axvspan(
+            phase[max(start - 1, 0)], phase[min(stop + 1, len(phase) - 1)],
+            facecolor="none", edgecolor="#bbbbbb", hatch="///", lw=0.0, zorder=0,
+        )  # fmt: skip
+    longest = int(np.argmax(stops - starts))
+    middle = 0.5 * (phase[starts[longest]] + phase[stops[longest]])
+    low, high = axes.get_xlim()
+    place = (middle - low) / (high - low)
+    side = "left" if place < 0.15 else "right" if place > 0.85 else "center"
+    box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 1.5}
+    axes.text(middle, 0.04, words, transform=axes.get_xaxis_transform(), ha=side, va="bottom", fontsize=8, bbox=box)
 
 
 def shade(axes: Any, spans: Sequence[tuple[float, float]], label: str) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from gearbench.figures.plotting import BLUE, GREEN, GREY, ORANGE, figure, save, shade
+from gearbench.figures.plotting import BLUE, GREEN, GREY, ORANGE, closed, figure, phase_axis, save, shade
 from gearbench.geometry.pair.zones import Span
 
 Array = NDArray[np.float64]
@@ -28,13 +28,12 @@ def draw_stiffness(path: Path, static: xr.Dataset, zones: Sequence[Span], label:
             colour = colours[number % len(colours)]
             tangent = static["stiffness_tangent"].values[number]
             secant = static["stiffness_secant"].values[number]
-            axes.plot(*_closed(phase, tangent / 1e6), color=colour, label=f"tangent dF/d dte at {load:g} {unit}")
+            axes.plot(*closed(phase, tangent / 1e6), color=colour, label=f"tangent dF/d dte at {load:g} {unit}")
             if np.abs(secant - tangent).max() > 1e-6 * tangent.max():
                 text = f"secant F/dte at {load:g} {unit}"
-                axes.plot(*_closed(phase, secant / 1e6), color=colour, ls="--", label=text)
-        axes.set_xlim(0, 1)
+                axes.plot(*closed(phase, secant / 1e6), color=colour, ls="--", label=text)
         axes.set_ylim(bottom=0)
-        axes.set_xlabel("mesh phase [cycles]; 0: contact at the pitch point")
+        phase_axis(axes)
         axes.set_ylabel("mesh stiffness k [N/um]")
         axes.set_title(f"Mesh stiffness over one mesh period, {static.attrs.get('model', '')} model")
         axes.legend(loc="lower right")
@@ -64,8 +63,3 @@ def draw_record(path: Path, record: xr.Dataset, realisation: int = 0) -> None:
 def _signals(record: xr.Dataset, realisation: int) -> tuple[Array, Array, Array]:
     row = record.isel(realisation=realisation)
     return record["time"].values, row["torque_driver"].values, row["dte"].values
-
-
-def _closed(phase: Array, values: Array) -> tuple[Array, Array]:
-    """One period with its end, phase 1, which equals its beginning."""
-    return np.append(phase, phase[0] + 1.0), np.append(values, values[0])

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gearbench.figures.plotting import BLUE, GREY, ORANGE, figure, save
+from gearbench.figures.plotting import BLUE, GREY, ORANGE, closed, figure, phase_axis, save
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -19,6 +19,11 @@ def plot_static(result: xr.Dataset, path: Path) -> None:
     """Transmission error at every load over mesh phase, without load where known, and its swing over the load."""
     te = 1e6 * result["transmission_error"].values
     loads, unit = result["load"].values, result["load"].attrs["units"]
+    if len(loads) == 1:  # no swing over the load
+        with figure(size=(8.0, 4.5)) as (drawing, axes):
+            _curves(axes, result, te, loads, unit)
+            save(drawing, path)
+        return
     with figure(1, 2, size=(11.0, 4.5), width_ratios=(3, 2)) as (drawing, (left, right)):
         _curves(left, result, te, loads, unit)
         order = np.argsort(loads)
@@ -36,14 +41,16 @@ def plot_static(result: xr.Dataset, path: Path) -> None:
 def _curves(axes: Any, result: xr.Dataset, te: np.ndarray, loads: np.ndarray, unit: str) -> None:
     """One curve a load, light to dark."""
     phase = result["phase"].values
+    period = float(round(phase[-1] + phase[1])) if len(phase) > 1 else 1.0
     drawn = np.unique(np.linspace(0, len(loads) - 1, min(MOST_CURVES, len(loads))).round().astype(int))
     for number, i in enumerate(drawn):
         strength = 0.35 + 0.65 * (number + 1) / len(drawn)
         text = f"{loads[i] * 1e6:.4g} um" if unit == "m" else f"{loads[i]:.4g} {unit}"
-        axes.plot(phase, te[i], color=BLUE, alpha=strength, lw=1.2)
-        axes.annotate(text, (phase[-1], te[i, -1]), xytext=(3, 0), textcoords="offset points", fontsize=7, color=GREY)
+        axes.plot(*closed(phase, te[i], period), color=BLUE, alpha=strength, lw=1.2)
+        axes.annotate(text, (period, te[i, 0]), xytext=(3, 0), textcoords="offset points", fontsize=7, color=GREY)
     if "transmission_error_unloaded" in result:
         without = 1e6 * result["transmission_error_unloaded"].values
-        axes.plot(phase, without, color=ORANGE, lw=1.2, label="without load")
+        axes.plot(*closed(phase, without, period), color=ORANGE, lw=1.2, label="without load")
         axes.legend(loc="best")
-    axes.set(title="Static transmission error", xlabel="mesh phase [cycles]", ylabel="TE [um]")
+    axes.set(title="Static transmission error", ylabel="TE [um]")
+    phase_axis(axes, period)

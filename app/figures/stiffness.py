@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gearbench.figures.plotting import BLUE, GREEN, GREY, ORANGE, figure, save
+from gearbench.figures.plotting import BLUE, GREEN, GREY, ORANGE, closed, figure, phase_axis, save
 
 if TYPE_CHECKING:
     from gearbench.bench.results.stiffness_table import StiffnessTable
@@ -27,12 +27,12 @@ def draw_stiffness_table(path: Path, table: StiffnessTable) -> None:
         for row in table.rows:
             if row.curve is not None:
                 style = "--" if row.torsion else "-"
-                axes.plot(table.phase, row.curve / 1e6, style, color=COLOURS[row.model], label=row.model)
+                axes.plot(*closed(table.phase, row.curve / 1e6), style, color=COLOURS[row.model], label=row.model)
                 continue
             axes.axhline(row.mean / 1e6, color=GREY, label="ISO 6336-1 c_gamma (mean)")
             if row.single is not None:
                 axes.axhline(row.single / 1e6, color=GREY, linestyle=":", label="ISO 6336-1 c' (one pair)")
-        axes.set_xlabel("mesh phase [cycles]")
+        phase_axis(axes)
         axes.set_ylabel("mesh stiffness [N/um]")
         axes.set_title(f"Mesh stiffness at {table.torque:.4g} N m")
         axes.set_ylim(bottom=0.0)

@@ -16,6 +16,7 @@ DONE, DEFECT, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130  # DEFECT: one of ours
 # was not imported cannot have been raised, and importing it here would cost time.
 USER_ERRORS = (
     ("gearbench.files.whole", "FileError"),
+    ("gearbench.kernels.trust", "CacheError"),
     ("gearbench.rig.errors", "CaseError"),
     ("gearbench.records.errors", "RecordError"),
     ("gearbench.geometry.error", "GeometryError"),

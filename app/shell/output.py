@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from gearbench.files import write_text, write_whole
+from gearbench.files import remove_strays, write_text, write_whole
 from gearbench.shell.failure import InputError
 
 _MARK = "run.json"
@@ -25,8 +25,9 @@ class Output:
     folder: Path
 
     def has(self, name: str) -> bool:
-        """Whether an earlier run of the same case and sources left this product."""
-        return (self.folder / name).is_file()
+        """Whether an earlier run of the same case and sources left this product, and it is as it was written."""
+        written = self.files().get(name)
+        return written is not None and self.path(name).is_file() and digest_of(self.path(name)) == written
 
     def path(self, name: str) -> Path:
         """Where a product belongs."""
@@ -34,11 +35,13 @@ class Output:
 
     def write(self, name: str, write: Callable[[Path], object]) -> Path:
         """Let `write` fill the product `name`, which appears when it is complete. Raises FileError."""
-        target = write_whole(self.path(name), write)
-        mark = self.mark()
-        if name not in mark.get("files", []):
-            self.set_mark(mark | {"files": [*mark.get("files", []), name]})
-        return target
+
+        def write_and_note(temporary: Path) -> None:
+            write(temporary)
+            # Noted before the file has its name: a run that is killed in between makes the product again.
+            self.set_mark(self.mark() | {"files": self.files() | {name: digest_of(temporary)}})
+
+        return write_whole(self.path(name), write_and_note)
 
     def write_text(self, name: str, text: str) -> Path:
         """Write a text product."""
@@ -52,9 +55,20 @@ class Output:
             return {}
         return mark if isinstance(mark, dict) else {}
 
+    def files(self) -> dict[str, str]:
+        """SHA-256 (hex) of every product that a run of this folder wrote, by name."""
+        files = self.mark().get("files")
+        return {str(Path(name).name): str(digest) for name, digest in files.items()} if isinstance(files, dict) else {}
+
     def set_mark(self, mark: dict[str, Any]) -> None:
         """Replace that in one step."""
         write_text(self.path(_MARK), json.dumps(mark, indent=2) + "\n")
+
+
+def digest_of(path: Path) -> str:
+    """SHA-256 (hex) of a file."""
+    with path.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
 def fingerprint(*parts: str) -> str:
@@ -79,6 +93,7 @@ def claimed(folder: Path, command: str, identity: str, force: bool = False) -> I
             fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as error:
             raise InputError(f"another run is writing into {folder}") from error
+        remove_strays(folder)
         output = Output(folder)
         _take(output, command, identity, force)
         yield output
@@ -93,6 +108,6 @@ def _take(output: Output, command: str, identity: str, force: bool) -> None:
     if any(output.folder.iterdir()) and not force:
         what = "a run of another case, other options or other sources" if mark else "files of another origin"
         raise InputError(f"{output.folder} holds {what}: choose another --out, or add --force")
-    for name in mark.get("files", []):
-        (output.folder / Path(name).name).unlink(missing_ok=True)
-    output.set_mark({"command": command, "identity": identity, "files": []})
+    for name in output.files():
+        output.path(name).unlink(missing_ok=True)
+    output.set_mark({"command": command, "identity": identity, "files": {}})

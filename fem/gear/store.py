@@ -11,6 +11,7 @@ from dataclasses import fields
 from functools import lru_cache
 from importlib.metadata import version
 from importlib.util import find_spec
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,7 @@ from gearbench.rig.value import Value
 Arrays = Mapping[str, Any]  # of numpy arrays
 
 SOURCES = ("gearbench.geometry", "gearbench.fem", "gearbench.kernels")
+_COUNT = "number of arrays"
 LIBRARIES = ("numpy", "scipy", "scikit-fem", "gmsh")
 
 
@@ -58,13 +60,24 @@ def cached(key: str, make: Callable[[], Arrays]) -> Arrays:
     """
     path = cache_folder() / f"{key}.npz"
     try:
-        with np.load(path, allow_pickle=False) as stored:
-            return {name: stored[name] for name in stored.files}
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile):
+        return _stored(path)
+    except Exception:  # reading a damaged archive raises anything
         arrays = make()
+    content = {**arrays, _COUNT: np.asarray(len(arrays))}
     with suppress(OSError):
         path.parent.mkdir(parents=True, exist_ok=True)
-        write_whole(path, lambda temporary: np.savez(temporary, **arrays))
+        write_whole(path, lambda temporary: np.savez(temporary, allow_pickle=False, **content))
+    return arrays
+
+
+def _stored(path: Path) -> Arrays:
+    """The arrays in a file of numpy. Each member is read whole, so that its checksum covers its description too."""
+    with zipfile.ZipFile(path) as archive:
+        members = {name.removesuffix(".npy"): BytesIO(archive.read(name)) for name in archive.namelist()}
+    arrays = {name: np.lib.format.read_array(member, allow_pickle=False) for name, member in members.items()}
+    # A damaged directory of the archive may hide members.
+    if arrays.pop(_COUNT) != len(arrays):
+        raise EOFError(f"{path} lacks arrays")
     return arrays
 
 

@@ -21,7 +21,8 @@ STEEPEST = radians(75)  # of a crack to the normal of the fillet where it starts
 CLEAR = 0.1  # modules left between a crack and whatever else bounds its sector
 NEAR_START = 0.2  # of a point's distance from the start: there the crack's own fillet may be that close
 SHORTEST = 5e-3  # modules
-STEPS = 400  # places looked at per crack of the longest kind
+LONGEST = 8.0  # modules: nobody meshes a crack longer than that, whatever room there is
+STEPS = 400  # places looked at per module of a crack
 
 
 @dataclass(frozen=True)
@@ -83,22 +84,22 @@ def slit(tooth: Profile, gear: Gear, crack: Crack, name: str = "gear") -> Slit:
             " where the crack starts"
         )
     direction = -np.array([np.cos(crack.direction), np.sin(crack.direction)])
-    most, limit = _longest(tooth, gear.hub_radius, start, direction)
+    most, reason = _longest(tooth, gear.hub_radius, start, direction)
     least = SHORTEST * tooth.module
     if not least <= crack.length < most:
         raise GeometryError(
             f"{name}.crack.length_mm = {1e3 * crack.length:g} must be at least {1e3 * least:.3g} and less than"
-            f" {1e3 * most:.4g}, where the crack comes within {CLEAR:g} modules of {limit}"
+            f" {1e3 * most:.4g}, {reason}"
         )
     along = float(tooth.fillet_length(tooth.beta_form) - tooth.fillet_length(beta))
     return Slit(start, direction, crack.length, along)
 
 
 def _longest(tooth: Profile, hub_radius: float, start: Array, direction: Array) -> tuple[float, str]:
-    """Length [m] at which a crack comes too close to something, and what that is."""
+    """Length [m] at which a crack comes too close to something, or is LONGEST, and the words for it."""
     clear = CLEAR * tooth.module
     reach = float(np.hypot(*start)) + tooth.tip_radius
-    t = np.linspace(0.0, min(reach, 8 * tooth.module), 8 * STEPS)[1:]
+    t = np.linspace(0.0, min(reach, LONGEST * tooth.module), int(LONGEST) * STEPS)[1:]
     points = start + t[:, None] * direction
     radius, angle = np.hypot(*points.T), np.arctan2(points[:, 1], points[:, 0])
     near = np.minimum(clear, NEAR_START * t)
@@ -112,5 +113,7 @@ def _longest(tooth: Profile, hub_radius: float, start: Array, direction: Array) 
         "the hub circle": radius - hub_radius < near,
     }
     firsts = {what: int(np.argmax(hit)) for what, hit in found.items() if hit.any()}
+    if not firsts:
+        return float(t[-1]), f"the longest crack that is meshed ({LONGEST:g} modules)"
     limit = min(firsts, key=lambda what: firsts[what])
-    return float(t[firsts[limit]]), limit
+    return float(t[firsts[limit]]), f"where the crack comes within {CLEAR:g} modules of {limit}"

@@ -21,11 +21,14 @@ def load_table(path: Path, what: str) -> Table:
         raise CaseError(f"{what} {path} does not exist")
     if path.is_dir():
         raise CaseError(f"{what} {path} is a folder, not a TOML file")
+    if not path.is_file():  # a device or a pipe may never end
+        raise CaseError(f"{what} {path} is not a plain file, which a TOML file is")
     try:
-        raw = path.read_bytes() if path.stat().st_size <= _LARGEST_FILE else None
+        with path.open("rb") as file:
+            raw = file.read(_LARGEST_FILE + 1)
     except OSError as error:
         raise CaseError(f"{what} {path} cannot be read: {error.strerror or error}") from error
-    if raw is None:
+    if len(raw) > _LARGEST_FILE:
         raise CaseError(f"{what} {path} is larger than {_LARGEST_FILE // 1_000_000} MB, which no case needs")
     try:
         text = raw.decode("utf-8-sig")

@@ -11,8 +11,11 @@ from matplotlib.figure import Figure
 
 from gearbench.cases import case_path
 from gearbench.figures import frf as figures_frf
+from gearbench.figures import gear as figures_gear
+from gearbench.figures import static as figures_static
 from gearbench.figures.frf import draw_itf, draw_natural_frequencies
 from gearbench.figures.gear import draw_pair
+from gearbench.figures.plotting import closed
 from gearbench.figures.record import draw_record
 from gearbench.geometry import pair
 from gearbench.rig import read_case
@@ -71,7 +74,7 @@ def test_maps_are_thinned_without_averaging() -> None:
     assert values.shape == (frequency.size, phase.size) and frequency.size <= 1000
     whole = figures_frf.magnitude(large)
     rows = np.searchsorted(large["frequency"].values, frequency)
-    assert np.array_equal(values, whole[rows])
+    assert np.array_equal(values, np.column_stack((whole[rows], whole[rows, :1])))
 
 
 def test_the_same_picture_gives_the_same_file(tmp_path: Path) -> None:
@@ -126,3 +129,52 @@ def test_a_band_without_a_mode_is_said_in_words() -> None:
     answers = {"te_peak_to_peak_um": 1.0, "torque_mean_nm": 2.0, "te_mesh_orders_um": [1.0, 1.0, 1.0]}
     modes = {"first_mode_hz": (nan, nan), "first_mode_fewest_pairs_hz": nan, "first_mode_most_pairs_hz": nan}
     assert headline(answers | modes)[2] == "First mode: none in the identified band"
+
+
+def with_gap(missing: slice) -> xr.Dataset:
+    made = frf()
+    made["natural_frequency"][0, missing] = np.nan
+    return made
+
+
+def test_the_legends_of_the_gears_lie_outside_the_axes(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    figures: list[Figure] = []
+    monkeypatch.setattr(figures_gear, "save", lambda figure, path: figures.append(figure))
+    case = read_case(case_path("quick_lumped"))
+    draw_pair(tmp_path / "gears.png", case.rig, pair(case.rig), None)
+    figures[0].savefig(tmp_path / "gears.png")
+    for axes in figures[0].axes:
+        legend, label = axes.get_legend().get_window_extent(), axes.xaxis.label.get_window_extent()
+        assert legend.y1 < axes.get_window_extent().y0 and not legend.overlaps(label)
+
+
+def test_curves_and_ticks_reach_both_ends_of_the_period(drawn: list[Figure]) -> None:
+    draw_natural_frequencies(Path("n.png"), {"identified": frf()}, [], "")
+    (axes,) = drawn[0].axes
+    phase, values = axes.lines[0].get_data()
+    assert (phase[0], phase[-1]) == (0.0, 1.0) and values[0] == values[-1]
+    assert axes.get_xlim() == (0.0, 1.0) and {0.0, 1.0} <= set(axes.get_xticks())
+    shifted, continued = closed(np.array([0.1, 0.4, 0.7]), np.array([1.0, 2.0, 3.0]))
+    np.testing.assert_allclose(shifted, [-0.3, 0.1, 0.4, 0.7, 1.1])
+    np.testing.assert_array_equal(continued, [3.0, 1.0, 2.0, 3.0, 1.0])
+
+
+@pytest.mark.parametrize("missing", [slice(5, 9), slice(0, 3), slice(31, None)])
+def test_a_gap_in_a_curve_is_explained_on_it(drawn: list[Figure], missing: slice) -> None:
+    draw_natural_frequencies(Path("n.png"), {"identified": with_gap(missing)}, [], "")
+    draw_natural_frequencies(Path("n.png"), {"identified": frf()}, [], "")
+    words = [[text.get_text() for text in figure.axes[0].texts] for figure in drawn]
+    assert words == [[figures_frf.NO_MODE], []]
+
+
+def test_one_load_is_a_curve_and_several_have_a_swing(monkeypatch: pytest.MonkeyPatch) -> None:
+    figures: list[Figure] = []
+    monkeypatch.setattr(figures_static, "save", lambda figure, path: figures.append(figure))
+    phase = np.arange(8) / 8
+    for loads in ([50.0], [50.0, 100.0]):
+        te = np.outer(loads, 1e-8 * (2 + np.cos(2 * np.pi * phase)))
+        data = {"transmission_error": (("load", "phase"), te)}
+        result = xr.Dataset(data, coords={"load": ("load", loads, {"units": "N m"}), "phase": phase})
+        figures_static.plot_static(result, Path("static.png"))
+    assert [len(figure.axes) for figure in figures] == [1, 2]
+    assert all(line.get_xdata()[-1] == 1.0 for figure in figures for line in figure.axes[0].lines)

@@ -5,12 +5,13 @@ from __future__ import annotations
 import errno
 import os
 import stat
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from gearbench.files import FileError, write_text, write_whole
+from gearbench.files import FileError, remove_strays, write_text, write_whole
 
 
 @pytest.fixture(params=[0o022, 0o077])
@@ -70,3 +71,32 @@ def test_a_missing_folder_and_a_folder_in_the_way_are_named(tmp_path: Path) -> N
     with pytest.raises(FileError, match=r"/folder cannot be written: \w+"):
         write_text(tmp_path / "folder", "text")
     assert names(tmp_path) == ["folder"]
+
+
+def test_what_a_killed_writer_left_goes_a_day_later(tmp_path: Path) -> None:
+    """Names and ages: ours and old goes; ours at work stays; the user's own stays, however old."""
+    old = time.time() - 2 * 86_400
+    stray, at_work, own = (
+        tmp_path / f".gearbench-{'0' * 16}.nc",
+        tmp_path / f".gearbench-{'1' * 16}.nc",
+        tmp_path / ".gearbench-notes.txt",
+    )
+    for path in (stray, at_work, own):
+        path.write_text("half")
+    for path in (stray, own):
+        os.utime(path, (old, old))
+    write_text(tmp_path / "a.txt", "text")
+    assert names(tmp_path) == sorted(["a.txt", at_work.name, own.name])
+    remove_strays(tmp_path)
+    assert names(tmp_path) == sorted(["a.txt", own.name])
+
+
+def test_the_names_of_temporary_files_are_those_that_are_removed(tmp_path: Path) -> None:
+    def killed(temporary: Path) -> None:
+        remove_strays(tmp_path)
+        assert not temporary.exists()
+        temporary.write_text("again")
+
+    for name in ("a.nc", "no_suffix", "b.tar.gz"):
+        write_whole(tmp_path / name, killed)
+        (tmp_path / name).unlink()

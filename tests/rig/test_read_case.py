@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from math import pi
 from pathlib import Path
 
@@ -302,3 +303,22 @@ def test_a_byte_order_mark_is_harmless(tmp_path: Path) -> None:
     path = tmp_path / "bom.toml"
     path.write_bytes(b"\xef\xbb\xbf" + CASE.encode())
     assert isinstance(read_case(path), Case)
+
+
+def test_devices_pipes_and_folders_are_refused_at_once(write, tmp_path: Path) -> None:
+    """As a case and as a gear file; a device or a pipe would be read for ever."""
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    for name, words in ((str(pipe), "is not a plain file"), ("/dev/zero", "is not a plain file"), (".", "is a folder")):
+        with pytest.raises(CaseError, match=words):
+            read_case(tmp_path / name)
+        with pytest.raises(CaseError, match=rf"gear file rig.driver = \S+ {words}"):
+            read_case(write(), [f'rig.driver="{name}"'])
+
+
+def test_a_file_that_grows_while_it_is_read_has_a_limit(write, tmp_path: Path) -> None:
+    sparse = tmp_path / "sparse.toml"
+    with sparse.open("wb") as file:
+        file.truncate(2**40)
+    with pytest.raises(CaseError, match="larger than 4 MB"):
+        read_case(sparse)

@@ -48,7 +48,7 @@ def test_a_mark_cannot_point_outside_the_folder(tmp_path: Path) -> None:
     precious.write_text("keep")
     folder = tmp_path / "out"
     folder.mkdir()
-    (folder / "run.json").write_text('{"command": "run", "identity": "x", "files": ["../precious.txt"]}')
+    (folder / "run.json").write_text('{"command": "run", "identity": "x", "files": {"../precious.txt": ""}}')
     with claimed(folder, "run", "a", force=True):
         pass
     assert precious.read_text() == "keep"
@@ -79,3 +79,35 @@ def test_a_broken_write_leaves_the_old_file(tmp_path: Path) -> None:
 def test_fingerprints_keep_their_parts_apart() -> None:
     assert fingerprint("ab", "c") != fingerprint("a", "bc")
     assert fingerprint("ab", "c") == fingerprint("ab", "c")
+
+
+def test_a_product_that_is_not_as_it_was_written_is_made_again(tmp_path: Path) -> None:
+    """Truncated, emptied, another of the same size, or never noted: none of them is a product."""
+    with claimed(tmp_path, "run", "a") as output:
+        for name in ("cut.png", "empty.nc", "other.nc", "whole.nc"):
+            output.write_text(name, "content")
+    (tmp_path / "cut.png").write_text("cont")
+    (tmp_path / "empty.nc").write_text("")
+    (tmp_path / "other.nc").write_text("CONTENT")
+    (tmp_path / "foreign.nc").write_text("content")
+    with claimed(tmp_path, "run", "a") as output:
+        names = ("cut.png", "empty.nc", "other.nc", "foreign.nc", "absent.nc", "whole.nc")
+        assert [name for name in names if output.has(name)] == ["whole.nc"]
+
+
+def test_a_run_killed_in_its_first_write_does_not_block_the_folder(tmp_path: Path) -> None:
+    (tmp_path / f".gearbench-{'a' * 16}.json").write_text("{")
+    with claimed(tmp_path, "run", "a"):
+        assert [path.name for path in tmp_path.iterdir()] == ["run.json"]
+
+
+@pytest.mark.parametrize(
+    "mark", ["", "[]", '{"command": "run", "identity": "a", "files": ["record.nc"]}', '{"files": 3}']
+)
+def test_a_damaged_mark_takes_nothing_for_done(tmp_path: Path, mark: str) -> None:
+    (tmp_path / "run.json").write_text(mark)
+    (tmp_path / "record.nc").write_text("old")
+    with claimed(tmp_path, "run", "a", force=True) as output:
+        assert not output.has("record.nc")
+        output.write_text("record.nc", "new")
+        assert output.has("record.nc")

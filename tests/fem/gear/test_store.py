@@ -49,6 +49,22 @@ def test_a_damaged_entry_is_made_again(folder: Path, damage: Any) -> None:
     assert len(calls) == 2
 
 
+def test_no_damage_of_a_byte_gives_an_error_or_other_numbers(folder: Path) -> None:
+    """Every byte of an entry in its turn: the arrays are those that were made, from disk or again."""
+    calls, make = make_counter()
+    cached("key", make)
+    path, hurt = folder / "key.npz", folder / "hurt.npz"
+    whole = path.read_bytes()
+    made = make()
+    for place, byte in enumerate(whole):
+        hurt.write_bytes(whole[:place] + bytes([0xFF - byte]) + whole[place + 1 :])
+        found = cached("hurt", make)
+        assert set(found) == set(made), place
+        for name, array in made.items():
+            assert found[name].dtype == array.dtype and np.array_equal(found[name], array), place
+    assert len(calls) > 0.5 * len(whole)
+
+
 def test_a_pickled_entry_is_not_loaded(folder: Path) -> None:
     calls, make = make_counter()
     folder.mkdir()

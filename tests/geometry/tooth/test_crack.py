@@ -107,3 +107,15 @@ def test_the_mesh_has_a_slit_and_the_neighbours_cuts(
     assert (times == 1).sum() == len(mesh.free_edges) + others
     # The outline stays closed but for the open mouth.
     assert len(np.unique(mesh.boundary_edges[:, :2])) == len(mesh.boundary_edges) + 2
+
+
+@pytest.mark.parametrize("direction", [2.0, 3.0, 8.0, 14.0])
+def test_a_crack_that_meets_nothing_is_limited_by_its_length(cracked: Callable[..., Gear], direction: float) -> None:
+    """Of many teeth a direction near the radius leads past everything for 8 modules."""
+    changes = {"teeth": 62, "hub_radius": 30e-3, "direction": direction}
+    gear = cracked(**changes)
+    assert slit(profile(gear), gear, gear.crack).length == 0.8e-3  # type: ignore[arg-type]
+    module = 1e3 * gear.module
+    assert refusal(cracked(length=8.01e-3 * module, **changes)).endswith(
+        f"less than {8 * module:.4g}, the longest crack that is meshed (8 modules)"
+    )
