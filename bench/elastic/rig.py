@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from gearbench.bench.errors import BenchError
 from gearbench.bench.plan.schedule import Schedule
 from gearbench.bench.record.attributes import bodies_of
-from gearbench.fem.contact.law import Law, elastic_pair
+from gearbench.fem.contact.law import PAIRS, Law, elastic_pair
 from gearbench.fem.contact.static import position, static_cycle
 from gearbench.fem.contact.store import stored_law
 from gearbench.fem.gear.body import CondensedGear
@@ -71,14 +71,12 @@ def natural_frequencies(machine: Machine, torque: float, phase: float) -> Array:
     dte = static_cycle(law, np.array([phase]), torque=[torque]).transmission_error[0, 0]
     theta1 = phase * law.driver.pitch + dte / law.driver.rb
     theta2 = phase * law.driven.pitch
-    n, sides, teeth, found, _, active, _, _, _, flex, _ = position(
-        law, theta1, theta2, 0.0, 0.0, 0.0, 0.0, np.zeros(8)
-    )
-    rows = contact_rows(machine, sides, teeth, found, n)[active[:n]]
+    found = position(law, theta1, theta2, 0.0, 0.0, 0.0, 0.0, np.zeros(PAIRS))
+    rows = contact_rows(machine, found.pairs)[found.active]
     # Modes are unknowns of their own here, so the pairs keep only the residual's flexibility.
     modal = rows[:, machine.rotations + 2 :]
     squares = machine.stiffness[machine.rotations + 2 :]
-    residual = flex[np.ix_(active[:n], active[:n])] - (modal / squares) @ modal.T
+    residual = found.flexibility[np.ix_(found.active, found.active)] - (modal / squares) @ modal.T
     stiffness = np.diag(machine.stiffness) + rows.T @ np.linalg.solve(residual, rows)
     mass = mass_matrix(machine, theta1, theta2)
     size = len(mass)

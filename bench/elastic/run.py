@@ -17,28 +17,11 @@ from gearbench.bench.protocol import Channels, Drive, Note
 from gearbench.bench.record.channels import dte_of, force_of, support_factor, turned_by
 from gearbench.fem.contact.curve import EDGE_SEPARATION
 from gearbench.fem.motion.machine import Machine
-from gearbench.fem.motion.transient import CHANNELS, Scheme, advance, initial_state, make_scheme
+from gearbench.fem.motion.transient import CHANNELS, Scheme, advance, columns, initial_state, make_scheme
 from gearbench.fem.motion.transient import State as Step
 from gearbench.rig import Case
 
 Array = NDArray[np.float64]
-
-
-class Samples(NamedTuple):
-    """What the integrator hands out, each (...): angles [rad], support motions [m], driven torque [N m], number of
-    tooth pairs that carry."""
-
-    angle_driver: Array
-    angle_driven: Array
-    y_driver: Array
-    y_driven: Array
-    torque_driven: Array
-    pairs: Array
-
-
-def columns(outputs: Array) -> Samples:
-    """Outputs (..., CHANNELS) by name."""
-    return Samples(*np.moveaxis(outputs, -1, 0))
 
 
 class State(NamedTuple):
@@ -136,7 +119,7 @@ class Elastic:
         )
 
     def apart(self, outputs: Array) -> NDArray[np.bool_]:
-        return np.asarray(columns(outputs).pairs == 0)
+        return np.asarray(columns(outputs).loaded == 0)
 
 
 def prepare(case: Case, plan: Schedule, note: Note) -> Elastic:

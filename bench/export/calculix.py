@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from gearbench.bench.elastic.rig import ElasticRig, elastic_rig
 from gearbench.bench.errors import BenchError
-from gearbench.fem.contact.kinematics import Contact
+from gearbench.fem.contact.kinematics import CORNER1, CORNER2, EDGE1, EDGE2, ON_LINE, Contact
 from gearbench.fem.contact.law import PAIRS, contact_in
 from gearbench.fem.contact.static import position, solve_torque, static_cycle
 from gearbench.fem.gear.elasticity import plane_moduli
@@ -123,9 +123,8 @@ def contact_model(
         torques=torques,
         head=(),
     )
-    model = ContactModel(
-        deck, phase, dte, torques, sum(m.force > 0 for m in met), all(m.contact.slave == 0 or not m.force for m in met)
-    )
+    on_line = all(m.contact.slave == ON_LINE or not m.force for m in met)
+    model = ContactModel(deck, phase, dte, torques, sum(m.force > 0 for m in met), on_line)
     return replace(model, deck=replace(deck, head=_head(case, model, name or case.name)))
 
 
@@ -142,16 +141,14 @@ def meetings(elastic: ElasticRig, phase: float, dte: float) -> tuple[Meeting, ..
     """The tooth pairs that touch at a mesh phase [cycles] and DTE [m], or whose gap is below OPEN."""
     law = elastic.law
     theta1 = phase * law.driver.pitch + dte / law.driver.rb
-    n, sides, teeth, found, force, *_ = position(
-        law, theta1, phase * law.driven.pitch, 0.0, 0.0, 0.0, 0.0, np.zeros(PAIRS)
-    )
-    least = LEAST_SHARE * float(force[:n].sum())
+    found = position(law, theta1, phase * law.driven.pitch, 0.0, 0.0, 0.0, 0.0, np.zeros(PAIRS))
+    least = LEAST_SHARE * float(found.force.sum())
     shapes = elastic.pair.driver, elastic.pair.driven
     out = []
-    for p in np.flatnonzero((sides[:n] == 0) & (found[:n, 0] < OPEN)):
-        contact, load = contact_in(found, p), float(force[p])
+    for p in np.flatnonzero((found.pairs["side"] == 0) & (found.pairs["gap"] < OPEN)):
+        contact, load = contact_in(found.pairs, p), float(found.force[p])
         half_width = _half_width(elastic, contact, max(load, least))
-        out.append(Meeting(int(teeth[p]), shapes, contact, load, half_width))
+        out.append(Meeting(int(found.pairs["tooth"][p]), shapes, contact, load, half_width))
     return tuple(out)
 
 
@@ -159,10 +156,11 @@ def _half_width(elastic: ElasticRig, contact: Contact, force: float) -> float:
     """Hertz half-width [m] of a contact under a force [N]; a tip edge is as round as its arc."""
     pair = elastic.pair
     radii = [max(contact.xi1, END_SIZE), max(contact.xi2, END_SIZE)]
-    if contact.slave in (1, 2):
-        radii[contact.slave - 1] = (pair.driver, pair.driven)[contact.slave - 1].edge_radius
-    elif contact.slave in (3, 4):
-        radii[contact.slave - 3] = END_SIZE
+    if contact.slave in (EDGE1, EDGE2):
+        gear = contact.slave - EDGE1
+        radii[gear] = (pair.driver, pair.driven)[gear].edge_radius
+    elif contact.slave in (CORNER1, CORNER2):
+        radii[contact.slave - CORNER1] = END_SIZE
     relative = radii[0] * radii[1] / (radii[0] + radii[1])
     modulus = plane_moduli(elastic.rig.material).modulus / 2
     return sqrt(4 * force / pair.face_width * relative / (pi * modulus))

@@ -107,9 +107,9 @@ def _force_table(law: Law, phases: Array, dte: Array, force: Array) -> int:
         guess = np.zeros(PAIRS)
         for j in range(len(dte)):
             theta1 = phases[i] * law.driver.pitch + dte[j] / law.driver.rb
-            result = position(law, theta1, phases[i] * law.driven.pitch, 0.0, 0.0, 0.0, 0.0, guess)
-            force[i, j] = result[6] / law.driver.rb
-            failed += 0 if result[10] else 1
+            found = position(law, theta1, phases[i] * law.driven.pitch, 0.0, 0.0, 0.0, 0.0, guess)
+            force[i, j] = found.torque_driver / law.driver.rb
+            failed += 0 if found.converged else 1
     return failed
 
 
@@ -118,14 +118,12 @@ def _tangent_shares(law: Law, phases: Array, dte: Array, first: int, share: Arra
     """Fill share (phases, offsets): part of each working pair in the tangent stiffness at the given deflections."""
     for i in range(len(phases)):
         theta1 = phases[i] * law.driver.pitch + dte[i] / law.driver.rb
-        n, sides, teeth, _, _, active, _, _, _, flex, _ = position(
-            law, theta1, phases[i] * law.driven.pitch, 0.0, 0.0, 0.0, 0.0, np.zeros(PAIRS)
-        )
-        stiff = newton_step(np.ones(n), flex, active)
+        found = position(law, theta1, phases[i] * law.driven.pitch, 0.0, 0.0, 0.0, 0.0, np.zeros(PAIRS))
+        stiff = newton_step(np.ones(len(found.pairs)), found.flexibility, found.active)
         total = 0.0
-        for p in range(n):
-            column = teeth[p] - first
-            if sides[p] == 0 and active[p] and 0 <= column < share.shape[1]:
+        for p in range(len(found.pairs)):
+            column = found.pairs[p].tooth - first
+            if found.pairs[p].side == 0 and found.active[p] and 0 <= column < share.shape[1]:
                 share[i, column] = stiff[p, 0]
                 total += stiff[p, 0]
         for column in range(share.shape[1]):

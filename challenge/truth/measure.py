@@ -47,9 +47,9 @@ def fastest(plant: Plant) -> float:
     """An upper estimate of the fastest angular frequency [rad/s]."""
     mesh = 2.0 * plant.teeth.stiffness.max()
     rows = [
-        plant.coupling[0] / plant.inertia[0],
-        (plant.coupling[0] + mesh * plant.base_driver**2) / plant.inertia[1],
-        (plant.shaft[0] + mesh * plant.base_driven**2) / plant.inertia[2],
+        plant.coupling.stiffness / plant.inertia.rotor,
+        (plant.coupling.stiffness + mesh * plant.base_driver**2) / plant.inertia.driver,
+        (plant.shaft.stiffness + mesh * plant.base_driven**2) / plant.inertia.driven,
         *((plant.support[i] + mesh) / plant.mass[i // 2] for i in range(4)),
     ]
     return float(np.sqrt(max(rows)))
@@ -60,8 +60,8 @@ def fastest_decay(plant: Plant) -> float:
     teeth = plant.teeth
     damping = teeth.damping * max(1.0, 1.0 - teeth.damping_load + teeth.damping_load * IMPACT[1])
     damping += teeth.damping_quadratic * IMPACT[0]
-    mobility = plant.base_driver**2 / plant.inertia[1] + plant.base_driven**2 / plant.inertia[2]
-    return float(damping * 2.0 * teeth.stiffness.max() * (mobility + (1.0 / plant.mass).sum()))
+    mobility = plant.base_driver**2 / plant.inertia.driver + plant.base_driven**2 / plant.inertia.driven
+    return float(damping * 2.0 * teeth.stiffness.max() * (mobility + (1.0 / np.array(plant.mass)).sum()))
 
 
 def steps_per_sample(plant: Plant, rate: float) -> int:
@@ -91,19 +91,20 @@ def start_state(plant: Plant, torque: Array, step: float, first: int) -> Array:
     lift = np.array([-plant.sine, -plant.cosine, plant.sine, plant.cosine]) * force / plant.support
     state[4:8] = lift
     ratio = plant.base_driver / plant.base_driven
-    inertia = plant.inertia[2] + plant.inertia[3] + (plant.inertia[0] + plant.inertia[1]) / ratio**2
+    inertia = plant.inertia.driven + plant.inertia.load + (plant.inertia.rotor + plant.inertia.driver) / ratio**2
     points = torque.size
     spectrum = rfft(torque - mean) / ratio
     omega = 2 * pi * rfftfreq(points, 0.5 * step)
-    turning = spectrum / (plant.governor[0] - inertia * omega**2 + 1j * omega * plant.governor[1])
+    governor = plant.governor
+    turning = spectrum / (governor.stiffness - inertia * omega**2 + 1j * omega * governor.damping)
     at = 2 * pi * ((2 * first) % points) * np.arange(turning.size) / points
     waves = 2.0 / points * turning * np.exp(1j * at)
     driven, speed = float(waves.real.sum()), float((1j * omega * waves).real.sum())
-    state[2], state[3] = driven + mean / ratio / plant.shaft[0], driven
+    state[2], state[3] = driven + mean / ratio / plant.shaft.stiffness, driven
     near = plant.teeth.stiffness.max() * 1.4
     across = (lift[1] - lift[3]) * plant.cosine + (lift[0] - lift[2]) * plant.sine
     state[1] = (force / near - across + plant.base_driven * state[2]) / plant.base_driver
-    state[2 * DEGREES] = mean / plant.coupling[0]
+    state[2 * DEGREES] = mean / plant.coupling.stiffness
     state[0] = state[1] + state[2 * DEGREES]
     state[DEGREES + 2] = state[DEGREES + 3] = speed
     state[DEGREES] = state[DEGREES + 1] = speed / ratio

@@ -13,57 +13,7 @@ from math import cos, floor, pi, sin, sqrt, tanh
 import numpy as np
 
 from gearbench.challenge.errors import ChallengeError
-from gearbench.challenge.truth.packing import (
-    BACKLASH,
-    BASE_DRIVEN,
-    BASE_DRIVER,
-    BASE_PITCH,
-    COSINE,
-    COUPLING,
-    DRIFT,
-    ECCENTRICITY,
-    ECCENTRICITY_ANGLE,
-    EXCESS,
-    FRICTION,
-    FRICTION_SHAPE,
-    FRICTION_SPEED,
-    GOVERNOR,
-    INERTIA,
-    LINE_OF_ACTION,
-    LOAD_TORQUE,
-    MASS,
-    MODE_DAMPING,
-    MODE_MASS,
-    MODE_SHAPE,
-    MODE_STIFFNESS,
-    PAIR_DAMPING,
-    PAIR_DAMPING_LOAD,
-    PAIR_DAMPING_ONSET,
-    PAIR_DAMPING_QUADRATIC,
-    PAIR_EXPONENT,
-    PAIR_REFERENCE,
-    RIPPLE,
-    RIPPLE_ORDER,
-    RIPPLES,
-    ROLL_PITCH,
-    SENSOR_ON_HOUSING,
-    SHAFT,
-    SHARE_DRIVEN,
-    SHARE_DRIVER,
-    SINE,
-    SPEED_DRIVEN,
-    SPEED_DRIVER,
-    STIFFNESS,
-    SUPPORT,
-    SUPPORT_DAMPING,
-    SUPPORT_EXPONENT,
-    SUPPORT_REFERENCE,
-    TABLE_FIRST,
-    TABLE_PITCH,
-    TONE,
-    Mesh,
-    pack,
-)
+from gearbench.challenge.truth.packing import Mesh, Record, pack
 from gearbench.challenge.truth.plant import DEGREES, OUTPUTS, STATES, Array, Plant
 from gearbench.kernels.compiled import ROUNDING, compiled
 
@@ -103,60 +53,60 @@ def derivative(plant: Plant, time: float, torque: float, state: Array) -> tuple[
 
 @_compiled
 def _pair_force(
-    c: Array, mesh: Mesh, number: int, v: float, sweep: float, dte: float, rate: float, scale: float
+    c: Record, mesh: Mesh, number: int, v: float, sweep: float, dte: float, rate: float, scale: float
 ) -> float:
     """Normal force of the pair `number` at position `v`, which moves by `sweep` pitches a second."""
-    table, one, two = mesh
-    place = (v - c[TABLE_FIRST]) / c[TABLE_PITCH]
+    table, one, two = mesh.table, mesh.driver, mesh.driven
+    place = (v - c.teeth.first) / c.teeth.pitch
     cell = int(place)
     if place < 0.0 or cell >= table.shape[0] - 1:
         return 0.0
     part = place - cell
     tooth1, tooth2 = number % one.shape[0], number % two.shape[0]
-    slope = table[cell + 1, EXCESS] - table[cell, EXCESS]
-    delta = dte + table[cell, EXCESS] + part * slope + one[tooth1, 0] + two[tooth2, 0]
+    slope = table[cell + 1].excess - table[cell].excess
+    delta = dte + table[cell].excess + part * slope + one[tooth1].error + two[tooth2].error
     if delta <= 0.0:
         return 0.0
-    closing = rate + slope / c[TABLE_PITCH] * sweep
-    k = table[cell, STIFFNESS] + part * (table[cell + 1, STIFFNESS] - table[cell, STIFFNESS])
-    share1 = table[cell, SHARE_DRIVER] + part * (table[cell + 1, SHARE_DRIVER] - table[cell, SHARE_DRIVER])
-    share2 = table[cell, SHARE_DRIVEN] + part * (table[cell + 1, SHARE_DRIVEN] - table[cell, SHARE_DRIVEN])
-    k *= scale / (1.0 + share1 * one[tooth1, 1] + share2 * two[tooth2, 1])
-    relative = delta / c[PAIR_REFERENCE]
-    tangent = k * relative ** c[PAIR_EXPONENT]
+    closing = rate + slope / c.teeth.pitch * sweep
+    k = table[cell].stiffness + part * (table[cell + 1].stiffness - table[cell].stiffness)
+    share1 = table[cell].share_driver + part * (table[cell + 1].share_driver - table[cell].share_driver)
+    share2 = table[cell].share_driven + part * (table[cell + 1].share_driven - table[cell].share_driven)
+    k *= scale / (1.0 + share1 * one[tooth1].crack + share2 * two[tooth2].crack)
+    relative = delta / c.teeth.reference
+    tangent = k * relative ** c.teeth.exponent
     elastic = tangent * delta
-    tangent *= 1.0 + c[PAIR_EXPONENT]
-    damping = c[PAIR_DAMPING] * (1.0 - c[PAIR_DAMPING_LOAD] + c[PAIR_DAMPING_LOAD] * relative)
-    damping += c[PAIR_DAMPING_QUADRATIC] * abs(closing)
-    if delta < c[PAIR_DAMPING_ONSET]:
-        damping *= delta / c[PAIR_DAMPING_ONSET]
+    tangent *= 1.0 + c.teeth.exponent
+    damping = c.teeth.damping * (1.0 - c.teeth.damping_load + c.teeth.damping_load * relative)
+    damping += c.teeth.damping_quadratic * abs(closing)
+    if delta < c.teeth.damping_onset:
+        damping *= delta / c.teeth.damping_onset
     return max(elastic + damping * tangent * closing, 0.0)
 
 
 @_compiled
-def _sliding(c: Array, speed: float) -> float:
+def _sliding(c: Record, speed: float) -> float:
     """Regularised sign of a sliding speed."""
-    if c[FRICTION_SHAPE] == 0:
-        return tanh(speed / c[FRICTION_SPEED])
-    return speed / sqrt(speed * speed + c[FRICTION_SPEED] * c[FRICTION_SPEED])
+    if c.teeth.friction_shape == 0:
+        return tanh(speed / c.teeth.friction_speed)
+    return speed / sqrt(speed * speed + c.teeth.friction_speed * c.teeth.friction_speed)
 
 
 @_compiled
 def _working(
-    c: Array, mesh: Mesh, s: Array, turn: float, speed1: float, speed2: float, dte: float, rate: float, scale: float
+    c: Record, mesh: Mesh, s: Array, turn: float, speed1: float, speed2: float, dte: float, rate: float, scale: float
 ) -> tuple[float, float, float, float]:
     """Of all pairs on the working flanks: normal force, friction, and friction's moments on both gears."""
-    last = c[TABLE_FIRST] + c[TABLE_PITCH] * (mesh[0].shape[0] - 1)
-    across = (s[DEGREES + 5] - s[DEGREES + 7]) * c[SINE] - (s[DEGREES + 4] - s[DEGREES + 6]) * c[COSINE]
-    sweep = c[BASE_DRIVER] / c[BASE_PITCH] * speed1
+    last = c.teeth.first + c.teeth.pitch * (mesh.table.shape[0] - 1)
+    across = (s[DEGREES + 5] - s[DEGREES + 7]) * c.sine - (s[DEGREES + 4] - s[DEGREES + 6]) * c.cosine
+    sweep = c.base_driver / c.base_pitch * speed1
     normal, rubbing, moment1, moment2 = 0.0, 0.0, 0.0, 0.0
-    for number in range(floor(turn - last) + 1, floor(turn - c[TABLE_FIRST]) + 1):
+    for number in range(floor(turn - last) + 1, floor(turn - c.teeth.first) + 1):
         v = turn - number
         force = _pair_force(c, mesh, number, v, sweep, dte, rate, scale)
         if force > 0.0:
-            rho1 = c[ROLL_PITCH] + v * c[BASE_PITCH]
-            rho2 = c[LINE_OF_ACTION] - rho1
-            rub = c[FRICTION] * force * _sliding(c, rho1 * speed1 - rho2 * speed2 + across)
+            rho1 = c.roll_pitch + v * c.base_pitch
+            rho2 = c.line_of_action - rho1
+            rub = c.teeth.friction * force * _sliding(c, rho1 * speed1 - rho2 * speed2 + across)
             normal += force
             rubbing += rub
             moment1 += rub * rho1
@@ -165,122 +115,124 @@ def _working(
 
 
 @_compiled
-def _back(c: Array, mesh: Mesh, turn: float, speed1: float, dte: float, rate: float, scale: float) -> float:
+def _back(c: Record, mesh: Mesh, turn: float, speed1: float, dte: float, rate: float, scale: float) -> float:
     """Normal force of the back flanks, whose contacts run from tip to root and pass the pitch point half a pitch
     later; `dte` closes them and is counted from their contact."""
-    last = c[TABLE_FIRST] + c[TABLE_PITCH] * (mesh[0].shape[0] - 1)
-    sweep = -c[BASE_DRIVER] / c[BASE_PITCH] * speed1
+    last = c.teeth.first + c.teeth.pitch * (mesh.table.shape[0] - 1)
+    sweep = -c.base_driver / c.base_pitch * speed1
     force = 0.0
-    for number in range(floor(turn - 0.5 + c[TABLE_FIRST]), floor(turn - 0.5 + last) + 1):
-        clean = dte - mesh[1][number % mesh[1].shape[0], 0] - mesh[2][number % mesh[2].shape[0], 0]
+    for number in range(floor(turn - 0.5 + c.teeth.first), floor(turn - 0.5 + last) + 1):
+        clean = dte - mesh.driver[number % mesh.driver.shape[0]].error - mesh.driven[number % mesh.driven.shape[0]].error
         force += _pair_force(c, mesh, number, number + 0.5 - turn, sweep, clean, rate, scale)
     return force
 
 
 @_compiled
-def _supports(c: Array, s: Array, progress: float, force: Array) -> None:
+def _supports(c: Record, s: Array, progress: float, force: Array) -> None:
     """Forces (4,) of the supports on the gears' centres, with opposite sign."""
     for i in range(4):
-        lift = c[MODE_SHAPE + 0 + i] * s[8] + c[MODE_SHAPE + 4 + i] * s[9]
-        lift_rate = c[MODE_SHAPE + 0 + i] * s[DEGREES + 8] + c[MODE_SHAPE + 4 + i] * s[DEGREES + 9]
+        lift = c.mode_shape[0, i] * s[8] + c.mode_shape[1, i] * s[9]
+        lift_rate = c.mode_shape[0, i] * s[DEGREES + 8] + c.mode_shape[1, i] * s[DEGREES + 9]
         y = s[4 + i] - lift
-        k = c[SUPPORT + i] * (1.0 + progress * c[DRIFT + 1 + i // 2])
-        if c[SUPPORT_EXPONENT + i] != 0.0:
-            k *= (abs(y) / c[SUPPORT_REFERENCE + i]) ** c[SUPPORT_EXPONENT + i]
-        force[i] = k * y + c[SUPPORT_DAMPING + i] * (s[DEGREES + 4 + i] - lift_rate)
+        k = c.support[i] * (1.0 + progress * (c.drift.driver if i < 2 else c.drift.driven))
+        if c.support_exponent[i] != 0.0:
+            k *= (abs(y) / c.support_reference[i]) ** c.support_exponent[i]
+        force[i] = k * y + c.support_damping[i] * (s[DEGREES + 4 + i] - lift_rate)
 
 
 @_compiled
-def _drive(c: Array, time: float, torque: float, s: Array, rate: Array) -> float:
+def _drive(c: Record, time: float, torque: float, s: Array, rate: Array) -> float:
     """Torque on the driver from the coupling; sets the rates of the rotor and of the coupling's twist."""
-    if c[TONE] != 0.0:
-        torque += c[TONE] * cos(c[TONE + 1] * time + c[TONE + 2])
-    angle = c[RIPPLE_ORDER] * (c[SPEED_DRIVER] * time + s[0])
+    if c.tone.amplitude != 0.0:
+        torque += c.tone.amplitude * cos(c.tone.frequency * time + c.tone.phase)
+    angle = c.ripple_order * (c.speed_driver * time + s[0])
     cosine, sine = cos(angle), sin(angle)
     a, b = 1.0, 0.0
-    for k in range(RIPPLES):
+    for k in range(len(c.ripple)):
         a, b = a * cosine - b * sine, a * sine + b * cosine
-        torque += c[RIPPLE + 2 * k] * a + c[RIPPLE + 2 * k + 1] * b
-    elastic = c[COUPLING] * s[2 * DEGREES]
+        torque += c.ripple[k, 0] * a + c.ripple[k, 1] * b
+    elastic = c.coupling.stiffness * s[2 * DEGREES]
     turning = s[DEGREES] - s[DEGREES + 1]
     slip = 0.0
-    if c[COUPLING + 2] > 0.0:
-        if elastic > c[COUPLING + 2]:
-            slip = (elastic - c[COUPLING + 2]) / c[COUPLING + 3]
-        elif elastic < -c[COUPLING + 2]:
-            slip = (elastic + c[COUPLING + 2]) / c[COUPLING + 3]
-    passed = elastic + c[COUPLING + 1] * (turning - slip)
-    rate[DEGREES] = (torque - passed) / c[INERTIA]
+    if c.coupling.limit > 0.0:
+        if elastic > c.coupling.limit:
+            slip = (elastic - c.coupling.limit) / c.coupling.slip
+        elif elastic < -c.coupling.limit:
+            slip = (elastic + c.coupling.limit) / c.coupling.slip
+    passed = elastic + c.coupling.damping * (turning - slip)
+    rate[DEGREES] = (torque - passed) / c.inertia.rotor
     rate[2 * DEGREES] = turning - slip
     return passed
 
 
 @_compiled
-def _derivative(c: Array, mesh: Mesh, time: float, torque: float, s: Array, rate: Array, seen: Array) -> None:
+def _derivative(c: Record, mesh: Mesh, time: float, torque: float, s: Array, rate: Array, seen: Array) -> None:
     d = DEGREES
-    progress = max(time, 0.0) / c[DRIFT + 3]
-    angle1, angle2 = c[SPEED_DRIVER] * time + s[1], c[SPEED_DRIVEN] * time + s[2]
-    speed1, speed2 = c[SPEED_DRIVER] + s[d + 1], c[SPEED_DRIVEN] + s[d + 2]
+    progress = max(time, 0.0) / c.drift.duration
+    angle1, angle2 = c.speed_driver * time + s[1], c.speed_driven * time + s[2]
+    speed1, speed2 = c.speed_driver + s[d + 1], c.speed_driven + s[d + 2]
     # Geometric centres off the axes: polar angles of both.
-    pole1, pole2 = c[ECCENTRICITY_ANGLE] + angle1, c[ECCENTRICITY_ANGLE + 1] - angle2
-    e1, e2 = c[ECCENTRICITY], c[ECCENTRICITY + 1]
+    pole1, pole2 = c.eccentricity_angle.driver + angle1, c.eccentricity_angle.driven - angle2
+    e1, e2 = c.eccentricity.driver, c.eccentricity.driven
     x1, y1 = e1 * cos(pole1), e1 * sin(pole1)
     x2, y2 = e2 * cos(pole2), e2 * sin(pole2)
     # Their part in the levers: derivative of dte to each angle.
-    lever1 = c[BASE_DRIVER] + x1 * c[COSINE] - y1 * c[SINE]
-    lever2 = c[BASE_DRIVEN] - x2 * c[COSINE] + y2 * c[SINE]
+    lever1 = c.base_driver + x1 * c.cosine - y1 * c.sine
+    lever2 = c.base_driven - x2 * c.cosine + y2 * c.sine
     u1, w1 = -y1 * speed1 + s[d + 4], x1 * speed1 + s[d + 5]
     u2, w2 = y2 * speed2 + s[d + 6], -x2 * speed2 + s[d + 7]
     apart_x, apart_y = s[4] + x1 - s[6] - x2, s[5] + y1 - s[7] - y2
     apart_u, apart_w = u1 - u2, w1 - w2
-    twist = c[BASE_DRIVER] * s[1] - c[BASE_DRIVEN] * s[2]
-    twist_rate = c[BASE_DRIVER] * s[d + 1] - c[BASE_DRIVEN] * s[d + 2]
-    dte = twist + apart_y * c[COSINE] + apart_x * c[SINE]
-    dte_rate = twist_rate + apart_w * c[COSINE] + apart_u * c[SINE]
-    turn = mesh[1].shape[0] * angle1 / (2.0 * pi)
-    scale = 1.0 + progress * c[DRIFT]
+    twist = c.base_driver * s[1] - c.base_driven * s[2]
+    twist_rate = c.base_driver * s[d + 1] - c.base_driven * s[d + 2]
+    dte = twist + apart_y * c.cosine + apart_x * c.sine
+    dte_rate = twist_rate + apart_w * c.cosine + apart_u * c.sine
+    turn = mesh.driver.shape[0] * angle1 / (2.0 * pi)
+    scale = 1.0 + progress * c.drift.mesh
     force, rub, moment1, moment2 = _working(c, mesh, s, turn, speed1, speed2, dte, dte_rate, scale)
     pull1, pull2 = force * lever1 + moment1, force * lever2 + moment2
-    fy = force * c[COSINE] + rub * c[SINE]
-    fx = force * c[SINE] - rub * c[COSINE]
-    closed = -twist - apart_y * c[COSINE] + apart_x * c[SINE] - c[BACKLASH]
+    fy = force * c.cosine + rub * c.sine
+    fx = force * c.sine - rub * c.cosine
+    closed = -twist - apart_y * c.cosine + apart_x * c.sine - c.teeth.backlash
     if closed > -2e-5:  # errors and profile of the back flanks are smaller
-        closing = -twist_rate - apart_w * c[COSINE] + apart_u * c[SINE]
+        closing = -twist_rate - apart_w * c.cosine + apart_u * c.sine
         push = _back(c, mesh, turn, speed1, closed, closing, scale)
-        pull1 -= push * (c[BASE_DRIVER] + x1 * c[COSINE] + y1 * c[SINE])
-        pull2 -= push * (c[BASE_DRIVEN] - x2 * c[COSINE] - y2 * c[SINE])
-        fy -= push * c[COSINE]
-        fx += push * c[SINE]
+        pull1 -= push * (c.base_driver + x1 * c.cosine + y1 * c.sine)
+        pull2 -= push * (c.base_driven - x2 * c.cosine - y2 * c.sine)
+        fy -= push * c.cosine
+        fx += push * c.sine
     for i in range(d):
         rate[i] = s[d + i]
     passed = _drive(c, time, torque, s, rate)
-    shaft = c[SHAFT] * (s[2] - s[3]) + c[SHAFT + 1] * (s[d + 2] - s[d + 3])
-    rate[d + 1] = (passed - pull1) / c[INERTIA + 1]
-    rate[d + 2] = (pull2 - shaft) / c[INERTIA + 2]
-    held = c[GOVERNOR] * s[3] + c[GOVERNOR + 1] * s[d + 3]
-    rate[d + 3] = (shaft - c[LOAD_TORQUE] - held) / c[INERTIA + 3]
+    shaft = c.shaft.stiffness * (s[2] - s[3]) + c.shaft.damping * (s[d + 2] - s[d + 3])
+    rate[d + 1] = (passed - pull1) / c.inertia.driver
+    rate[d + 2] = (pull2 - shaft) / c.inertia.driven
+    held = c.governor.stiffness * s[3] + c.governor.damping * s[d + 3]
+    rate[d + 3] = (shaft - c.load_torque - held) / c.inertia.load
     # The four slots of the supports are filled first with their forces, then with the accelerations.
     supports = rate[d + 4 : d + 8]
     _supports(c, s, progress, supports)
-    for j in range(2):
-        total = -c[MODE_STIFFNESS + j] * s[8 + j] - c[MODE_DAMPING + j] * s[d + 8 + j]
-        for i in range(4):
-            total += c[MODE_SHAPE + 4 * j + i] * supports[i]
-        rate[d + 8 + j] = total / c[MODE_MASS + j]
-    supports[0] = (-fx - supports[0]) / c[MASS]
-    supports[1] = (-fy - supports[1]) / c[MASS]
-    supports[2] = (fx - supports[2]) / c[MASS + 1]
-    supports[3] = (fy - supports[3]) / c[MASS + 1]
+    one = -c.mode_stiffness[0] * s[8] - c.mode_damping[0] * s[d + 8]
+    two = -c.mode_stiffness[1] * s[9] - c.mode_damping[1] * s[d + 9]
+    for i in range(4):
+        one += c.mode_shape[0, i] * supports[i]
+        two += c.mode_shape[1, i] * supports[i]
+    rate[d + 8] = one / c.mode_mass[0]
+    rate[d + 9] = two / c.mode_mass[1]
+    supports[0] = (-fx - supports[0]) / c.mass.driver
+    supports[1] = (-fy - supports[1]) / c.mass.driver
+    supports[2] = (fx - supports[2]) / c.mass.driven
+    supports[3] = (fy - supports[3]) / c.mass.driven
     seen[0], seen[1] = s[1], s[2]
-    base1 = c[MODE_SHAPE + 1] * s[8] + c[MODE_SHAPE + 5] * s[9]
-    base2 = c[MODE_SHAPE + 3] * s[8] + c[MODE_SHAPE + 7] * s[9]
-    seen[2] = s[5] - c[SENSOR_ON_HOUSING] * base1
-    seen[3] = s[7] - c[SENSOR_ON_HOUSING] * base2
+    base1 = c.mode_shape[0, 1] * s[8] + c.mode_shape[1, 1] * s[9]
+    base2 = c.mode_shape[0, 3] * s[8] + c.mode_shape[1, 3] * s[9]
+    seen[2] = s[5] - c.sensor_on_housing * base1
+    seen[3] = s[7] - c.sensor_on_housing * base2
     seen[4], seen[5], seen[6] = shaft, force, dte
 
 
 @_compiled
-def _run(c: Array, mesh: Mesh, torque: Array, s: Array, h: float, first: int, stride: int, out: Array) -> None:
+def _run(c: Record, mesh: Mesh, torque: Array, s: Array, h: float, first: int, stride: int, out: Array) -> None:
     """Advance the state `s` in place and fill `out`."""
     k1, k2, k3, k4 = np.empty(STATES), np.empty(STATES), np.empty(STATES), np.empty(STATES)
     trial = np.empty(STATES)

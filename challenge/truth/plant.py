@@ -55,6 +55,55 @@ class Teeth(NamedTuple):
     friction_shape: int  # 0: tanh; 1: v/sqrt(v^2 + v0^2)
 
 
+class Inertias(NamedTuple):
+    """Of what turns [kg m^2]."""
+
+    rotor: float
+    driver: float
+    driven: float
+    load: float
+
+
+class Gears(NamedTuple):
+    """A number of each gear."""
+
+    driver: float
+    driven: float
+
+
+class Coupling(NamedTuple):
+    """Between rotor and driver."""
+
+    stiffness: float  # [N m/rad]
+    damping: float  # [N m s/rad]
+    limit: float  # torque [N m] beyond which it slips; 0: never
+    slip: float  # damping of the slip [N m s/rad]
+
+
+class Spring(NamedTuple):
+    """A torsional spring with its damper."""
+
+    stiffness: float  # [N m/rad]
+    damping: float  # [N m s/rad]
+
+
+class Tone(NamedTuple):
+    """A torque on the rotor beside the excitation."""
+
+    amplitude: float  # [N m]
+    frequency: float  # [rad/s]
+    phase: float
+
+
+class Drift(NamedTuple):
+    """Relative change of stiffnesses over the record, and its duration [s]."""
+
+    mesh: float
+    driver: float  # of the driver's supports
+    driven: float
+    duration: float
+
+
 class Plant(NamedTuple):
     """All numbers of the equations of motion, SI. Arrays of four are x_driver, y_driver, x_driven, y_driven."""
 
@@ -68,8 +117,8 @@ class Plant(NamedTuple):
     cosine: float
     speed_driver: float  # steady, [rad/s]
     speed_driven: float
-    inertia: Array  # (4,) rotor, driver, driven, load
-    mass: Array  # (2,) driver, driven
+    inertia: Inertias
+    mass: Gears  # [kg]
     support: Array  # (4,) [N/m]
     support_damping: Array  # (4,)
     support_exponent: Array  # (4,)
@@ -79,13 +128,13 @@ class Plant(NamedTuple):
     mode_damping: Array  # (2,)
     mode_shape: Array  # (2, 4) motion of the four supports
     sensor_on_housing: float  # 1: y channels are relative to the housing; 0: to the ground
-    coupling: Array  # (4,) stiffness, damping, torque limit (0: none), damping of the slip
-    shaft: Array  # (2,) stiffness, damping
-    governor: Array  # (2,) stiffness, damping of what holds the load's speed
+    coupling: Coupling
+    shaft: Spring  # between driven gear and load
+    governor: Spring  # what holds the load's speed
     load_torque: float
-    eccentricity: Array  # (2,) [m]
-    eccentricity_angle: Array  # (2,) polar angle of the geometric centre at rotation 0
+    eccentricity: Gears  # [m]
+    eccentricity_angle: Gears  # polar angle of the geometric centre at rotation 0
     ripple: Array  # (orders, 2) cosine and sine amplitudes [N m] at ripple_order, 2 ripple_order, ... of the rotor
     ripple_order: float
-    tone: Array  # (3,) amplitude [N m], angular frequency [rad/s], phase
-    drift: Array  # (4,) relative change of mesh, driver support, driven support over the record; duration [s]
+    tone: Tone
+    drift: Drift

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from gearbench.bench.plan.schedule import Schedule, schedule
 from gearbench.challenge.errors import ChallengeError
 from gearbench.challenge.truth.levels import RIPPLE_ORDERS, Levels
-from gearbench.challenge.truth.plant import Plant, Teeth
+from gearbench.challenge.truth.plant import Coupling, Drift, Gears, Inertias, Plant, Spring, Teeth, Tone
 from gearbench.challenge.truth.structure import Structure
 from gearbench.challenge.truth.teeth import pair_law, scaled
 from gearbench.geometry import Pair, pair
@@ -108,8 +108,8 @@ def build_plant(bench: Bench, rig: Structure, levels: Levels, experiment: Experi
         cosine=float(np.cos(alpha)),
         speed_driver=plan.speed_driver,
         speed_driven=plan.speed_driven,
-        inertia=np.ascontiguousarray(rig.inertia),
-        mass=np.ascontiguousarray(rig.mass),
+        inertia=Inertias(*rig.inertia),
+        mass=Gears(*rig.mass),
         support=np.ascontiguousarray(rig.support),
         support_damping=np.ascontiguousarray(rig.support_damping),
         support_exponent=np.array([0.0, levels.exponent[0], 0.0, levels.exponent[1]]),
@@ -119,19 +119,19 @@ def build_plant(bench: Bench, rig: Structure, levels: Levels, experiment: Experi
         mode_damping=modes[2],
         mode_shape=np.ascontiguousarray(rig.mode_shape),
         sensor_on_housing=rig.sensor_on_housing,
-        coupling=np.array([spring, 2 * rig.coupling_damping * np.sqrt(spring * reduced), limit, spring * SLIP_TIME]),
-        shaft=np.array([shaft, 2 * rig.shaft_damping * np.sqrt(shaft * driven)]),
-        governor=np.array([governed, 2 * rig.governor_damping * np.sqrt(governed * load)]),
+        coupling=Coupling(spring, 2 * rig.coupling_damping * np.sqrt(spring * reduced), limit, spring * SLIP_TIME),
+        shaft=Spring(shaft, 2 * rig.shaft_damping * np.sqrt(shaft * driven)),
+        governor=Spring(governed, 2 * rig.governor_damping * np.sqrt(governed * load)),
         load_torque=experiment.torque_mean * z2 / z1,
-        eccentricity=0.5 * np.array(levels.runout),
+        eccentricity=Gears(*(0.5 * size for size in levels.runout)),
         # Most material when the centre lies on the line of action, towards the mate.
-        eccentricity_angle=np.array(
-            [np.pi / 2 - alpha - levels.runout_phase[0], -np.pi / 2 - alpha + levels.runout_phase[1]]
+        eccentricity_angle=Gears(
+            np.pi / 2 - alpha - levels.runout_phase[0], -np.pi / 2 - alpha + levels.runout_phase[1]
         ),
         ripple=_ripple(levels, experiment),
         ripple_order=float(RIPPLE_ORDERS[0]),
         tone=_tone(levels, experiment, plan),
-        drift=np.array([*foreign.drift, experiment.periods * plan.samples_per_period / plan.sampling_rate]),
+        drift=Drift(*foreign.drift, experiment.periods * plan.samples_per_period / plan.sampling_rate),
     )
 
 
@@ -190,8 +190,8 @@ def _ripple(levels: Levels, experiment: Experiment) -> Array:
     return np.ascontiguousarray(parts)
 
 
-def _tone(levels: Levels, experiment: Experiment, plan: Schedule) -> Array:
+def _tone(levels: Levels, experiment: Experiment, plan: Schedule) -> Tone:
     foreign = levels.foreign
     spacing = plan.sampling_rate / plan.samples_per_period
     line = round(foreign.tone_frequency / spacing) + foreign.tone_offset
-    return np.array([foreign.tone * experiment.torque_mean, 2 * np.pi * line * spacing, foreign.tone_phase])
+    return Tone(foreign.tone * experiment.torque_mean, 2 * np.pi * line * spacing, foreign.tone_phase)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from gearbench.fem.contact.kernel import Kernel, lagrange
-from gearbench.fem.contact.kinematics import CORNER_SEPARATION, Contact, Tooth
+from gearbench.fem.contact.kinematics import CORNER1, CORNER2, CORNER_SEPARATION, EDGE1, EDGE2, Contact, Tooth
 from gearbench.fem.contact.line import gap_to_master, line_contact, touching_point
 from gearbench.kernels.compiled import compiled
 
@@ -62,11 +62,11 @@ def edge_reach(slave: Tooth, master: Tooth, a: float, separation: float) -> floa
 def _follows(slave: Tooth, master: Tooth, a: float, xi: float, separation: float) -> bool:
     """Whether contact of the slave's tip edge at this roll length still lies on both flanks."""
     alpha = acos((slave.rb + master.rb) / a)
-    c, s, reference = touching_point(slave, master, xi, a)
+    touch = touching_point(slave, master, xi, a)
     rho_m = a * sin(alpha) - xi
-    left = reference - (rho_m - master.rb * alpha)
-    _, foot = gap_to_master(slave, master, c, a, s)
-    turned = s >= slave.s_tip - 1e-12 and slave.edge_radius > 0
+    left = touch.reference - (rho_m - master.rb * alpha)
+    _, foot = gap_to_master(slave, master, touch.angle, a, touch.s)
+    turned = touch.s >= slave.s_tip - 1e-12 and slave.edge_radius > 0
     return not (left > separation or turned or foot**2 / (2 * master.rb) < master.s_form or rho_m <= separation / 4)
 
 
@@ -92,7 +92,7 @@ def tabulate(slave: Tooth, master: Tooth, ks: Kernel, km: Kernel, half_plane: fl
     else:
         xi = _curve_nodes(slave, middle, reach)
     value = np.array(
-        [[line_contact(slave, master, ks, km, half_plane, a, x, exp(f))[0] / exp(f) for x in xi] for f in logs]
+        [[line_contact(slave, master, ks, km, half_plane, a, x, exp(f)).approach / exp(f) for x in xi] for f in logs]
     )
     slope = np.array([CubicSpline(xi, v)(xi, 1) for v in value])
     return Curve(xi, value, slope, float(logs[0]), float(logs[1] - logs[0]), slave.corner)
@@ -104,11 +104,11 @@ def _corner_nodes(slave: Tooth, master: Tooth, a: float, last: float) -> Array:
     step, below = 2e-6, [corner]
     largest = CORNER_SEPARATION * slave.rb * slave.pitch
     while len(below) < 100:
-        c, s, reference = touching_point(slave, master, below[-1] - step, a)
-        _, foot = gap_to_master(slave, master, c, a, s)
+        touch = touching_point(slave, master, below[-1] - step, a)
+        _, foot = gap_to_master(slave, master, touch.angle, a, touch.s)
         rolled = a * sin(acos((slave.rb + master.rb) / a)) - (below[-1] - step)
         below.append(below[-1] - step)
-        if reference - (rolled - master.rb * acos((slave.rb + master.rb) / a)) > largest or foot > master.rho_end:
+        if touch.reference - (rolled - master.rb * acos((slave.rb + master.rb) / a)) > largest or foot > master.rho_end:
             break
         step = min(step * 1.4, 0.02 * slave.rb * slave.pitch)
     step, above = 2e-6, [corner]
@@ -205,9 +205,9 @@ def lone_approach(curves: Curves, k: Contact, force: float):
     if corner1 >= 0.0 and corner2 >= 0.0:
         left1, left2 = k.xi1 - corner1, k.xi2 - corner2
     t = 0.5 + (left2 - left1) / (4 * BLEND * (left1 + left2))
-    if k.slave == 1 or k.slave == 3:
+    if k.slave == EDGE1 or k.slave == CORNER1:
         t = 1.0
-    elif k.slave == 2 or k.slave == 4:
+    elif k.slave == EDGE2 or k.slave == CORNER2:
         t = 0.0
     if corner1 >= 0.0 and corner2 < 0.0:
         t = 1.0
@@ -218,11 +218,11 @@ def lone_approach(curves: Curves, k: Contact, force: float):
     u, slope = 0.0, 0.0
     if w > 0.0:
         # A tip edge on its way to the mate's corner is felt as in that corner.
-        xi = curves.driver.xi[0] if k.slave == 2 and corner1 >= 0.0 else k.xi1
+        xi = curves.driver.xi[0] if k.slave == EDGE2 and corner1 >= 0.0 else k.xi1
         u1, slope1 = curve_at(curves.driver, xi, force)
         u, slope = w * u1, w * slope1
     if w < 1.0:
-        xi = curves.driven.xi[0] if k.slave == 1 and corner2 >= 0.0 else k.xi2
+        xi = curves.driven.xi[0] if k.slave == EDGE1 and corner2 >= 0.0 else k.xi2
         u2, slope2 = curve_at(curves.driven, xi, force)
         u, slope = u + (1 - w) * u2, slope + (1 - w) * slope2
     return u, slope

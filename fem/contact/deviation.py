@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.fem.contact.kinematics import Contact, Tooth
+from gearbench.fem.contact.kinematics import CORNER1, CORNER2, EDGE1, EDGE2, ON_LINE, Contact, Tooth
 from gearbench.geometry.tooth.micro import profile_excess, relief, teeth_alike
 from gearbench.geometry.tooth.profile import Profile
 from gearbench.kernels.compiled import compiled
@@ -49,6 +49,19 @@ class Flanks(NamedTuple):
     eccentricity: float
     phase: float
     largest: float
+
+
+class EdgeDeviation(NamedTuple):
+    """A real tip edge in contact: what it adds to the gap, levers on slave and master, roll and arc length of the
+    contact on the slave, and of its foot on the master; all [m]."""
+
+    gap: float
+    lever_slave: float
+    lever_master: float
+    xi: float
+    s: float
+    foot: float
+    s_foot: float
 
 
 def ideal_flanks(teeth: int) -> Flanks:
@@ -158,13 +171,12 @@ def deviation(flanks: Flanks, side: int, tooth: int, rho: float):
 def edge_deviation(
     slave: Tooth, master: Tooth, flanks: Flanks, side: int, tooth: int, line: float, rho: float, slope: float,
     lever: float, xi: float, s: float, foot: float, s_foot: float,
-):  # fmt: skip
+) -> EdgeDeviation:  # fmt: skip
     """Contact of a real tip edge with a master flank whose excess has the derivative `slope` at the foot.
 
     rho: rigid roll length of the slave. The edge has been moved with the end of its involute, from whose normal the
     contact has turned, and stays there: the tilt of the master's normal turns the slave's lever too. Slopes of both
     flanks delay the turn over the edge: until then contact is still on the flank, `late` behind, and gains as there.
-    Returns what it all adds to the gap, both levers, and the places xi, s on slave and master.
     """
     own, own_slope = deviation(flanks, side, tooth, rho)
     _, at_end = deviation(flanks, side, tooth, slave.rho_end - 0.5 * flanks.step)
@@ -187,14 +199,7 @@ def edge_deviation(
         foot, s_foot = min(foot + left * master.rb / foot_, master.rho_end), min(s_foot + left, master.s_end)
     elif beyond > 0.0:
         s = slave.s_end + (s - slave.s_end) * (1.0 - late / beyond)
-    return own * (1.0 - cos(turned)) - gain, here, master.rb * (1.0 + slope), moved, s, foot, s_foot
-
-
-@compiled
-def corner_tilt(slave: Tooth, master: Tooth, s: float, lever: float, foot: float, slope: float) -> float:
-    """What the slope of the master's flank adds to the lever of a slave that touches it with its undercut corner."""
-    square = slave.rb * (slave.rb + 2.0 * s) - lever * lever
-    return slope * master.rb * sqrt(max(square, 0.0)) / max(foot, LEAST_ROLL)
+    return EdgeDeviation(own * (1.0 - cos(turned)) - gain, here, master.rb * (1.0 + slope), moved, s, foot, s_foot)
 
 
 @compiled
@@ -207,15 +212,15 @@ def deviate(
     line = sqrt(a * a - (t1.rb + t2.rb) ** 2)
     shift = 0.5 * min(k.gap, 0.0)
     # Rigid roll lengths: those without elastic approach, which follow the rotation of one gear alone.
-    rho1 = k.xi1 if k.slave in (2, 4) else k.xi1 - shift
-    rho2 = k.xi2 if k.slave in (1, 3) else k.xi2 - shift
+    rho1 = k.xi1 if k.slave == EDGE2 or k.slave == CORNER2 else k.xi1 - shift
+    rho2 = k.xi2 if k.slave == EDGE1 or k.slave == CORNER1 else k.xi2 - shift
     # Teeth differ on their working flanks only, where both numbers are the same.
     i1, i2 = tooth % len(f1.pitch), tooth % len(f2.pitch)
     v1, e1 = deviation(f1, side, i1, rho1)
     v2, e2 = deviation(f2, side, i2, rho2)
     gap = k.gap - v1 - v2
     xi1, xi2, s1, s2, lever1, lever2 = k.xi1, k.xi2, k.s1, k.s2, k.lever1, k.lever2
-    if k.slave == 0:
+    if k.slave == ON_LINE:
         # Slopes of both flanks at once gain more than each alone.
         gap += e1 * e2 * t1.rb * t2.rb / line
         r1, r2 = max(rho1, LEAST_ROLL), max(rho2, LEAST_ROLL)
@@ -223,17 +228,13 @@ def deviate(
         t = max(min(t, t1.s_end - s1, s2 - t2.s_form), s2 - t2.s_end, t1.s_form - s1)
         xi1, xi2, s1, s2 = xi1 + t * t1.rb / r1, xi2 - t * t2.rb / r2, s1 + t, s2 - t
         lever1, lever2 = lever1 + t1.rb * e1, lever2 + t2.rb * e2
-    elif k.slave == 1:
-        more, lever1, lever2, xi1, s1, xi2, s2 = edge_deviation(
-            t1, t2, f1, side, i1, line, rho1, e2, lever1, xi1, s1, xi2, s2
-        )
-        gap += more
-    elif k.slave == 2:
-        more, lever2, lever1, xi2, s2, xi1, s1 = edge_deviation(
-            t2, t1, f2, side, i2, line, rho2, e1, lever2, xi2, s2, xi1, s1
-        )
-        gap += more
-    elif k.slave == 3:  # the mate's slope tilts the normal in the driver's corner
+    elif k.slave == EDGE1:
+        e = edge_deviation(t1, t2, f1, side, i1, line, rho1, e2, lever1, xi1, s1, xi2, s2)
+        gap, lever1, lever2, xi1, s1, xi2, s2 = gap + e.gap, e.lever_slave, e.lever_master, e.xi, e.s, e.foot, e.s_foot
+    elif k.slave == EDGE2:
+        e = edge_deviation(t2, t1, f2, side, i2, line, rho2, e1, lever2, xi2, s2, xi1, s1)
+        gap, lever2, lever1, xi2, s2, xi1, s1 = gap + e.gap, e.lever_slave, e.lever_master, e.xi, e.s, e.foot, e.s_foot
+    elif k.slave == CORNER1:  # the mate's slope tilts the normal in the driver's corner
         lever1 += e2 * t2.rb * sqrt(max(t1.rb**2 + t1.corner**2 - lever1**2, 0.0)) / max(xi2, LEAST_ROLL)
         lever2 += t2.rb * e2
     else:

@@ -16,6 +16,9 @@ from gearbench.geometry.pair.kinematics import Pair
 from gearbench.geometry.tooth.profile import Profile
 from gearbench.kernels.compiled import compiled
 
+# Where a pair touches, `Contact.slave`: on the line of action, or with a tip edge or an undercut corner, of the driver
+# (1) or of the driven gear (2).
+ON_LINE, EDGE1, EDGE2, CORNER1, CORNER2 = range(5)
 APART = 1.0  # gap of a pair that cannot touch [m]
 CORNER_SEPARATION = 0.017  # of the base pitch (0.05 modules): how far a corner is followed beyond the line of action
 
@@ -43,8 +46,7 @@ class Tooth(NamedTuple):
 class Contact(NamedTuple):
     """Contact of one tooth pair in a given rigid configuration.
 
-    gap [m] (negative: overlap); slave 0: on the line of action, 1: driver's tip edge, 2: driven gear's tip edge,
-    3: driver's undercut corner, 4: driven gear's undercut corner;
+    gap [m] (negative: overlap); slave: ON_LINE, EDGE1, EDGE2, CORNER1 or CORNER2;
     xi1, xi2: roll lengths of the contact point, elastic approach shared equally, beyond rho_end on a tip edge, short of
     the corner on a corner [m];
     s1, s2: arc lengths of the contact points [m]; lever1, lever2 [m]; nx, ny: direction of the force on the driven.
@@ -60,6 +62,30 @@ class Contact(NamedTuple):
     lever2: float
     nx: float
     ny: float
+
+
+class EdgeContact(NamedTuple):
+    """The slave's tip edge at the master's involute: gap [m], tangent angle of the master's normal, roll length of the
+    master's foot [m], lever on the slave [m], and the angle that the contact has moved along the edge arc (negative:
+    still on the involute)."""
+
+    gap: float
+    tangent: float
+    foot: float
+    lever: float
+    moved: float
+
+
+class CornerContact(NamedTuple):
+    """The slave's undercut corner at the master's involute or tip edge: gap [m], tangent angle of the master's normal,
+    roll length of the master's foot, or of its involute's end [m], its arc length [m], levers on both [m]."""
+
+    gap: float
+    tangent: float
+    foot: float
+    s_foot: float
+    lever_slave: float
+    lever_master: float
 
 
 def tooth_of(shape: Profile, working_pressure_angle: float, least: float = inf) -> Tooth:
@@ -92,13 +118,11 @@ def teeth_of(pair: Pair) -> tuple[Tooth, Tooth]:
 
 
 @compiled
-def edge_contact(slave: Tooth, master: Tooth, c_slave: float, c_master: float, dx: float, dy: float):
+def edge_contact(
+    slave: Tooth, master: Tooth, c_slave: float, c_master: float, dx: float, dy: float
+) -> EdgeContact:
     """Gap of the slave's tip edge to the master's involute: rb (angle + inv(alpha) - psi_b) - radius (docs/physics.md,
-    "Contact law").
-
-    Returns gap, tangent angle of the master's normal, roll length of the master's foot, lever on the slave and the
-    angle that the contact has moved along the edge arc (negative: still on the involute).
-    """
+    "Contact law")."""
     angle = c_slave + slave.edge_angle
     wx = slave.edge_r * cos(angle)
     wy = slave.edge_r * sin(angle)
@@ -114,24 +138,22 @@ def edge_contact(slave: Tooth, master: Tooth, c_slave: float, c_master: float, d
     start = slave.psi + c_slave - slave.rho_end / slave.rb
     moved = start - phi
     foot = sqrt(v * v - master.rb**2) - to_centre
-    return to_centre - slave.edge_radius, phi, foot, lever, moved
+    return EdgeContact(to_centre - slave.edge_radius, phi, foot, lever, moved)
 
 
 @compiled
-def corner_contact(slave: Tooth, master: Tooth, c_slave: float, c_master: float, dx: float, dy: float):
+def corner_contact(
+    slave: Tooth, master: Tooth, c_slave: float, c_master: float, dx: float, dy: float
+) -> CornerContact:
     """Gap of the slave's undercut corner to the master's involute, or to its tip edge beyond: as `edge_contact` with a
-    point instead of the slave's arc.
-
-    Returns gap, tangent angle of the master's normal, roll length of the master's foot (or of its involute's end), its
-    arc length, and the levers on slave and master.
-    """
+    point instead of the slave's arc."""
     angle = slave.psi + c_slave - slave.corner / slave.rb
     wx = slave.rb * cos(angle) - slave.corner * sin(angle)
     wy = slave.rb * sin(angle) + slave.corner * cos(angle)
     vx, vy = dx - wx, dy - wy
     v = hypot(vx, vy)
     if v <= master.rb:
-        return APART, 0.0, 0.0, 0.0, slave.rb, master.rb
+        return CornerContact(APART, 0.0, 0.0, 0.0, slave.rb, master.rb)
     alpha = acos(master.rb / v)
     polar = atan2(vy, vx)
     gap = master.rb * (polar + tan(alpha) - alpha - master.psi - c_master)
@@ -151,7 +173,13 @@ def corner_contact(slave: Tooth, master: Tooth, c_slave: float, c_master: float,
     if foot <= 0.0 or gap > CORNER_SEPARATION * slave.rb * slave.pitch:
         gap = APART
     nx, ny = -sin(phi), cos(phi)
-    return gap, phi, foot, at, wx * ny - wy * nx, vx * ny - vy * nx
+    return CornerContact(gap, phi, foot, at, wx * ny - wy * nx, vx * ny - vy * nx)
+
+
+@compiled
+def on_edge(tooth: Tooth, moved: float) -> float:
+    """Arc length [m] of the tip edge's point by whose angle `moved` the contact has moved along it."""
+    return min(tooth.s_end + tooth.edge_radius * min(max(moved, 0.0), 1.5), tooth.s_tip)
 
 
 @compiled
@@ -166,36 +194,32 @@ def contact(t1: Tooth, t2: Tooth, c1: float, c2: float, dx: float, dy: float) ->
     over1, over2 = rho1 - t1.rho_end, rho2 - t2.rho_end
     before = False  # a tip edge that has not yet passed the mate's corner still faces the flank beyond it
     if rho1 < t1.corner:
-        gap, phi, foot, at, lever1, lever2 = corner_contact(t1, t2, c1, c2, dx, dy)
-        before = at > t2.s_end and edge_contact(t2, t1, c2, c1, dx, dy)[2] >= t1.corner
+        k = corner_contact(t1, t2, c1, c2, dx, dy)
+        before = k.s_foot > t2.s_end and edge_contact(t2, t1, c2, c1, dx, dy).foot >= t1.corner
         if not before:
-            xi1 = rho1 + 0.5 * min(gap, 0.0)
-            return Contact(gap, 3, xi1, foot, t1.s_form, at, lever1, lever2, -sin(phi), cos(phi))
+            xi1, nx, ny = rho1 + 0.5 * min(k.gap, 0.0), -sin(k.tangent), cos(k.tangent)
+            return Contact(k.gap, CORNER1, xi1, k.foot, t1.s_form, k.s_foot, k.lever_slave, k.lever_master, nx, ny)
     if rho2 < t2.corner:
-        gap, phi, foot, at, lever2, lever1 = corner_contact(t2, t1, c2, c1, dx, dy)
-        before = at > t1.s_end and edge_contact(t1, t2, c1, c2, dx, dy)[2] >= t2.corner
+        k = corner_contact(t2, t1, c2, c1, dx, dy)
+        before = k.s_foot > t1.s_end and edge_contact(t1, t2, c1, c2, dx, dy).foot >= t2.corner
         if not before:
-            xi2 = rho2 + 0.5 * min(gap, 0.0)
-            return Contact(gap, 4, foot, xi2, at, t2.s_form, lever1, lever2, -sin(phi), cos(phi))
+            xi2, nx, ny = rho2 + 0.5 * min(k.gap, 0.0), -sin(k.tangent), cos(k.tangent)
+            return Contact(k.gap, CORNER2, k.foot, xi2, k.s_foot, t2.s_form, k.lever_master, k.lever_slave, nx, ny)
     if not before and over1 <= 0.0 and over2 <= 0.0:
         shift = 0.5 * min(gap, 0.0)
         xi1, xi2 = max(rho1 + shift, t1.corner), max(rho2 + shift, t2.corner)
         s1 = xi1 * xi1 / (2 * t1.rb)
         s2 = xi2 * xi2 / (2 * t2.rb)
-        return Contact(gap, 0, xi1, xi2, s1, s2, t1.rb, t2.rb, -sin(phi), cos(phi))
+        return Contact(gap, ON_LINE, xi1, xi2, s1, s2, t1.rb, t2.rb, -sin(phi), cos(phi))
     if over2 >= over1:
-        gap, phi, foot, lever, moved = edge_contact(t2, t1, c2, c1, dx, dy)
-        shift = 0.5 * min(gap, 0.0)
-        moved = min(max(moved, 0.0), 1.5)
-        s2 = min(t2.s_end + t2.edge_radius * moved, t2.s_tip)
-        foot = max(foot, 0.0)
-        return Contact(gap, 2, foot, rho2 + shift, foot * foot / (2 * t1.rb), s2, t1.rb, lever, -sin(phi), cos(phi))
-    gap, phi, foot, lever, moved = edge_contact(t1, t2, c1, c2, dx, dy)
-    shift = 0.5 * min(gap, 0.0)
-    moved = min(max(moved, 0.0), 1.5)
-    s1 = min(t1.s_end + t1.edge_radius * moved, t1.s_tip)
-    foot = max(foot, 0.0)
-    return Contact(gap, 1, rho1 + shift, foot, s1, foot * foot / (2 * t2.rb), lever, t2.rb, -sin(phi), cos(phi))
+        e = edge_contact(t2, t1, c2, c1, dx, dy)
+        foot, s2 = max(e.foot, 0.0), on_edge(t2, e.moved)
+        xi2, s1, nx, ny = rho2 + 0.5 * min(e.gap, 0.0), foot * foot / (2 * t1.rb), -sin(e.tangent), cos(e.tangent)
+        return Contact(e.gap, EDGE2, foot, xi2, s1, s2, t1.rb, e.lever, nx, ny)
+    e = edge_contact(t1, t2, c1, c2, dx, dy)
+    foot, s1 = max(e.foot, 0.0), on_edge(t1, e.moved)
+    xi1, s2, nx, ny = rho1 + 0.5 * min(e.gap, 0.0), foot * foot / (2 * t2.rb), -sin(e.tangent), cos(e.tangent)
+    return Contact(e.gap, EDGE1, xi1, foot, s1, s2, e.lever, t2.rb, nx, ny)
 
 
 @compiled

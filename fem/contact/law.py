@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from gearbench.fem.contact.curve import EDGE_SEPARATION, LOAD_RANGE, Curve, Curves, edge_reach, lone_approach, tabulate
 from gearbench.fem.contact.deviation import Flanks, deviate, flanks_of, ideal_flanks
 from gearbench.fem.contact.kernel import Kernel, crack_flexibility, cross_flexibility, grid_position, make_kernel
-from gearbench.fem.contact.kinematics import Contact, Tooth, pair_contact, teeth_of
+from gearbench.fem.contact.kinematics import EDGE1, EDGE2, Contact, Tooth, pair_contact, teeth_of
 from gearbench.fem.gear.body import CondensedGear, rounded
 from gearbench.fem.gear.elasticity import plane_moduli
 from gearbench.geometry.pair.kinematics import Pair, pair
@@ -24,9 +24,15 @@ from gearbench.rig import Gear, Material, Rig, sound_gear
 __all__ = ["EDGE_SEPARATION", "LOAD_RANGE", "PAIRS", "Curve", "Law", "elastic_pair", "make_law"]
 
 Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Meetings = NDArray[np.void]  # of MEETING
 
 PAIRS = 8  # tooth pairs, both flank sides together, that may touch at once
-FIELDS = len(Contact._fields)
+# A tooth pair near contact: flank side (0 working, 1 back), driver tooth, and its `Contact`.
+MEETING = np.dtype(
+    [("side", np.int64), ("tooth", np.int64)]
+    + [(name, np.int64 if name == "slave" else np.float64) for name in Contact._fields]
+)
 NEAR = 0.25  # of the base pitch: how far beyond the path of contact tooth pairs are looked at
 
 
@@ -47,6 +53,16 @@ class Law(NamedTuple):
     flanks1: Flanks
     flanks2: Flanks
     play: float
+
+
+class Shared(NamedTuple):
+    """How the pairs share a load: forces (n,) [N], flexibility (n, n) [m/N] tangent to that state, flags (n,) of the
+    pairs that carry, and whether it was found."""
+
+    force: Array
+    flexibility: Array
+    active: Flags
+    converged: bool
 
 
 def elastic_pair(rig: Rig) -> Pair:
@@ -118,18 +134,15 @@ def near_teeth(t1: Tooth, t2: Tooth, reach1: float, reach2: float, side: int, th
 @compiled
 def modelled(law: Law, k: Contact) -> bool:
     """Whether a contact lies on involutes, or on a tip edge as far as it is followed."""
-    beyond = (k.slave == 1 and k.xi1 > law.reach1) or (k.slave == 2 and k.xi2 > law.reach2)
+    beyond = (k.slave == EDGE1 and k.xi1 > law.reach1) or (k.slave == EDGE2 and k.xi2 > law.reach2)
     return not beyond and k.s1 >= law.driver.s_form and k.s2 >= law.driven.s_form
 
 
 @compiled
-def find_pairs(law: Law, theta1: float, theta2: float, dx: float, dy: float, margin: float):
-    """Tooth pairs on the modelled flanks whose gap is below `margin`: sides and driver teeth (PAIRS,), contacts
-    (PAIRS, fields of Contact) and their number."""
+def find_pairs(law: Law, theta1: float, theta2: float, dx: float, dy: float, margin: float) -> Meetings:
+    """Tooth pairs (n,) on the modelled flanks whose gap is below `margin`, at most PAIRS."""
     t1, t2 = law.driver, law.driven
-    sides = np.zeros(PAIRS, np.int64)
-    teeth = np.zeros(PAIRS, np.int64)
-    found = np.zeros((PAIRS, FIELDS))
+    found = np.zeros(PAIRS, MEETING)
     n = 0
     for side in range(2):
         first, last = near_teeth(t1, t2, law.reach1, law.reach2, side, theta1, dx, dy)
@@ -140,13 +153,12 @@ def find_pairs(law: Law, theta1: float, theta2: float, dx: float, dy: float, mar
             if law.play > 0.0:
                 k = deviate(t1, t2, law.flanks1, law.flanks2, side, j, theta1, theta2, dx, dy, k)
             if k.gap < margin:
-                sides[n] = side
-                teeth[n] = j
-                found[n, 0], found[n, 1], found[n, 2], found[n, 3] = (k.gap, k.slave, k.xi1, k.xi2)
-                found[n, 4], found[n, 5], found[n, 6], found[n, 7] = (k.s1, k.s2, k.lever1, k.lever2)
-                found[n, 8], found[n, 9] = k.nx, k.ny
+                met = found[n]
+                met.side, met.tooth = side, j
+                met.gap, met.slave, met.xi1, met.xi2, met.s1, met.s2 = k.gap, k.slave, k.xi1, k.xi2, k.s1, k.s2
+                met.lever1, met.lever2, met.nx, met.ny = k.lever1, k.lever2, k.nx, k.ny
                 n += 1
-    return sides, teeth, found, n
+    return found[:n]
 
 
 @compiled
@@ -166,48 +178,52 @@ def off_flanks(law: Law, theta1: float, theta2: float, dx: float, dy: float) -> 
 
 
 @compiled
-def contact_in(found: Array, p: int) -> Contact:
-    """Contact p of those that `find_pairs` returns."""
-    k = found[p]
-    return Contact(k[0], int(k[1]), k[2], k[3], k[4], k[5], k[6], k[7], k[8], k[9])
+def contact_in(pairs: Meetings, p: int) -> Contact:
+    """Contact of pair p."""
+    k = pairs[p]
+    return Contact(k.gap, k.slave, k.xi1, k.xi2, k.s1, k.s2, k.lever1, k.lever2, k.nx, k.ny)
 
 
 @compiled
-def overlaps(found: Array, n: int) -> Array:
-    """Rigid overlap (n,) [m] of the listed pairs."""
-    out = np.empty(n)
-    for p in range(n):
-        out[p] = -found[p, 0]
+def overlaps(pairs: Meetings) -> Array:
+    """Rigid overlap (n,) [m] of the pairs."""
+    out = np.empty(len(pairs))
+    for p in range(len(pairs)):
+        out[p] = -pairs[p].gap
     return out
 
 
 @compiled
-def coupling(law: Law, sides, teeth, found: Array, n: int) -> Array:
-    """Approach at pair p per force on pair q [m/N]; on the diagonal, besides the pair's own curve, only what a crack
-    adds."""
+def coupling(law: Law, pairs: Meetings) -> Array:
+    """Approach (n, n) at pair p per force on pair q [m/N]; on the diagonal, besides the pair's own curve, only what a
+    crack adds."""
+    n = len(pairs)
     x1, x2 = np.empty(n), np.empty(n)
     tooth1, tooth2 = np.empty(n, np.int64), np.empty(n, np.int64)
     for p in range(n):
-        k = contact_in(found, p)
+        k = pairs[p]
         x1[p], x2[p] = grid_position(law.k1, k.s1), grid_position(law.k2, k.s2)
         # Counter-clockwise: the driver's numbers run clockwise; back pairs join driven tooth number + 1.
-        tooth1[p], tooth2[p] = -teeth[p], teeth[p] + sides[p]
+        tooth1[p], tooth2[p] = -k.tooth, k.tooth + k.side
     out = np.zeros((n, n))
     for p in range(n):
         for q in range(n):
+            loaded, at = pairs[q].side, pairs[p].side
             if p != q:
                 apart1, apart2 = tooth1[p] - tooth1[q], tooth2[p] - tooth2[q]
-                out[p, q] = cross_flexibility(law.k1, sides[q], x1[q], sides[p], x1[p], apart1)
-                out[p, q] += cross_flexibility(law.k2, sides[q], x2[q], sides[p], x2[p], apart2)
+                out[p, q] = cross_flexibility(law.k1, loaded, x1[q], at, x1[p], apart1)
+                out[p, q] += cross_flexibility(law.k2, loaded, x2[q], at, x2[p], apart2)
             if law.k1.cracked >= 0:
-                out[p, q] += crack_flexibility(law.k1, sides[q], tooth1[q], x1[q], sides[p], tooth1[p], x1[p])
+                out[p, q] += crack_flexibility(law.k1, loaded, tooth1[q], x1[q], at, tooth1[p], x1[p])
             if law.k2.cracked >= 0:
-                out[p, q] += crack_flexibility(law.k2, sides[q], tooth2[q], x2[q], sides[p], tooth2[p], x2[p])
+                out[p, q] += crack_flexibility(law.k2, loaded, tooth2[q], x2[q], at, tooth2[p], x2[p])
     return out
 
 
 @compiled
-def imbalance(curves: Curves, found: Array, over: Array, flexibility: Array, gain: float, force: Array, active):
+def imbalance(
+    curves: Curves, pairs: Meetings, over: Array, flexibility: Array, gain: float, force: Array, active: Flags
+) -> tuple[Array, Array]:
     """What the forces leave of the overlaps (n,), and the derivative (n, n) of what they take."""
     n = len(over)
     tangent = np.empty((n, n))
@@ -218,14 +234,14 @@ def imbalance(curves: Curves, found: Array, over: Array, flexibility: Array, gai
             tangent[p, q] = flexibility[p, q]
             left[p] -= flexibility[p, q] * force[q]
         if active[p]:
-            u, slope = lone_approach(curves, contact_in(found, p), force[p])
+            u, slope = lone_approach(curves, contact_in(pairs, p), force[p])
             left[p] -= gain * u
             tangent[p, p] += gain * slope
     return left, tangent
 
 
 @compiled
-def newton_step(left: Array, tangent: Array, active) -> Array:
+def newton_step(left: Array, tangent: Array, active: Flags) -> Array:
     """Change (n, 1) of the active forces that closes what is left, to first order; zero elsewhere."""
     n = len(left)
     system = np.zeros((n, n + 1))
@@ -241,12 +257,13 @@ def newton_step(left: Array, tangent: Array, active) -> Array:
 
 
 @compiled
-def share_load(curves: Curves, found: Array, over: Array, flexibility: Array, gain: float, guess: Array):
+def share_load(
+    curves: Curves, pairs: Meetings, over: Array, flexibility: Array, gain: float, guess: Array
+) -> Shared:
     """Forces >= 0 with over = flexibility F + gain D(F) on loaded pairs and over <= flexibility F on the others, where
     D is each pair's own curve: Newton with an active set.
 
-    over (n,) [m]; flexibility (n, n) [m/N]; guess (n,) [N]. Returns forces, tangent flexibility (n, n), flags of the
-    loaded pairs and whether it converged.
+    over (n,) [m]; flexibility (n, n) [m/N]; guess (n,) [N].
     """
     n = len(over)
     force = np.zeros(n)
@@ -256,7 +273,7 @@ def share_load(curves: Curves, found: Array, over: Array, flexibility: Array, ga
         if active[p]:
             force[p] = guess[p] if guess[p] > 0.0 else max(over[p], 1e-9) * 1e8
     for _ in range(100):
-        left, tangent = imbalance(curves, found, over, flexibility, gain, force, active)
+        left, tangent = imbalance(curves, pairs, over, flexibility, gain, force, active)
         changed = False
         for p in range(n):
             if not active[p] and left[p] > 1e-15:
@@ -281,5 +298,5 @@ def share_load(curves: Curves, found: Array, over: Array, flexibility: Array, ga
             worst = max(worst, abs(new - force[p]) / max(new, 1e-6))
             force[p] = new
         if not changed and worst < 1e-11:
-            return force, tangent, active, True
-    return force, tangent, active, False
+            return Shared(force, tangent, active, True)
+    return Shared(force, tangent, active, False)

@@ -8,6 +8,7 @@ position of the cells enters the result.
 from __future__ import annotations
 
 from math import acos, atan2, cos, hypot, log, pi, sin, sqrt, tan
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,39 @@ CELLS = 32
 CELLS_EDGE = 64
 REFITS = 4
 OUT_OF_REACH = 1.0  # [m]
+
+
+class Touch(NamedTuple):
+    """A touching point: angle and arc length [m] of the slave, and the gap [m] that counts as none."""
+
+    angle: float
+    s: float
+    reference: float
+
+
+class Window(NamedTuple):
+    """A stretch of the slave's boundary by its arc lengths [m]; whether it reaches the tip edge or a corner."""
+
+    low: float
+    high: float
+    edge: bool
+
+
+class Pressing(NamedTuple):
+    """Cell forces (n,) [N], their common approach [m] and its slope [m/N] by the sum of the forces."""
+
+    force: Array
+    approach: float
+    slope: float
+
+
+class Line(NamedTuple):
+    """A loaded contact line: approach [m], its slope [m/N], cell edges (n + 1,) [m] and cell forces (n,) [N]."""
+
+    approach: float
+    slope: float
+    edges: Array
+    force: Array
 
 
 @compiled
@@ -52,8 +86,8 @@ def gap_to_master(slave: Tooth, master: Tooth, c: float, a: float, s: float):
 
 
 @compiled
-def touching_point(slave: Tooth, master: Tooth, xi: float, a: float):
-    """Slave angle, arc length and gap reference of the point that touches when the slave's roll length is xi."""
+def touching_point(slave: Tooth, master: Tooth, xi: float, a: float) -> Touch:
+    """The point that touches when the slave's roll length is xi."""
     phi = -acos((slave.rb + master.rb) / a)
     c = xi / slave.rb + phi - slave.psi
     if xi < slave.corner:
@@ -61,19 +95,19 @@ def touching_point(slave: Tooth, master: Tooth, xi: float, a: float):
     elif xi <= slave.rho_end:
         s = xi * xi / (2 * slave.rb)
     else:
-        _, _, _, _, moved = edge_contact(slave, master, c, 0.0, a, 0.0)
+        moved = edge_contact(slave, master, c, 0.0, a, 0.0).moved
         s = min(slave.s_end + slave.edge_radius * max(moved, 0.0), slave.s_tip)
     reference, _ = gap_to_master(slave, master, c, a, s)
-    return c, s, reference
+    return Touch(c, s, reference)
 
 
 @compiled
-def window(slave: Tooth, master: Tooth, xi: float, a: float, force: float, compliance: float):
-    """First guess of the loaded stretch of the slave's boundary, and whether it reaches the tip edge or a corner.
+def window(slave: Tooth, master: Tooth, xi: float, a: float, force: float, compliance: float) -> Window:
+    """First guess of the loaded stretch of the slave's boundary.
 
     compliance: 4/(pi E* b) [m/N], so that the Hertz half-width is sqrt(compliance R force).
     """
-    _, s0, _ = touching_point(slave, master, xi, a)
+    s0 = touching_point(slave, master, xi, a).s
     rho_s = min(max(xi, slave.corner), slave.rho_end)
     rho_m = max(a * sin(acos((slave.rb + master.rb) / a)) - max(xi, slave.corner), 1e-4)
     half = sqrt(compliance * force * rho_s * rho_m / (rho_s + rho_m))
@@ -88,7 +122,7 @@ def window(slave: Tooth, master: Tooth, xi: float, a: float, force: float, compl
         # Cut short by the corner, the loaded stretch reaches further to the other side.
         high = min(s0 + 2.5 * half, slave.s_tip)
         edge = True
-    return max(low, slave.s_form), high, edge
+    return Window(max(low, slave.s_form), high, edge)
 
 
 @compiled
@@ -142,8 +176,8 @@ def flexibility_matrix(
 
 
 @compiled
-def complementarity(a: Array, h: Array, force: float):
-    """Cell forces >= 0 with sum `force` and common approach u: u <= h + A q, equal where q > 0. Returns q, u, du/dF."""
+def complementarity(a: Array, h: Array, force: float) -> Pressing:
+    """Cell forces q >= 0 with sum `force` and common approach u: u <= h + A q, equal where q > 0."""
     n = len(h)
     active = np.ones(n, np.bool_)
     q = np.zeros(n)
@@ -184,43 +218,41 @@ def complementarity(a: Array, h: Array, force: float):
                         changed = True
             if not changed:
                 break
-    return q, u, slope
+    return Pressing(q, u, slope)
 
 
 @compiled
 def line_contact(
     slave: Tooth, master: Tooth, k_slave: Kernel, k_master: Kernel, half_plane: float, a: float, xi: float, force: float
-):
+) -> Line:
     """Elastic approach of one pair under a force, neighbours unloaded.
 
     half_plane: 2/(pi E* b) [m/N]; a: centre distance; xi: roll length of the contact on the slave (beyond rho_end on
-    its tip edge, short of `corner` on its undercut corner). Returns approach [m], its slope [m/N], cell edges [m] and
-    cell forces [N].
+    its tip edge, short of `corner` on its undercut corner).
     """
-    c, s0, reference = touching_point(slave, master, xi, a)
-    low, high, edge = window(slave, master, xi, a, force, 2 * half_plane)
-    n = CELLS_EDGE if edge else CELLS
-    rounds = REFITS if edge else 1
+    touch = touching_point(slave, master, xi, a)
+    loaded = window(slave, master, xi, a, force, 2 * half_plane)
+    low, high = loaded.low, loaded.high
+    n = CELLS_EDGE if loaded.edge else CELLS
+    rounds = REFITS if loaded.edge else 1
     edges = cell_edges(low, high, n)
-    q = np.zeros(n)
-    u = 0.0
-    slope = 0.0
+    found = Pressing(np.zeros(n), 0.0, 0.0)
     for turn in range(rounds):
         edges = cell_edges(low, high, n)
         centres = 0.5 * (edges[1:] + edges[:-1])
         h = np.empty(n)
         feet = np.empty(n)
         for i in range(n):
-            h[i], foot = gap_to_master(slave, master, c, a, centres[i])
+            h[i], foot = gap_to_master(slave, master, touch.angle, a, centres[i])
             feet[i] = foot * foot / (2 * master.rb)
-            h[i] -= reference
-        matrix = flexibility_matrix(k_slave, k_master, edges, centres, feet, s0, half_plane)
-        q, u, slope = complementarity(matrix, h, force)
+            h[i] -= touch.reference
+        matrix = flexibility_matrix(k_slave, k_master, edges, centres, feet, touch.s, half_plane)
+        found = complementarity(matrix, h, force)
         if turn == rounds - 1:
             break
-        loaded = np.nonzero(q > 0.0)[0]
-        first, last = loaded[0], loaded[-1]
+        pressed = np.nonzero(found.force > 0.0)[0]
+        first, last = pressed[0], pressed[-1]
         span = edges[last + 1] - edges[first]
         low = max(edges[first] - (0.02 if first > 0 else 0.4) * span, slave.s_form)
         high = min(edges[last + 1] + (0.02 if last < n - 1 else 0.4) * span, slave.s_tip)
-    return u, slope, edges, q
+    return Line(found.approach, found.slope, edges, found.force)

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.fem.contact.law import (
     PAIRS,
+    Flags,
     Law,
-    contact_in,
+    Meetings,
     coupling,
     find_pairs,
     newton_step,
@@ -53,30 +54,40 @@ class StaticCycle:
     unloaded: Array
 
 
-@compiled
-def position(law: Law, theta1: float, theta2: float, x1: float, y1: float, x2: float, y2: float, guess: Array):
-    """Equilibrium of all pairs at given hub positions.
+class Equilibrium(NamedTuple):
+    """Equilibrium of the n pairs near contact."""
 
-    Returns number of pairs, sides, teeth, contacts, forces, active flags, driver torque, driven torque, tangent
-    d(driver torque)/d theta1, tangent flexibility between the pairs and whether it converged.
-    """
-    sides, teeth, found, n = find_pairs(law, theta1, theta2, law.centre + x2 - x1, y2 - y1, MARGIN)
-    c = coupling(law, sides, teeth, found, n)
-    force, flex, active, ok = share_load(law.curves, found, overlaps(found, n), c, 1.0, guess[:n])
+    pairs: Meetings  # (n,)
+    force: Array  # (n,) [N]
+    active: Flags  # (n,) whether they carry
+    torque_driver: float  # [N m]
+    torque_driven: float
+    tangent: float  # d(driver torque)/d theta1 [N m/rad]
+    flexibility: Array  # (n, n) [m/N] tangent to this state
+    converged: bool
+
+
+@compiled
+def position(
+    law: Law, theta1: float, theta2: float, x1: float, y1: float, x2: float, y2: float, guess: Array
+) -> Equilibrium:
+    """Equilibrium of all pairs at given hub positions; guess (PAIRS,) [N] of their forces."""
+    pairs = find_pairs(law, theta1, theta2, law.centre + x2 - x1, y2 - y1, MARGIN)
+    n = len(pairs)
+    load = share_load(law.curves, pairs, overlaps(pairs), coupling(law, pairs), 1.0, guess[:n])
     t1 = 0.0
     t2 = 0.0
     lever = np.zeros(n)
     for p in range(n):
-        k = contact_in(found, p)
-        sign = 1.0 - 2.0 * sides[p]
-        lever[p] = sign * k.lever1
-        t1 += lever[p] * force[p]
-        t2 += sign * k.lever2 * force[p]
-    stiff = newton_step(lever, flex, active)
+        sign = 1.0 - 2.0 * pairs[p].side
+        lever[p] = sign * pairs[p].lever1
+        t1 += lever[p] * load.force[p]
+        t2 += sign * pairs[p].lever2 * load.force[p]
+    stiff = newton_step(lever, load.flexibility, load.active)
     tangent = 0.0
     for p in range(n):
         tangent += lever[p] * stiff[p, 0]
-    return n, sides, teeth, found, force, active, t1, t2, tangent, flex, ok
+    return Equilibrium(pairs, load.force, load.active, t1, t2, tangent, load.flexibility, load.converged)
 
 
 def static_cycle(
@@ -110,17 +121,18 @@ def static_cycle(
                 guess = solve_torque(law, float(phase), float(load), guess)
             else:
                 guess = float(load)
-            n, sides, teeth, _, force, _, a, b, slope, _, ok = _at(law, float(phase), guess)
-            if not ok:
+            found = _at(law, float(phase), guess)
+            if not found.converged:
                 raise ContactError(f"no static equilibrium at mesh phase {phase:g} with {named}")
             _check_flanks(law, float(phase), guess, named)
-            te[i, j], t1[i, j], t2[i, j] = guess, a, b
-            tangent[i, j] = slope / law.driver.rb**2
-            total = max(float(force[:n].sum()), 1e-300)
+            te[i, j], t1[i, j], t2[i, j] = guess, found.torque_driver, found.torque_driven
+            tangent[i, j] = found.tangent / law.driver.rb**2
+            total = max(float(found.force.sum()), 1e-300)
             first = int(np.floor(phase)) - 2
-            for p in range(n):
-                if sides[p] == 0 and 0 <= teeth[p] - first < PAIRS:
-                    share[i, j, teeth[p] - first] = force[p] / total
+            sides, teeth = found.pairs["side"].tolist(), found.pairs["tooth"].tolist()
+            for side, tooth, force in zip(sides, teeth, found.force, strict=True):
+                if side == 0 and 0 <= tooth - first < PAIRS:
+                    share[i, j, tooth - first] = force / total
             if progress:
                 progress((i * len(phases) + j + 1) / te.size)
     used = np.nonzero(share.any(axis=(0, 1)))[0]
@@ -144,8 +156,8 @@ def unloaded_dte(law: Law, phase: float, x: Array = STILL, y: Array = STILL) -> 
     for _ in range(40):
         theta1 = phase * law.driver.pitch + dte / law.driver.rb
         place = law.centre + x[1] - x[0], y[1] - y[0]
-        sides, _, found, n = find_pairs(law, theta1, phase * law.driven.pitch, *place, 2.5 * opened + MARGIN)
-        gaps = found[:n, 0][sides[:n] == 0]
+        pairs = find_pairs(law, theta1, phase * law.driven.pitch, *place, 2.5 * opened + MARGIN)
+        gaps = pairs["gap"][pairs["side"] == 0]
         if not len(gaps):
             break
         least = float(gaps.min())
@@ -166,7 +178,7 @@ def _check_flanks(law: Law, phase: float, dte: float, load: str) -> None:
         )
 
 
-def _at(law: Law, phase: float, dte: float, x: Array = STILL, y: Array = STILL):
+def _at(law: Law, phase: float, dte: float, x: Array = STILL, y: Array = STILL) -> Equilibrium:
     theta1 = phase * law.driver.pitch + dte / law.driver.rb
     return position(law, theta1, phase * law.driven.pitch, x[0], y[0], x[1], y[1], np.zeros(PAIRS))
 
@@ -190,9 +202,9 @@ def solve_torque(
     # Gaps are differences of angles that grow with the phase: below this the DTE is rounding.
     finest = 1e-15 * (1.0 + abs(phase) * law.driver.pitch) * rb
     for _ in range(200):
-        result = _at(law, phase, dte, x, y)
-        t1, slope, ok = result[6], result[8] / rb, result[10]
-        if not ok:
+        found = _at(law, phase, dte, x, y)
+        t1, slope = found.torque_driver, found.tangent / rb
+        if not found.converged:
             raise ContactError(f"no static equilibrium at mesh phase {phase:g} and DTE {dte:g} m")
         if abs(t1 - torque) <= 1e-12 * torque:
             return dte

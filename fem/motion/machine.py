@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.fem.contact.kernel import grid_position, row_at
-from gearbench.fem.contact.law import Law, contact_in
+from gearbench.fem.contact.law import Law, Meetings
 from gearbench.fem.gear.body import CondensedGear
 from gearbench.geometry.pair.kinematics import Pair
 from gearbench.geometry.tooth.body import Body
@@ -94,30 +94,37 @@ def make_machine(
     )
 
 
+class Vector(NamedTuple):
+    """Components of a direction."""
+
+    x: float
+    y: float
+
+
 @compiled
-def seen_from(x: float, y: float, chi: float):
+def seen_from(x: float, y: float, chi: float) -> Vector:
     """World direction in the frame of a gear turned by chi."""
-    return x * cos(chi) + y * sin(chi), -x * sin(chi) + y * cos(chi)
+    return Vector(x * cos(chi) + y * sin(chi), -x * sin(chi) + y * cos(chi))
 
 
 @compiled
-def hub_coupling(hub1: Array, hub2: Array, rotations: int, axis1, axis2) -> Array:
+def hub_coupling(hub1: Array, hub2: Array, rotations: int, axis1: Vector, axis2: Vector) -> Array:
     """Coupling mass of the hubs' unknowns and the modes, (hub unknowns, modes), the supports' direction being axis1
     (axis2) in the frame of the driver (driven gear): the modes turn with their gear, the supports do not."""
     n1, n2 = len(hub1), len(hub2)
     out = np.zeros((rotations + 2, n1 + n2))
     for k in range(n1):
         out[0, k] = hub1[k, 2]
-        out[rotations, k] = hub1[k, 0] * axis1[0] + hub1[k, 1] * axis1[1]
+        out[rotations, k] = hub1[k, 0] * axis1.x + hub1[k, 1] * axis1.y
     for k in range(n2):
         if rotations == 2:
             out[1, n1 + k] = -hub2[k, 2]
-        out[rotations + 1, n1 + k] = hub2[k, 0] * axis2[0] + hub2[k, 1] * axis2[1]
+        out[rotations + 1, n1 + k] = hub2[k, 0] * axis2.x + hub2[k, 1] * axis2.y
     return out
 
 
 @compiled
-def support_axes(machine: Machine, theta1: float, theta2: float):
+def support_axes(machine: Machine, theta1: float, theta2: float) -> tuple[Vector, Vector]:
     """The supports' direction in the frames of driver and driven gear."""
     x, y = machine.axis_x, machine.axis_y
     chi1, chi2 = theta1 + machine.law.driver.zero, machine.law.driven.zero - theta2 + pi
@@ -135,7 +142,7 @@ def mass_matrix(machine: Machine, theta1: float, theta2: float) -> Array:
 
 
 @compiled
-def angles(machine: Machine, d: Array, t: float):
+def angles(machine: Machine, d: Array, t: float) -> tuple[float, float]:
     """Angles of driver and driven gear [rad] at time t."""
     theta1 = machine.speed1 * t + d[0]
     theta2 = machine.speed2 * t
@@ -143,17 +150,17 @@ def angles(machine: Machine, d: Array, t: float):
 
 
 @compiled
-def contact_rows(machine: Machine, sides, teeth, found, n: int) -> Array:
+def contact_rows(machine: Machine, pairs: Meetings) -> Array:
     """Derivative of every pair's gap by the unknowns, which is also the direction of its force; (n, d)."""
     r = machine.rotations
     n1, n2 = len(machine.omega1), len(machine.omega2)
     k1, k2 = machine.law.k1, machine.law.k2
     z1 = k1.modes_front.shape[1]
     z2 = k2.modes_front.shape[1]
-    rows = np.zeros((n, r + 2 + n1 + n2))
-    for p in range(n):
-        k = contact_in(found, p)
-        sign = 1.0 - 2.0 * sides[p]
+    rows = np.zeros((len(pairs), r + 2 + n1 + n2))
+    for p in range(len(pairs)):
+        k = pairs[p]
+        sign = 1.0 - 2.0 * k.side
         rows[p, 0] = -sign * k.lever1
         if r == 2:
             rows[p, 1] = sign * k.lever2
@@ -162,13 +169,13 @@ def contact_rows(machine: Machine, sides, teeth, found, n: int) -> Array:
         rows[p, r + 1] = along
         x1 = grid_position(k1, k.s1)
         x2 = grid_position(k2, k.s2)
-        tooth1 = (-teeth[p]) % z1
-        tooth2 = (teeth[p] + sides[p]) % z2
+        tooth1 = (-k.tooth) % z1
+        tooth2 = (k.tooth + k.side) % z2
         for q in range(n1):
-            table = k1.modes_front if sides[p] == 0 else k1.modes_back
+            table = k1.modes_front if k.side == 0 else k1.modes_back
             rows[p, r + 2 + q] = row_at(table[q, tooth1], x1)
         for q in range(n2):
-            table = k2.modes_front if sides[p] == 0 else k2.modes_back
+            table = k2.modes_front if k.side == 0 else k2.modes_back
             rows[p, r + 2 + n1 + q] = row_at(table[q, tooth2], x2)
     return rows
 
@@ -187,14 +194,14 @@ def modal_flexibility(rows: Array, stiffness: Array, first: int) -> Array:
 
 
 @compiled
-def reaction(hub: Array, sides, found: Array, force: Array, acceleration: Array, n: int) -> float:
+def reaction(hub: Array, pairs: Meetings, force: Array, acceleration: Array) -> float:
     """Moment [N m] that holds the driven gear against its rotation where its speed is prescribed.
 
     hub (modes, 3): coupling mass of the driven gear's modes, the last of the accelerations.
     """
     total = 0.0
-    for p in range(n):
-        total += (1.0 - 2.0 * sides[p]) * contact_in(found, p).lever2 * force[p]
+    for p in range(len(pairs)):
+        total += (1.0 - 2.0 * pairs[p].side) * pairs[p].lever2 * force[p]
     first = len(acceleration) - len(hub)
     for k in range(len(hub)):
         total += hub[k, 2] * acceleration[first + k]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.fem.contact.curve import Curves
-from gearbench.fem.contact.kinematics import Contact
+from gearbench.fem.contact.kinematics import CORNER1, EDGE1, EDGE2, ON_LINE, Contact
 from gearbench.fem.contact.law import PAIRS, Law, contact_in
 from gearbench.fem.contact.line import gap_to_master, line_contact, touching_point
 from gearbench.fem.contact.static import ContactError, position
@@ -49,13 +49,12 @@ def pair_loads(law: Law, phase: float, dte: float) -> list[PairLoad]:
     """The loaded pairs at a mesh phase [cycles] and DTE [m], hub centres held. Raises ContactError."""
     theta1 = phase * law.driver.pitch + dte / law.driver.rb
     found = position(law, theta1, phase * law.driven.pitch, 0.0, 0.0, 0.0, 0.0, np.zeros(PAIRS))
-    n, sides, teeth, contacts, force, active = found[:6]
-    if not found[-1]:
+    if not found.converged:
         raise ContactError(f"no static equilibrium at mesh phase {phase:g} and DTE {dte:g} m")
     return [
-        PairLoad(int(sides[p]), int(teeth[p]), contact_in(contacts, p), float(force[p]))
-        for p in range(n)
-        if active[p] and force[p] > 0.0
+        PairLoad(int(pair["side"]), int(pair["tooth"]), contact_in(found.pairs, p), float(force))
+        for p, (pair, force) in enumerate(zip(found.pairs, found.force, strict=True))
+        if found.active[p] and force > 0.0
     ]
 
 
@@ -64,8 +63,8 @@ def driver_is_slave(curves: Curves, k: Contact) -> bool:
     corner1, corner2 = curves.driver.corner, curves.driven.corner
     if (corner1 >= 0.0) != (corner2 >= 0.0):
         return corner1 >= 0.0
-    if k.slave != 0:
-        return k.slave in (1, 3)
+    if k.slave != ON_LINE:
+        return k.slave in (EDGE1, CORNER1)
     if corner1 >= 0.0:
         return k.xi1 - corner1 <= k.xi2 - corner2
     return curves.end1 - k.xi1 <= curves.end2 - k.xi2
@@ -76,13 +75,13 @@ def _line(law: Law, k: Contact, force: float) -> tuple[bool, Array, Array, Array
     first = driver_is_slave(law.curves, k)
     own, mate = (law.driver, law.driven) if first else (law.driven, law.driver)
     ks, km = (law.k1, law.k2) if first else (law.k2, law.k1)
-    xi, curve, other = (k.xi1, law.curves.driver, 2) if first else (k.xi2, law.curves.driven, 1)
+    xi, curve, other = (k.xi1, law.curves.driver, EDGE2) if first else (k.xi2, law.curves.driven, EDGE1)
     if k.slave == other and curve.corner >= 0.0:
         xi = float(curve.xi[0])
-    _, _, edges, q = line_contact(own, mate, ks, km, law.half_plane, law.centre, xi, force)
-    c, _, _ = touching_point(own, mate, xi, law.centre)
-    feet = np.array([gap_to_master(own, mate, c, law.centre, s)[1] for s in edges])
-    return first, edges, np.minimum(feet**2 / (2 * mate.rb), mate.s_tip), q
+    line = line_contact(own, mate, ks, km, law.half_plane, law.centre, xi, force)
+    c = touching_point(own, mate, xi, law.centre).angle
+    feet = np.array([gap_to_master(own, mate, c, law.centre, s)[1] for s in line.edges])
+    return first, line.edges, np.minimum(feet**2 / (2 * mate.rb), mate.s_tip), line.force
 
 
 def _strips(shape: Profile, edges: Array, force: Array, side: int, thickness: float) -> Strips:

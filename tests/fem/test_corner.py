@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gearbench.fem.contact.kinematics import Contact, pair_contact, teeth_of
+from gearbench.fem.contact.kinematics import CORNER1, CORNER2, EDGE1, EDGE2, Contact, pair_contact, teeth_of
 from gearbench.fem.contact.law import elastic_pair, make_law
 from gearbench.fem.contact.static import static_cycle
 from gearbench.fem.gear.body import condense
@@ -78,7 +78,7 @@ def test_gap_is_the_least_distance_of_the_outlines(meshing: Pair) -> None:
         found = at(meshing, float(phase))
         kinds.add(found.slave)
         assert 0.0 < found.gap == pytest.approx(distance(meshing, float(phase)), abs=2e-9)
-    assert kinds == ({2, 3} if meshing.driver.undercut else {1, 4})
+    assert kinds == ({EDGE2, CORNER1} if meshing.driver.undercut else {EDGE1, CORNER2})
 
 
 def test_levers_are_the_gap_s_derivatives(meshing: Pair) -> None:
@@ -92,7 +92,7 @@ def test_levers_are_the_gap_s_derivatives(meshing: Pair) -> None:
             return pair_contact(one, two, *place[:2], *angles, meshing.centre_distance, y).gap
 
         found = pair_contact(one, two, *place, meshing.centre_distance, 0.0)
-        arcs += found.slave >= 3 and (found.s2 > two.s_end or found.s1 > one.s_end)
+        arcs += found.slave in (CORNER1, CORNER2) and (found.s2 > two.s_end or found.s1 > one.s_end)
         assert -(gap(a=h) - gap(a=-h)) / (2 * h) == pytest.approx(found.lever1, rel=1e-5)
         assert (gap(b=h) - gap(b=-h)) / (2 * h) == pytest.approx(found.lever2, rel=1e-5)
         # Moving the driven centre along y opens the pair by the normal's y.

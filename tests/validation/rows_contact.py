@@ -77,7 +77,7 @@ def hertz() -> float:
                 for c in centres
             ]
         )
-        q, _, _ = complementarity(matrix, centres**2 / (2 * radius), force)
+        q = complementarity(matrix, centres**2 / (2 * radius), force).force
         pressure = q / widths / width
         # For a semi-ellipse the second moment is b^2/4, whatever the cells.
         found = 2 * sqrt(float(np.sum(q * (centres**2 + widths**2 / 12)) / force))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from gearbench.bench.elastic.rig import ElasticRig, elastic_rig, machine_for
 from gearbench.commands.checks import Check
 from gearbench.fem.contact.static import static_cycle
-from gearbench.fem.motion.transient import advance, initial_state, make_scheme
+from gearbench.fem.motion.transient import advance, columns, initial_state, make_scheme
 from gearbench.rig import Gear, Rig, Simulation, Support, Supports
 
 Array = NDArray[np.float64]
@@ -46,10 +46,11 @@ def quasi_static() -> float:
     assert failed < 0
     law = bench.law
     along = cos(bench.pair.working_pressure_angle)
+    seen = columns(samples)
     dte = (
-        law.driver.rb * samples[:, 0]
-        - law.driven.rb * samples[:, 1]
-        + along * (samples[:, 2] - samples[:, 3])
+        law.driver.rb * seen.angle_driver
+        - law.driven.rb * seen.angle_driven
+        + along * (seen.y_driver - seen.y_driven)
     )
     chosen = np.arange(15, steps, 16)
     phases = frequency * (chosen + 1) / rate

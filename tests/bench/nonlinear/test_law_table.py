@@ -10,7 +10,7 @@ from gearbench.bench import BenchError
 from gearbench.bench.elastic.rig import elastic_rig
 from gearbench.bench.nonlinear import law_table as module
 from gearbench.bench.nonlinear.law_table import PHASES, mesh_law
-from gearbench.fem.contact.law import Law
+from gearbench.fem.contact.law import PAIRS, Law
 from gearbench.fem.contact.static import position, static_cycle
 from gearbench.geometry import pair
 from gearbench.lumped import mesh_stiffness
@@ -82,12 +82,10 @@ def test_shares_are_those_of_the_pairs_tangents(law: MeshLaw, solved: Law) -> No
         slopes = {}
         for size, sign in ((dte + 2e-9, 1.0), (dte - 2e-9, -1.0)):
             theta1 = phase * solved.driver.pitch + size / solved.driver.rb
-            n, sides, teeth, _, force, *_ = position(
-                solved, theta1, phase * solved.driven.pitch, 0.0, 0.0, 0.0, 0.0, np.zeros(8)
-            )
-            for p in range(n):
-                assert sides[p] == 0
-                slopes[int(teeth[p])] = slopes.get(int(teeth[p]), 0.0) + sign * force[p]
+            found = position(solved, theta1, phase * solved.driven.pitch, 0.0, 0.0, 0.0, 0.0, np.zeros(PAIRS))
+            assert np.all(found.pairs["side"] == 0)
+            for tooth, force in zip(found.pairs["tooth"], found.force, strict=True):
+                slopes[int(tooth)] = slopes.get(int(tooth), 0.0) + sign * force
         total = sum(slopes.values())
         for number, share in zip(*law.pairs(phase), strict=True):
             assert share == pytest.approx(slopes.get(int(number), 0.0) / total, abs=2e-3)

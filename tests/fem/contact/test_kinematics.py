@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gearbench.fem.contact.kinematics import Contact, pair_contact, teeth_of
+from gearbench.fem.contact.kinematics import EDGE1, EDGE2, ON_LINE, Contact, pair_contact, teeth_of
 from gearbench.geometry.pair.kinematics import Pair, pair
 
 MIRROR = np.array([1.0, -1.0])
@@ -91,7 +91,7 @@ def test_gap_is_the_least_distance_of_the_profiles(
 def test_the_phases_reach_both_tip_edges(meshing: Pair) -> None:
     one, two = teeth_of(meshing)
     slaves = {at(meshing, 0, 0, p * one.pitch - 1e-5 / one.rb, p * two.pitch).slave for p in PHASES}
-    assert slaves == {0, 1, 2}
+    assert slaves == {ON_LINE, EDGE1, EDGE2}
 
 
 @pytest.mark.parametrize("phase", [-0.3, 0.0, 0.41])
@@ -100,7 +100,7 @@ def test_front_and_back_gaps_share_the_backlash(meshing: Pair, phase: float) -> 
     front = at(meshing, 0, 0, phase * one.pitch, phase * two.pitch)
     assert front.gap == pytest.approx(0.0, abs=1e-15)
     backs = [at(meshing, 1, j, phase * one.pitch, phase * two.pitch) for j in range(-3, 4)]
-    on_line = [k.gap for k in backs if k.slave == 0]
+    on_line = [k.gap for k in backs if k.slave == ON_LINE]
     assert on_line
     np.testing.assert_allclose(on_line, meshing.backlash_normal, rtol=1e-10)
 
@@ -141,7 +141,7 @@ def test_contact_goes_over_to_the_tip_edge_without_a_jump(meshing: Pair, end: in
     switch = None
     for low, high in pairwise(np.linspace(0, end * 1.0, 400)):
         before, after = (at(meshing, 0, 0, p * one.pitch + 1e-5 / one.rb, p * two.pitch) for p in (low, high))
-        if before.slave == 0 and after.slave != 0:
+        if before.slave == ON_LINE and after.slave != ON_LINE:
             switch = low, high
             break
     assert switch is not None
@@ -149,9 +149,9 @@ def test_contact_goes_over_to_the_tip_edge_without_a_jump(meshing: Pair, end: in
     for _ in range(60):
         middle = 0.5 * (low + high)
         k = at(meshing, 0, 0, middle * one.pitch + 1e-5 / one.rb, middle * two.pitch)
-        low, high = (middle, high) if k.slave == 0 else (low, middle)
+        low, high = (middle, high) if k.slave == ON_LINE else (low, middle)
     inner, outer = (at(meshing, 0, 0, p * one.pitch + 1e-5 / one.rb, p * two.pitch) for p in (low, high))
-    assert (inner.slave, outer.slave) == (0, 2 if end < 0 else 1)
+    assert (inner.slave, outer.slave) == (ON_LINE, EDGE2 if end < 0 else EDGE1)
     for name in ("gap", "s1", "s2", "xi1", "xi2"):
         # Overlap displaces the foot on the line of action by half of it: 5 um of roll, at most.
         assert getattr(inner, name) == pytest.approx(getattr(outer, name), abs=1e-11 if name == "gap" else 6e-6)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gearbench.fem.contact.curve import curve_at, lone_approach
-from gearbench.fem.contact.kinematics import pair_contact
+from gearbench.fem.contact.kinematics import EDGE1, EDGE2, ON_LINE, pair_contact
 from gearbench.fem.contact.law import contact_in, coupling, find_pairs, make_law, overlaps, share_load
 from gearbench.fem.contact.line import line_contact
 
@@ -25,7 +25,7 @@ def test_curves_interpolate_the_contact_lines(unequal: Any, swap: bool) -> None:
     for _ in range(60):
         xi = rng.uniform(curve.xi[0], curve.xi[-1])
         force = np.exp(rng.uniform(np.log(5.0), np.log(2e4)))
-        u = line_contact(slave, master, ks, km, law.half_plane, law.centre, xi, force)[0]
+        u = line_contact(slave, master, ks, km, law.half_plane, law.centre, xi, force).approach
         where = "corner" if xi > slave.rho_end - 2e-4 else "inside"
         worst[where] = max(worst[where], abs(curve_at(curve, xi, force)[0] / u - 1))
     assert worst["inside"] < 3e-4
@@ -47,11 +47,11 @@ def test_the_gear_nearer_its_tip_is_the_slave(unequal: Any, phase: float) -> Non
         law.centre,
         0.0,
     )
-    driver = k.slave == 1 or (k.slave == 0 and law.driver.rho_end - k.xi1 < law.driven.rho_end - k.xi2)
+    driver = k.slave == EDGE1 or (k.slave == ON_LINE and law.driver.rho_end - k.xi1 < law.driven.rho_end - k.xi2)
     gears = ((law.driver, law.k1), (law.driven, law.k2))
     (slave, ks), (master, km) = gears if driver else gears[::-1]
     line = line_contact(slave, master, ks, km, law.half_plane, law.centre, k.xi1 if driver else k.xi2, 500.0)
-    assert lone_approach(law.curves, k, 500.0)[0] == pytest.approx(line[0], rel=1e-3)
+    assert lone_approach(law.curves, k, 500.0)[0] == pytest.approx(line.approach, rel=1e-3)
 
 
 @pytest.mark.parametrize("force", [1e-4, 1.0, 300.0, 1e4])
@@ -69,9 +69,9 @@ def test_coupling_is_reciprocal_on_both_flank_sides(twins: Any) -> None:
     """Four pairs of which two touch with their back flanks: the flexibility matrix is symmetric (Maxwell)."""
     law = twins.law
     pitch = law.driver.pitch
-    sides, teeth, found, n = find_pairs(law, 0.3 * pitch, 0.3 * pitch, law.centre, 0.0, 2e-4)
-    assert n >= 3 and 0 in sides[:n] and 1 in sides[:n]
-    c = coupling(law, sides, teeth, found, n)
+    pairs = find_pairs(law, 0.3 * pitch, 0.3 * pitch, law.centre, 0.0, 2e-4)
+    assert len(pairs) >= 3 and set(pairs["side"]) == {0, 1}
+    c = coupling(law, pairs)
     np.testing.assert_array_equal(np.diag(c), 0.0)
     assert np.abs(c - c.T).max() < 1e-3 * np.abs(c).max()
 
@@ -79,11 +79,11 @@ def test_coupling_is_reciprocal_on_both_flank_sides(twins: Any) -> None:
 def test_the_same_force_on_both_flanks_of_a_tooth_squeezes_it_only(twins: Any) -> None:
     """A push from behind moves the working flank outward, the one from the front inward."""
     law = twins.law
-    sides, teeth, found, n = find_pairs(law, 0.0, 0.0, law.centre, 0.0, 2e-4)
-    c = coupling(law, sides, teeth, found, n)
-    front = next(p for p in range(n) if sides[p] == 0 and contact_in(found, p).slave == 0 and teeth[p] == 0)
-    for p in range(n):
-        if sides[p] == 1 and teeth[p] in (0, -1):
+    pairs = find_pairs(law, 0.0, 0.0, law.centre, 0.0, 2e-4)
+    c = coupling(law, pairs)
+    (front,) = np.flatnonzero((pairs["side"] == 0) & (pairs["tooth"] == 0) & (pairs["slave"] == ON_LINE))
+    for p, pair in enumerate(pairs):
+        if pair["side"] == 1 and pair["tooth"] in (0, -1):
             # The driver's tooth 0 (or the driven one) is bent forward: overlap of the working flanks grows.
             assert c[front, p] < 0
 
@@ -93,16 +93,16 @@ def test_shared_load_closes_every_gap(unequal: Any) -> None:
     law = unequal.law
     dte = 2e-5
     theta1 = 0.5 * law.driver.pitch + dte / law.driver.rb
-    sides, teeth, found, n = find_pairs(law, theta1, 0.5 * law.driven.pitch, law.centre, 0.0, 2e-5)
-    c = coupling(law, sides, teeth, found, n)
-    force, flex, active, ok = share_load(law.curves, found, overlaps(found, n), c, 1.0, np.zeros(n))
-    assert ok and active.sum() == 2
-    assert np.all(force[~active] == 0.0)
-    for p in range(n):
-        approach = lone_approach(law.curves, contact_in(found, p), force[p])[0] if active[p] else 0.0
-        left = -found[p, 0] - c[p] @ force - approach
-        assert abs(left) < 1e-9 * dte if active[p] else left <= 1e-12
-    assert np.all(np.linalg.eigvalsh(0.5 * (flex + flex.T)) > 0)
+    pairs = find_pairs(law, theta1, 0.5 * law.driven.pitch, law.centre, 0.0, 2e-5)
+    c = coupling(law, pairs)
+    load = share_load(law.curves, pairs, overlaps(pairs), c, 1.0, np.zeros(len(pairs)))
+    assert load.converged and load.active.sum() == 2
+    assert np.all(load.force[~load.active] == 0.0)
+    for p, (gap, force, active) in enumerate(zip(pairs["gap"], load.force, load.active, strict=True)):
+        approach = lone_approach(law.curves, contact_in(pairs, p), force)[0] if active else 0.0
+        left = -gap - c[p] @ load.force - approach
+        assert abs(left) < 1e-9 * dte if active else left <= 1e-12
+    assert np.all(np.linalg.eigvalsh(0.5 * (load.flexibility + load.flexibility.T)) > 0)
 
 
 def test_given_curves_are_taken_over(twins: Any) -> None:
@@ -125,9 +125,9 @@ def test_no_pair_is_overlooked(unequal: Any, margin: float) -> None:
         for side in (0, 1):
             for j in range(round(phase) - 4, round(phase) + 5):
                 k = pair_contact(law.driver, law.driven, side, j, theta1, theta2, dx, dy)
-                reach = (np.inf, law.reach1, law.reach2)[k.slave]
-                on = (k.xi1 if k.slave == 1 else k.xi2) <= reach
+                reach = {ON_LINE: np.inf, EDGE1: law.reach1, EDGE2: law.reach2}[k.slave]
+                on = (k.xi1 if k.slave == EDGE1 else k.xi2) <= reach
                 if k.gap < margin and on and k.s1 >= law.driver.s_form and k.s2 >= law.driven.s_form:
                     expected.add((side, j))
-        sides, teeth, _, n = find_pairs(law, theta1, theta2, dx, dy, margin)
-        assert {(int(sides[p]), int(teeth[p])) for p in range(n)} == expected
+        pairs = find_pairs(law, theta1, theta2, dx, dy, margin)
+        assert set(zip(pairs["side"], pairs["tooth"], strict=True)) == expected

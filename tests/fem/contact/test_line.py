@@ -9,7 +9,7 @@ import pytest
 
 from gearbench.fem.contact.kernel import POINTS, Kernel
 from gearbench.fem.contact.kinematics import Tooth, teeth_of
-from gearbench.fem.contact.line import line_contact, log_integral
+from gearbench.fem.contact.line import Line, line_contact, log_integral
 
 WIDTH = 0.02
 COMPLIANCE = 4 / (np.pi * 206e9 * WIDTH)  # 2/(pi E* b) with 1/E* = 2/E
@@ -22,7 +22,7 @@ def rigid_body(tooth: Tooth) -> Kernel:
     return Kernel(table, table, tooth.s_end, tooth.s_tip, 6.0, 0, WIDTH, modes, modes, np.zeros((0, 0, 2, 2, 0, 0)), -1)
 
 
-def solve(twins: Any, xi: float, force: float) -> tuple[float, float, np.ndarray, np.ndarray]:
+def solve(twins: Any, xi: float, force: float) -> Line:
     one, two = teeth_of(twins.pair)
     a = twins.pair.centre_distance
     return line_contact(one, two, rigid_body(one), rigid_body(two), COMPLIANCE, a, xi, force)
@@ -52,7 +52,7 @@ def test_hertz(twins: Any, place: float, force: float) -> None:
 def test_pressure_is_a_complementarity_solution(twins: Any) -> None:
     """No cell pulls, and unloaded cells lie outside one loaded stretch."""
     for xi in (twins.law.driver.rho_end - 1e-4, twins.law.driver.rho_end + 1e-4):
-        _, _, _, q = line_contact(
+        q = line_contact(
             twins.law.driver,
             twins.law.driven,
             twins.law.k1,
@@ -61,7 +61,7 @@ def test_pressure_is_a_complementarity_solution(twins: Any) -> None:
             twins.law.centre,
             xi,
             1000.0,
-        )
+        ).force
         assert q.min() >= 0.0
         loaded = np.nonzero(q > 0)[0]
         assert np.all(np.diff(loaded) == 1)
@@ -73,11 +73,11 @@ def test_slope_is_the_derivative_of_the_approach(twins: Any, corner: bool) -> No
     law = twins.law
     xi = law.driver.rho_end + (5e-5 if corner else -2e-3)
 
-    def approach(force: float) -> tuple[float, float]:
-        return line_contact(law.driver, law.driven, law.k1, law.k2, law.half_plane, law.centre, xi, force)[:2]
+    def under(force: float) -> Line:
+        return line_contact(law.driver, law.driven, law.k1, law.k2, law.half_plane, law.centre, xi, force)
 
-    slope = approach(500.0)[1]
-    found = (approach(505.0)[0] - approach(495.0)[0]) / 10.0
+    slope = under(500.0).slope
+    found = (under(505.0).approach - under(495.0).approach) / 10.0
     # At a corner the cells are fitted anew to every load: the slope is that of the last fit.
     assert slope == pytest.approx(found, rel=2e-2 if corner else 2e-3)
 

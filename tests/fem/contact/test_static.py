@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from gearbench.fem.contact.law import PAIRS, contact_in, make_law
-from gearbench.fem.contact.static import ContactError, position, solve_torque, static_cycle
+from gearbench.fem.contact.kinematics import ON_LINE
+from gearbench.fem.contact.law import PAIRS, make_law
+from gearbench.fem.contact.static import ContactError, Equilibrium, position, solve_torque, static_cycle
 from gearbench.fem.gear.body import condense
 from gearbench.rig import Material
 
@@ -17,7 +18,7 @@ TORQUE = 120.0
 FREE = np.zeros(PAIRS)
 
 
-def held(law: Any, phase: float, dte: float, y1: float = 0.0, x2: float = 0.0) -> tuple:
+def held(law: Any, phase: float, dte: float, y1: float = 0.0, x2: float = 0.0) -> Equilibrium:
     theta1 = phase * law.driver.pitch + dte / law.driver.rb
     return position(law, theta1, phase * law.driven.pitch, 0.0, y1, x2, 0.0, FREE)
 
@@ -38,13 +39,13 @@ def test_torque_ratio_and_moment_balance(unequal: Any, cycle: Any) -> None:
         cycle.torque_driven[0],
         strict=True,
     ):
-        n, sides, _, found, force, active = held(law, phase, te)[:6]
-        loaded = [contact_in(found, p) for p in range(n) if active[p]]
-        assert np.all(sides[:n][active] == 0)
-        pull = sum(f * k.ny for f, k in zip(force[:n][active], loaded, strict=True))
+        found = held(law, phase, te)
+        loaded = found.pairs[found.active]
+        assert np.all(loaded["side"] == 0)
+        pull = found.force[found.active] @ loaded["ny"]
         assert t1 + t2 == pytest.approx(law.centre * pull, rel=1e-9)
         assert t1 == pytest.approx(TORQUE, rel=1e-9)
-        if all(k.slave == 0 for k in loaded):
+        if np.all(loaded["slave"] == ON_LINE):
             on_line += 1
             assert t2 / t1 == pytest.approx(30 / 20, rel=1e-6)
         else:
@@ -98,9 +99,9 @@ def zones(law: Any, phases: NDArray[np.float64]) -> NDArray[np.int64]:
     out = []
     for phase in phases:
         dte = solve_torque(law, float(phase), TORQUE)
-        n, _, _, found, _, active = held(law, float(phase), dte)[:6]
-        loaded = [contact_in(found, p).slave for p in range(n) if active[p]]
-        out.append(len(loaded) - (10 if any(loaded) else 0))
+        found = held(law, float(phase), dte)
+        slave = found.pairs["slave"][found.active]
+        out.append(len(slave) - (10 if np.any(slave != ON_LINE) else 0))
     return np.array(out)
 
 
@@ -127,7 +128,7 @@ def test_equal_gears_see_each_other_alike(twins: Any) -> None:
     shift = dte / (law.driver.rb * law.driver.pitch)
     for phase in np.linspace(-0.5, 0.5, 11):
         there, back = held(law, phase, dte), held(law, -phase - shift, dte)
-        assert there[6] == pytest.approx(back[7], rel=1e-9)
+        assert there.torque_driver == pytest.approx(back.torque_driven, rel=1e-9)
 
 
 def test_back_flanks_mirror_working_flanks(twins: Any) -> None:
@@ -139,14 +140,12 @@ def test_back_flanks_mirror_working_flanks(twins: Any) -> None:
         mirrored1 = -theta1 - 2 * law.driver.zero
         mirrored2 = -theta2 + 2 * law.driven.zero + law.driven.pitch
         back = position(law, mirrored1, mirrored2, 0.0, -1e-5, 0.0, 1e-5, FREE)
-        assert front[6] > 0
-        assert np.all(back[1][: back[0]][back[5]] == 1)
-        assert back[6] == pytest.approx(-front[6], rel=1e-9)
-        assert back[7] == pytest.approx(-front[7], rel=1e-9)
-        assert back[8] == pytest.approx(front[8], rel=1e-6)
-        np.testing.assert_allclose(
-            np.sort(back[4][: back[0]])[::-1][:2], np.sort(front[4][: front[0]])[::-1][:2], rtol=1e-9
-        )
+        assert front.torque_driver > 0
+        assert np.all(back.pairs["side"][back.active] == 1)
+        assert back.torque_driver == pytest.approx(-front.torque_driver, rel=1e-9)
+        assert back.torque_driven == pytest.approx(-front.torque_driven, rel=1e-9)
+        assert back.tangent == pytest.approx(front.tangent, rel=1e-6)
+        np.testing.assert_allclose(np.sort(back.force)[::-1][:2], np.sort(front.force)[::-1][:2], rtol=1e-9)
 
 
 def test_te_vanishes_with_the_load(unequal: Any) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gearbench.fem.contact.kernel import cross_flexibility, grid_position
-from gearbench.fem.contact.law import contact_in, coupling, find_pairs, make_law
+from gearbench.fem.contact.law import coupling, find_pairs, make_law
 from gearbench.fem.gear.body import condense
 from gearbench.fem.motion.machine import contact_rows, make_machine, mass_matrix, modal_flexibility
 from gearbench.geometry.tooth.body import body
@@ -29,16 +29,15 @@ def test_contact_rows_are_the_gaps_derivatives(unequal: Any) -> None:
     q = np.array([0.45 * law.driver.pitch + 1e-5 / law.driver.rb, 0.45 * law.driven.pitch, 2e-5, -1e-5])
 
     def gaps(q: np.ndarray) -> dict:
-        sides, teeth, found, n = find_pairs(law, q[0], q[1], law.centre, q[3] - q[2], 5e-4)
-        return {(sides[p], teeth[p]): found[p, 0] for p in range(n)}
+        pairs = find_pairs(law, q[0], q[1], law.centre, q[3] - q[2], 5e-4)
+        return {(pair["side"], pair["tooth"]): pair["gap"] for pair in pairs}
 
-    sides, teeth, found, n = find_pairs(law, q[0], q[1], law.centre, q[3] - q[2], 4e-4)
-    rows = contact_rows(machine, sides, teeth, found, n)
-    assert n >= 3 and 1 in sides[:n]
+    pairs = find_pairs(law, q[0], q[1], law.centre, q[3] - q[2], 4e-4)
+    rows = contact_rows(machine, pairs)
+    assert len(pairs) >= 3 and 1 in pairs["side"]
     for k, step in enumerate((1e-6, 1e-6, 1e-7, 1e-7)):
         up, down = gaps(q + step * np.eye(4)[k]), gaps(q - step * np.eye(4)[k])
-        for p in range(n):
-            pair = sides[p], teeth[p]
+        for p, pair in enumerate(zip(pairs["side"], pairs["tooth"], strict=True)):
             assert rows[p, k] == pytest.approx((up[pair] - down[pair]) / (2 * step), rel=1e-4, abs=1e-4)
 
 
@@ -54,13 +53,13 @@ def test_modes_and_coupling_count_the_teeth_alike(gear: Any, twins: Any) -> None
     bodies = tuple(body(twins.pair.driver, rig.driver, rig.material.density) for _ in range(2))
     machine = make_machine(rig, twins.pair, law, (slender, slender), bodies, 1.0)
     at = 0.5 * law.driver.pitch
-    sides, teeth, found, n = find_pairs(law, at, at, law.centre, 0.0, 2e-4)
-    assert n >= 3 and set(sides[:n]) == {0, 1}
-    rows = contact_rows(machine, sides, teeth, found, n)
+    pairs = find_pairs(law, at, at, law.centre, 0.0, 2e-4)
+    assert len(pairs) >= 3 and set(pairs["side"]) == {0, 1}
+    rows = contact_rows(machine, pairs)
     modal = modal_flexibility(rows, machine.stiffness, 4 if machine.rotations == 2 else 3)
-    static = coupling(law, sides, teeth, found, n)
-    off = ~np.eye(n, dtype=bool)
-    same = sides[:n][:, None] == sides[:n][None]
+    static = coupling(law, pairs)
+    off = ~np.eye(len(pairs), dtype=bool)
+    same = pairs["side"][:, None] == pairs["side"][None]
     scale = np.abs(static).max()
     assert np.abs(modal - static)[off].max() < 1e-2 * scale
     # Pushing both flanks the same way twists the hub, from opposite sides it does not.
@@ -72,23 +71,23 @@ def test_coupling_takes_the_teeth_in_their_order(unequal: Any) -> None:
     """Driver teeth are numbered clockwise, driven ones counter-clockwise; a back pair is driven by the next tooth."""
     law = unequal.law
     k1, k2 = law.k1, law.k2
-    sides, teeth, found, n = find_pairs(law, 0.5 * law.driver.pitch, 0.5 * law.driven.pitch, law.centre, 0.0, 3e-4)
-    c = coupling(law, sides, teeth, found, n)
-    number = {(int(sides[p]), int(teeth[p])): p for p in range(n)}
+    pairs = find_pairs(law, 0.5 * law.driver.pitch, 0.5 * law.driven.pitch, law.centre, 0.0, 3e-4)
+    c = coupling(law, pairs)
+    number = {(int(pair["side"]), int(pair["tooth"])): p for p, pair in enumerate(pairs)}
     zero, one = number[0, 0], number[0, 1]
 
     def flexibility(p: int, q: int, apart1: int, apart2: int) -> float:
-        load, at = contact_in(found, q), contact_in(found, p)
+        load, at = pairs[q], pairs[p]
         one, two = (
             cross_flexibility(
                 kernel,
-                int(sides[q]),
+                int(load["side"]),
                 grid_position(kernel, s_load),
-                int(sides[p]),
+                int(at["side"]),
                 grid_position(kernel, s),
                 apart,
             )
-            for kernel, s_load, s, apart in ((k1, load.s1, at.s1, apart1), (k2, load.s2, at.s2, apart2))
+            for kernel, s_load, s, apart in ((k1, load["s1"], at["s1"], apart1), (k2, load["s2"], at["s2"], apart2))
         )
         return one + two
 
@@ -152,9 +151,9 @@ def test_every_tooth_sees_the_same_gear(unequal: Any, side: int) -> None:
     for number in (0, 1, 2, 7):
         phase = 0.1 + number
         theta1, theta2 = phase * law.driver.pitch, phase * law.driven.pitch
-        sides, teeth, found, n = find_pairs(law, theta1, theta2, law.centre, 0.0, 3e-4)
-        rows = contact_rows(machine, sides, teeth, found, n)
-        p = next(p for p in range(n) if sides[p] == side and teeth[p] == number)
+        pairs = find_pairs(law, theta1, theta2, law.centre, 0.0, 3e-4)
+        rows = contact_rows(machine, pairs)
+        (p,) = np.flatnonzero((pairs["side"] == side) & (pairs["tooth"] == number))
         hubs = mass_matrix(machine, theta1, theta2)[:4, 4:]
         seen.append(hubs / machine.stiffness[4:] @ rows[p, 4:])
     for other in seen[1:]:

@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 
 from gearbench.bench.elastic.rig import natural_frequencies
 from gearbench.fem.contact.curve import lone_approach
-from gearbench.fem.contact.law import PAIRS, contact_in, coupling, find_pairs
+from gearbench.fem.contact.law import contact_in, coupling, find_pairs
 from gearbench.fem.contact.static import MARGIN, static_cycle
 from gearbench.fem.motion.machine import Machine, angles, contact_rows, make_machine, mass_matrix, modal_flexibility
 from gearbench.fem.motion.transient import (
     Scheme,
     State,
     advance,
+    columns,
     frequency_error,
     initial_state,
     make_scheme,
@@ -58,9 +59,10 @@ def march(
 ) -> State:
     """Step by step, each looked at."""
     for _ in range(steps):
-        state, moment, ok = take_step(machine, scheme, state, torque)
-        assert ok
-        look(state, moment)
+        step = take_step(machine, scheme, state, torque)
+        assert step.converged
+        state = step.state
+        look(state, step.torque_driven)
     return state
 
 
@@ -71,15 +73,15 @@ class Meeting:
         law, r = machine.law, machine.rotations
         theta1, theta2 = angles(machine, state.d, state.t)
         y = state.d[r + 1] - state.d[r]
-        met = find_pairs(law, theta1, theta2, law.centre + machine.axis_x * y, machine.axis_y * y, MARGIN)
-        self.sides, self.teeth, self.found, self.count = met
-        self.rows = contact_rows(machine, *met)
-        self.contacts = [contact_in(met[2], p) for p in range(met[3])]
-        self.cross = coupling(law, *met) - modal_flexibility(self.rows, machine.stiffness, r + 2)
+        self.pairs = find_pairs(law, theta1, theta2, law.centre + machine.axis_x * y, machine.axis_y * y, MARGIN)
+        self.count = len(self.pairs)
+        rows = contact_rows(machine, self.pairs)
+        self.contacts = [contact_in(self.pairs, p) for p in range(self.count)]
+        self.cross = coupling(law, self.pairs) - modal_flexibility(rows, machine.stiffness, r + 2)
         self.law = law
 
     def approach(self, p: int, force: float) -> float:
-        return float(lone_approach(self.law.curves, contact_in(self.found, p), force)[0])
+        return float(lone_approach(self.law.curves, contact_in(self.pairs, p), force)[0])
 
     def energy(self, force: Array) -> float:
         """Elastic energy of the residual flexibility under forces: sum of the integrals of F du."""
@@ -96,7 +98,7 @@ class Meeting:
 def energy(machine: Machine, state: State, torque: float, force: Array | None = None) -> float:
     """Kinetic, modal, support and contact energy, less the work of the constant torque."""
     met = Meeting(machine, state)
-    contact = met.energy(state.force[: met.count] if force is None else force)
+    contact = met.energy(state.force if force is None else force)
     mass = mass_matrix(machine, *angles(machine, state.d, state.t))
     elastic = 0.5 * machine.stiffness @ state.d**2
     return 0.5 * state.v @ mass @ state.v + elastic + contact - torque * state.d[0]
@@ -273,9 +275,10 @@ def test_slow_running_is_static(unequal: Any, boundary: str) -> None:
     assert failed == -1
     alpha = unequal.pair.working_pressure_angle
     # Where both gears are free, the driven one's angle tells the phase.
-    dte = law.driver.rb * samples[:, 0] - law.driven.rb * samples[:, 1]
-    dte += np.cos(alpha) * (samples[:, 2] - samples[:, 3])
-    phases = samples[:, 1] / law.driven.pitch
+    seen = columns(samples)
+    dte = law.driver.rb * seen.angle_driver - law.driven.rb * seen.angle_driven
+    dte += np.cos(alpha) * (seen.y_driver - seen.y_driven)
+    phases = seen.angle_driven / law.driven.pitch
     static = static_cycle(law, phases, torque=[TORQUE]).transmission_error[0]
     np.testing.assert_allclose(dte, static, rtol=1e-3)
     if boundary == "speed":
@@ -352,7 +355,7 @@ def test_pairs_that_part_and_meet_again(twins: Any) -> None:
     torque = np.where((t > 0.001) & (t < 0.003), -0.5 * TORQUE, TORQUE)
     state, samples, failed = advance(machine, make_scheme(t[1], 0.8), initial_state(machine, TORQUE), torque, 1)
     assert failed == -1
-    assert samples[:, 5].min() == 0
+    assert columns(samples).loaded.min() == 0
     start = initial_state(machine, TORQUE)
     np.testing.assert_allclose(state.d[:3], start.d[:3], rtol=1e-3)
-    assert state.force[: PAIRS // 2].sum() > 0
+    assert state.force[state.pairs["side"] == 0].sum() > 0

@@ -207,6 +207,6 @@ def test_which_sectors() -> None:
 
 def test_without_equilibrium_there_is_no_field(unequal: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     assert pair_loads(unequal.law, 0.0, -1e-6) == []
-    monkeypatch.setattr(loaded_module, "position", lambda *given: (*position(*given)[:-1], False))
+    monkeypatch.setattr(loaded_module, "position", lambda *given: position(*given)._replace(converged=False))
     with pytest.raises(ContactError, match="no static equilibrium at mesh phase 0 and DTE 1e-05 m"):
         pair_loads(unequal.law, 0.0, 1e-5)
