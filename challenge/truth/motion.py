@@ -122,7 +122,8 @@ def _back(c: Record, mesh: Mesh, turn: float, speed1: float, dte: float, rate: f
     sweep = -c.base_driver / c.base_pitch * speed1
     force = 0.0
     for number in range(floor(turn - 0.5 + c.teeth.first), floor(turn - 0.5 + last) + 1):
-        clean = dte - mesh.driver[number % mesh.driver.shape[0]].error - mesh.driven[number % mesh.driven.shape[0]].error
+        one, two = mesh.driver[number % mesh.driver.shape[0]], mesh.driven[number % mesh.driven.shape[0]]
+        clean = dte - one.error - two.error
         force += _pair_force(c, mesh, number, number + 0.5 - turn, sweep, clean, rate, scale)
     return force
 
