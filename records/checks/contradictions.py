@@ -91,7 +91,8 @@ def clocks_agree(look: Look) -> list[Finding]:
     best: tuple[float, str, float] | None = None
     for name in _suspects(accounts, ("torque_", "angle_", "y_")):
         relations = [relation for relation in accounts.relations() if name in accounts.channels(relation)]
-        now = max(float(accounts.misfit(relation)[0]) for relation in relations)
+        # A late channel spoils every relation that it is in: one that fits clears it.
+        now = min(float(accounts.misfit(relation)[0]) for relation in relations)
         if now < (SUSPICIOUS_Y if name.startswith("y_") else SUSPICIOUS):
             continue
 
