@@ -158,6 +158,14 @@ def _silent() -> Iterator[None]:
         os.close(void)
 
 
+def _write(gmsh: Any, target: Path) -> None:
+    """Raises OSError: gmsh tells a full disk, as any failure of writing, by a plain Exception."""
+    try:
+        gmsh.write(str(target))
+    except Exception as error:
+        raise OSError("its contents could not be written; is the disk full?") from error
+
+
 def write_step(path: Path, gears: Iterable[Placed]) -> Path:
     """Both gears as solids, in mm. Raises MeshingUnavailable without gmsh."""
 
@@ -169,7 +177,7 @@ def write_step(path: Path, gears: Iterable[Placed]) -> Path:
                     _step_gear(gmsh.model.occ, gear)
                 gmsh.model.occ.synchronize()
                 with _silent():
-                    gmsh.write(str(target))
+                    _write(gmsh, target)
             finally:
                 gmsh.model.remove()
 

@@ -81,7 +81,7 @@ def damage_attributes(rng: Rng, record: xr.Dataset) -> xr.Dataset:
     hurt = record.copy()
     odd: list[Any] = [0, -1, 1e-300, 1e300, np.nan, np.inf, "", "x", "1", np.zeros(3), np.arange(2), "speed", 2**40]
     for _ in range(rng.integers(1, 4)):
-        key = str(rng.choice(list(hurt.attrs)))
+        key = str(rng.choice([str(name) for name in hurt.attrs]))
         kind = rng.random()
         value = hurt.attrs[key]
         if kind < 0.2:
@@ -96,7 +96,7 @@ def damage_attributes(rng: Rng, record: xr.Dataset) -> xr.Dataset:
 def damage_channels(rng: Rng, record: xr.Dataset) -> xr.Dataset:
     """A channel without meaning: constant, of NaN, scaled, shifted, clipped, renamed, left out, of another type."""
     hurt = record.copy(deep=True)
-    name = str(rng.choice(list(hurt.data_vars)))
+    name = str(rng.choice([str(one) for one in hurt.data_vars]))
     values = hurt[name].values
     kind = int(rng.integers(9))
     if kind == 0:

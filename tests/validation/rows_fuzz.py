@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import resource
+import shutil
 import signal
 import subprocess
 import sys
@@ -106,14 +107,18 @@ def _pair_example(number: int) -> str | None:
     for side, z, x in zip(("driver", "driven"), teeth, shifts, strict=True):
         hub = round(0.7 * m * (z / 2 - 1.5), 3)
         values = {"teeth": z, "module_mm": m, "profile_shift": x, "face_width_mm": width, "hub_radius_mm": hub}
-        values |= {"bore_radius_mm": 0, "tip_edge_radius_mm": 0}
+        # Of a disc to the tips, so that any hub's share is enough.
+        radius = 1e-3 * m * (z / 2 + 2)
+        mass = 7850 * pi * radius**2 * 1e-3 * width
+        values |= {"mass_kg": mass, "inertia_kg_m2": mass * radius**2 / 2}
+        values |= {"bore_radius_mm": 0, "tip_edge_radius_um": 0, "thinning_um": 0}
         chosen += [f"rig.{side}.{key}={value}" for key, value in values.items()]
     try:
         case = read_case("quick_lumped", chosen)
         found = pair(case.rig)
         result = static(case, positions=32, torque=[0.05 * width * teeth[0] * m * 2])
-    except (CaseError, GeometryError):
-        return None
+    except (CaseError, GeometryError) as error:
+        return f"{error} of {chosen}"
     pitch, ratio = closed_forms(1e-3 * m, teeth, shifts)
     if abs(found.base_pitch - pitch) > 1e-9:
         return f"base pitch {found.base_pitch} and not {pitch} of {chosen}"
@@ -198,6 +203,8 @@ def full_disk() -> Got:
         def example(number: int) -> str | None:
             name, arguments = writers[number % len(writers)]
             least = static_size + 1 if name in ("d.png", "e.svg") else 0
+            if name in ("out", "run"):  # nothing to take up
+                shutil.rmtree(folder / name, ignore_errors=True)
             limit = int(generator(number, 3).integers(least, sizes[name]))
             return _in_room(limit, arguments(folder / name), folder)
 

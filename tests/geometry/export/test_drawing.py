@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearbench.files import FileError
+from gearbench.files import FileError, write_whole
 from gearbench.geometry import gear_area
-from gearbench.geometry.export.drawing import placed_gears, write_dxf, write_step
+from gearbench.geometry.export.drawing import _write, placed_gears, write_dxf, write_step
 from gearbench.rig import Gear, Rig
 
 MakeGear = Callable[..., Gear]
@@ -89,3 +89,15 @@ def test_step_holds_both_solids(tmp_path: Path, bench: Rig, capfd: pytest.Captur
 def test_a_missing_folder_is_named(tmp_path: Path, bench: Rig) -> None:
     with pytest.raises(FileError, match=r"must exist$"):
         write_dxf(tmp_path / "none" / "pair.dxf", placed_gears(bench))
+
+
+def test_a_step_file_that_cannot_be_written_is_one_sentence(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """What gmsh raises when the disk is full, as measured with a limit on the size of files."""
+
+    class Gmsh:
+        def write(self, name: str) -> None:
+            raise Exception(f"Could not create file '{name}'")
+
+    with pytest.raises(FileError, match=r"/a\.step cannot be written: its contents could not be written"):
+        write_whole(tmp_path / "a.step", lambda target: _write(Gmsh(), target))
+    assert not list(tmp_path.iterdir())
