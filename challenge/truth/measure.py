@@ -18,7 +18,21 @@ from gearbench.bench.record.attributes import experiment_attributes, rig_attribu
 from gearbench.bench.record.sensors import repeated
 from gearbench.challenge.truth.levels import DELAYED, Foreign, Levels
 from gearbench.challenge.truth.motion import integrate
-from gearbench.challenge.truth.plant import DEGREES, OUTPUTS, STATES, Plant
+from gearbench.challenge.truth.plant import (
+    DEGREES,
+    DRIVEN,
+    DRIVER,
+    LOAD,
+    OUTPUTS,
+    ROTOR,
+    STATES,
+    TWIST,
+    X_DRIVEN,
+    X_DRIVER,
+    Y_DRIVEN,
+    Y_DRIVER,
+    Plant,
+)
 from gearbench.challenge.truth.rigs import Bench, build_plant
 from gearbench.challenge.truth.structure import Structure
 from gearbench.records import make_record
@@ -89,7 +103,7 @@ def start_state(plant: Plant, torque: Array, step: float, first: int) -> Array:
     mean = float(torque.mean())
     force = mean / plant.base_driver
     lift = np.array([-plant.sine, -plant.cosine, plant.sine, plant.cosine]) * force / plant.support
-    state[4:8] = lift
+    state[X_DRIVER : Y_DRIVEN + 1] = lift
     ratio = plant.base_driver / plant.base_driven
     inertia = plant.inertia.driven + plant.inertia.load + (plant.inertia.rotor + plant.inertia.driver) / ratio**2
     points = torque.size
@@ -100,14 +114,14 @@ def start_state(plant: Plant, torque: Array, step: float, first: int) -> Array:
     at = 2 * pi * ((2 * first) % points) * np.arange(turning.size) / points
     waves = 2.0 / points * turning * np.exp(1j * at)
     driven, speed = float(waves.real.sum()), float((1j * omega * waves).real.sum())
-    state[2], state[3] = driven + mean / ratio / plant.shaft.stiffness, driven
+    state[DRIVEN], state[LOAD] = driven + mean / ratio / plant.shaft.stiffness, driven
     near = plant.teeth.stiffness.max() * 1.4
-    across = (lift[1] - lift[3]) * plant.cosine + (lift[0] - lift[2]) * plant.sine
-    state[1] = (force / near - across + plant.base_driven * state[2]) / plant.base_driver
-    state[2 * DEGREES] = mean / plant.coupling.stiffness
-    state[0] = state[1] + state[2 * DEGREES]
-    state[DEGREES + 2] = state[DEGREES + 3] = speed
-    state[DEGREES] = state[DEGREES + 1] = speed / ratio
+    across = (state[Y_DRIVER] - state[Y_DRIVEN]) * plant.cosine + (state[X_DRIVER] - state[X_DRIVEN]) * plant.sine
+    state[DRIVER] = (force / near - across + plant.base_driven * state[DRIVEN]) / plant.base_driver
+    state[TWIST] = mean / plant.coupling.stiffness
+    state[ROTOR] = state[DRIVER] + state[TWIST]
+    state[DEGREES + DRIVEN] = state[DEGREES + LOAD] = speed
+    state[DEGREES + ROTOR] = state[DEGREES + DRIVER] = speed / ratio
     return state
 
 

@@ -14,7 +14,25 @@ import numpy as np
 
 from gearbench.challenge.errors import ChallengeError
 from gearbench.challenge.truth.packing import Mesh, Record, pack
-from gearbench.challenge.truth.plant import DEGREES, OUTPUTS, STATES, Array, Plant
+from gearbench.challenge.truth.plant import (
+    DEGREES,
+    DRIVEN,
+    DRIVER,
+    LOAD,
+    MODE_1,
+    MODE_2,
+    OUTPUTS,
+    ROTOR,
+    STATES,
+    TWIST,
+    X_DRIVEN,
+    X_DRIVER,
+    Y_DRIVEN,
+    Y_DRIVER,
+    Array,
+    Plant,
+    Seen,
+)
 from gearbench.kernels.compiled import ROUNDING, compiled
 
 # Python's error model orders the operations as they were in every record made so far: with numpy's, last digits differ.
@@ -43,11 +61,11 @@ def integrate(
     return final, out
 
 
-def derivative(plant: Plant, time: float, torque: float, state: Array) -> tuple[Array, Array]:
-    """Rate (STATES,) of the state at `time` [s] under a `torque` [N m] on the rotor, and the OUTPUTS there."""
-    rate, seen = np.empty(STATES), np.empty(len(OUTPUTS))
+def derivative(plant: Plant, time: float, torque: float, state: Array) -> tuple[Array, Seen]:
+    """Rate (STATES,) of the state at `time` [s] under a `torque` [N m] on the rotor, and what is seen there."""
+    rate = np.empty(STATES)
     numbers, mesh = pack(plant)
-    _derivative(numbers, mesh, time, torque, np.asarray(state, dtype=float), rate, seen)
+    seen = _derivative(numbers, mesh, time, torque, np.asarray(state, dtype=float), rate)
     return rate, seen
 
 
@@ -97,7 +115,8 @@ def _working(
 ) -> tuple[float, float, float, float]:
     """Of all pairs on the working flanks: normal force, friction, and friction's moments on both gears."""
     last = c.teeth.first + c.teeth.pitch * (mesh.table.shape[0] - 1)
-    across = (s[DEGREES + 5] - s[DEGREES + 7]) * c.sine - (s[DEGREES + 4] - s[DEGREES + 6]) * c.cosine
+    d = DEGREES
+    across = (s[d + Y_DRIVER] - s[d + Y_DRIVEN]) * c.sine - (s[d + X_DRIVER] - s[d + X_DRIVEN]) * c.cosine
     sweep = c.base_driver / c.base_pitch * speed1
     normal, rubbing, moment1, moment2 = 0.0, 0.0, 0.0, 0.0
     for number in range(floor(turn - last) + 1, floor(turn - c.teeth.first) + 1):
@@ -122,23 +141,30 @@ def _back(c: Record, mesh: Mesh, turn: float, speed1: float, dte: float, rate: f
     sweep = -c.base_driver / c.base_pitch * speed1
     force = 0.0
     for number in range(floor(turn - 0.5 + c.teeth.first), floor(turn - 0.5 + last) + 1):
-        one, two = mesh.driver[number % mesh.driver.shape[0]], mesh.driven[number % mesh.driven.shape[0]]
-        clean = dte - one.error - two.error
+        tooth1, tooth2 = number % len(mesh.driver), number % len(mesh.driven)
+        clean = dte - mesh.driver[tooth1].error - mesh.driven[tooth2].error
         force += _pair_force(c, mesh, number, number + 0.5 - turn, sweep, clean, rate, scale)
     return force
+
+
+@_compiled
+def _lift(c: Record, s: Array, coordinate: int) -> float:
+    """Motion [m] of the housing at a support."""
+    i = coordinate - X_DRIVER
+    return c.mode_shape[0, i] * s[MODE_1] + c.mode_shape[1, i] * s[MODE_2]
 
 
 @_compiled
 def _supports(c: Record, s: Array, progress: float, force: Array) -> None:
     """Forces (4,) of the supports on the gears' centres, with opposite sign."""
     for i in range(4):
-        lift = c.mode_shape[0, i] * s[8] + c.mode_shape[1, i] * s[9]
-        lift_rate = c.mode_shape[0, i] * s[DEGREES + 8] + c.mode_shape[1, i] * s[DEGREES + 9]
-        y = s[4 + i] - lift
-        k = c.support[i] * (1.0 + progress * (c.drift.driver if i < 2 else c.drift.driven))
+        lift = _lift(c, s, X_DRIVER + i)
+        lift_rate = c.mode_shape[0, i] * s[DEGREES + MODE_1] + c.mode_shape[1, i] * s[DEGREES + MODE_2]
+        y = s[X_DRIVER + i] - lift
+        k = c.support[i] * (1.0 + progress * (c.drift.driver if X_DRIVER + i < X_DRIVEN else c.drift.driven))
         if c.support_exponent[i] != 0.0:
             k *= (abs(y) / c.support_reference[i]) ** c.support_exponent[i]
-        force[i] = k * y + c.support_damping[i] * (s[DEGREES + 4 + i] - lift_rate)
+        force[i] = k * y + c.support_damping[i] * (s[DEGREES + X_DRIVER + i] - lift_rate)
 
 
 @_compiled
@@ -146,14 +172,14 @@ def _drive(c: Record, time: float, torque: float, s: Array, rate: Array) -> floa
     """Torque on the driver from the coupling; sets the rates of the rotor and of the coupling's twist."""
     if c.tone.amplitude != 0.0:
         torque += c.tone.amplitude * cos(c.tone.frequency * time + c.tone.phase)
-    angle = c.ripple_order * (c.speed_driver * time + s[0])
+    angle = c.ripple_order * (c.speed_driver * time + s[ROTOR])
     cosine, sine = cos(angle), sin(angle)
     a, b = 1.0, 0.0
     for k in range(len(c.ripple)):
         a, b = a * cosine - b * sine, a * sine + b * cosine
         torque += c.ripple[k, 0] * a + c.ripple[k, 1] * b
-    elastic = c.coupling.stiffness * s[2 * DEGREES]
-    turning = s[DEGREES] - s[DEGREES + 1]
+    elastic = c.coupling.stiffness * s[TWIST]
+    turning = s[DEGREES + ROTOR] - s[DEGREES + DRIVER]
     slip = 0.0
     if c.coupling.limit > 0.0:
         if elastic > c.coupling.limit:
@@ -161,17 +187,18 @@ def _drive(c: Record, time: float, torque: float, s: Array, rate: Array) -> floa
         elif elastic < -c.coupling.limit:
             slip = (elastic + c.coupling.limit) / c.coupling.slip
     passed = elastic + c.coupling.damping * (turning - slip)
-    rate[DEGREES] = (torque - passed) / c.inertia.rotor
-    rate[2 * DEGREES] = turning - slip
+    rate[DEGREES + ROTOR] = (torque - passed) / c.inertia.rotor
+    rate[TWIST] = turning - slip
     return passed
 
 
 @_compiled
-def _derivative(c: Record, mesh: Mesh, time: float, torque: float, s: Array, rate: Array, seen: Array) -> None:
+def _derivative(c: Record, mesh: Mesh, time: float, torque: float, s: Array, rate: Array) -> Seen:
+    """Fill the rate of the state `s`; returns what is seen there."""
     d = DEGREES
     progress = max(time, 0.0) / c.drift.duration
-    angle1, angle2 = c.speed_driver * time + s[1], c.speed_driven * time + s[2]
-    speed1, speed2 = c.speed_driver + s[d + 1], c.speed_driven + s[d + 2]
+    angle1, angle2 = c.speed_driver * time + s[DRIVER], c.speed_driven * time + s[DRIVEN]
+    speed1, speed2 = c.speed_driver + s[d + DRIVER], c.speed_driven + s[d + DRIVEN]
     # Geometric centres off the axes: polar angles of both.
     pole1, pole2 = c.eccentricity_angle.driver + angle1, c.eccentricity_angle.driven - angle2
     e1, e2 = c.eccentricity.driver, c.eccentricity.driven
@@ -180,12 +207,12 @@ def _derivative(c: Record, mesh: Mesh, time: float, torque: float, s: Array, rat
     # Their part in the levers: derivative of dte to each angle.
     lever1 = c.base_driver + x1 * c.cosine - y1 * c.sine
     lever2 = c.base_driven - x2 * c.cosine + y2 * c.sine
-    u1, w1 = -y1 * speed1 + s[d + 4], x1 * speed1 + s[d + 5]
-    u2, w2 = y2 * speed2 + s[d + 6], -x2 * speed2 + s[d + 7]
-    apart_x, apart_y = s[4] + x1 - s[6] - x2, s[5] + y1 - s[7] - y2
+    u1, w1 = -y1 * speed1 + s[d + X_DRIVER], x1 * speed1 + s[d + Y_DRIVER]
+    u2, w2 = y2 * speed2 + s[d + X_DRIVEN], -x2 * speed2 + s[d + Y_DRIVEN]
+    apart_x, apart_y = s[X_DRIVER] + x1 - s[X_DRIVEN] - x2, s[Y_DRIVER] + y1 - s[Y_DRIVEN] - y2
     apart_u, apart_w = u1 - u2, w1 - w2
-    twist = c.base_driver * s[1] - c.base_driven * s[2]
-    twist_rate = c.base_driver * s[d + 1] - c.base_driven * s[d + 2]
+    twist = c.base_driver * s[DRIVER] - c.base_driven * s[DRIVEN]
+    twist_rate = c.base_driver * s[d + DRIVER] - c.base_driven * s[d + DRIVEN]
     dte = twist + apart_y * c.cosine + apart_x * c.sine
     dte_rate = twist_rate + apart_w * c.cosine + apart_u * c.sine
     turn = mesh.driver.shape[0] * angle1 / (2.0 * pi)
@@ -205,31 +232,26 @@ def _derivative(c: Record, mesh: Mesh, time: float, torque: float, s: Array, rat
     for i in range(d):
         rate[i] = s[d + i]
     passed = _drive(c, time, torque, s, rate)
-    shaft = c.shaft.stiffness * (s[2] - s[3]) + c.shaft.damping * (s[d + 2] - s[d + 3])
-    rate[d + 1] = (passed - pull1) / c.inertia.driver
-    rate[d + 2] = (pull2 - shaft) / c.inertia.driven
-    held = c.governor.stiffness * s[3] + c.governor.damping * s[d + 3]
-    rate[d + 3] = (shaft - c.load_torque - held) / c.inertia.load
+    shaft = c.shaft.stiffness * (s[DRIVEN] - s[LOAD]) + c.shaft.damping * (s[d + DRIVEN] - s[d + LOAD])
+    rate[d + DRIVER] = (passed - pull1) / c.inertia.driver
+    rate[d + DRIVEN] = (pull2 - shaft) / c.inertia.driven
+    held = c.governor.stiffness * s[LOAD] + c.governor.damping * s[d + LOAD]
+    rate[d + LOAD] = (shaft - c.load_torque - held) / c.inertia.load
     # The four slots of the supports are filled first with their forces, then with the accelerations.
-    supports = rate[d + 4 : d + 8]
+    supports = rate[d + X_DRIVER : d + MODE_1]
     _supports(c, s, progress, supports)
-    one = -c.mode_stiffness[0] * s[8] - c.mode_damping[0] * s[d + 8]
-    two = -c.mode_stiffness[1] * s[9] - c.mode_damping[1] * s[d + 9]
-    for i in range(4):
-        one += c.mode_shape[0, i] * supports[i]
-        two += c.mode_shape[1, i] * supports[i]
-    rate[d + 8] = one / c.mode_mass[0]
-    rate[d + 9] = two / c.mode_mass[1]
-    supports[0] = (-fx - supports[0]) / c.mass.driver
-    supports[1] = (-fy - supports[1]) / c.mass.driver
-    supports[2] = (fx - supports[2]) / c.mass.driven
-    supports[3] = (fy - supports[3]) / c.mass.driven
-    seen[0], seen[1] = s[1], s[2]
-    base1 = c.mode_shape[0, 1] * s[8] + c.mode_shape[1, 1] * s[9]
-    base2 = c.mode_shape[0, 3] * s[8] + c.mode_shape[1, 3] * s[9]
-    seen[2] = s[5] - c.sensor_on_housing * base1
-    seen[3] = s[7] - c.sensor_on_housing * base2
-    seen[4], seen[5], seen[6] = shaft, force, dte
+    for j in range(2):
+        total = -c.mode_damping[j] * s[d + MODE_1 + j] - c.mode_stiffness[j] * s[MODE_1 + j]
+        for i in range(4):
+            total += c.mode_shape[j, i] * supports[i]
+        rate[d + MODE_1 + j] = total / c.mode_mass[j]
+    rate[d + X_DRIVER] = (-fx - rate[d + X_DRIVER]) / c.mass.driver
+    rate[d + Y_DRIVER] = (-fy - rate[d + Y_DRIVER]) / c.mass.driver
+    rate[d + X_DRIVEN] = (fx - rate[d + X_DRIVEN]) / c.mass.driven
+    rate[d + Y_DRIVEN] = (fy - rate[d + Y_DRIVEN]) / c.mass.driven
+    y_driver = s[Y_DRIVER] - c.sensor_on_housing * _lift(c, s, Y_DRIVER)
+    y_driven = s[Y_DRIVEN] - c.sensor_on_housing * _lift(c, s, Y_DRIVEN)
+    return Seen(s[DRIVER], s[DRIVEN], y_driver, y_driven, shaft, force, dte)
 
 
 @_compiled
@@ -237,23 +259,25 @@ def _run(c: Record, mesh: Mesh, torque: Array, s: Array, h: float, first: int, s
     """Advance the state `s` in place and fill `out`."""
     k1, k2, k3, k4 = np.empty(STATES), np.empty(STATES), np.empty(STATES), np.empty(STATES)
     trial = np.empty(STATES)
-    unused = np.empty(len(OUTPUTS))
     last = torque.size
     j = (2 * first) % last
     for row in range(out.shape[0]):
         for inner in range(stride):
             time = (first + row * stride + inner) * h
-            _derivative(c, mesh, time, torque[j], s, k1, out[row] if inner == 0 else unused)
+            seen = _derivative(c, mesh, time, torque[j], s, k1)
+            if inner == 0:
+                for i in range(len(seen)):
+                    out[row, i] = seen[i]
             middle = torque[j + 1]
             j = j + 2 if j + 2 < last else 0
             for i in range(STATES):
                 trial[i] = s[i] + 0.5 * h * k1[i]
-            _derivative(c, mesh, time + 0.5 * h, middle, trial, k2, unused)
+            _derivative(c, mesh, time + 0.5 * h, middle, trial, k2)
             for i in range(STATES):
                 trial[i] = s[i] + 0.5 * h * k2[i]
-            _derivative(c, mesh, time + 0.5 * h, middle, trial, k3, unused)
+            _derivative(c, mesh, time + 0.5 * h, middle, trial, k3)
             for i in range(STATES):
                 trial[i] = s[i] + h * k3[i]
-            _derivative(c, mesh, time + h, torque[j], trial, k4, unused)
+            _derivative(c, mesh, time + h, torque[j], trial, k4)
             for i in range(STATES):
                 s[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])

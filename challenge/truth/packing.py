@@ -44,8 +44,8 @@ def _record(values: dict[str, Any]) -> Record:
 
 
 def _part(value: Any) -> NDArray[Any]:
-    if isinstance(value, tuple):
-        value = value._asdict()  # type: ignore[attr-defined]
+    if hasattr(value, "_asdict"):
+        value = value._asdict()
     return np.asarray(_record(value)) if isinstance(value, dict) else np.asarray(value, dtype=float)
 
 

@@ -19,9 +19,24 @@ COORDINATES = ("rotor", "driver", "driven", "load", "x_driver", "y_driver", "x_d
 DEGREES = len(COORDINATES)
 # The state: coordinates, their rates, and the elastic twist of the coupling [rad].
 STATES = 2 * DEGREES + 1
-# What the integrator hands out: angles (departures) [rad], what the displacement sensors see [m], torque in the load
-# shaft [N m], normal force of the working flanks [N], transmission error [m].
-OUTPUTS = ("angle_driver", "angle_driven", "y_driver", "y_driven", "torque_driven", "force", "dte")
+# Places of the coordinates; those of their rates are DEGREES further on.
+ROTOR, DRIVER, DRIVEN, LOAD, X_DRIVER, Y_DRIVER, X_DRIVEN, Y_DRIVEN, MODE_1, MODE_2 = range(DEGREES)
+TWIST = 2 * DEGREES
+
+
+class Seen(NamedTuple):
+    """What the integrator hands out."""
+
+    angle_driver: float  # departure [rad]
+    angle_driven: float
+    y_driver: float  # as the displacement sensors see it [m]
+    y_driven: float
+    torque_driven: float  # in the load shaft [N m]
+    force: float  # normal force of the working flanks [N]
+    dte: float  # transmission error [m]
+
+
+OUTPUTS = Seen._fields
 
 
 class Teeth(NamedTuple):

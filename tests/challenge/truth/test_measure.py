@@ -19,9 +19,11 @@ from gearbench.challenge.truth.measure import (
     run_condition,
     steps_per_sample,
 )
+from gearbench.challenge.truth.plant import OUTPUTS
 from gearbench.challenge.truth.rigs import conditions_of
 from gearbench.challenge.truth.structure import draw_structure
 
+Y_DRIVER, Y_DRIVEN, TORQUE, FORCE = (OUTPUTS.index(name) for name in ("y_driver", "y_driven", "torque_driven", "force"))
 BENCH = short_bench()
 CONDITION = conditions_of(BENCH.nominal)[0]
 RIG = draw_structure(BENCH.nominal, "test", np.random.default_rng(1))
@@ -51,7 +53,7 @@ def test_halving_the_step_changes_less_than_the_noise() -> None:
     rms = np.sqrt(((coarse.seen - fine.seen) ** 2).mean(axis=0))
     assert (rms[:4] < 0.1 * np.array([1e-6, 1e-6, 0.05e-6, 0.05e-6])).all()
     # The gears run ten times as fast as in the demonstration: the ends of the path come sudden.
-    assert rms[4] < 0.002 * coarse.seen[:, 4].std()
+    assert rms[TORQUE] < 0.002 * coarse.seen[:, TORQUE].std()
 
 
 def test_second_period_repeats_the_first() -> None:
@@ -67,9 +69,9 @@ def test_second_period_repeats_the_first() -> None:
 def test_forces_balance_in_the_mean() -> None:
     run = run_condition(BENCH, RIG, replace(LEVELS, friction=0.0), CONDITION)
     torque = run.command.mean()
-    assert run.seen[:, 4].mean() == pytest.approx(torque * 1.5, rel=0.02)
-    assert run.seen[:, 5].mean() == pytest.approx(torque / BENCH.meshing.driver.base_radius, rel=0.02)
-    assert run.seen[:, 2].mean() < 0 < run.seen[:, 3].mean()
+    assert run.seen[:, TORQUE].mean() == pytest.approx(torque * 1.5, rel=0.02)
+    assert run.seen[:, FORCE].mean() == pytest.approx(torque / BENCH.meshing.driver.base_radius, rel=0.02)
+    assert run.seen[:, Y_DRIVER].mean() < 0 < run.seen[:, Y_DRIVEN].mean()
 
 
 @pytest.mark.parametrize("name", ["angle_driver", "angle_driven", "y_driver", "y_driven"])
@@ -125,16 +127,16 @@ def test_filter_is_on_the_recorded_or_on_the_acting_torque(acting: bool) -> None
     foreign = Foreign(filter_frequency=700.0, filter_order=1, filter_acting=acting)
     plain, run = (run_condition(BENCH, RIG, replace(LEVELS, foreign=f), CONDITION) for f in (Foreign(), foreign))
     assert bool(run.command.std() < 0.95 * plain.command.std()) is not acting
-    assert bool(np.abs(run.seen[:, 4] - plain.seen[:, 4]).max() > 1.0) is acting
+    assert bool(np.abs(run.seen[:, TORQUE] - plain.seen[:, TORQUE]).max() > 1.0) is acting
 
 
 def test_drift_is_none_at_the_start_and_grows() -> None:
     drifting = replace(LEVELS, foreign=Foreign(drift=(0.0, 0.1, 0.0)))
     plain, run = (run_condition(BENCH, RIG, levels, CONDITION) for levels in (LEVELS, drifting))
-    change = np.abs(run.seen[:, 2] - plain.seen[:, 2])
+    change = np.abs(run.seen[:, Y_DRIVER] - plain.seen[:, Y_DRIVER])
     tenth = change.size // 10
     assert change[:tenth].mean() < 0.2 * change[-tenth:].mean()
-    assert change[-tenth:].mean() == pytest.approx(0.1 * np.abs(plain.seen[-tenth:, 2]).mean(), rel=0.3)
+    assert change[-tenth:].mean() == pytest.approx(0.1 * np.abs(plain.seen[-tenth:, Y_DRIVER]).mean(), rel=0.3)
 
 
 def test_steps_follow_stiffness_and_damping() -> None:

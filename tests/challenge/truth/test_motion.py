@@ -8,7 +8,28 @@ from shared.truth_plants import drawn_plant, undamped
 
 from gearbench.challenge.errors import ChallengeError
 from gearbench.challenge.truth.motion import derivative, integrate
-from gearbench.challenge.truth.plant import DEGREES, OUTPUTS, STATES, Array, Plant
+from gearbench.challenge.truth.plant import (
+    DEGREES,
+    DRIVEN,
+    DRIVER,
+    LOAD,
+    MODE_1,
+    OUTPUTS,
+    ROTOR,
+    STATES,
+    TWIST,
+    X_DRIVEN,
+    X_DRIVER,
+    Y_DRIVEN,
+    Y_DRIVER,
+    Array,
+    Coupling,
+    Gears,
+    Inertias,
+    Plant,
+    Seen,
+    Tone,
+)
 
 FORCE, DTE = OUTPUTS.index("force"), OUTPUTS.index("dte")
 HUGE = 1e12
@@ -16,19 +37,19 @@ HUGE = 1e12
 
 def energy(plant: Plant, state: Array, torque: float) -> float:
     """Kinetic and potential energy [J], the constant torques' included; backlash and all springs, no dampers."""
-    q, v, d = state[:DEGREES], state[DEGREES : 2 * DEGREES], DEGREES
-    kinetic = 0.5 * (plant.inertia @ v[:4] ** 2 + plant.mass.repeat(2) @ v[4:8] ** 2 + plant.mode_mass @ v[8:] ** 2)
-    stretch = q[4:8] - q[8:] @ plant.mode_shape
+    q, v = state[:DEGREES], state[DEGREES:TWIST]
+    kinetic = 0.5 * inertias(plant) @ v**2
+    stretch = q[X_DRIVER:MODE_1] - q[MODE_1:] @ plant.mode_shape
     p = plant.support_exponent
     potential = np.sum(plant.support * np.abs(stretch) ** (p + 2) / plant.support_reference**p / (p + 2))
-    potential += 0.5 * (plant.mode_stiffness @ q[8:] ** 2 + plant.coupling[0] * state[2 * d] ** 2)
-    potential += 0.5 * (plant.shaft[0] * (q[2] - q[3]) ** 2 + plant.governor[0] * q[3] ** 2)
-    potential += plant.load_torque * q[3] - torque * q[0]
+    potential += 0.5 * (plant.mode_stiffness @ q[MODE_1:] ** 2 + plant.coupling.stiffness * state[TWIST] ** 2)
+    potential += 0.5 * (plant.shaft.stiffness * (q[DRIVEN] - q[LOAD]) ** 2 + plant.governor.stiffness * q[LOAD] ** 2)
+    potential += plant.load_torque * q[LOAD] - torque * q[ROTOR]
     # Geometric centres, driver at 0 and driven gear at the centre distance, which drops out.
-    one, two = plant.eccentricity_angle[0] + q[1], plant.eccentricity_angle[1] - q[2]
-    x = q[4] + plant.eccentricity[0] * np.cos(one) - q[6] - plant.eccentricity[1] * np.cos(two)
-    y = q[5] + plant.eccentricity[0] * np.sin(one) - q[7] - plant.eccentricity[1] * np.sin(two)
-    twist = plant.base_driver * q[1] - plant.base_driven * q[2]
+    one, two = plant.eccentricity_angle.driver + q[DRIVER], plant.eccentricity_angle.driven - q[DRIVEN]
+    x = q[X_DRIVER] + plant.eccentricity.driver * np.cos(one) - q[X_DRIVEN] - plant.eccentricity.driven * np.cos(two)
+    y = q[Y_DRIVER] + plant.eccentricity.driver * np.sin(one) - q[Y_DRIVEN] - plant.eccentricity.driven * np.sin(two)
+    twist = plant.base_driver * q[DRIVER] - plant.base_driven * q[DRIVEN]
     working = twist + plant.cosine * y + plant.sine * x
     back = -twist - plant.cosine * y + plant.sine * x - plant.teeth.backlash
     teeth = plant.teeth
@@ -39,30 +60,35 @@ def energy(plant: Plant, state: Array, torque: float) -> float:
     return float(kinetic + potential)
 
 
+def inertias(plant: Plant) -> Array:
+    """Inertia of each coordinate."""
+    return np.concatenate((plant.inertia, np.repeat(plant.mass, 2), plant.mode_mass))
+
+
 def off_centre(plant: Plant) -> Plant:
     """Centres far off their axes, across the line of action at rest, where they do not move the flanks."""
     alpha = np.arctan2(plant.sine, plant.cosine)
-    return plant._replace(eccentricity=np.array([60e-6, 90e-6]), eccentricity_angle=np.array([-alpha, -alpha]))
+    return plant._replace(eccentricity=Gears(60e-6, 90e-6), eccentricity_angle=Gears(-alpha, -alpha))
 
 
 def lively_state(plant: Plant) -> Array:
     """Gears apart in the middle of their backlash, both turning towards each other."""
     state = np.zeros(STATES)
     rng = np.random.default_rng(4)
-    state[1] = -0.4 * plant.teeth.backlash / plant.base_driver
-    state[4:10] = 3e-6 * rng.standard_normal(6)
-    state[DEGREES : DEGREES + 4] = [-4.0, 6.0, -2.0, 0.1]
-    state[DEGREES + 4 : 2 * DEGREES] = 0.03 * rng.standard_normal(6)
-    state[2 * DEGREES] = state[0] - state[1]
+    state[DRIVER] = -0.4 * plant.teeth.backlash / plant.base_driver
+    state[X_DRIVER:DEGREES] = 3e-6 * rng.standard_normal(6)
+    state[DEGREES : DEGREES + X_DRIVER] = [-4.0, 6.0, -2.0, 0.1]
+    state[DEGREES + X_DRIVER : TWIST] = 0.03 * rng.standard_normal(6)
+    state[TWIST] = state[ROTOR] - state[DRIVER]
     return state
 
 
 def test_energy_is_kept_in_contact() -> None:
     plant = off_centre(undamped(drawn_plant()))
     state, torque = lively_state(plant), 30.0
-    state[1] = 60e-6 / plant.base_driver  # deep in contact, turning slowly
-    state[0] = state[1] + state[2 * DEGREES]
-    state[DEGREES : DEGREES + 4] *= 0.02
+    state[DRIVER] = 60e-6 / plant.base_driver  # deep in contact, turning slowly
+    state[ROTOR] = state[DRIVER] + state[TWIST]
+    state[DEGREES : DEGREES + X_DRIVER] *= 0.02
     start = energy(plant, state, torque)
     for _ in range(10):
         state, seen = integrate(plant, np.full(2, torque), state, step=5e-7, first=0, outputs=16, stride=1)
@@ -75,7 +101,7 @@ def test_energy_is_kept_through_impacts_on_both_flanks() -> None:
     plant = plant._replace(teeth=plant.teeth._replace(backlash=10e-6))
     state, torque, step = lively_state(plant), 30.0, 5e-7
     start = energy(plant, state, torque)
-    swing = 0.5 * plant.inertia @ state[DEGREES : DEGREES + 4] ** 2
+    swing = 0.5 * np.array(plant.inertia) @ state[DEGREES : DEGREES + X_DRIVER] ** 2
     both = []
     for _ in range(40):
         state, seen = integrate(plant, np.full(2, torque), state, step=step, first=0, outputs=500, stride=1)
@@ -94,10 +120,10 @@ def test_each_damper_takes_energy(which: str) -> None:
         "friction": {"teeth": teeth._replace(friction=0.05)},
         "mesh": {"teeth": teeth._replace(damping=5e-6, damping_load=0.0, damping_onset=0.0)},
         "supports": {"support_damping": np.full(4, 3e3)},
-        "coupling": {"coupling": plant.coupling + np.array([0.0, 0.5, 0.0, 0.0])},
-        "shaft": {"shaft": plant.shaft + np.array([0.0, 50.0])},
+        "coupling": {"coupling": plant.coupling._replace(damping=0.5)},
+        "shaft": {"shaft": plant.shaft._replace(damping=50.0)},
         "housing": {"mode_damping": np.full(2, 1e4)},
-        "governor": {"governor": plant.governor + np.array([0.0, 500.0])},
+        "governor": {"governor": plant.governor._replace(damping=500.0)},
     }[which]
     damped = plant._replace(**changed)
     state, torque = lively_state(plant), 30.0
@@ -114,13 +140,13 @@ def oscillator(damping: float = 0.0) -> tuple[Plant, float]:
     """The driver alone on the mesh, all else immovable; and its undamped angular frequency."""
     plant = undamped(drawn_plant())
     teeth = plant.teeth._replace(exponent=0.0, damping=damping, damping_load=0.0, damping_onset=0.0)
-    driver = plant.inertia[1]
+    driver = plant.inertia.driver
     alone = plant._replace(
         teeth=teeth,
-        inertia=np.array([HUGE, driver, HUGE, HUGE]),
-        mass=np.full(2, HUGE),
-        coupling=np.array([0.0, 0.0, 0.0, 1.0]),
-        eccentricity=np.zeros(2),
+        inertia=Inertias(HUGE, driver, HUGE, HUGE),
+        mass=Gears(HUGE, HUGE),
+        coupling=Coupling(0.0, 0.0, 0.0, 1.0),
+        eccentricity=Gears(0.0, 0.0),
     )
     return alone, plant.base_driver * np.sqrt(4e8 / driver)
 
@@ -133,10 +159,10 @@ def oscillator_error(damping: float, steps: int) -> float:
     decay = 0.5 * damping * omega**2
     damped = np.sqrt(omega**2 - decay**2)
     state = np.zeros(STATES)
-    state[1] = start / plant.base_driver
+    state[DRIVER] = start / plant.base_driver
     # The torque acts through the coupling's elastic twist, which nothing changes.
-    soft = plant._replace(coupling=np.array([1e-6, 0.0, 0.0, 1.0]))
-    state[2 * DEGREES] = 4e8 * mean * plant.base_driver / 1e-6
+    soft = plant._replace(coupling=Coupling(1e-6, 0.0, 0.0, 1.0))
+    state[TWIST] = 4e8 * mean * plant.base_driver / 1e-6
     _, seen = integrate(soft, np.zeros(2), state, step=span / steps, first=0, outputs=steps, stride=1)
     t = np.arange(steps) * span / steps
     shape = np.cos(damped * t) + decay / damped * np.sin(damped * t)
@@ -152,7 +178,7 @@ def test_one_pair_and_everything_else_rigid_is_an_oscillator_integrated_with_ord
 
 def test_static_equilibrium() -> None:
     plant = drawn_plant()
-    plant = undamped(plant)._replace(sensor_on_housing=1.0, eccentricity=np.zeros(2), load_torque=150.0)
+    plant = undamped(plant)._replace(sensor_on_housing=1.0, eccentricity=Gears(0.0, 0.0), load_torque=150.0)
     torque = 150.0 * plant.base_driver / plant.base_driven
     force = torque / plant.base_driver
     pull = force * np.array([-plant.sine, -plant.cosine, plant.sine, plant.cosine])
@@ -163,17 +189,19 @@ def test_static_equilibrium() -> None:
     teeth = plant.teeth
     deflection = (force * teeth.reference**teeth.exponent / 4e8) ** (1 / (1 + teeth.exponent))
     state = np.zeros(STATES)
-    state[4:8], state[8:10] = centres, modes
-    state[2] = 150.0 / plant.shaft[0]
-    across = (centres[1] - centres[3]) * plant.cosine + (centres[0] - centres[2]) * plant.sine
-    state[1] = (deflection - across + plant.base_driven * state[2]) / plant.base_driver
-    state[2 * DEGREES] = torque / plant.coupling[0]
-    state[0] = state[1] + state[2 * DEGREES]
+    state[X_DRIVER:MODE_1], state[MODE_1:DEGREES] = centres, modes
+    state[DRIVEN] = 150.0 / plant.shaft.stiffness
+    across = (state[Y_DRIVER] - state[Y_DRIVEN]) * plant.cosine + (state[X_DRIVER] - state[X_DRIVEN]) * plant.sine
+    state[DRIVER] = (deflection - across + plant.base_driven * state[DRIVEN]) / plant.base_driver
+    state[TWIST] = torque / plant.coupling.stiffness
+    state[ROTOR] = state[DRIVER] + state[TWIST]
     rate, seen = derivative(plant, 0.0, torque, state)
-    masses = np.concatenate((plant.inertia, plant.mass.repeat(2), plant.mode_mass))
+    masses = inertias(plant)
     scale = np.concatenate((np.full(4, torque), np.full(6, force)))
-    assert np.abs(rate[DEGREES : 2 * DEGREES] * masses / scale).max() < 1e-9
-    assert seen == pytest.approx([state[1], state[2], stretch[1], stretch[3], 150.0, force, deflection], rel=1e-9)
+    assert np.abs(rate[DEGREES:TWIST] * masses / scale).max() < 1e-9
+    y_driver, y_driven = stretch[Y_DRIVER - X_DRIVER], stretch[Y_DRIVEN - X_DRIVER]
+    wanted = Seen(state[DRIVER], state[DRIVEN], y_driver, y_driven, 150.0, force, deflection)
+    assert seen == pytest.approx(wanted, rel=1e-9)
 
 
 def sliding_velocity(plant: Plant, state: Array, roll: float) -> float:
@@ -184,10 +212,10 @@ def sliding_velocity(plant: Plant, state: Array, roll: float) -> float:
     contact = base + roll * np.array([np.sin(alpha), np.cos(alpha)])
     distance = (plant.base_driver + plant.base_driven) / plant.cosine
     v = state[DEGREES:]
-    spin1, spin2 = plant.speed_driver + v[1], -(plant.speed_driven + v[2])
+    spin1, spin2 = plant.speed_driver + v[DRIVER], -(plant.speed_driven + v[DRIVEN])
     from_driven = contact - np.array([distance, 0.0])
-    one = np.array([v[4], v[5]]) + spin1 * np.array([-contact[1], contact[0]])
-    two = np.array([v[6], v[7]]) + spin2 * np.array([-from_driven[1], from_driven[0]])
+    one = np.array([v[X_DRIVER], v[Y_DRIVER]]) + spin1 * np.array([-contact[1], contact[0]])
+    two = np.array([v[X_DRIVEN], v[Y_DRIVEN]]) + spin2 * np.array([-from_driven[1], from_driven[0]])
     return float(tangent @ (one - two))
 
 
@@ -198,14 +226,14 @@ def test_friction_takes_force_times_sliding_velocity(turn: float) -> None:
     rubbing = sound._replace(teeth=sound.teeth._replace(friction=0.1, friction_shape=0, friction_speed=1e-6))
     state = lively_state(plant)
     angle = turn * 2 * np.pi / 20
-    state[1], state[2] = angle, (plant.base_driver * angle - 20e-6) / plant.base_driven
+    state[DRIVER], state[DRIVEN] = angle, (plant.base_driver * angle - 20e-6) / plant.base_driven
     (with_it, seen), (without, _) = derivative(rubbing, 0.0, 0.0, state), derivative(sound, 0.0, 0.0, state)
-    masses = np.concatenate((plant.inertia, plant.mass.repeat(2), plant.mode_mass))
-    forces = masses * (with_it - without)[DEGREES : 2 * DEGREES]
-    velocity = state[DEGREES : 2 * DEGREES] + np.array([0, 100.0, sound.speed_driven, *[0.0] * 7])
+    masses = inertias(plant)
+    forces = masses * (with_it - without)[DEGREES:TWIST]
+    velocity = state[DEGREES:TWIST] + np.array([0, 100.0, sound.speed_driven, *[0.0] * 7])
     slide = sliding_velocity(sound, state, plant.roll_pitch + turn * plant.base_pitch)
-    assert seen[FORCE] > 1000.0
-    assert forces @ velocity == pytest.approx(-0.1 * seen[FORCE] * abs(slide), rel=1e-6)
+    assert seen.force > 1000.0
+    assert forces @ velocity == pytest.approx(-0.1 * seen.force * abs(slide), rel=1e-6)
     assert np.sign(slide) == np.sign(turn)
 
 
@@ -214,28 +242,28 @@ def test_torques_on_the_rotor() -> None:
     size, phase = 2.0, 0.7
     ripple = np.zeros((4, 2))
     ripple[2] = [size * np.cos(phase), -size * np.sin(phase)]
-    driven = plant._replace(ripple=ripple, tone=np.array([0.5, 300.0, 0.2]), speed_driver=11.0)
+    driven = plant._replace(ripple=ripple, tone=Tone(0.5, 300.0, 0.2), speed_driver=11.0)
     state = lively_state(plant)
-    state[0] = 0.31
+    state[ROTOR] = 0.31
     rate, _ = derivative(driven, 0.05, 7.0, state)
-    passed = plant.coupling[0] * state[2 * DEGREES]
+    passed = plant.coupling.stiffness * state[TWIST]
     angle = 11.0 * 0.05 + 0.31
     torque = 7.0 + size * np.cos(18 * angle + phase) + 0.5 * np.cos(300.0 * 0.05 + 0.2)
-    assert rate[DEGREES] * plant.inertia[0] == pytest.approx(torque - passed, rel=1e-9)
+    assert rate[DEGREES + ROTOR] * plant.inertia.rotor == pytest.approx(torque - passed, rel=1e-9)
 
 
 def test_slipping_coupling_passes_no_more_than_its_limit() -> None:
     plant = undamped(drawn_plant())
-    spring = plant.coupling[0]
-    slipping = plant._replace(coupling=np.array([spring, 0.0, 50.0, 1e-6 * spring]))
+    spring = plant.coupling.stiffness
+    slipping = plant._replace(coupling=Coupling(spring, 0.0, 50.0, 1e-6 * spring))
     state = np.zeros(STATES)
-    state[DEGREES] = 3.0
+    state[DEGREES + ROTOR] = 3.0
     twists = []
     for _ in range(50):
         state, _ = integrate(slipping, np.full(2, 60.0), state, step=1e-6, first=0, outputs=20, stride=1)
-        twists.append(state[2 * DEGREES])
+        twists.append(state[TWIST])
     assert 50.0 < spring * max(twists) < 60.0
-    assert state[0] - state[1] - state[2 * DEGREES] > 1e-4
+    assert state[ROTOR] - state[DRIVER] - state[TWIST] > 1e-4
 
 
 def test_crack_and_pitch_error_belong_to_their_tooth() -> None:
@@ -248,14 +276,14 @@ def test_crack_and_pitch_error_belong_to_their_tooth() -> None:
     share = np.full_like(teeth.stiffness, 0.4)
     plant = plant._replace(
         teeth=teeth._replace(crack_driver=broken, error_driven=late, share_driver=share, exponent=0.0),
-        eccentricity=np.zeros(2),
+        eccentricity=Gears(0.0, 0.0),
     )
 
     def force(pair: int) -> float:
         state = np.zeros(STATES)
-        state[1] = pair * 2 * np.pi / 20
-        state[2] = (plant.base_driver * state[1] - 10e-6) / plant.base_driven
-        return float(derivative(plant, 0.0, 0.0, state)[1][FORCE])
+        state[DRIVER] = pair * 2 * np.pi / 20
+        state[DRIVEN] = (plant.base_driver * state[DRIVER] - 10e-6) / plant.base_driven
+        return float(derivative(plant, 0.0, 0.0, state)[1].force)
 
     assert [force(pair) for pair in (0, 1, 2)] == pytest.approx([4000.0] * 3, rel=1e-6)
     assert [force(3), force(43)] == pytest.approx([4000.0 / 1.2] * 2, rel=1e-6)
@@ -264,14 +292,14 @@ def test_crack_and_pitch_error_belong_to_their_tooth() -> None:
 
 
 def test_eccentric_centres_add_material_at_the_run_out_phase() -> None:
-    plant = undamped(drawn_plant())._replace(eccentricity=np.array([5e-6, 0.0]))
+    plant = undamped(drawn_plant())._replace(eccentricity=Gears(5e-6, 0.0))
     for phase, turned, expected in ((0.4, 0.4, 5e-6), (0.4, 0.4 + np.pi, -5e-6), (0.4, 0.4 + np.pi / 2, 0.0)):
         alpha = np.arctan2(plant.sine, plant.cosine)
-        placed = plant._replace(eccentricity_angle=np.array([np.pi / 2 - alpha - phase, 0.0]))
+        placed = plant._replace(eccentricity_angle=Gears(np.pi / 2 - alpha - phase, 0.0))
         state = np.zeros(STATES)
-        state[1] = turned
-        state[2] = plant.base_driver * turned / plant.base_driven
-        assert derivative(placed, 0.0, 0.0, state)[1][DTE] == pytest.approx(expected, abs=1e-12)
+        state[DRIVER] = turned
+        state[DRIVEN] = plant.base_driver * turned / plant.base_driven
+        assert derivative(placed, 0.0, 0.0, state)[1].dte == pytest.approx(expected, abs=1e-12)
 
 
 def test_integration_refuses_nonsense() -> None:

@@ -10,7 +10,7 @@ from shared.truth_plants import drawn_levels, short_bench, undamped
 
 from gearbench.challenge.truth.levels import Levels
 from gearbench.challenge.truth.motion import derivative
-from gearbench.challenge.truth.plant import DEGREES, OUTPUTS, STATES, Plant
+from gearbench.challenge.truth.plant import DEGREES, DRIVEN, DRIVER, ROTOR, STATES, Plant
 from gearbench.challenge.truth.rigs import build_plant, conditions_of
 from gearbench.challenge.truth.structure import draw_structure
 
@@ -32,8 +32,8 @@ def test_run_out_adds_half_its_size_at_its_phase(side: int) -> None:
     for turned in (0.7, 1.9, 0.7 + np.pi):
         state = np.zeros(STATES)
         other = plant.base_driver / plant.base_driven
-        state[1], state[2] = (turned, turned * other) if side == 0 else (turned / other, turned)
-        dte = derivative(plant, 0.0, 0.0, state)[1][OUTPUTS.index("dte")]
+        state[DRIVER], state[DRIVEN] = (turned, turned * other) if side == 0 else (turned / other, turned)
+        dte = derivative(plant, 0.0, 0.0, state)[1].dte
         assert dte == pytest.approx(6e-6 * np.cos(turned - 0.7), abs=1e-12)
 
 
@@ -41,17 +41,17 @@ def test_ripple_is_a_part_of_the_mean_torque_at_its_orders() -> None:
     size, phase = np.array([0.0, 0.01, 0.0, 0.004]), np.array([0.0, 0.5, 0.0, 2.0])
     plant = plant_of(replace(LEVELS, ripple=size, ripple_phase=phase))
     state = np.zeros(STATES)
-    state[0] = 0.23
-    with_it = derivative(plant, 0.0, 0.0, state)[0][DEGREES]
-    without = derivative(plant._replace(ripple=0.0 * plant.ripple), 0.0, 0.0, state)[0][DEGREES]
+    state[ROTOR] = 0.23
+    with_it = derivative(plant, 0.0, 0.0, state)[0][DEGREES + ROTOR]
+    without = derivative(plant._replace(ripple=0.0 * plant.ripple), 0.0, 0.0, state)[0][DEGREES + ROTOR]
     torque = 100.0 * (0.01 * np.cos(12 * 0.23 + 0.5) + 0.004 * np.cos(24 * 0.23 + 2.0))
-    assert (with_it - without) * plant.inertia[0] == pytest.approx(torque, rel=1e-9)
+    assert (with_it - without) * plant.inertia.rotor == pytest.approx(torque, rel=1e-9)
 
 
 def test_coupling_resonates_at_its_frequency() -> None:
     plant = plant_of(replace(LEVELS, coupling_frequency=1300.0))
-    rotor, driver = plant.inertia[:2]
-    omega = np.sqrt(plant.coupling[0] * (1 / rotor + 1 / driver))
+    rotor, driver = plant.inertia.rotor, plant.inertia.driver
+    omega = np.sqrt(plant.coupling.stiffness * (1 / rotor + 1 / driver))
     assert omega == pytest.approx(2 * np.pi * 1300.0)
 
 
@@ -79,9 +79,9 @@ def test_crack_takes_its_part_of_the_bending_stiffness() -> None:
 
 def test_tone_lies_off_the_lines() -> None:
     foreign = replace(LEVELS.foreign, tone=0.02, tone_frequency=500.0, tone_offset=0.4)
-    amplitude, omega, _ = plant_of(replace(LEVELS, foreign=foreign)).tone
+    tone = plant_of(replace(LEVELS, foreign=foreign)).tone
     spacing = EXPERIMENT.sampling_rate / EXPERIMENT.samples_per_period
-    line = omega / (2 * np.pi * spacing)
-    assert amplitude == pytest.approx(2.0)
+    line = tone.frequency / (2 * np.pi * spacing)
+    assert tone.amplitude == pytest.approx(2.0)
     assert line - np.floor(line) == pytest.approx(0.4)
     assert abs(line * spacing - 500.0) < spacing
