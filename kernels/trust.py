@@ -18,7 +18,7 @@ def trusted(folder: Path) -> Path:
     can write there: root, the owner of the program, the members of the folder's group.
 
     The group counts as invited: it writes where somebody has allowed it, and on many systems every user has one of his
-    own. A sticky folder that all may write to (/tmp) may hold the cache but not be it; below a folder that only its
+    own. A sticky folder that all may write to may hold the cache but not be it; below a folder that only its
     owner and group may enter all is safe. Raises CacheError. What cannot be made or looked at passes: nothing is read
     from there.
     """

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from gearbench.challenge.truth.levels import Levels, background
-from gearbench.challenge.truth.plant import Plant, Teeth
+from gearbench.challenge.truth.plant import Plant, Teeth, Tone
 from gearbench.challenge.truth.rigs import Bench, build_plant, conditions_of, make_bench
 from gearbench.challenge.truth.structure import draw_structure
 from gearbench.rig import Case, read_case
@@ -65,9 +65,9 @@ def undamped(plant: Plant) -> Plant:
         speed_driven=0.0,
         support_damping=np.zeros(4),
         mode_damping=np.zeros(2),
-        coupling=np.array([plant.coupling[0], 0.0, 0.0, 1.0]),
-        shaft=np.array([plant.shaft[0], 0.0]),
-        governor=np.array([plant.governor[0], 0.0]),
+        coupling=plant.coupling._replace(damping=0.0, limit=0.0, slip=1.0),
+        shaft=plant.shaft._replace(damping=0.0),
+        governor=plant.governor._replace(damping=0.0),
         ripple=0.0 * plant.ripple,
-        tone=np.zeros(3),
+        tone=Tone(0.0, 0.0, 0.0),
     )
