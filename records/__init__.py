@@ -1,4 +1,7 @@
-"""What comes back from a rig: the record, its channels, its file and its provenance."""
+"""What comes back from a rig: the record, its channels, its file and its provenance.
+
+`checks`: what a record alone can tell about itself, refused in a sentence or warned of.
+"""
 
 from gearbench.records.channels import unit_of_channel
 from gearbench.records.errors import RecordError
