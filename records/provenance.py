@@ -55,9 +55,7 @@ def source_digest() -> str:
     return digest.hexdigest()
 
 
-def provenance(
-    case_text: str, seed: int | None, settings: Mapping[str, Any], *, release: str | None = None
-) -> str:
+def provenance(case_text: str, seed: int | None, settings: Mapping[str, Any], *, release: str | None = None) -> str:
     """JSON text for the attribute `provenance`: version, digest of sources, case, seed, settings.
 
     `settings` holds what was chosen at run time (sub-steps, solver, limits); it must be JSON-serialisable.

@@ -124,8 +124,7 @@ def _check_channel_sets(record: xr.Dataset) -> None:
             raise RecordError(f"attribute {name} is missing; without it dte and force cannot be computed")
     if both_free and "torque_driven" not in names:
         raise RecordError(
-            "channel torque_driven is missing, which driven_boundary ="
-            f" {record.attrs['driven_boundary']!r} needs"
+            f"channel torque_driven is missing, which driven_boundary = {record.attrs['driven_boundary']!r} needs"
         )
 
 

@@ -70,7 +70,7 @@ def check_record(record: xr.Dataset, source: str = "") -> tuple[Finding, ...]:
     >>> try:
     ...     check_record(record)
     ... except gb.records.RecordError as error:
-    ...     print(str(error)[:46])
+    ...     print(str(error)[:45])
     y_driver moves against the force of the teeth
     """
     look = Look(record)

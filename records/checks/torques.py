@@ -30,9 +30,7 @@ def torque_as_declared(look: Look) -> list[Finding]:
         ]
     if mean < -MEANS_LITTLE * size:
         return [
-            Finding(
-                f"the mean of torque_driver is {mean:.4g} N m and must be positive: it closes the working flanks"
-            )
+            Finding(f"the mean of torque_driver is {mean:.4g} N m and must be positive: it closes the working flanks")
         ]
     return []
 
