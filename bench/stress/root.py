@@ -14,6 +14,7 @@ from gearbench.fem.gear.store import cached, key_for
 from gearbench.fem.stress.fields import elastic_gear
 from gearbench.fem.stress.loaded import PairLoad, pair_loads
 from gearbench.fem.stress.root import RootKernel, peak, root_kernel, root_stress
+from gearbench.geometry.mesh.element_size import default_size
 from gearbench.rig import Gear, Material, Rig, sound_gear
 
 Array = NDArray[np.float64]
@@ -77,7 +78,7 @@ def with_root_stress(elastic: ElasticRig, result: xr.Dataset, element_size: floa
 
 def _fine(gear: Gear, element_size: float | None) -> float | None:
     """Element size for fillets: None where the asked one is coarser than the default."""
-    return element_size if element_size is not None and element_size < gear.module / 12 else None
+    return element_size if element_size is not None and element_size < default_size(gear.module) else None
 
 
 def _teeth(loads: list[list[list[PairLoad]]]) -> NDArray[np.int64]:
