@@ -305,7 +305,7 @@ def test_set_up_does_not_wait_for_answers(checkout: Checkout) -> None:
 
 
 def test_mesher_asks_for_the_libraries_the_launcher_installs() -> None:
-    words = (ROOT / "geometry" / "mesh" / "sector_mesh.py").read_text(encoding="utf-8").replace('"', " ").split()
+    words = (ROOT / "geometry" / "mesh" / "filling.py").read_text(encoding="utf-8").replace('"', " ").split()
     assert set(LIBRARIES) <= {word.strip(",;:.)") for word in words}
     launcher = (ROOT / "gearbench").read_text(encoding="utf-8")
     assert all(f"{soname}={package}" in launcher for soname, package in zip(SONAMES, LIBRARIES, strict=True))

@@ -36,6 +36,6 @@ def wedging(law: Law, cycle: StaticCycle, backlash: float) -> str | None:
 def _overlap(law: Law, phase: float, dte: float) -> float:
     """Deepest overlap [m] of back flanks in the position of a mesh phase [cycles] and transmission error [m]."""
     theta1 = phase * law.driver.pitch + dte / law.driver.rb
-    sides, _, found, n = find_pairs(law, theta1, phase * law.driven.pitch, law.centre, 0.0, 0.0)
-    gaps = found[:n, 0][sides[:n] == 1]
+    found = find_pairs(law, theta1, phase * law.driven.pitch, law.centre, 0.0, 0.0)
+    gaps = found["gap"][found["side"] == 1]
     return max(0.0, -float(gaps.min())) if len(gaps) else 0.0

@@ -19,7 +19,9 @@ def errors_defined(package: str) -> list[tuple[str, str]]:
     found = []
     for path in sorted((ROOT / package).rglob("*.py")):
         for node in ast.parse(path.read_text(encoding="utf-8")).body:
-            if isinstance(node, ast.ClassDef) and BASES & {getattr(base, "id", "") for base in node.bases}:
+            if not isinstance(node, ast.ClassDef) or node.name.startswith("_"):
+                continue
+            if BASES & {getattr(base, "id", "") for base in node.bases}:
                 module = ".".join(path.relative_to(ROOT).with_suffix("").parts)
                 found.append((f"gearbench.{module}", node.name))
     return found

@@ -47,7 +47,8 @@ def force_at(solved: Law, dte: float, phase: float) -> float:
     """Static force [N], all pairs in equilibrium."""
     theta1 = phase * solved.driver.pitch + dte / solved.driver.rb
     return float(
-        position(solved, theta1, phase * solved.driven.pitch, 0.0, 0.0, 0.0, 0.0, np.zeros(8))[6] / solved.driver.rb
+        position(solved, theta1, phase * solved.driven.pitch, 0.0, 0.0, 0.0, 0.0, np.zeros(PAIRS)).torque_driver
+        / solved.driver.rb
     )
 
 
