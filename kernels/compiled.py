@@ -22,6 +22,9 @@ from gearbench.kernels.identity import identity
 CONFIG: Any = numba.config
 # Division by zero gives infinity, as in numpy; nobody calls these through C function pointers.
 OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+# Of a helper of one loop: part of its caller's machine code, so that handing over named tuples of arrays costs nothing
+# (a call counts references to each array and copies them all), and not to be called from Python.
+INLINED: dict[str, Any] = {"forceinline": True, "no_cpython_wrapper": True}
 # For `fastmath`: only what cannot change a result beyond rounding, which is fused multiply-add, free order of sums,
 # signs of zero, reciprocals.
 ROUNDING = {"contract", "reassoc", "nsz", "arcp"}

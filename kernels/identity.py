@@ -12,12 +12,15 @@ from __future__ import annotations
 import dis
 import hashlib
 from collections.abc import Callable, Iterator
-from types import CodeType, ModuleType
+from types import CodeType, FunctionType, ModuleType
 from typing import Any
 
 import numba
 import numpy as np
+from numba import types
+from numba.extending import intrinsic
 
+Intrinsic: Any = type(intrinsic(lambda typing: (types.void(), None)))  # it has no public name
 OUTSIDE = ("builtins", "math", "numpy")  # what comes from there changes with the versions of Python and Numba only
 PLAIN = (bool, int, float, complex, str, bytes, type(None), np.generic, np.dtype)
 GLOBAL, EXTENDED = dis.opmap["LOAD_GLOBAL"], dis.opmap["EXTENDED_ARG"]
@@ -83,7 +86,9 @@ def _read(function: Callable[..., Any], name: str) -> object:
 
 def _described(value: Any) -> object:
     """What of a value enters machine code; its repr is the same in every process."""
-    if kept := getattr(getattr(value, "py_func", value), "__dict__", {}).get("identity"):
+    plain = getattr(value, "py_func", value)
+    # Only of functions: numpy has something of that name too.
+    if isinstance(plain, (FunctionType, Intrinsic)) and (kept := plain.__dict__.get("identity")):
         return kept
     if isinstance(value, PLAIN):
         return type(value).__name__, repr(value)

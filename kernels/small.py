@@ -41,6 +41,58 @@ def eliminate(system: Array) -> Array:
     return out
 
 
+@compiled(forceinline=True)
+def solve_in_place(system: Array, n: int) -> None:
+    """Solve [A | b], the first n rows and n + 1 columns of `system`, by Gaussian elimination with row pivoting; the
+    solution stands in column n. A singular A gives infinities or NaN."""
+    for k in range(n):
+        pivot = k
+        for i in range(k + 1, n):
+            if abs(system[i, k]) > abs(system[pivot, k]):
+                pivot = i
+        if pivot != k:
+            for j in range(k, n + 1):
+                system[k, j], system[pivot, j] = system[pivot, j], system[k, j]
+        scale = 1.0 / system[k, k]
+        for i in range(k + 1, n):
+            factor = system[i, k] * scale
+            for j in range(k + 1, n + 1):
+                system[i, j] -= factor * system[k, j]
+    for k in range(n - 1, -1, -1):
+        for j in range(k + 1, n):
+            system[k, n] -= system[k, j] * system[j, n]
+        system[k, n] /= system[k, k]
+
+
+@compiled(forceinline=True)
+def invert(matrix: Array, inverse: Array) -> None:
+    """Write the inverse (n, n) of a matrix (n, n) by Gauss and Jordan's method with row pivoting; `matrix` is
+    overwritten. A singular one gives infinities or NaN."""
+    n = len(matrix)
+    for i in range(n):
+        for j in range(n):
+            inverse[i, j] = 1.0 if i == j else 0.0
+    for k in range(n):
+        pivot = k
+        for i in range(k + 1, n):
+            if abs(matrix[i, k]) > abs(matrix[pivot, k]):
+                pivot = i
+        if pivot != k:
+            for j in range(n):
+                matrix[k, j], matrix[pivot, j] = matrix[pivot, j], matrix[k, j]
+                inverse[k, j], inverse[pivot, j] = inverse[pivot, j], inverse[k, j]
+        scale = 1.0 / matrix[k, k]
+        for j in range(n):
+            matrix[k, j] *= scale
+            inverse[k, j] *= scale
+        for i in range(n):
+            factor = matrix[i, k]
+            if i != k and factor != 0.0:
+                for j in range(n):
+                    matrix[i, j] -= factor * matrix[k, j]
+                    inverse[i, j] -= factor * inverse[k, j]
+
+
 @compiled
 def times(matrix: Array, vector: Array) -> Array:
     """Matrix (n, m) times vector (m,)."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import importlib.util
+import json
 import os
 import shutil
 import subprocess
@@ -209,20 +210,20 @@ def test_nothing_is_compiled_otherwise() -> None:
         if (isinstance(node, ast.Import) and any(one.name.split(".")[0] == "numba" for one in node.names))
         or (isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "numba")
     }
-    assert files == {"kernels/compiled.py", "kernels/identity.py"}
+    assert files == {"kernels/borrowed.py", "kernels/compiled.py", "kernels/identity.py"}
 
 
 # The mesh force of the non-linear lumped model at one entry of its table, whose fields two files know.
 LUMPED = """
 import numpy as np
-from gearbench.lumped.nonlinear.model import Constants
-from gearbench.lumped.nonlinear.step import _entry, _mesh
+from gearbench.lumped.nonlinear.constants import Constants
+from gearbench.lumped.nonlinear.forces import entry, mesh
 from gearbench.lumped.nonlinear.tables import Table
 
 values = dict(position=1.5, excess=2e-6, excess_rate=0.0, gain=1.2, ripple=7.0, back=3e-6)
 table = Table(**{name: np.array([value]) for name, value in values.items()})
 constants = dict.fromkeys(Constants._fields, 0.0) | {"root": 1e3, "damping_factor": 2.0}
-print(float(_mesh(8e-6, 0.1, _entry(table, 0), np.linspace(1e8, 2e8, 12).reshape(3, 4), Constants(**constants))))
+print(float(mesh(8e-6, 0.1, entry(table, 0), np.linspace(1e8, 2e8, 12).reshape(3, 4), Constants(**constants))))
 """
 COLUMNS = (
     "    excess: Array  # a [m]\n",
@@ -250,3 +251,32 @@ def test_the_lumped_model_sees_its_columns_change_places(tmp_path: Path) -> None
     assert text.count("".join(COLUMNS)) == 1
     tables.write_text(text.replace("".join(COLUMNS), "".join(reversed(COLUMNS))), encoding="utf-8")
     assert result() == before > 0
+
+
+EVERY = """
+import importlib, json, pkgutil, sys
+import gearbench.fem, gearbench.kernels, gearbench.lumped
+
+found = {}
+for package in (gearbench.fem, gearbench.kernels, gearbench.lumped):
+    for module in pkgutil.walk_packages(package.__path__, package.__name__ + "."):
+        for name, value in vars(importlib.import_module(module.name)).items():
+            plain = getattr(value, "py_func", None)
+            if plain is not None:
+                found[plain.__module__ + "." + name] = plain.__dict__["identity"]
+json.dump(found, sys.stdout)
+"""
+
+
+def test_every_kernel_is_found_again_by_the_next_process() -> None:
+    def identities(seed: str) -> dict[str, str]:
+        environment = os.environ | {"PYTHONHASHSEED": seed}
+        done = subprocess.run(
+            [sys.executable, "-P", "-c", EVERY], env=environment, capture_output=True, text=True, check=True
+        )
+        found: dict[str, str] = json.loads(done.stdout)
+        return found
+
+    one, two = identities("1"), identities("2")
+    assert len(one) > 50
+    assert [name for name in one if one[name] != two[name]] == []
