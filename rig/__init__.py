@@ -4,15 +4,17 @@
 """
 
 from gearbench.rig.casefile.case import Case, CaseError, dump_case, read_case
-from gearbench.rig.drive import Coupling, Drive, Ripple
+from gearbench.rig.drive import Coupling, Drive, Load, OutputShaft, Ripple
 from gearbench.rig.experiment import Condition, Experiment, Identification, Multisine, Simulation
 from gearbench.rig.gear import Crack, Gear
 from gearbench.rig.mesh import Friction, MeshCorrection
 from gearbench.rig.neutral import effects_in, sound_gear
-from gearbench.rig.rig import Damping, Load, Material, Rig, Support, Supports
+from gearbench.rig.rig import Damping, Material, Rig
 from gearbench.rig.sensors import Sensors
+from gearbench.rig.support import Across, Housing, Support, Supports
 
 __all__ = [
+    "Across",
     "Case",
     "CaseError",
     "Condition",
@@ -23,11 +25,13 @@ __all__ = [
     "Experiment",
     "Friction",
     "Gear",
+    "Housing",
     "Identification",
     "Load",
     "Material",
     "MeshCorrection",
     "Multisine",
+    "OutputShaft",
     "Rig",
     "Ripple",
     "Sensors",

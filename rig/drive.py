@@ -1,4 +1,4 @@
-"""What stands before the driver: its boundary, a rotor behind a coupling, torque ripple."""
+"""What stands before the driver and behind the driven gear: boundaries, inertias behind couplings, torque ripple."""
 
 from __future__ import annotations
 
@@ -52,9 +52,46 @@ class Ripple(Value):
         return self
 
 
-class Drive(Value):
-    """Boundary of the driver: the torque of the experiment, and what passes it on."""
+class OutputShaft(Coupling):
+    """An inertia beyond a shaft on the driven gear, such as a brake's; the boundary of the load acts on the inertia."""
 
-    boundary: Literal["torque"] = quantity("torque", doc="what is imposed on the driver")
+    inertia: float = quantity(
+        0.0, "kg_m2", ge=0.0, le=1e6, doc="inertia beyond the shaft; of no effect where its speed is prescribed"
+    )
+
+
+# torque: what the experiment imposes; speed: constant; inertia: constant torque on a free end.
+Boundary = Literal["torque", "speed", "inertia"]
+
+
+class Drive(Value):
+    """Boundary of the driver, at the outer end of its shaft, and what lies between.
+
+    "torque": the experiment's torque; "inertia": its mean alone, so that there is no multisine; "speed": constant
+    speed, and the mean torque acts on the load.
+    """
+
+    boundary: Boundary = quantity("torque", doc="what is imposed on the driver's shaft")
     coupling: Coupling | None = quantity(None, doc="absent: the torque acts on the gear itself")
     ripple: Ripple | None = quantity(None, doc="absent: no torque but the commanded one")
+
+
+class Load(Value):
+    """Boundary of the driven gear, at the outer end of its shaft, and what lies between.
+
+    "speed": constant speed; "torque": the torque that balances the driver's at any time; "inertia": the one that
+    balances the driver's mean. Where both ends turn freely it also makes up for the losses of friction.
+    """
+
+    boundary: Boundary = quantity("speed", doc="what is imposed on the driven gear's shaft")
+    coupling: OutputShaft | None = quantity(None, doc="absent: the load acts on the gear itself")
+
+    @model_validator(mode="after")
+    def _end_has_inertia(self) -> Load:
+        shaft = self.coupling
+        if self.boundary != "speed" and shaft is not None and shaft.stiffness is not None and not shaft.inertia:
+            raise ValueError(
+                f'coupling.inertia_kg_m2 = 0 must be greater than 0 while boundary = "{self.boundary}" lets the end of'
+                " the elastic shaft turn freely"
+            )
+        return self

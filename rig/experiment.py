@@ -82,7 +82,9 @@ class Experiment(Value):
 class Simulation(Value):
     """How the experiment is simulated."""
 
-    model: Literal["lumped", "reduced"] = quantity("reduced", doc="lumped 3-DOF model or reduced finite elements")
+    model: Literal["lumped", "reduced", "full"] = quantity(
+        "reduced", doc="lumped 3-DOF model, reduced finite elements, or full: all their unknowns"
+    )
     substeps: int = quantity(0, ge=0, le=1024, doc="integration steps per sample; 0: as many as the error bound needs")
     mesh_stiffness: Literal["potential-energy", "rectangular", "finite-element"] = quantity(
         "potential-energy", doc="lumped model: law of k(t); finite-element: the non-linear model on FE tables"
@@ -92,13 +94,15 @@ class Simulation(Value):
     stiffness_edge: float = quantity(
         0.02, ge=0.0, le=0.5, doc="lumped model: width of the switches of k(t) in mesh periods; 0: sharp"
     )
-    element_size: float | None = quantity(None, "um", gt=0.0, doc="flank element size; absent: module / 12")
+    element_size: float | None = quantity(
+        None, "um", gt=0.0, doc="flank element size; absent: module / 12, of the full model module / 4"
+    )
     element: Literal["triangle", "quadrilateral"] = quantity(
         "triangle", doc="elements of the condensed gears; stress is always found on triangles, cracks need them"
     )
     modes: int = quantity(8, ge=0, le=60, doc="fixed-hub modes kept per gear (reduced model)")
     spectral_radius: float = quantity(
-        0.9, ge=0.0, le=1.0, doc="generalised-alpha spectral radius at infinite frequency (reduced model)"
+        0.9, ge=0.0, le=1.0, doc="generalised-alpha spectral radius at infinite frequency (reduced and full model)"
     )
 
     @model_validator(mode="after")
@@ -114,7 +118,7 @@ class Simulation(Value):
 class Identification(Value):
     """Local polynomial method for periodically time-varying systems."""
 
-    method: Literal["lpm"] = quantity("lpm", doc="estimator")
+    method: Literal["lpm", "mesh-feedback"] = quantity("lpm", doc="estimator")
     harmonics: int = quantity(0, ge=0, le=2000, doc="branches L on each side; 0: as many as the record supports")
     order: int | None = quantity(None, ge=0, le=6, doc="polynomial order R; absent: chosen by predicted error")
     window: int = quantity(0, ge=0, le=500, doc="half-width n of the local window, in lines; 0: chosen")

@@ -25,10 +25,14 @@ class MeshCorrection(Value):
     """What multiplies the mesh force, and the errors common to all tooth pairs, as series in mesh phase.
 
     Stiffness: scale (1 + sum_n cos_n cos(2 pi n phase) + sin_n sin(2 pi n phase)); error (excess material
-    of every pair): mean + sum_n cos_n cos(..) + sin_n sin(..). n = 1, 2, .. counts mesh orders.
+    of every pair): mean + sum_n cos_n cos(..) + sin_n sin(..). n = 1, 2, .. counts mesh orders. The drift is linear in
+    time, as that of a rig that warms up.
     """
 
     stiffness_scale: float = quantity(1.0, gt=0.0, le=10.0, doc="factor on the mesh force")
+    stiffness_drift: float = quantity(
+        0.0, gt=-1.0, le=1.0, doc="relative change of the stiffness from the first to the last sample of a record"
+    )
     stiffness_cos: tuple[float, ...] = quantity((), doc="relative cosine amplitudes at mesh orders 1, 2, ..")
     stiffness_sin: tuple[float, ...] = quantity((), doc="relative sine amplitudes at mesh orders 1, 2, ..")
     error_mean: float = quantity(

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from gearbench.rig.drive import Drive
+from gearbench.rig.drive import Drive, Load
 from gearbench.rig.gear import Gear
 from gearbench.rig.rig import Rig
 from gearbench.rig.value import Value, fields_of, key_of
 
 # Fields that only shape an effect whose size another field gives: alone they change nothing.
-_SHAPES = {"transition_speed"}
+_SHAPES = {"transition_speed", "encoder_runout_driver_phase", "encoder_runout_driven_phase"}
 _GEAR_SHAPES = {
     "tip_relief_start_diameter",
     "tip_relief_shape",
@@ -52,19 +52,26 @@ FLANK_FIELDS = (
 def effects_in(rig: Rig) -> tuple[str, ...]:
     """Dotted TOML keys ("rig.driver.runout_um") of all effects that the rig has, in the order of a dumped case.
 
-    An effect is what an ideal rig lacks: tooth errors and cracks, non-linear supports, what stands behind a
-    coupling, ripple, friction, corrections of the mesh, delays and noise of the sensors. A field with its
-    neutral value is none, and neither is an error of zero, a shape without an amount, a crack without loss or length,
-    or a ripple of amplitude 0.
+    An effect is what an ideal rig lacks: tooth errors and cracks, non-linear supports and those across, a housing,
+    what stands behind a coupling, boundaries other than torque on the driver and speed or balancing torque on the load,
+    ripple, friction, corrections of the mesh, errors of the sensors. A field with its neutral value is none, and
+    neither is an error of zero, a shape without an amount, a crack without loss or length, a ripple of amplitude 0, or
+    a rigid shaft to a load whose speed is prescribed.
     Backlash (thinning, centre distance) belongs to the geometry and is not listed.
     """
     found: list[str] = []
     for side in ("driver", "driven"):
         found += [f"rig.{side}.{key}" for key in _gear_effects(getattr(rig, side))]
     for side in ("driver", "driven"):
-        if getattr(rig.support, side).exponent:
+        support = getattr(rig.support, side)
+        if support.exponent:
             found.append(f"rig.support.{side}.exponent")
+        if support.across is not None:
+            found.append(f"rig.support.{side}.across")
+    if rig.housing is not None:
+        found.append("rig.housing")
     found += [f"rig.drive.{key}" for key in _drive_effects(rig.drive)]
+    found += [f"rig.load.{key}" for key in _load_effects(rig.load)]
     for table in ("friction", "mesh", "sensors"):
         found += [f"rig.{table}.{key}" for key in _departures(getattr(rig, table))]
     return tuple(found)
@@ -88,10 +95,25 @@ def _gear_effects(gear: Gear) -> list[str]:
     return found
 
 
+def has_sensors(rig: Rig) -> bool:
+    """Whether sensors change anything in a record."""
+    return bool(_departures(rig.sensors))
+
+
 def _drive_effects(drive: Drive) -> list[str]:
-    found = ["coupling"] if drive.coupling else []
+    found = ["boundary"] if drive.boundary != "torque" else []
+    found += ["coupling"] if drive.coupling else []
     if drive.ripple and any(drive.ripple.amplitude):
         found.append("ripple")
+    return found
+
+
+def _load_effects(load: Load) -> list[str]:
+    found = ["boundary"] if load.boundary == "inertia" else []
+    shaft = load.coupling
+    turning = shaft is not None and shaft.inertia > 0 and load.boundary != "speed"
+    if shaft is not None and (shaft.stiffness is not None or turning):
+        found.append("coupling")
     return found
 
 

@@ -1,14 +1,17 @@
-"""The rig: a gear pair, its material, supports, drives and damping."""
+"""The rig: a gear pair, its material, damping, and what its other files describe."""
 
 from __future__ import annotations
 
 from math import pi
-from typing import ClassVar, Literal
+from typing import Literal
 
-from gearbench.rig.drive import Drive
+from pydantic import model_validator
+
+from gearbench.rig.drive import Drive, Load
 from gearbench.rig.gear import Gear
 from gearbench.rig.mesh import Friction, MeshCorrection
 from gearbench.rig.sensors import Sensors
+from gearbench.rig.support import Housing, Supports
 from gearbench.rig.value import Value, quantity
 
 
@@ -19,37 +22,6 @@ class Material(Value):
     poisson: float = quantity(0.3, ge=0.0, lt=0.5, doc="Poisson's ratio")
     density: float = quantity(7810.0, "kg_m3", gt=0.0, le=3e4, doc="density")
     state: Literal["plane-stress", "plane-strain"] = quantity("plane-stress", doc="stress state of the 2-D model")
-
-
-class Support(Value):
-    """Spring and damper between one gear's centre and the ground, in y or along the line of action.
-
-    Force: stiffness y (|y| / reference_deflection)^exponent + damping y'.
-    """
-
-    stiffness: float = quantity(unit="n_per_m", gt=0.0, doc="support stiffness")
-    damping: float = quantity(0.0, "n_s_per_m", ge=0.0, doc="support damping")
-    exponent: float = quantity(
-        0.0, gt=-0.9, le=3.0, doc="e of the force k y (|y| / reference_deflection)^e; 0: linear"
-    )
-    reference_deflection: float = quantity(
-        10e-6, "um", gt=0.0, le=1e-2, doc="deflection at which the secant stiffness is `stiffness`"
-    )
-
-
-class Supports(Value):
-    """The supports of both gears; `direction` is the axis along which the centres move."""
-
-    common: ClassVar[type[Value] | None] = Support
-    driver: Support = quantity(doc="support of the driver")
-    driven: Support = quantity(doc="support of the driven gear")
-    direction: Literal["tangential", "line-of-action"] = quantity("tangential", doc="axis of support motion")
-
-
-class Load(Value):
-    """Boundary of the driven gear: constant speed, or the torque that balances the driver's at any time."""
-
-    boundary: Literal["speed", "torque"] = quantity("speed", doc="what is imposed on the driven gear")
 
 
 class Damping(Value):
@@ -82,10 +54,30 @@ class Rig(Value):
     driver: Gear = quantity(doc="driving gear, or the file that holds it")
     driven: Gear = quantity(doc="driven gear, or the file that holds it")
     material: Material = quantity(Material(), doc="material of both gears")
-    support: Supports = quantity(doc="supports of both gears")
+    support: Supports = quantity(Supports(), doc="supports of both gears; absent: rigid")
+    housing: Housing | None = quantity(None, doc="absent: the supports stand on the ground")
     drive: Drive = quantity(Drive(), doc="boundary of the driver")
     load: Load = quantity(Load(), doc="boundary of the driven gear")
     damping: Damping = quantity(Damping(), doc="damping of gears and mesh")
     friction: Friction = quantity(Friction(), doc="friction between the flanks")
     mesh: MeshCorrection = quantity(MeshCorrection(), doc="corrections of the mesh force and of the pairs' errors")
-    sensors: Sensors = quantity(Sensors(), doc="delays and noise of the channels")
+    sensors: Sensors = quantity(Sensors(), doc="what the measuring chain does to the channels")
+
+    @model_validator(mode="after")
+    def _driven_and_loaded(self) -> Rig:
+        drive, load = self.drive, self.load
+        if drive.boundary == load.boundary == "speed":
+            raise ValueError(
+                'drive.boundary = "speed" and load.boundary = "speed" leave no torque to press the flanks together: one'
+                ' of them must be "torque" or "inertia"'
+            )
+        if drive.boundary == "speed" and drive.ripple is not None and any(drive.ripple.amplitude):
+            raise ValueError(
+                'drive.ripple acts on nothing while drive.boundary = "speed" holds the speed of what it would act on'
+            )
+        for side in ("driver", "driven"):
+            if self.housing is not None and getattr(self.support, side).stiffness is None:
+                raise ValueError(
+                    f"support.{side}.stiffness_n_per_m is missing: behind rigid supports there is no housing"
+                )
+        return self

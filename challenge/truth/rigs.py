@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.bench.plan.schedule import Schedule, schedule
+from gearbench.bench.refusals.stated import check_springs, check_stated
 from gearbench.challenge.errors import ChallengeError
 from gearbench.challenge.truth.levels import RIPPLE_ORDERS, Levels
 from gearbench.challenge.truth.plant import Coupling, Drift, Gears, Inertias, Plant, Spring, Teeth, Tone
@@ -41,6 +42,8 @@ def conditions_of(nominal: Case) -> tuple[Condition, ...]:
 
 def check_nominal(nominal: Case) -> None:
     """Refuse a nominal case that no truth rig can be built around. Raises ChallengeError."""
+    check_stated(nominal, "a challenge")
+    check_springs(nominal, "a challenge")
     rig = nominal.rig
     extra = [key for key in effects_in(rig) if not key.startswith(ALLOWED)]
     if extra:

@@ -9,6 +9,7 @@ from typing import Any
 
 from pydantic import ValidationError, model_validator
 
+from gearbench.rig.casefile.defaults import Completed, complete
 from gearbench.rig.casefile.reader import Reader, show, table_type
 from gearbench.rig.casefile.toml import Table, apply_settings, include_gear, load_table
 from gearbench.rig.casefile.writer import write_conditions, write_tables
@@ -25,7 +26,9 @@ _CONDITION_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,59}")
 class Case(Value):
     """A rig, an experiment on it, and how both are simulated and identified.
 
-    `conditions` are complete experiments, one record each; without any, `experiment` is the only one.
+    `conditions` are complete experiments, one record each; without any, `experiment` is the only one. A case may lack
+    an experiment (`stated` is then False, and its `experiment` a placeholder): it serves `static`, `mesh` and `check`.
+    `assumed` says what the file leaves out and was taken instead.
     `uncertainty` maps a dotted field path ("rig.support.driver.stiffness") to a standard deviation in SI.
     """
 
@@ -36,6 +39,8 @@ class Case(Value):
     identification: Identification = quantity(Identification(), doc="how the record is identified")
     conditions: tuple[Condition, ...] = derived((), doc="[[condition]]: named variations of the experiment")
     uncertainty: dict[str, float] = derived({}, doc="standard deviations in SI by dotted field path")
+    stated: bool = derived(True, doc="whether an experiment is given")
+    assumed: tuple[str, ...] = derived((), doc="sentences on values that the file leaves out")
 
     @model_validator(mode="after")
     def _fits_together(self) -> Case:
@@ -45,6 +50,15 @@ class Case(Value):
                 f"identification.band_hz ends at {band[1]:g}, which must lie below half of"
                 f" experiment.sampling_rate_hz, {half:g} Hz"
             )
+        for where, experiment in (
+            ("experiment", self.experiment),
+            *((f'experiment of condition "{one.name}"', one.experiment) for one in self.conditions),
+        ):
+            if experiment.multisine is not None and self.rig.drive.boundary != "torque":
+                raise ValueError(
+                    f"the {where} has a multisine, which needs a driver torque to be imposed, but rig.drive.boundary ="
+                    f' "{self.rig.drive.boundary}": leave the multisine out, or set "torque"'
+                )
         names = [condition.name for condition in self.conditions]
         for name in names:
             if names.count(name) > 1:
@@ -53,7 +67,7 @@ class Case(Value):
 
     def under(self, condition: Condition) -> Case:
         """The case whose experiment is that of one condition."""
-        return self.model_copy(update={"experiment": condition.experiment, "conditions": ()})
+        return self.model_copy(update={"experiment": condition.experiment, "conditions": (), "stated": True})
 
     def experiments(self) -> list[tuple[str, Case]]:
         """The case under each of its conditions and that one's name; without any, the case itself under no name."""
@@ -70,15 +84,16 @@ def read_case(path: str | Path, overrides: Sequence[str] = ()) -> Case:
     apply_settings(document, overrides, path.parent)
     for side in ("driver", "driven"):
         include_gear(document, side, path.parent)
-    return _case_of(document)
+    return _case_of(document, complete(document, path))
 
 
-def _case_of(document: Table) -> Case:
+def _case_of(document: Table, completed: Completed) -> Case:
     reader = Reader(Case)
     conditions = document.pop("condition", [])
     fields = reader.table(Case, document, "", "")
     fields["conditions"] = _read_conditions(conditions, document["experiment"], reader)
     fields["uncertainty"] = reader.uncertainty
+    fields |= completed._asdict()
     try:
         return Case.model_validate(fields)
     except ValidationError as error:
@@ -148,5 +163,5 @@ def dump_case(case: Case) -> str:
     >>> print(gb.dump_case(gb.read_case("quick_lumped")).splitlines()[0])
     name = "quick_lumped"
     """
-    tables = write_tables(Case, case, "", case.uncertainty)
+    tables = write_tables(Case, case, "", case.uncertainty, () if case.stated else ("experiment",))
     return tables + write_conditions(case.conditions, case.uncertainty)

@@ -61,13 +61,19 @@ class Reader:
         own = table.get(key, {})
         shared = {name: table[name] for name in fields_of(inner) if name in table}
         result = self.table(inner, shared, where, path, partial=True)
+        if isinstance(own, Mapping):
+            for name in own.keys() & fields_of(inner).keys():
+                self._forget(f"{path}.{fields_of(inner)[name][0]}")
         result |= self.table(inner, own, f"{_dot(where)}{key}", path, partial=True)
         for name, (attribute, info) in fields_of(inner).items():
             if info.is_required() and attribute not in result:
                 raise CaseError(f"{where}.{name} is missing ({info.description}; or {where}.{key}.{name} for one gear)")
-            if name in own and not isinstance(own[name], Mapping):
-                self.uncertainty.pop(f"{path}.{attribute}", None)
         return result
+
+    def _forget(self, path: str) -> None:
+        """Drop the standard deviations of a field, or of all in a table, that is given again."""
+        for known in [one for one in self.uncertainty if one == path or one.startswith(f"{path}.")]:
+            del self.uncertainty[known]
 
     def value(self, info: FieldInfo, unit: str, raw: Any, where: str, path: str) -> Any:
         """One field's value in SI."""

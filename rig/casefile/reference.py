@@ -8,7 +8,7 @@ from gearbench.rig.casefile.case import Case
 from gearbench.rig.casefile.reader import table_type
 from gearbench.rig.casefile.writer import write_value
 from gearbench.rig.gear import Crack, Gear
-from gearbench.rig.rig import Support
+from gearbench.rig.support import Across, Support
 from gearbench.rig.value import SYMBOLS, Value, fields_of, unit_of
 
 _HEAD = """\
@@ -45,6 +45,10 @@ _EXAMPLES: dict[str, str] = {
     "stiffness_n_per_m": "6e6",
     "rig.drive.coupling.inertia_kg_m2": "2e-3",
     "rig.drive.coupling.stiffness_nm_per_rad": "5e4",
+    "rig.load.coupling.stiffness_nm_per_rad": "5e4",
+    "rig.housing.mass_kg": "40.0",
+    "rig.housing.stiffness_n_per_m": "1e9",
+    "rig.sensors.filter_hz": "3500.0",
     "rig.drive.ripple.orders": "[6, 12]",
     "rig.drive.ripple.amplitude_nm": "[0.6, 0.3]",
     "rig.drive.ripple.phase_deg": "[0.0, 90.0]",
@@ -65,7 +69,13 @@ _EXAMPLES: dict[str, str] = {
 }
 
 # Of keys and tables without default, those that the file sets.
-_CHOSEN = {"experiment.mesh_frequency_hz", "experiment.multisine", "experiment.multisine.amplitude_nm"}
+_CHOSEN = {
+    "rig.support.driver.stiffness_n_per_m",
+    "rig.support.driven.stiffness_n_per_m",
+    "experiment.mesh_frequency_hz",
+    "experiment.multisine",
+    "experiment.multisine.amplitude_nm",
+}
 
 
 def reference_text() -> str:
@@ -83,7 +93,7 @@ def _table(model: type[Value], path: str, absent: bool = False) -> str:
             optional = info.default is None and where not in _CHOSEN
             tables.append(_table(inner, where, absent or optional))
             continue
-        lines.append(_line(key, where, info, unit_of(model, name), absent, model in (Gear, Crack, Support)))
+        lines.append(_line(key, where, info, unit_of(model, name), absent, model in (Gear, Crack, Support, Across)))
     hidden = "# " if absent else ""
     header = f"{hidden}[{path}]\n" if path and lines else ""
     own = header + "".join(f"{line}\n" for line in lines) + "\n" if lines else ""

@@ -37,15 +37,18 @@ def write_lines(model: type[Value], value: Value, path: str, uncertainty: Mappin
     return lines
 
 
-def write_tables(model: type[Value], value: Value, path: str, uncertainty: Mapping[str, float]) -> str:
-    """One table and all its sub-tables. Table names carry no unit, so `path` is their TOML name as well."""
+def write_tables(
+    model: type[Value], value: Value, path: str, uncertainty: Mapping[str, float], without: Sequence[str] = ()
+) -> str:
+    """One table and all its sub-tables but those in `without`. Table names carry no unit, so `path` is their TOML name
+    as well."""
     lines = write_lines(model, value, path, uncertainty)
     header = [f"[{path}]"] if path and lines else []
     text = "".join(f"{line}\n" for line in [*header, *lines])
     text += "\n" if text else ""
     for name, _ in fields_of(model).values():
         held = getattr(value, name)
-        if isinstance(held, Value):
+        if isinstance(held, Value) and name not in without:
             text += write_tables(type(held), held, f"{_dot(path)}{name}", uncertainty)
     return text
 

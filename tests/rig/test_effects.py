@@ -17,6 +17,11 @@ REFERENCE = case_path("reference")  # 62/62 teeth
 COUPLING = "rig.drive.coupling={inertia_kg_m2 = 2e-3, stiffness_nm_per_rad = 5e4, damping_nm_s_per_rad = 1.5}"
 RIPPLE = "rig.drive.ripple={orders = [6, 12], amplitude_nm = [0.6, 0.3], phase_deg = [0, 90]}"
 SLIT = "rig.driver.crack={tooth = 7, length_mm = 0.8, direction_deg = 60}"
+ACROSS = "rig.support.driven.across={stiffness_n_per_m = 2e7, damping_n_s_per_m = 300, coupling_n_per_m = -3e6}"
+HOUSING = "rig.housing={mass_kg = 40, stiffness_n_per_m = 1e9, damping_n_s_per_m = 2e3}"
+SHAFT = "rig.load.coupling={inertia_kg_m2 = 0.02, stiffness_nm_per_rad = 4e4, damping_nm_s_per_rad = 2}"
+FREE = "rig.load.boundary=inertia"
+CONSTANT = "experiment={mesh_frequency_hz = 2, torque_mean_nm = 2, sampling_rate_hz = 8192, samples_per_period = 8192}"
 CRACK = "rig.driver.crack={tooth = 7, stiffness_loss = 0.35}"
 
 
@@ -49,6 +54,18 @@ def refusal(*settings: str) -> str:
         ("rig.support.reference_deflection_um=4.7", lambda rig: rig.support.driver.reference_deflection, 4.7e-6),
         (COUPLING, lambda rig: tuple(rig.drive.coupling.model_dump().values()), (2e-3, 5e4, 1.5)),
         (RIPPLE, lambda rig: tuple(rig.drive.ripple.model_dump().values()), ((6, 12), (0.6, 0.3), (0.0, pi / 2))),
+        (SHAFT, lambda rig: tuple(rig.load.coupling.model_dump().values()), (0.02, 4e4, 2.0)),
+        (ACROSS, lambda rig: tuple(rig.support.driven.across.model_dump().values()), (2e7, 300.0, -3e6)),
+        (ACROSS.replace(".driven", ""), lambda rig: rig.support.driver.across.coupling, -3e6),
+        (HOUSING, lambda rig: tuple(rig.housing.model_dump().values()), (40.0, 1e9, 2e3)),
+        ("rig.mesh.stiffness_drift=-0.004", lambda rig: rig.mesh.stiffness_drift, -0.004),
+        ("rig.sensors.encoder_runout_driven_urad=20.1", lambda rig: rig.sensors.encoder_runout_driven, 20.1e-6),
+        ("rig.sensors.encoder_runout_driver_phase_deg=90", lambda rig: rig.sensors.encoder_runout_driver_phase, pi / 2),
+        ("rig.sensors.filter_hz=4000", lambda rig: rig.sensors.filter, 4000.0),
+        ("rig.sensors.gain_torque_driver=1.02", lambda rig: rig.sensors.gain_torque_driver, 1.02),
+        ("rig.sensors.quantisation_angle_urad=0.3", lambda rig: rig.sensors.quantisation_angle, 0.3e-6),
+        ("rig.sensors.quantisation_displacement_um=0.01", lambda rig: rig.sensors.quantisation_displacement, 0.01e-6),
+        ("rig.sensors.quantisation_torque_nm=0.01", lambda rig: rig.sensors.quantisation_torque, 0.01),
         ("rig.friction.coefficient=0.06", lambda rig: rig.friction.coefficient, 0.06),
         ("rig.friction.transition_speed_m_per_s=0.01", lambda rig: rig.friction.transition_speed, 0.01),
         ("rig.mesh.error_mean_um=-3.1", lambda rig: rig.mesh.error_mean, -3.1e-6),
@@ -91,7 +108,25 @@ def test_a_rig_without_effects_has_none() -> None:
             ("rig.sensors.noise_torque_nm=0.1", "rig.sensors.delay_torque_driven_us=-1"),
             ("rig.sensors.delay_torque_driven_us", "rig.sensors.noise_torque_nm"),
         ),
+        ((ACROSS,), ("rig.support.driven.across",)),
+        ((HOUSING,), ("rig.housing",)),
+        ((SHAFT,), ("rig.load.coupling",)),
+        (("rig.load.boundary=torque", "rig.load.coupling={inertia_kg_m2 = 0.1}"), ("rig.load.coupling",)),
+        ((FREE,), ("rig.load.boundary",)),
+        ((CONSTANT, "rig.drive.boundary=inertia"), ("rig.drive.boundary",)),
+        ((CONSTANT, "rig.load.boundary=torque", "rig.drive.boundary=speed"), ("rig.drive.boundary",)),
+        (("rig.mesh.stiffness_drift=0.001",), ("rig.mesh.stiffness_drift",)),
+        (
+            ("rig.sensors.gain_torque_driven=0.99", "rig.sensors.filter_hz=1e3"),
+            ("rig.sensors.filter_hz", "rig.sensors.gain_torque_driven"),
+        ),
+        (("rig.sensors.quantisation_torque_nm=0.1",), ("rig.sensors.quantisation_torque_nm",)),
+        (("rig.sensors.encoder_runout_driver_urad=1",), ("rig.sensors.encoder_runout_driver_urad",)),
         # Neutral: nothing but shapes, zeros, and what belongs to the geometry.
+        (("rig.sensors.encoder_runout_driver_phase_deg=10", "rig.sensors.gain_torque_driver=1"), ()),
+        # A rigid shaft to an end that turns steadily, whatever its inertia; without inertia it is nothing at all.
+        (("rig.load.coupling={inertia_kg_m2 = 0.1}",), ()),
+        (("rig.load.boundary=torque", "rig.load.coupling={}"), ()),
         (("rig.driver.runout_phase_deg=40", "rig.friction.transition_speed_m_per_s=1"), ()),
         (("rig.support.reference_deflection_um=1",), ()),
         (("rig.driver.thinning_um=30", "rig.driver.crack={tooth = 1, stiffness_loss = 0}"), ()),
@@ -114,9 +149,11 @@ def test_a_sound_gear_has_no_errors_and_the_same_geometry() -> None:
 
 def test_optional_tables_stay_absent_when_written(tmp_path: Path) -> None:
     plain = dump_case(changed())
-    for table in ("coupling", "ripple", "crack"):
+    for table in ("coupling]", "ripple", "crack", "across", "housing"):
         assert table not in plain
-    full = changed(errors(), CRACK, COUPLING, RIPPLE, "rig.drive.coupling.inertia_kg_m2={value = 2e-3, sd = 4e-5}")
+    structure = (ACROSS, HOUSING, SHAFT, "rig.sensors.filter_hz=2e3")
+    spread = "rig.drive.coupling.inertia_kg_m2={value = 2e-3, sd = 4e-5}"
+    full = changed(errors(), CRACK, COUPLING, RIPPLE, *structure, spread)
     copy = tmp_path / "copy.toml"
     copy.write_text(dump_case(full), encoding="utf-8")
     assert read_case(copy) == full
@@ -130,7 +167,11 @@ def test_the_reference_file_shows_valid_optional_tables(tmp_path: Path) -> None:
         lines.append(line.removeprefix("# ") if inside else line)
     full = tmp_path / "full.toml"
     full.write_text("\n".join(lines), encoding="utf-8")
-    wanted = ("rig.driver.crack.length_mm", "rig.driven.crack.length_mm", "rig.drive.coupling", "rig.drive.ripple")
+    wanted = (
+        *("rig.driver.crack.length_mm", "rig.driven.crack.length_mm"),
+        *("rig.support.driver.across", "rig.support.driven.across", "rig.housing"),
+        *("rig.drive.coupling", "rig.drive.ripple", "rig.load.coupling"),
+    )
     assert effects_in(read_case(full).rig) == wanted
 
 
@@ -151,6 +192,15 @@ def test_standard_deviations_of_new_numbers() -> None:
         "rig.support.driven.reference_deflection": 3e-6,
         "rig.driven.pitch_error.0": 0.25e-6,
     }
+
+
+def test_a_gear_with_its_own_support_across_keeps_none_of_the_common_one() -> None:
+    common = "rig.support.across={stiffness_n_per_m = {value = 2e7, sd = 1e6}, damping_n_s_per_m = 5}"
+    own = "rig.support.driver.across={stiffness_n_per_m = 1e7}"
+    case = changed(common, own)
+    assert case.rig.support.driver.across.model_dump() == {"stiffness": 1e7, "damping": 0.0, "coupling": 0.0}
+    assert case.rig.support.driven.across.damping == 5.0
+    assert case.uncertainty == {"rig.support.driven.across.stiffness": 1e6}
 
 
 @pytest.mark.parametrize(
@@ -199,6 +249,20 @@ def test_standard_deviations_of_new_numbers() -> None:
             "rig.drive.ripple={orders = [6.5], amplitude_nm = [1], phase_deg = [0]}",
             ["rig.drive.ripple.orders[0] = 6.5", "whole number"],
         ),
+        (SHAFT.replace("0.02", "-1"), ["rig.load.coupling.inertia_kg_m2 = -1", "at least 0"]),
+        ("rig.load={boundary = 'torque', coupling = {stiffness_nm_per_rad = 1}}", ["rig.load", "inertia_kg_m2 = 0"]),
+        ("rig.drive.boundary=speed", ["drive.boundary", "load.boundary", "no torque"]),
+        ("rig.drive.boundary=inertia", ["the experiment has a multisine", 'rig.drive.boundary = "inertia"']),
+        ("rig.drive.boundary=torqe", ["rig.drive.boundary", 'did you mean "torque"?']),
+        (ACROSS.replace("-3e6", "1.2e7"), ["rig.support.driven", "across.coupling_n_per_m = 12000000", "1.09545e+07"]),
+        (ACROSS.replace("stiffness_n_per_m = 2e7, ", ""), ["rig.support.driven.across.stiffness_n_per_m is missing"]),
+        (HOUSING.replace("40", "0"), ["rig.housing.mass_kg = 0", "greater than 0 kg"]),
+        (HOUSING.replace("mass_kg = 40, ", ""), ["rig.housing.mass_kg is missing"]),
+        ("rig.mesh.stiffness_drift=-1", ["rig.mesh.stiffness_drift = -1", "greater than -1"]),
+        ("rig.sensors.filter_hz=0", ["rig.sensors.filter_hz = 0", "greater than 0 Hz"]),
+        ("rig.sensors.gain_torque_driver=0", ["gain_torque_driver = 0", "greater than 0"]),
+        ("rig.sensors.quantisation_angle_urad=-1", ["quantisation_angle_urad = -1", "at least 0 urad"]),
+        ("rig.sensors.encoder_runout_driver_urad=20000", ["encoder_runout_driver_urad = 20000", "at most 10000"]),
         ("rig.friction.coefficient=1.1", ["rig.friction.coefficient = 1.1", "at most 1"]),
         ("rig.friction.transition_speed_m_per_s=0", ["transition_speed_m_per_s = 0", "greater than 0 m/s"]),
         ("rig.mesh.stiffness_scale=0", ["rig.mesh.stiffness_scale = 0", "greater than 0"]),

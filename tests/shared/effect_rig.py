@@ -15,7 +15,7 @@ from gearbench.lumped.nonlinear.law import MeshLaw
 from gearbench.lumped.nonlinear.model import NonLinear
 from gearbench.lumped.nonlinear.step import Outputs, columns, integrate
 from gearbench.lumped.nonlinear.tables import Motion, tables
-from gearbench.rig import Damping, Gear, Rig, Support, Supports
+from gearbench.rig import Coupling, Damping, Gear, Rig, Support, Supports
 
 Array = NDArray[np.float64]
 
@@ -34,15 +34,25 @@ def make_rig(driver: dict[str, Any] | None = None, driven: dict[str, Any] | None
 
 
 def make_model(rig: Rig, law: MeshLaw | None = None) -> NonLinear:
-    """The model with inertias of its own, written down here: rotor, boundaries and direction as the rig says."""
-    coupling = rig.drive.coupling
-    rotor = coupling.inertia if coupling else 0.0
-    elastic = coupling is not None and coupling.stiffness is not None
-    first = GEARS[0] + (0.0 if elastic else rotor)
-    masses = (first / RADII[0] ** 2, GEARS[1] / RADII[1] ** 2, rotor / RADII[0] ** 2 if elastic else 0.0, *MASSES)
-    mesh_mass = equivalent_mass(RADII, (GEARS[0] + rotor, GEARS[1]), rig.load.boundary)
+    """The model with inertias of its own, written down here: shafts, boundaries and direction as the rig says."""
+    rotor, turning1, beyond1 = _shaft(rig.drive.coupling, GEARS[0])
+    brake, turning2, beyond2 = _shaft(rig.load.coupling, GEARS[1])
+    squares = RADII[0] ** 2, RADII[1] ** 2
+    masses = (turning1 / squares[0], turning2 / squares[1], beyond1 / squares[0], *MASSES)
+    inertias = GEARS[0] + rotor, GEARS[1] + brake
+    mesh_mass = equivalent_mass(RADII, inertias, rig.load.boundary)
+    if rig.drive.boundary == "speed":
+        mesh_mass = inertias[1] / squares[1]
     factor = cos(ALPHA) if rig.support.direction == "tangential" else 1.0
-    return NonLinear(rig, law or hat_law(), RADII, ALPHA, factor, masses, mesh_mass)
+    outer = beyond2 / squares[1] if rig.load.boundary != "speed" else 0.0
+    return NonLinear(rig, law or hat_law(), RADII, ALPHA, factor, masses, mesh_mass, outer)
+
+
+def _shaft(coupling: Coupling | None, gear: float) -> tuple[float, float, float]:
+    """Inertia beyond a shaft, what of it and the gear turns as one, and what turns for itself [kg m^2]."""
+    inertia = coupling.inertia if coupling else 0.0
+    elastic = coupling is not None and coupling.stiffness is not None
+    return inertia, gear + (0.0 if elastic else inertia), inertia if elastic else 0.0
 
 
 def run(

@@ -1,0 +1,133 @@
+"""What a case may leave unsaid: the values that an engineer would take, put into its table before it is read.
+
+Each is said in a sentence, so that nobody has to guess what was computed.
+"""
+
+from __future__ import annotations
+
+from decimal import Decimal
+from math import ceil, log2
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from gearbench.rig.casefile.toml import Table
+from gearbench.rig.gear import Gear
+
+# Part of the root circle's radius at which a gear without bore is held.
+HUB_PART = Decimal("0.6")
+# Length of an excitation period that is aimed at [s], and samples over twice its highest frequency.
+PERIOD = 1.0
+OVERSAMPLING = 1.28
+# Samples of a mesh period without excitation.
+SAMPLES_PER_MESH = 256
+
+# Stands for an experiment where a case has none; nothing reads it but what asks whether there is one.
+PLACEHOLDER: Table = {
+    "mesh_frequency_hz": 1,
+    "torque_mean_nm": 1,
+    "sampling_rate_hz": SAMPLES_PER_MESH,
+    "samples_per_period": SAMPLES_PER_MESH,
+}
+
+
+class Completed(NamedTuple):
+    """`assumed`: sentences, one for each value that was put in; `stated`: whether the case has an experiment."""
+
+    assumed: tuple[str, ...]
+    stated: bool
+
+
+def complete(document: Table, path: Path) -> Completed:
+    """Put into a case's table, in place, what it leaves out and what has a usual value. Whatever is not as it should
+    be is left alone: reading the table finds it."""
+    assumed = []
+    if "name" not in document:
+        document["name"] = path.stem
+    rig = document.get("rig")
+    if isinstance(rig, dict):
+        assumed += [line for side in ("driver", "driven") if (line := _hub(rig.get(side), f"rig.{side}"))]
+    conditions = document.get("condition")
+    if "experiment" not in document and not (isinstance(conditions, list) and conditions):
+        document["experiment"] = dict(PLACEHOLDER)
+        return Completed(tuple(assumed), False)
+    experiment = document.get("experiment")
+    if isinstance(experiment, dict) and isinstance(rig, dict):
+        assumed += _sampling(experiment, rig.get("driver"))
+    return Completed(tuple(assumed), True)
+
+
+def _hub(gear: Any, where: str) -> str | None:
+    """The radius at which a gear is held: that of its bore, or a part of the root circle's."""
+    if not isinstance(gear, dict) or "hub_radius_mm" in gear:
+        return None
+    bore = _number(gear.get("bore_radius_mm"))
+    if bore:
+        gear["hub_radius_mm"] = bore
+        return f"{where}.hub_radius_mm = {float(bore):g}: the gear is rigid from its bore inwards"
+    module, teeth = _number(gear.get("module_mm")), _number(gear.get("teeth"))
+    shift = _number(gear.get("profile_shift", _default("profile_shift")))
+    dedendum = _number(gear.get("dedendum", _default("dedendum")))
+    if module is None or teeth is None or shift is None or dedendum is None:
+        return None
+    root = module * (teeth / 2 + shift - dedendum)
+    if root <= 0:
+        return None
+    gear["hub_radius_mm"] = hub = round(HUB_PART * root, 4)
+    return f"{where}.hub_radius_mm = {float(hub):g}: the gear is rigid inside {100 * HUB_PART:.0f} % of its root circle"
+
+
+def _sampling(experiment: Table, driver: Any) -> list[str]:
+    """Sampling rate and samples of a period: a period of about a second that holds whole mesh periods, sampled a good
+    quarter above twice the highest excited frequency; without excitation, one mesh period."""
+    rate, samples = experiment.get("sampling_rate_hz"), experiment.get("samples_per_period")
+    mesh = _mesh_frequency(experiment, driver)
+    if (rate is not None and samples is not None) or not mesh:
+        return []
+    multisine = experiment.get("multisine")
+    top = None
+    if isinstance(multisine, dict) and isinstance(multisine.get("band_hz"), list) and len(multisine["band_hz"]) == 2:
+        top = _number(multisine["band_hz"][1])
+    if multisine is not None and not top:
+        return []
+    cycles = max(1, round(PERIOD * float(mesh))) if top else 1
+    period = cycles / mesh
+    if rate is None:
+        least = 2 * OVERSAMPLING * float(top) * float(period) if top else cycles * SAMPLES_PER_MESH
+        count = _number(samples) or Decimal(2 ** max(4, ceil(log2(least))))
+        rate = experiment["sampling_rate_hz"] = count / period
+        said = [f"experiment.sampling_rate_hz = {float(rate):.10g}"]
+    else:
+        said = []
+    if samples is None:
+        known = _number(rate)
+        if known is None:
+            return []
+        samples = experiment["samples_per_period"] = round(known * period)
+        said.append(f"experiment.samples_per_period = {samples}")
+    reason = f"for a band up to {float(top):g} Hz" if top else "without excitation"
+    held = f"{cycles} mesh period{'s' if cycles > 1 else ''} a period"
+    return [f"{' and '.join(said)}: {held}, {reason}"]
+
+
+def _mesh_frequency(experiment: Table, driver: Any) -> Decimal | None:
+    """Mesh frequency [Hz] that an experiment's table states, None where it does not."""
+    given = _number(experiment.get("mesh_frequency_hz"))
+    if given is not None:
+        return given if given > 0 else None
+    speed = _number(experiment.get("speed_driver_rpm"))
+    teeth = _number(driver.get("teeth")) if isinstance(driver, dict) else None
+    return speed * teeth / 60 if speed and teeth and speed > 0 and teeth > 0 else None
+
+
+def _number(raw: Any) -> Decimal | None:
+    """A plain finite number of a table, also one with a standard deviation; None for anything else."""
+    if isinstance(raw, dict):
+        raw = raw.get("value")
+    if isinstance(raw, bool) or not isinstance(raw, int | float | Decimal):
+        return None
+    number = Decimal(str(raw))
+    return number if number.is_finite() else None
+
+
+def _default(name: str) -> Any:
+    return Gear.model_fields[name].default

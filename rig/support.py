@@ -1,0 +1,95 @@
+"""What holds the gears' centres: supports along one direction and across it, and a housing behind both."""
+
+from __future__ import annotations
+
+from math import pi
+from typing import ClassVar, Literal, NamedTuple
+
+from pydantic import model_validator
+
+from gearbench.rig.value import Value, format_number, quantity
+
+
+class Across(Value):
+    """Spring and damper of one gear's centre to the ground, square to the direction of its support.
+
+    `coupling` k_c is the stiffness between both directions, as bearings and asymmetric pedestals have it: x adds k_c x
+    to the force of the support, and its deflection y adds k_c y to the force across.
+    """
+
+    stiffness: float = quantity(unit="n_per_m", gt=0.0, doc="stiffness square to the support's direction")
+    damping: float = quantity(0.0, "n_s_per_m", ge=0.0, doc="damping square to the support's direction")
+    coupling: float = quantity(0.0, "n_per_m", doc="stiffness that couples both directions; 0: none")
+
+
+# A rigid support is a centre this many times as heavy as its gear, critically damped at this frequency [Hz]: a gear of
+# 1 kg moves by less than 3e-12 m under 10 kN, at any frequency.
+HELD_MASS = 1e10
+HELD_FREQUENCY = 100.0
+
+
+class Holding(NamedTuple):
+    """How a centre is held: mass that moves with it [kg], stiffness [N/m] and damping [N s/m]."""
+
+    mass: float
+    stiffness: float
+    damping: float
+
+
+class Support(Value):
+    """Spring and damper between one gear's centre and the ground, or the housing, in y or along the line of action.
+
+    Force: stiffness y (|y| / reference_deflection)^exponent + damping y'. Without a stiffness the support is rigid.
+    """
+
+    stiffness: float | None = quantity(None, "n_per_m", gt=0.0, doc="support stiffness; absent: rigid")
+    damping: float = quantity(0.0, "n_s_per_m", ge=0.0, doc="support damping")
+    exponent: float = quantity(
+        0.0, gt=-0.9, le=3.0, doc="e of the force k y (|y| / reference_deflection)^e; 0: linear"
+    )
+    reference_deflection: float = quantity(
+        10e-6, "um", gt=0.0, le=1e-2, doc="deflection at which the secant stiffness is `stiffness`"
+    )
+    across: Across | None = quantity(None, doc="absent: the centre does not move across the support's direction")
+
+    @model_validator(mode="after")
+    def _stable(self) -> Support:
+        if self.stiffness is None:
+            for name in ("damping", "exponent", "across"):
+                if getattr(self, name):
+                    raise ValueError(f"stiffness_n_per_m is missing: a support without it is rigid, and has no {name}")
+            return self
+        if self.across is None:
+            return self
+        coupling, product = self.across.coupling, self.stiffness * self.across.stiffness
+        if not coupling**2 < product:
+            raise ValueError(
+                f"across.coupling_n_per_m = {format_number(coupling)} must lie between plus and minus"
+                f" {product**0.5:.6g}, the root of both directions' stiffnesses, or the support pushes its gear away"
+            )
+        return self
+
+
+    def holding(self, mass: float) -> Holding:
+        """How the support holds a gear of that mass [kg]."""
+        if self.stiffness is not None:
+            return Holding(mass, self.stiffness, self.damping)
+        held, rate = HELD_MASS * mass, 2 * pi * HELD_FREQUENCY
+        return Holding(held, held * rate**2, 2 * held * rate)
+
+
+class Supports(Value):
+    """The supports of both gears; `direction` is the axis along which they act."""
+
+    common: ClassVar[type[Value] | None] = Support
+    driver: Support = quantity(Support(), doc="support of the driver")
+    driven: Support = quantity(Support(), doc="support of the driven gear")
+    direction: Literal["tangential", "line-of-action"] = quantity("tangential", doc="axis of support motion")
+
+
+class Housing(Value):
+    """One rigid body between both supports and the ground, which moves along the supports' direction."""
+
+    mass: float = quantity(unit="kg", gt=0.0, le=1e7, doc="mass of the housing")
+    stiffness: float = quantity(unit="n_per_m", gt=0.0, doc="stiffness of the housing to the ground")
+    damping: float = quantity(0.0, "n_s_per_m", ge=0.0, doc="damping of the housing to the ground")
