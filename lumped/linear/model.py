@@ -164,13 +164,13 @@ def lumped_model(
     radii = (meshing.driver.base_radius, meshing.driven.base_radius)
     inertias = (bodies[0].inertia, bodies[1].inertia)
     tangential = rig.support.direction == "tangential"
-    supports = (rig.support.driver, rig.support.driven)
+    one, two = rig.support.driver.holding(bodies[0].mass), rig.support.driven.holding(bodies[1].mass)
     return Lumped(
         mesh_mass=equivalent_mass(radii, inertias, rig.load.boundary),
         support_factor=cos(meshing.working_pressure_angle) if tangential else 1.0,
-        masses=(bodies[0].mass, bodies[1].mass),
-        support_stiffness=(supports[0].stiffness, supports[1].stiffness),
-        support_damping=(supports[0].damping, supports[1].damping),
+        masses=(one.mass, two.mass),
+        support_stiffness=(one.stiffness, two.stiffness),
+        support_damping=(one.damping, two.damping),
         damping_ratio=rig.damping.mesh_ratio,
         stiffness=stiffness if stiffness is not None else mesh_stiffness(rig, meshing, simulation),
         error=amplitudes,

@@ -30,6 +30,9 @@ the gear. m_e counts the rotor in both cases, so that a stiffer and stiffer coup
 Where both gears turn freely T2 balances driver torque and friction at any time: T2/rb2 = T1/rb1 - mu f (m1/rb1 -
 m2/rb2); the mean speed then stays, and ripple alone moves both gears together.
 
+What else a real rig has (a shaft behind the driven gear, a housing, supports across, other boundaries) is a
+`lumped.nonlinear.structure` beside these equations.
+
 Mesh phase and shaft angles are those of the steady rotation, not of the vibrating gears: vibrations of 10 um shift
 the phase by a thousandth of a cycle. With a prescribed driven speed the phase is exact, as it is the driven gear's.
 """
@@ -37,8 +40,7 @@ the phase by a thousandth of a cycle. With a prescribed driven speed the phase i
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import cos, pi, sin
-from typing import NamedTuple
+from math import cos, inf, pi, sin
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,7 +48,24 @@ from numpy.typing import NDArray
 from gearbench.geometry import Pair, body
 from gearbench.lumped.errors import LumpedError
 from gearbench.lumped.linear.model import equivalent_mass
+from gearbench.lumped.nonlinear.constants import Constants, Rubbing
+from gearbench.lumped.nonlinear.coordinates import Coordinates, Further
 from gearbench.lumped.nonlinear.law import MeshLaw
+from gearbench.lumped.nonlinear.rest import (
+    centre_at_rest,
+    inverse_masses,
+    mesh_direction,
+    pressed_by,
+    springs_and_dampers,
+)
+from gearbench.lumped.nonlinear.structure import (
+    Structure,
+    both_free,
+    driven_turns,
+    elastic_load,
+    has_structure,
+    structure_of,
+)
 from gearbench.rig import Rig
 
 Array = NDArray[np.float64]
@@ -54,75 +73,23 @@ Array = NDArray[np.float64]
 # Of friction's decay rate, what a step resolves like a mode: Runge-Kutta then is stable up to 0.7 of the largest
 # tabulated force. Beyond it, sliding turns round at every step; the force stays bounded.
 RESOLVED = 0.125
+# Of a mode beyond half the sampling rate, what a step resolves like one below: its frequency is then right to 1 % and
+# its damping ratio to 0.01, far from where Runge-Kutta becomes unstable.
+UNSEEN = 0.5
 
 LIMITS = (
     "forces of unbalance, also of eccentric gears, are left out",
-    "the centres move along the support direction only: friction acts on rotations and tangential supports",
     "errors act through one spring, weighted with the pairs' shares at a reference load, not pair by pair",
     "back flanks are free of friction, pitch errors and cracks",
     "mesh phase is that of the steady rotation",
 )
-
-
-class Coordinates(NamedTuple):
-    """The coordinates [m] of a model, or their rates or accelerations."""
-
-    u1: float
-    y1: float
-    y2: float
-    u2: float
-    w: float
-
-
-COORDINATES = len(Coordinates._fields)
-
-
-class Constants(NamedTuple):
-    """Numbers that the integrator needs. Inverse masses [1/kg] are 0 for coordinates that do not move."""
-
-    inverse_u1: float
-    inverse_u2: float
-    inverse_w: float
-    inverse_y1: float
-    inverse_y2: float
-    rigid: float  # 1: torque acts on the gear, 0: on the rotor
-    shaft_stiffness: float  # S [N/m]
-    shaft_damping: float  # D [N s/m]
-    factor: float  # g
-    stiffness1: float  # [N/m]
-    stiffness2: float
-    damping1: float  # [N s/m]
-    damping2: float
-    exponent1: float
-    exponent2: float
-    reference1: float  # [m]
-    reference2: float
-    damping_factor: float  # 2 zeta sqrt(m_e) [kg^1/2]
-    backlash: float  # [m]
-    root: float  # grid steps per root of deflection [m^-1/2]
-    mirror: float  # phase at which back flanks pass the pitch point, in rows of the force table
-
-
-class Rubbing(NamedTuple):
-    """Friction, as the integrator needs it. A pair `away` cycles behind the pitch point has the roll lengths rb_i
-    (centre_i +- away pitch_i) and in the steady rotation the sliding velocity away drift."""
-
-    coefficient: float
-    steepness: float  # 1 / v0 [s/m]
-    drift: float  # [m/s] per cycle
-    centre1: float
-    centre2: float
-    pitch1: float
-    pitch2: float
-    slide: float  # sin(a_w), or 0 along the line of action
-    offset: float  # of the first column of `share`
-    share: Array  # (phases + 1, n_o)
+ONE_DIRECTION = "the centres move along the support direction only: friction acts on rotations and tangential supports"
 
 
 @dataclass(frozen=True, eq=False)
 class NonLinear:
-    """The model of one rig. base_radii [m]; masses [kg]: M_1 (the rotor included where it is rigid), M_2, M_r (0:
-    rigid or none), m_1, m_2."""
+    """The model of one rig. base_radii [m]; masses [kg]: M_1 (the rotor included where it is rigid), M_2 (likewise),
+    M_r (0: rigid or none), m_1, m_2; outer: M_l beyond an elastic shaft of the load (0: none that turns)."""
 
     rig: Rig
     law: MeshLaw
@@ -131,11 +98,34 @@ class NonLinear:
     factor: float
     masses: tuple[float, float, float, float, float]
     mesh_mass: float  # m_e [kg]
+    outer: float = 0.0
 
     @property
     def free(self) -> bool:
-        """Whether the driven gear turns freely."""
-        return self.rig.load.boundary == "torque"
+        """Whether nothing holds the rotation of both gears together."""
+        return both_free(self.rig)
+
+    @property
+    def slide(self) -> float:
+        """Sine of the angle from the supports' direction to the line of action: the part of the friction force that the
+        supports feel, and what a motion across them contributes to the DTE."""
+        return sin(self.working_pressure_angle) if self.rig.support.direction == "tangential" else 0.0
+
+    @property
+    def structure(self) -> Structure | None:
+        """What the integrator needs beyond `constants`; None for a rig without more structure."""
+        return structure_of(self.rig, self.masses[3:], self.outer, self.base_radii[1], self.slide)
+
+    @property
+    def limits(self) -> tuple[str, ...]:
+        """What the model leaves out of this rig, in words."""
+        across = self.rig.support.driver.across is not None and self.rig.support.driven.across is not None
+        return LIMITS if across else (LIMITS[0], ONE_DIRECTION, *LIMITS[1:])
+
+    @property
+    def size(self) -> int:
+        """Number of coordinates."""
+        return len(Coordinates._fields) + (len(Further._fields) if has_structure(self.rig) else 0)
 
     @property
     def elastic_shaft(self) -> bool:
@@ -154,21 +144,23 @@ class NonLinear:
         """What the integrator needs, table apart."""
         one, two = self.rig.support.driver, self.rig.support.driven
         m1, m2, rotor, mass1, mass2 = self.masses
+        held1, held2 = one.holding(mass1), two.holding(mass2)
         stiffness, damping = self.shaft
+        driven = self.rig.drive.boundary == "speed"
         return Constants(
-            inverse_u1=1.0 / m1,
-            inverse_u2=1.0 / m2 if self.free else 0.0,
-            inverse_w=1.0 / rotor if rotor else 0.0,
-            inverse_y1=1.0 / mass1,
-            inverse_y2=1.0 / mass2,
+            inverse_u1=0.0 if driven and not rotor else 1.0 / m1,
+            inverse_u2=1.0 / m2 if driven_turns(self.rig) else 0.0,
+            inverse_w=1.0 / rotor if rotor and not driven else 0.0,
+            inverse_y1=1.0 / held1.mass,
+            inverse_y2=1.0 / held2.mass,
             rigid=0.0 if rotor else 1.0,
             shaft_stiffness=stiffness,
             shaft_damping=damping,
             factor=self.factor,
-            stiffness1=one.stiffness,
-            stiffness2=two.stiffness,
-            damping1=one.damping,
-            damping2=two.damping,
+            stiffness1=held1.stiffness,
+            stiffness2=held2.stiffness,
+            damping1=held1.damping,
+            damping2=held2.damping,
             exponent1=one.exponent,
             exponent2=two.exponent,
             reference1=one.reference_deflection,
@@ -194,78 +186,78 @@ class NonLinear:
             centre2=roll2 / r2,
             pitch1=law.base_pitch / r1,
             pitch2=law.base_pitch / r2,
-            slide=sliding_factor(self),
+            slide=self.slide,
             offset=float(law.offsets[0]),
             share=law.closed[0],
         )
 
     def friction_rate(self) -> float:
         """Decay rate [1/s] of sliding at the pitch point where it turns round, at the largest tabulated force."""
-        c, friction, across = self.constants(), self.rig.friction, sliding_factor(self)
+        c, s, friction = self.constants(), self.structure, self.rig.friction
         levers = [roll / radius for roll, radius in zip(self.law.pitch_roll, self.base_radii, strict=True)]
         yielding = levers[0] ** 2 * c.inverse_u1 + levers[1] ** 2 * c.inverse_u2
-        yielding += across**2 * (c.inverse_y1 + c.inverse_y2)
+        yielding += self.slide**2 * (c.inverse_y1 + c.inverse_y2)
+        if s is not None:
+            yielding += self.factor**2 * (s.inverse_x1 + s.inverse_x2)
         return friction.coefficient * float(self.law.force.max()) / friction.transition_speed * yielding
 
-    def support_deflection(self, force: float) -> tuple[float, float]:
-        """y1, y2 [m] at rest under the mesh force [N]."""
-        out = []
-        across = self.factor * force
-        for support, push in ((self.rig.support.driver, -across), (self.rig.support.driven, across)):
-            deflection = push / support.stiffness
-            if support.exponent:  # a linear support does not depend on its reference, not even in rounding
-                reference = support.reference_deflection
-                size = abs(deflection) / reference
-                deflection = float(np.sign(push)) * reference * size ** (1 / (1 + support.exponent))
-            out.append(deflection)
-        return out[0], out[1]
+    def centres(self, force: float) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Deflections along and across [m] of both supports at rest under the mesh force [N]."""
+        one, two = self.rig.support.driver, self.rig.support.driven
+        along, across = self.factor * force, self.slide * force
+        return centre_at_rest(one, -along, -across), centre_at_rest(two, along, across)
 
     def equilibrium(self, force: float, excess: float, gain: float, phase: float) -> Array:
-        """State (2 x COORDINATES,) at rest under the force T1/rb1 > 0 [N], without friction and ripple."""
-        high = self.law.approach[-1]
-        while gain * float(self.law.evaluate(high, phase)[0]) < force:
-            high *= 2
-        low = 0.0
-        for _ in range(100):
-            middle = 0.5 * (low + high)
-            low, high = (middle, high) if gain * float(self.law.evaluate(middle, phase)[0]) < force else (low, middle)
-        y1, y2 = self.support_deflection(force)
-        u1 = high - excess - self.factor * (y1 - y2)
+        """State (2 size,) at rest under the force T1/rb1 > 0 [N], without friction and ripple: all coordinates, then
+        their rates. The housing is at rest where it is without load: both gears push it alike."""
+        (y1, x1), (y2, x2) = self.centres(force)
+        apart = pressed_by(self.law, force, gain, phase) - excess - self.factor * (y1 - y2)
         twist = force / self.shaft[0] if self.elastic_shaft else 0.0
-        return np.array([*Coordinates(u1, y1, y2, 0.0, u1 + twist), *Coordinates(0.0, 0.0, 0.0, 0.0, 0.0)])
+        structure = self.structure
+        if structure is None:
+            return np.array([*Coordinates(apart, y1, y2, 0.0, apart + twist), *(0.0 for _ in Coordinates._fields)])
+        apart -= self.slide * (x1 - x2)
+        out = force / structure.load_stiffness if elastic_load(self.rig) else 0.0
+        # The end whose speed is prescribed is where it would be in steady rotation.
+        u2 = -twist - apart if self.rig.drive.boundary == "speed" else structure.held * out
+        place = Coordinates(u2 + apart, y1, y2, u2, u2 + apart + twist), Further(u2 - out, 0.0, x1, x2)
+        return np.array([*place[0], *place[1], *np.zeros(self.size)])
 
     def linearised(self, stiffness: float, force: float) -> Array:
-        """State matrix (2 x COORDINATES, 2 x COORDINATES) at a mesh stiffness [N/m], supports at rest under `force`.
+        """State matrix (2 size, 2 size) at a mesh stiffness [N/m], supports at rest under `force`.
 
         Without friction: away from the pitch point small vibrations do not turn the steady direction of sliding.
         """
-        c = self.constants()
-        inverse = np.array([c.inverse_u1, c.inverse_y1, c.inverse_y2, c.inverse_u2, c.inverse_w])
-        mesh = np.array([1.0, c.factor, -c.factor, -1.0, 0.0])
-        shaft = np.array([1.0, 0.0, 0.0, 0.0, -1.0])
-        springs = stiffness * np.outer(mesh, mesh) + c.shaft_stiffness * np.outer(shaft, shaft)
-        dampers = c.damping_factor * np.sqrt(stiffness) * np.outer(mesh, mesh)
-        dampers += c.shaft_damping * np.outer(shaft, shaft)
-        supports = ((1, c.stiffness1, c.exponent1, c.reference1), (2, c.stiffness2, c.exponent2, c.reference2))
-        for (row, k, exponent, reference), y in zip(supports, self.support_deflection(force), strict=True):
-            springs[row, row] += k * (1 + exponent) * (abs(y) / reference) ** exponent
-        dampers[1, 1] += c.damping1
-        dampers[2, 2] += c.damping2
-        size = COORDINATES
+        c, s = self.constants(), self.structure
+        mesh = mesh_direction(c, s)
+        (y1, _), (y2, _) = self.centres(force)
+        tangents = (
+            c.stiffness1 * (1 + c.exponent1) * (abs(y1) / c.reference1) ** c.exponent1,
+            c.stiffness2 * (1 + c.exponent2) * (abs(y2) / c.reference2) ** c.exponent2,
+        )
+        springs, dampers = springs_and_dampers(c, s, tangents)
+        springs += stiffness * np.outer(mesh, mesh)
+        dampers += c.damping_factor * np.sqrt(stiffness) * np.outer(mesh, mesh)
+        inverse, size = inverse_masses(c, s), self.size
         matrix = np.zeros((2 * size, 2 * size))
         matrix[:size, size:] = np.eye(size)
         matrix[size:, :size] = -inverse[:, None] * springs
         matrix[size:, size:] = -inverse[:, None] * dampers
         return matrix
 
-    def fastest_rate(self, force: float) -> float:
-        """Largest magnitude [rad/s] of an eigenvalue over the mesh cycle, at the largest tabulated deflection; or more,
-        where friction turns round faster than a step of such a mode bears."""
+    def fastest_rate(self, force: float, visible: float = inf) -> float:
+        """Rate [rad/s] that steps must resolve: the largest magnitude of an eigenvalue over the mesh cycle, at the
+        largest tabulated deflection; or more, where friction turns round faster than a step of such a mode bears.
+
+        Modes faster than `visible` [rad/s], which no sample shows, count with the part UNSEEN.
+        """
         gain = self.rig.mesh.stiffness_scale
         gain *= 1 + sum(np.hypot(self.rig.mesh.stiffness_cos, self.rig.mesh.stiffness_sin)) if self._shaped else 1.0
+        gain *= 1 + max(self.rig.mesh.stiffness_drift, 0.0)
         _, tangent = self.law.evaluate(self.law.approach[-1], np.arange(self.law.phases) / self.law.phases)
-        mode = float(np.abs(np.linalg.eigvals(self.linearised(gain * float(tangent.max()), force))).max())
-        return max(mode, RESOLVED * self.friction_rate())
+        modes = np.abs(np.linalg.eigvals(self.linearised(gain * float(tangent.max()), force)))
+        modes = np.where(modes > visible, UNSEEN * modes, modes)
+        return max(float(modes.max()), RESOLVED * self.friction_rate())
 
     @property
     def _shaped(self) -> bool:
@@ -291,18 +283,24 @@ def nonlinear_model(rig: Rig, meshing: Pair, law: MeshLaw) -> NonLinear:
     for name, support in (("driver", rig.support.driver), ("driven", rig.support.driven)):
         if not support.exponent > -1.0:
             raise LumpedError(f"rig.support.{name}.exponent = {support.exponent:g} must be more than -1")
-    turning = one.inertia + (0.0 if elastic else rotor)
+    shaft = rig.load.coupling
+    output = shaft.inertia if shaft is not None else 0.0
+    twists = elastic_load(rig)
+    turning = one.inertia + (0.0 if elastic else rotor), two.inertia + (0.0 if twists else output)
     return NonLinear(
         rig=rig,
         law=law,
         base_radii=(r1, r2),
         working_pressure_angle=meshing.working_pressure_angle,
         factor=cos(meshing.working_pressure_angle) if rig.support.direction == "tangential" else 1.0,
-        masses=(turning / r1**2, two.inertia / r2**2, rotor / r1**2 if elastic else 0.0, one.mass, two.mass),
-        mesh_mass=equivalent_mass((r1, r2), (one.inertia + rotor, two.inertia), rig.load.boundary),
+        masses=(turning[0] / r1**2, turning[1] / r2**2, rotor / r1**2 if elastic else 0.0, one.mass, two.mass),
+        mesh_mass=mesh_mass_of(rig, (r1, r2), (one.inertia + rotor, two.inertia + output)),
+        outer=output / r2**2 if twists and rig.load.boundary != "speed" else 0.0,
     )
 
 
-def sliding_factor(model: NonLinear) -> float:
-    """Part of the friction force that the supports feel: sin(a_w), or 0 along the line of action."""
-    return sin(model.working_pressure_angle) if model.rig.support.direction == "tangential" else 0.0
+def mesh_mass_of(rig: Rig, base_radii: tuple[float, float], inertias: tuple[float, float]) -> float:
+    """m_e [kg] of both sides' whole inertias [kg m^2]; a side whose speed is prescribed counts as infinitely heavy."""
+    if rig.drive.boundary == "speed":
+        return inertias[1] / base_radii[1] ** 2
+    return equivalent_mass(base_radii, inertias, rig.load.boundary)

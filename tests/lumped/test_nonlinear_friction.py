@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from shared.effect_rig import FORCE, GEARS, MASSES, make_model, make_rig, run, steady_dte
 from shared.hat_mesh import ALPHA, BASE_PITCH, PHASES, PITCH_ROLL, RADII, hat, hat_law
 
-from gearbench.lumped.nonlinear.model import COORDINATES, Coordinates, NonLinear
+from gearbench.lumped.nonlinear.coordinates import COORDINATES, Coordinates
+from gearbench.lumped.nonlinear.model import NonLinear
 from gearbench.lumped.nonlinear.step import columns, integrate
 from gearbench.lumped.nonlinear.tables import Motion, tables
 from gearbench.rig import Friction, Load, Rig

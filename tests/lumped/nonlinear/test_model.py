@@ -17,7 +17,7 @@ from shared.hat_mesh import ALPHA, BASE_PITCH, BEND, BENDING, PHASES, PITCH_ROLL
 from gearbench.lumped import Lumped, LumpedError, tabulated_stiffness
 from gearbench.lumped.linear.runge_kutta import integrate as integrate_linear
 from gearbench.lumped.linear.runge_kutta import tabulate
-from gearbench.lumped.nonlinear.model import COORDINATES
+from gearbench.lumped.nonlinear.coordinates import COORDINATES
 from gearbench.lumped.nonlinear.step import columns, integrate
 from gearbench.lumped.nonlinear.tables import Motion, tables
 from gearbench.rig import Coupling, Crack, Drive, Friction, Load, MeshCorrection, Rig, Ripple, Support, Supports

@@ -1,0 +1,41 @@
+"""Coordinates of the non-linear lumped model, and its states as arrays."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class Coordinates(NamedTuple):
+    """The coordinates [m] that every rig has, or their rates or accelerations: rotations on the base circles of driver
+    u1, driven gear u2 and rotor w, and supports."""
+
+    u1: float
+    y1: float
+    y2: float
+    u2: float
+    w: float
+
+
+class Further(NamedTuple):
+    """Those of rigs with more structure: outer end of the load's shaft on the driven base circle, housing, and centres
+    across their supports."""
+
+    load: float
+    housing: float
+    x1: float
+    x2: float
+
+
+COORDINATES = len(Coordinates._fields)
+FURTHER = len(Further._fields)
+NAMES = (*Coordinates._fields, *Further._fields)
+
+
+def parted(values: Array) -> tuple[Coordinates, Further | tuple[()]]:
+    """Coordinates of one half of a state (5,) or (9,); the further ones are empty in the shorter."""
+    return Coordinates(*values[:COORDINATES]), Further(*values[COORDINATES:]) if len(values) > COORDINATES else ()

@@ -1,0 +1,141 @@
+"""The equations of motion at an instant, compiled; `lumped.nonlinear.model` and `structure` have them in words.
+
+Further coordinates e, their rates r and the structure are empty tuples for a rig without structure, and friction is
+None for one without: the compiler knows both, so that the plain model costs nothing for what it does not have. They are
+typed Any where mypy cannot follow the lengths of tuples.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.kernels.compiled import ROUNDING, compiled
+from gearbench.lumped.nonlinear.constants import Constants, Rubbing
+from gearbench.lumped.nonlinear.coordinates import Coordinates, Further
+from gearbench.lumped.nonlinear.forces import Entry, Rubbed, friction, mesh, spring
+from gearbench.lumped.nonlinear.structure import Structure
+
+Array = NDArray[np.float64]
+
+
+class Equations(NamedTuple):
+    """All that the equations of motion hold beside table and torque. free: 1 where nothing holds the rotation of both
+    gears together; mean: that of the driver's torque over its base radius [N]."""
+
+    secant: Array
+    constants: Constants
+    rubbing: Rubbing | None
+    structure: Structure | tuple[()]
+    free: float
+    mean: float
+
+
+class Answer(NamedTuple):
+    """What the equations of motion give: accelerations [m/s^2] and forces on the base circles [N]."""
+
+    acceleration: Coordinates
+    further: Further | tuple[()]
+    mesh_force: float
+    load_force: float
+    drive_force: float
+
+
+class Felt(NamedTuple):
+    """Forces [N] of mesh, driver's coupling and torque on the driver, and friction as in `Rubbed` but as a force."""
+
+    mesh: float
+    shaft: float
+    drive: float
+    rubbed: Rubbed
+
+
+@compiled(fastmath=ROUNDING)
+def _seen(travel: float, e: Any, s: Any) -> float:
+    """DTE, or its rate, with the part of the centres across their supports."""
+    if len(e) == 0:
+        return travel
+    return travel + s.slide * (e.x1 - e.x2)
+
+
+@compiled(fastmath=ROUNDING)
+def _plain(q: Coordinates, v: Coordinates, felt: Felt, force: float, p: Constants, free: float) -> Answer:
+    """The answer of a rig without more structure."""
+    f, pull, pull2 = felt.mesh, felt.rubbed.driver, felt.rubbed.driven
+    load = free * (force - pull) + (1.0 - free) * f + pull2
+    across = p.factor * f + felt.rubbed.along
+    acceleration = Coordinates(
+        u1=p.inverse_u1 * (p.rigid * felt.drive + felt.shaft - f - pull),
+        y1=p.inverse_y1 * (-across - p.damping1 * v.y1 - spring(q.y1, p.stiffness1, p.exponent1, p.reference1)),
+        y2=p.inverse_y2 * (across - p.damping2 * v.y2 - spring(q.y2, p.stiffness2, p.exponent2, p.reference2)),
+        u2=p.inverse_u2 * (f + pull2 - load),
+        w=p.inverse_w * (felt.drive - felt.shaft),
+    )
+    return Answer(acceleration, (), f, load, felt.drive)
+
+
+@compiled(fastmath=ROUNDING)
+def _structured(
+    q: Coordinates, v: Coordinates, e: Further, r: Further, felt: Felt, force: float, mean: float, p: Constants,
+    s: Structure,
+) -> Answer:  # fmt: skip
+    """The answer of a rig with structure; e, r: its further coordinates and their rates."""
+    f, rubbed = felt.mesh, felt.rubbed
+    twist = s.load_stiffness * (q.u2 - e.load) + s.load_damping * (v.u2 - r.load)
+    reaction = twist + s.rigid_load * (f + rubbed.driven)
+    load = s.held * reaction + s.follow * force + s.constant * mean + s.balance * (rubbed.driven - rubbed.driver)
+    along, across = p.factor * f + rubbed.along, s.slide * f - rubbed.across
+    y1, y2 = q.y1 - e.housing, q.y2 - e.housing
+    one = p.damping1 * (v.y1 - r.housing) + spring(y1, p.stiffness1, p.exponent1, p.reference1) + s.coupling1 * e.x1
+    two = p.damping2 * (v.y2 - r.housing) + spring(y2, p.stiffness2, p.exponent2, p.reference2) + s.coupling2 * e.x2
+    acceleration = Coordinates(
+        u1=p.inverse_u1 * (p.rigid * felt.drive + felt.shaft - f - rubbed.driver),
+        y1=p.inverse_y1 * (-along - one),
+        y2=p.inverse_y2 * (along - two),
+        u2=p.inverse_u2 * (f + rubbed.driven - twist - s.rigid_load * load),
+        w=p.inverse_w * (felt.drive - felt.shaft),
+    )
+    further = Further(
+        load=s.inverse_load * (twist - load),
+        housing=s.inverse_housing * (one + two - s.housing_damping * r.housing - s.housing_stiffness * e.housing),
+        x1=s.inverse_x1 * (-across - s.damping1 * r.x1 - s.stiffness1 * e.x1 - s.coupling1 * y1),
+        x2=s.inverse_x2 * (across - s.damping2 * r.x2 - s.stiffness2 * e.x2 - s.coupling2 * y2),
+    )
+    return Answer(acceleration, further, f, load, felt.shaft + p.rigid * (f + rubbed.driver))
+
+
+@compiled(fastmath=ROUNDING)
+def _answered(
+    q: Coordinates, v: Coordinates, e: Any, r: Any, felt: Felt, force: float, mean: float, p: Constants, s: Any,
+    free: float,
+) -> Answer:  # fmt: skip
+    """The answer to forces that are known."""
+    if len(e) == 0:
+        return _plain(q, v, felt, force, p, free)
+    return _structured(q, v, e, r, felt, force, mean, p, s)
+
+
+@compiled(fastmath=ROUNDING)
+def _rubbed(f: float, v: Coordinates, r: Any, position: float, p: Constants, rubbing: Rubbing | None) -> Rubbed:
+    """Friction [N] under the normal force f."""
+    if rubbing is not None and f > 0.0:  # without friction rubbing is None, known to the compiler
+        per = friction(v, r, position, rubbing, p.factor)
+        return Rubbed(f * per.driver, f * per.along, f * per.across, f * per.driven)
+    return Rubbed(0.0, 0.0, 0.0, 0.0)
+
+
+@compiled(fastmath=ROUNDING)
+def answer(q: Coordinates, v: Coordinates, e: Any, r: Any, at: Entry, force: float, of: Equations) -> Answer:
+    """Accelerations and forces at the coordinates q and e and their rates v and r, under T1/rb1 = force [N]."""
+    p, s = of.constants, of.structure
+    travel = _seen(q.u1 - q.u2 + p.factor * (q.y1 - q.y2), e, s)
+    f = mesh(travel, _seen(v.u1 - v.u2 + p.factor * (v.y1 - v.y2), r, s), at, of.secant, p)
+    felt = Felt(
+        mesh=f,
+        shaft=p.shaft_stiffness * (q.w - q.u1) + p.shaft_damping * (v.w - v.u1),
+        drive=force + at.ripple,
+        rubbed=_rubbed(f, v, r, at.position, p, of.rubbing),
+    )
+    return _answered(q, v, e, r, felt, force, of.mean, p, s, of.free)

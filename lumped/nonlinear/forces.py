@@ -1,0 +1,119 @@
+"""Forces of mesh, supports and friction at an instant, compiled."""
+
+from __future__ import annotations
+
+from math import copysign, sqrt, tanh
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.kernels.compiled import ROUNDING, compiled
+from gearbench.lumped.nonlinear.constants import Constants, Rubbing
+from gearbench.lumped.nonlinear.coordinates import Coordinates
+from gearbench.lumped.nonlinear.tables import Table
+
+Array = NDArray[np.float64]
+
+
+class Entry(NamedTuple):
+    """One entry of a `Table`."""
+
+    position: float
+    excess: float
+    excess_rate: float
+    gain: float
+    ripple: float
+    back: float
+
+
+class Rubbed(NamedTuple):
+    """Friction per normal force: against the driver's rotation, along and across the supports, and with the driven
+    rotation."""
+
+    driver: float
+    along: float
+    across: float
+    driven: float
+
+
+@compiled(fastmath=ROUNDING)
+def entry(table: Table, i: int) -> Entry:
+    """Entry i of the table."""
+    return Entry(
+        position=table.position[i],
+        excess=table.excess[i],
+        excess_rate=table.excess_rate[i],
+        gain=table.gain[i],
+        ripple=table.ripple[i],
+        back=table.back[i],
+    )
+
+
+@compiled(fastmath=ROUNDING)
+def _pressed(depth: float, rate: float, position: float, gain: float, secant: Array, p: Constants) -> float:
+    """Force [N] of flanks pressed by depth > 0 [m] and closing at rate [m/s]; never negative."""
+    last = secant.shape[1] - 1
+    row = int(position)
+    weight = position - row
+    root = p.root * sqrt(depth)
+    node = min(int(root), last - 1)
+    low = secant[row, node] + weight * (secant[row + 1, node] - secant[row, node])
+    high = secant[row, node + 1] + weight * (secant[row + 1, node + 1] - secant[row, node + 1])
+    rise = high - low
+    stiffness = low + (root - node) * rise
+    tangent = max(stiffness + 0.5 * root * rise, 0.0)
+    return max(gain * depth * stiffness + p.damping_factor * sqrt(gain * tangent) * rate, 0.0)
+
+
+@compiled(fastmath=ROUNDING)
+def mesh(travel: float, rate: float, at: Entry, secant: Array, p: Constants) -> float:
+    """Mesh force [N] at dte `travel` [m] and its rate [m/s]; negative on the back flanks."""
+    depth = travel + at.excess
+    if depth > 0.0:
+        return _pressed(depth, rate + at.excess_rate, at.position, at.gain, secant, p)
+    depth = at.back - travel - p.backlash
+    if depth > 0.0:
+        rows = secant.shape[0] - 1
+        position = p.mirror - at.position
+        if position < 0.0:
+            position += rows
+        return -_pressed(depth, -rate, min(position, rows * (1.0 - 1e-16)), at.gain, secant, p)
+    return 0.0
+
+
+@compiled(fastmath=ROUNDING)
+def spring(y: float, stiffness: float, exponent: float, reference: float) -> float:
+    """Force [N] of a support."""
+    if exponent == 0.0:
+        return stiffness * y
+    return stiffness * reference * copysign((abs(y) / reference) ** (1.0 + exponent), y)
+
+
+@compiled(fastmath=ROUNDING)
+def _aside(sliding: float, r: Any, factor: float) -> float:
+    """Sliding velocity with that of the centres across their supports."""
+    if len(r) == 0:
+        return sliding
+    return sliding - factor * (r.x1 - r.x2)
+
+
+@compiled(fastmath=ROUNDING)
+def friction(v: Coordinates, further: Any, position: float, r: Rubbing, factor: float) -> Rubbed:
+    """What friction does per normal force, at the rates v and `further`; factor: g."""
+    row = int(position)
+    weight = position - row
+    cycle = position / (r.share.shape[0] - 1)
+    # The sliding velocity is linear in the distance from the pitch point.
+    middle = _aside(r.centre1 * v.u1 - r.centre2 * v.u2 + r.slide * (v.y1 - v.y2), further, factor)
+    slope = r.drift + r.pitch1 * v.u1 + r.pitch2 * v.u2
+    m1, s, m2 = 0.0, 0.0, 0.0
+    for o in range(r.share.shape[1]):
+        part = r.share[row, o] + weight * (r.share[row + 1, o] - r.share[row, o])
+        if part != 0.0:
+            away = cycle - r.offset - o
+            part *= r.coefficient * tanh((middle + away * slope) * r.steepness)
+            m1 += part * (r.centre1 + away * r.pitch1)
+            s += part
+            m2 += part * (r.centre2 - away * r.pitch2)
+    return Rubbed(m1, s * r.slide, s * factor, m2)

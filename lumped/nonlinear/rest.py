@@ -1,0 +1,123 @@
+"""A rig at rest under a constant force, and its small vibrations about that."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.lumped.errors import LumpedError
+from gearbench.lumped.nonlinear.constants import Constants
+from gearbench.lumped.nonlinear.coordinates import COORDINATES, FURTHER
+from gearbench.lumped.nonlinear.law import MeshLaw
+from gearbench.lumped.nonlinear.structure import Structure
+from gearbench.rig import Support
+
+Array = NDArray[np.float64]
+
+BISECTIONS = 100
+
+
+def pressed_by(law: MeshLaw, force: float, gain: float, phase: float) -> float:
+    """Deflection [m] at which the mesh carries the force > 0 [N]."""
+    high = law.approach[-1]
+    while gain * float(law.evaluate(high, phase)[0]) < force:
+        high *= 2
+    low = 0.0
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if gain * float(law.evaluate(middle, phase)[0]) < force else (low, middle)
+    return float(high)
+
+
+def centre_at_rest(support: Support, push: float, aside: float) -> tuple[float, float]:
+    """Deflection along and across [m] of a support under a force along `push` and across `aside` [N].
+
+    Raises LumpedError where a softening support gives way under its cross-coupling.
+    """
+    across, stiffness = support.across, support.stiffness
+    if stiffness is None:  # rigid
+        return 0.0, 0.0
+    if across is None:
+        return _along(support, stiffness, push), 0.0
+    # x follows from the balance across; what is left along is the support's own spring less k_c^2/k_x.
+    softer = across.coupling**2 / across.stiffness
+    left = push - across.coupling * aside / across.stiffness
+    if support.exponent:
+        y = _along_less(support, stiffness, left, softer)
+    else:
+        y = left / (stiffness - softer)
+    return y, (aside - across.coupling * y) / across.stiffness
+
+
+def _along(support: Support, stiffness: float, push: float) -> float:
+    deflection = push / stiffness
+    if support.exponent:  # a linear support does not depend on its reference, not even in rounding
+        reference = support.reference_deflection
+        size = abs(deflection) / reference
+        deflection = float(np.sign(push)) * reference * size ** (1 / (1 + support.exponent))
+    return deflection
+
+
+def _along_less(support: Support, stiffness: float, push: float, softer: float) -> float:
+    """Deflection under `push` of the support beside a spring of stiffness -softer [N/m], by bisection."""
+
+    def short(y: float) -> bool:
+        own = stiffness * y * (y / support.reference_deflection) ** support.exponent
+        return own - softer * y < abs(push)
+
+    high = abs(_along(support, stiffness, push))
+    for _ in range(BISECTIONS):
+        if not short(high):
+            break
+        high *= 2
+    else:
+        raise LumpedError(
+            f"a support with exponent = {support.exponent:g} gives way under its across.coupling_n_per_m: nothing holds"
+            f" {abs(push):.4g} N"
+        )
+    low = 0.0
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if short(middle) else (low, middle)
+    return float(np.sign(push)) * high
+
+
+def inverse_masses(c: Constants, s: Structure | None) -> Array:
+    """Inverse masses [1/kg] of all coordinates, 0 for those that do not move; (5,) or (9,)."""
+    plain = [c.inverse_u1, c.inverse_y1, c.inverse_y2, c.inverse_u2, c.inverse_w]
+    return np.array(plain if s is None else [*plain, s.inverse_load, s.inverse_housing, s.inverse_x1, s.inverse_x2])
+
+
+def mesh_direction(c: Constants, s: Structure | None) -> Array:
+    """What each coordinate contributes to the DTE; (5,) or (9,)."""
+    plain = [1.0, c.factor, -c.factor, -1.0, 0.0]
+    return np.array(plain if s is None else [*plain, 0.0, 0.0, s.slide, -s.slide])
+
+
+def springs_and_dampers(c: Constants, s: Structure | None, tangents: tuple[float, float]) -> tuple[Array, Array]:
+    """Stiffness [N/m] and damping [N s/m] of all but the mesh, (n, n); tangents: of both supports along [N/m]."""
+    size = COORDINATES if s is None else COORDINATES + FURTHER
+    one = np.eye(size)
+    u1, y1, y2, u2, w = one[:COORDINATES]
+    shaft = u1 - w
+    springs, dampers = c.shaft_stiffness * np.outer(shaft, shaft), c.shaft_damping * np.outer(shaft, shaft)
+    if s is None:
+        for row, k, d in ((1, tangents[0], c.damping1), (2, tangents[1], c.damping2)):
+            springs[row, row] += k
+            dampers[row, row] += d
+        return springs, dampers
+    load, housing, x1, x2 = one[COORDINATES:]
+    pairs = (
+        (u2 - load, s.load_stiffness, s.load_damping),
+        (housing, s.housing_stiffness, s.housing_damping),
+        (y1 - housing, tangents[0], c.damping1),
+        (y2 - housing, tangents[1], c.damping2),
+        (x1, s.stiffness1, s.damping1),
+        (x2, s.stiffness2, s.damping2),
+    )
+    for seen, k, d in pairs:
+        springs += k * np.outer(seen, seen)
+        dampers += d * np.outer(seen, seen)
+    for along, across, k in ((y1 - housing, x1, s.coupling1), (y2 - housing, x2, s.coupling2)):
+        springs += k * (np.outer(along, across) + np.outer(across, along))
+    return springs, dampers

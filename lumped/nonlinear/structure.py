@@ -1,0 +1,98 @@
+"""What holds the gears of a real rig, as the integrator needs it: a shaft behind the driven gear, a housing behind the
+supports, supports across, and other boundaries than those of the plain model.
+
+    M_l o''  = S_l (u2 - o) + D_l (u2' - o') - T2/rb2       the driven gear then feels S_l (o - u2) + D_l (o' - u2')
+    m_h h''  = P_1 + P_2 - c_h h' - k_h h
+    m_i x_i'' = -+ (sin(a) f - mu f s cos(a)) - c_xi x_i' - k_xi x_i - k_ci (y_i - h)         - driver, + driven gear
+    P_i      = c_i (y_i' - h') + k_i (y_i - h) |(y_i - h)/y_ref|^e + k_ci x_i                what the supports pull with
+
+a is the angle from the supports' direction to the line of action: the working pressure angle where they are tangential,
+else 0. To the deflection of the mesh x adds sin(a) (x1 - x2), and to the sliding velocity -cos(a) (x1' - x2').
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from gearbench.rig import Rig
+
+
+class Structure(NamedTuple):
+    """Numbers that the integrator needs beyond `Constants`. Inverse masses [1/kg] are 0 for what does not move."""
+
+    load_stiffness: float  # S_l [N/m]
+    load_damping: float  # D_l [N s/m]
+    inverse_load: float
+    rigid_load: float  # 1: the load acts on the gear, 0: behind the shaft
+    held: float  # 1: the load's speed is prescribed and its torque a reaction
+    follow: float  # part of the driver's torque that the load balances at any time
+    constant: float  # part of the mean torque that it balances
+    balance: float  # part of the friction that it makes up for
+    housing_stiffness: float
+    housing_damping: float
+    inverse_housing: float
+    slide: float  # sin(a)
+    inverse_x1: float
+    inverse_x2: float
+    stiffness1: float  # k_x [N/m]
+    stiffness2: float
+    damping1: float  # c_x [N s/m]
+    damping2: float
+    coupling1: float  # k_c [N/m]
+    coupling2: float
+
+
+def elastic_load(rig: Rig) -> bool:
+    """Whether the load's shaft twists."""
+    return rig.load.coupling is not None and rig.load.coupling.stiffness is not None
+
+
+def driven_turns(rig: Rig) -> bool:
+    """Whether the driven gear is free to depart from its steady rotation."""
+    return rig.load.boundary != "speed" or elastic_load(rig)
+
+
+def both_free(rig: Rig) -> bool:
+    """Whether nothing holds the rotation of both gears together."""
+    return "speed" not in (rig.drive.boundary, rig.load.boundary)
+
+
+def has_structure(rig: Rig) -> bool:
+    """Whether a rig needs the further coordinates or boundaries."""
+    across = rig.support.driver.across or rig.support.driven.across
+    other = rig.load.boundary == "inertia" or rig.drive.boundary == "speed"
+    return bool(across) or rig.housing is not None or elastic_load(rig) or other
+
+
+def structure_of(
+    rig: Rig, masses: tuple[float, float], outer: float, base_radius: float, slide: float
+) -> Structure | None:
+    """The structure of a rig, None where it has none. masses (m_1, m_2) of the gears and `outer` M_l [kg]; base_radius
+    of the driven gear [m]; slide: sin(a)."""
+    if not has_structure(rig):
+        return None
+    shaft, housing, square = rig.load.coupling, rig.housing, base_radius**2
+    elastic = shaft is not None and shaft.stiffness is not None
+    one, two = rig.support.driver.across, rig.support.driven.across
+    return Structure(
+        load_stiffness=shaft.stiffness / square if shaft is not None and shaft.stiffness is not None else 0.0,
+        load_damping=shaft.damping / square if shaft is not None else 0.0,
+        inverse_load=1.0 / outer if elastic and rig.load.boundary != "speed" else 0.0,
+        rigid_load=0.0 if elastic else 1.0,
+        held=1.0 if rig.load.boundary == "speed" else 0.0,
+        follow=1.0 if rig.load.boundary == "torque" and both_free(rig) else 0.0,
+        constant=1.0 if rig.load.boundary == "inertia" or rig.drive.boundary == "speed" else 0.0,
+        balance=1.0 if both_free(rig) else 0.0,
+        housing_stiffness=housing.stiffness if housing is not None else 0.0,
+        housing_damping=housing.damping if housing is not None else 0.0,
+        inverse_housing=1.0 / housing.mass if housing is not None else 0.0,
+        slide=slide,
+        inverse_x1=1.0 / masses[0] if one is not None else 0.0,
+        inverse_x2=1.0 / masses[1] if two is not None else 0.0,
+        stiffness1=one.stiffness if one is not None else 0.0,
+        stiffness2=two.stiffness if two is not None else 0.0,
+        damping1=one.damping if one is not None else 0.0,
+        damping2=two.damping if two is not None else 0.0,
+        coupling1=one.coupling if one is not None else 0.0,
+        coupling2=two.coupling if two is not None else 0.0,
+    )
