@@ -2,7 +2,8 @@
 
 `gear`: plane elasticity of a tooth sector, the ring of sectors, condensation. `contact`: kinematics of real flanks,
 flank kernels, contact lines, the contact law of a pair, statics with hub centres held. `motion`: equations of motion of
-the reduced rig and their time integration. `stress`: fields inside loaded gears, root stress. Loads Numba.
+the reduced rig and their time integration. `full`: the same with every unknown of both gears. `stress`:
+fields inside loaded gears, root stress. Loads Numba.
 """
 
 from gearbench.fem.contact.law import Law, elastic_pair, make_law

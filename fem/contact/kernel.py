@@ -104,7 +104,7 @@ def make_kernel(gear: CondensedGear, order: int = 1) -> Kernel:
     )
 
 
-@compiled
+@compiled(forceinline=True)
 def grid_position(kernel: Kernel, s: float) -> float:
     """Position of arc length s on the grid, in grid steps, clipped to the grid."""
     if s > kernel.s_end:
@@ -113,7 +113,7 @@ def grid_position(kernel: Kernel, s: float) -> float:
     return ARC_POINTS + min(zeta / kernel.zeta_max, 1.0) * (FLANK_POINTS - 1)
 
 
-@compiled
+@compiled(forceinline=True)
 def lagrange(t: float):
     """Cubic Lagrange weights at t for nodes 0, 1, 2, 3."""
     return (
@@ -124,7 +124,7 @@ def lagrange(t: float):
     )
 
 
-@compiled
+@compiled(forceinline=True)
 def first_node(x: float) -> int:
     """First of the four nodes of the piece that holds grid position x."""
     if x < ARC_POINTS:
@@ -132,16 +132,45 @@ def first_node(x: float) -> int:
     return min(max(int(x) - 1, ARC_POINTS), POINTS - 4)
 
 
+class Place(NamedTuple):
+    """Where a value is read from a grid: the first of four nodes and their cubic weights."""
+
+    node: int
+    w0: float
+    w1: float
+    w2: float
+    w3: float
+
+
+@compiled(forceinline=True)
+def place_at(x: float) -> Place:
+    """Place of grid position x."""
+    node = first_node(x)
+    w0, w1, w2, w3 = lagrange(x - node)
+    return Place(node, w0, w1, w2, w3)
+
+
+@compiled(forceinline=True)
+def row_between(table: Array, n: int, at: Place) -> float:
+    """Cubic value along row n of a table (n, n)."""
+    j = at.node
+    return at.w0 * table[n, j] + at.w1 * table[n, j + 1] + at.w2 * table[n, j + 2] + at.w3 * table[n, j + 3]
+
+
+@compiled(forceinline=True)
+def table_between(table: Array, one: Place, two: Place) -> float:
+    """Bicubic value of a (n, n) table."""
+    i = one.node
+    total = one.w0 * row_between(table, i, two)
+    total += one.w1 * row_between(table, i + 1, two)
+    total += one.w2 * row_between(table, i + 2, two)
+    return total + one.w3 * row_between(table, i + 3, two)
+
+
 @compiled
 def table_at(table: Array, x: float, y: float) -> float:
     """Bicubic value of a (n, n) table at grid positions x, y."""
-    i, j = first_node(x), first_node(y)
-    b0, b1, b2, b3 = lagrange(y - j)
-    total = 0.0
-    for p, a in enumerate(lagrange(x - i)):
-        n = i + p
-        total += a * (b0 * table[n, j] + b1 * table[n, j + 1] + b2 * table[n, j + 2] + b3 * table[n, j + 3])
-    return total
+    return table_between(table, place_at(x), place_at(y))
 
 
 @compiled
@@ -152,10 +181,9 @@ def row_at(row: Array, x: float) -> float:
     return b0 * row[j] + b1 * row[j + 1] + b2 * row[j + 2] + b3 * row[j + 3]
 
 
-@compiled
-def cross_flexibility(kernel: Kernel, side_load: int, x_load: float, side: int, x: float, teeth_apart: int) -> float:
-    """Inward displacement at grid position x of one flank per total force at x_load on another, `teeth_apart` teeth
-    ccw [m/N].
+@compiled(forceinline=True)
+def cross_between(kernel: Kernel, side_load: int, load: Place, side: int, at: Place, teeth_apart: int) -> float:
+    """Inward displacement at a place of one flank per total force at another, `teeth_apart` teeth ccw [m/N].
 
     Only for different flanks; a back-flank load is the mirror image of a working-flank one.
     """
@@ -163,14 +191,20 @@ def cross_flexibility(kernel: Kernel, side_load: int, x_load: float, side: int, 
     if m < -kernel.reach or m > kernel.reach:
         return 0.0
     if side == side_load:
-        return table_at(kernel.front[m + kernel.reach], x_load, x)
-    return table_at(kernel.back[m + kernel.reach], x_load, x)
+        return table_between(kernel.front[m + kernel.reach], load, at)
+    return table_between(kernel.back[m + kernel.reach], load, at)
 
 
 @compiled
-def crack_flexibility(kernel: Kernel, side_load: int, load: int, x_load: float, side: int, tooth: int, x: float):
-    """What a crack adds to the inward displacement at grid position x of one flank per total force at x_load on
-    another, or on the same one [m/N]; teeth `load` and `tooth` by their numbers counter-clockwise."""
+def cross_flexibility(kernel: Kernel, side_load: int, x_load: float, side: int, x: float, teeth_apart: int) -> float:
+    """`cross_between` grid positions."""
+    return cross_between(kernel, side_load, place_at(x_load), side, place_at(x), teeth_apart)
+
+
+@compiled(forceinline=True)
+def crack_between(kernel: Kernel, side_load: int, load: int, at_load: Place, side: int, tooth: int, at: Place):
+    """What a crack adds to the inward displacement at a place of one flank per total force at one of another, or of the
+    same [m/N]; teeth `load` and `tooth` by their numbers counter-clockwise."""
     reach = len(kernel.extra) // 2
     teeth = kernel.modes_front.shape[1]
     # Teeth from the cracked one, to whichever side is nearer.
@@ -178,4 +212,10 @@ def crack_flexibility(kernel: Kernel, side_load: int, load: int, x_load: float, 
     b = (tooth - kernel.cracked + teeth // 2) % teeth - teeth // 2
     if kernel.cracked < 0 or abs(a) > reach or abs(b) > reach:
         return 0.0
-    return table_at(kernel.extra[a + reach, b + reach, side_load, side], x_load, x)
+    return table_between(kernel.extra[a + reach, b + reach, side_load, side], at_load, at)
+
+
+@compiled
+def crack_flexibility(kernel: Kernel, side_load: int, load: int, x_load: float, side: int, tooth: int, x: float):
+    """`crack_between` grid positions."""
+    return crack_between(kernel, side_load, load, place_at(x_load), side, tooth, place_at(x))

@@ -64,6 +64,21 @@ class Contact(NamedTuple):
     ny: float
 
 
+class Facing(NamedTuple):
+    """One flank side of a pair whose centres stand dx, dy [m] apart, in the world in which its flanks look like working
+    ones (the back flanks' is turned over): line of centres' direction, pressure angle, tangent angle of the flanks'
+    normal on the line of action and that normal, and the length of that line between the base circles [m]."""
+
+    dx: float
+    dy: float
+    bearing: float
+    alpha: float
+    phi: float
+    nx: float
+    ny: float
+    line: float
+
+
 class EdgeContact(NamedTuple):
     """The slave's tip edge at the master's involute: gap [m], tangent angle of the master's normal, roll length of the
     master's foot [m], lever on the slave [m], and the angle that the contact has moved along the edge arc (negative:
@@ -176,21 +191,30 @@ def corner_contact(
     return CornerContact(gap, phi, foot, at, wx * ny - wy * nx, vx * ny - vy * nx)
 
 
-@compiled
+@compiled(forceinline=True)
 def on_edge(tooth: Tooth, moved: float) -> float:
     """Arc length [m] of the tip edge's point by whose angle `moved` the contact has moved along it."""
     return min(tooth.s_end + tooth.edge_radius * min(max(moved, 0.0), 1.5), tooth.s_tip)
 
 
-@compiled
-def contact(t1: Tooth, t2: Tooth, c1: float, c2: float, dx: float, dy: float) -> Contact:
-    """Contact of one pair: c1, c2 are the teeth's angles in their frames; (dx, dy) from driver to driven centre."""
+@compiled(forceinline=True)
+def facing(t1: Tooth, t2: Tooth, dx: float, dy: float, side: int) -> Facing:
+    """What all contacts of a flank side (0: working, 1: back) share; (dx, dy) from driver to driven centre."""
     a = hypot(dx, dy)
     alpha = acos((t1.rb + t2.rb) / a)
-    phi = atan2(dy, dx) - alpha
-    rho1 = t1.rb * (t1.psi + c1 - phi)
-    rho2 = t2.rb * (t2.psi + c2 - phi)
-    gap = a * sin(alpha) - rho1 - rho2
+    up = dy if side == 0 else -dy
+    bearing = atan2(up, dx)
+    phi = bearing - alpha
+    return Facing(dx, up, bearing, alpha, phi, -sin(phi), cos(phi), a * sin(alpha))
+
+
+@compiled(forceinline=True)
+def contact(t1: Tooth, t2: Tooth, c1: float, c2: float, at: Facing) -> Contact:
+    """Contact of one pair: c1, c2 are the teeth's angles in their frames, in the world of `at`."""
+    dx, dy = at.dx, at.dy
+    rho1 = t1.rb * (t1.psi + c1 - at.phi)
+    rho2 = t2.rb * (t2.psi + c2 - at.phi)
+    gap = at.line - rho1 - rho2
     over1, over2 = rho1 - t1.rho_end, rho2 - t2.rho_end
     before = False  # a tip edge that has not yet passed the mate's corner still faces the flank beyond it
     if rho1 < t1.corner:
@@ -210,7 +234,7 @@ def contact(t1: Tooth, t2: Tooth, c1: float, c2: float, dx: float, dy: float) ->
         xi1, xi2 = max(rho1 + shift, t1.corner), max(rho2 + shift, t2.corner)
         s1 = xi1 * xi1 / (2 * t1.rb)
         s2 = xi2 * xi2 / (2 * t2.rb)
-        return Contact(gap, ON_LINE, xi1, xi2, s1, s2, t1.rb, t2.rb, -sin(phi), cos(phi))
+        return Contact(gap, ON_LINE, xi1, xi2, s1, s2, t1.rb, t2.rb, at.nx, at.ny)
     if over2 >= over1:
         e = edge_contact(t2, t1, c2, c1, dx, dy)
         foot, s2 = max(e.foot, 0.0), on_edge(t2, e.moved)
@@ -222,6 +246,17 @@ def contact(t1: Tooth, t2: Tooth, c1: float, c2: float, dx: float, dy: float) ->
     return Contact(e.gap, EDGE1, xi1, foot, s1, s2, e.lever, t2.rb, nx, ny)
 
 
+@compiled(forceinline=True)
+def seen_contact(t1: Tooth, t2: Tooth, side: int, tooth: int, theta1: float, theta2: float, at: Facing) -> Contact:
+    """`pair_contact` where what its flank side shares is known."""
+    c1 = theta1 + t1.zero - tooth * t1.pitch
+    if side == 0:
+        return contact(t1, t2, c1, t2.zero - theta2 + tooth * t2.pitch, at)
+    c2 = t2.zero - theta2 + (tooth + 1) * t2.pitch
+    k = contact(t1, t2, -c1, -c2, at)
+    return Contact(k.gap, k.slave, k.xi1, k.xi2, k.s1, k.s2, k.lever1, k.lever2, k.nx, -k.ny)
+
+
 @compiled
 def pair_contact(
     t1: Tooth, t2: Tooth, side: int, tooth: int, theta1: float, theta2: float, dx: float, dy: float
@@ -230,9 +265,4 @@ def pair_contact(
 
     The partner is the driven tooth of the same number on the working side, of the next one on the back side.
     """
-    c1 = theta1 + t1.zero - tooth * t1.pitch
-    if side == 0:
-        return contact(t1, t2, c1, t2.zero - theta2 + tooth * t2.pitch, dx, dy)
-    c2 = t2.zero - theta2 + (tooth + 1) * t2.pitch
-    k = contact(t1, t2, -c1, -c2, dx, -dy)
-    return Contact(k.gap, k.slave, k.xi1, k.xi2, k.s1, k.s2, k.lever1, k.lever2, k.nx, -k.ny)
+    return seen_contact(t1, t2, side, tooth, theta1, theta2, facing(t1, t2, dx, dy, side))

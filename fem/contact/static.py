@@ -9,18 +9,9 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.fem.contact.law import (
-    PAIRS,
-    Flags,
-    Law,
-    Meetings,
-    coupling,
-    find_pairs,
-    newton_step,
-    off_flanks,
-    overlaps,
-    share_load,
-)
+from gearbench.fem.contact.coupling import coupling
+from gearbench.fem.contact.law import PAIRS, Law, Meetings, find_pairs, off_flanks, overlaps
+from gearbench.fem.contact.sharing import Flags, newton_step, share_load
 from gearbench.kernels.compiled import compiled
 
 Array = NDArray[np.float64]
@@ -86,7 +77,7 @@ def position(
     stiff = newton_step(lever, load.flexibility, load.active)
     tangent = 0.0
     for p in range(n):
-        tangent += lever[p] * stiff[p, 0]
+        tangent += lever[p] * stiff[p]
     return Equilibrium(pairs, load.force, load.active, t1, t2, tangent, load.flexibility, load.converged)
 
 

@@ -1,9 +1,9 @@
-"""The reduced rig: rigid hubs on supports, fixed-hub modes and the contact law, as one set of equations of motion.
+"""The reduced rig: rigid hubs and what holds them, fixed-hub modes and the contact law, as one set of equations.
 
-Unknowns d: driver rotation beyond its nominal angle [rad]; the driven gear's likewise where its speed is not
-prescribed; support motions of driver and driven gear [m]; modal coordinates of both gears [kg^1/2 m].
+Unknowns d: those of the hubs (`hubs.Unknowns`), then modal coordinates of both gears [kg^1/2 m].
 Coriolis and centrifugal terms of the elastic displacement (not of the hubs, which are kept in inertial coordinates)
 are left out: relative to the elastic forces they are of the order (speed of rotation / lowest modal frequency)^2.
+Friction acts on the hubs only: the flanks' displacement along their tangent is not followed.
 """
 
 from __future__ import annotations
@@ -14,9 +14,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.fem.contact.kernel import grid_position, row_at
+from gearbench.fem.contact.coupling import PLACE, Places, find_places
+from gearbench.fem.contact.kernel import Kernel
 from gearbench.fem.contact.law import Law, Meetings
 from gearbench.fem.gear.body import CondensedGear
+from gearbench.fem.motion.hubs import ABSENT, Springs, Unknowns, both_free, hubs_of
 from gearbench.geometry.pair.kinematics import Pair
 from gearbench.geometry.tooth.body import Body
 from gearbench.kernels.compiled import compiled
@@ -25,26 +27,81 @@ from gearbench.rig import Rig
 Array = NDArray[np.float64]
 
 
+class Rubbing(NamedTuple):
+    """Friction between the flanks: coefficient, and 1/v0 [s/m] of the sliding speed over which it turns round."""
+
+    coefficient: float
+    steepness: float
+
+
+class Waves(NamedTuple):
+    """Torque ripple (waves,): orders per driver revolution, amplitudes [N m], phases [rad]."""
+
+    order: Array
+    torque: Array
+    phase: Array
+
+
+class Correction(NamedTuple):
+    """What is common to all pairs: factor on the mesh force, its relative drift over `duration` [s] from time 0 on, its
+    series in mesh orders 1, 2, ...; excess of the working flanks [m], its mean and series."""
+
+    scale: float
+    drift: float
+    duration: float
+    stiffness_cos: Array
+    stiffness_sin: Array
+    error_mean: float
+    error_cos: Array
+    error_sin: Array
+
+
+class Balance(NamedTuple):
+    """The load's torque where its speed is not prescribed: parts of the driver's torque, of the mean one [N m], and of
+    what friction and contact off the line of action take from both rotations together, that it balances."""
+
+    follow: float
+    constant: float
+    mean: float
+    losses: float
+
+
 class Machine(NamedTuple):
     """Equations of motion of the reduced rig.
 
-    rotations: 1 where the driven speed is prescribed, 2 where both gears turn freely. axis_x, axis_y: direction of the
-    support motion. mass, damping, stiffness (d,): diagonals (the rest of the mass matrix is `hub_coupling`); hub1,
-    hub2 (modes, 3): coupling mass of modes and hub; speed1, speed2: nominal speeds [rad/s]; beta [s]:
-    stiffness-proportional damping.
+    The first `hubs` unknowns are those of the hubs, numbered by `at`, the others modes. rotations: 1 where the driven
+    gear turns at its prescribed speed, 2 where both turn freely. axis_x, axis_y: direction of the support motion; a
+    motion across it is along (axis_y, -axis_x). mass (d,): diagonal (the rest of the mass matrix is `hub_coupling`);
+    hub_damping, hub_stiffness (hubs, hubs), springs, held, driven_at, loaded_at: as in `Hubs`; drive_shaft, load_shaft:
+    stiffness and damping of shafts to a prescribed speed; squares (modes,): modal stiffnesses, with the damping beta
+    [s] times as large; hub1, hub2 (modes, 3): coupling mass of modes and hub; shapes1, shapes2 (2, teeth, n, modes): of
+    both flank sides, as in the contact law's kernels; speed1, speed2: nominal speeds [rad/s].
     """
 
     law: Law
     rotations: int
+    hubs: int
+    at: Unknowns
     axis_x: float
     axis_y: float
     mass: Array
-    damping: Array
-    stiffness: Array
+    hub_damping: Array
+    hub_stiffness: Array
+    springs: Springs
+    held: NDArray[np.bool_]
+    driven_at: int
+    loaded_at: int
+    drive_shaft: tuple[float, float]
+    load_shaft: tuple[float, float]
+    rubbing: Rubbing
+    ripple: Waves
+    correction: Correction
+    balance: Balance
+    squares: Array
     hub1: Array
     hub2: Array
-    omega1: Array
-    omega2: Array
+    shapes1: Array
+    shapes2: Array
     speed1: float
     speed2: float
     beta: float
@@ -57,41 +114,83 @@ def make_machine(
     gears: tuple[CondensedGear, CondensedGear],
     bodies: tuple[Body, Body],
     mesh_frequency: float,
+    mean_torque: float = 0.0,
+    duration: float = 1.0,
 ) -> Machine:
-    """The reduced model of a rig at a mesh frequency [Hz]; gears and bodies: driver first."""
+    """The reduced model of a rig at a mesh frequency [Hz]; gears and bodies: driver first. Where a constant torque is
+    imposed it is the mean one [N m]; stiffness drifts over the duration [s]."""
     driver, driven = gears
-    rotations = 1 if rig.load.boundary == "speed" else 2
-    n1, n2 = len(driver.omega), len(driven.omega)
-    size = rotations + 2 + n1 + n2
-    mass, damping, stiffness = (np.zeros(size) for _ in range(3))
-    mass[0] = bodies[0].inertia
-    if rotations == 2:
-        mass[1] = bodies[1].inertia
-    for i, support in enumerate((rig.support.driver, rig.support.driven)):
-        k = rotations + i
-        mass[k], damping[k], stiffness[k] = (bodies[i].mass, support.damping, support.stiffness)
-    modal = slice(rotations + 2, size)
+    hubs = hubs_of(rig, bodies)
     squares = np.concatenate([driver.omega, driven.omega]) ** 2
-    mass[modal] = 1.0
-    stiffness[modal] = squares
-    damping[modal] = rig.damping.beta * squares
     alpha = pair.working_pressure_angle if rig.support.direction == "line-of-action" else 0.0
+    friction, mesh, free = rig.friction, rig.mesh, both_free(rig)
+    series = (mesh.stiffness_cos, mesh.stiffness_sin, mesh.error_cos, mesh.error_sin)
+    one, two, three, four = (np.array(values, dtype=float) for values in series)
     return Machine(
         law=law,
-        rotations=rotations,
+        rotations=1 if hubs.unknowns.driven == ABSENT else 2,
+        hubs=len(hubs.mass),
+        at=hubs.unknowns,
         axis_x=sin(alpha),
         axis_y=cos(alpha),
-        mass=mass,
-        damping=damping,
-        stiffness=stiffness,
+        mass=np.concatenate([hubs.mass, np.ones(len(squares))]),
+        hub_damping=hubs.damping,
+        hub_stiffness=hubs.stiffness,
+        springs=hubs.springs,
+        held=hubs.held,
+        driven_at=hubs.driven_at,
+        loaded_at=hubs.loaded_at,
+        drive_shaft=hubs.drive_shaft,
+        load_shaft=hubs.load_shaft,
+        rubbing=Rubbing(friction.coefficient, 1.0 / friction.transition_speed),
+        ripple=_waves(rig),
+        correction=Correction(
+            mesh.stiffness_scale, mesh.stiffness_drift, duration, one, two, mesh.error_mean, three, four
+        ),
+        balance=Balance(
+            follow=1.0 if free and rig.load.boundary == "torque" else 0.0,
+            constant=1.0 if rig.load.boundary == "inertia" or rig.drive.boundary == "speed" else 0.0,
+            mean=mean_torque,
+            losses=1.0 if free else 0.0,
+        ),
+        squares=squares,
         hub1=driver.mode_hub,
         hub2=driven.mode_hub,
-        omega1=driver.omega,
-        omega2=driven.omega,
+        shapes1=_shapes(law.k1),
+        shapes2=_shapes(law.k2),
         speed1=2 * pi * mesh_frequency / driver.teeth,
         speed2=2 * pi * mesh_frequency / driven.teeth,
         beta=rig.damping.beta,
     )
+
+
+def _waves(rig: Rig) -> Waves:
+    ripple = rig.drive.ripple
+    if ripple is None or not any(ripple.amplitude):
+        return Waves(np.zeros(0), np.zeros(0), np.zeros(0))
+    return Waves(*(np.array(values, dtype=float) for values in (ripple.orders, ripple.amplitude, ripple.phase)))
+
+
+def _shapes(kernel: Kernel) -> Array:
+    """Modal displacements with those of all modes at a point side by side."""
+    return np.ascontiguousarray(np.moveaxis(np.stack([kernel.modes_front, kernel.modes_back]), 1, -1))
+
+
+def block_diagonal(hubs: Array, modes: Array) -> Array:
+    """Matrix (d, d) of a block of the hubs' unknowns and a diagonal of the modes."""
+    out = np.diag(np.concatenate([np.zeros(len(hubs)), modes]))
+    out[: len(hubs), : len(hubs)] = hubs
+    return out
+
+
+def stiffness_matrix(machine: Machine) -> Array:
+    """Stiffness (d, d) without contact."""
+    return block_diagonal(machine.hub_stiffness, machine.squares)
+
+
+def damping_matrix(machine: Machine) -> Array:
+    """Damping (d, d) without contact."""
+    return block_diagonal(machine.hub_damping, machine.beta * machine.squares)
 
 
 class Vector(NamedTuple):
@@ -101,108 +200,106 @@ class Vector(NamedTuple):
     y: float
 
 
-@compiled
+@compiled(forceinline=True)
 def seen_from(x: float, y: float, chi: float) -> Vector:
     """World direction in the frame of a gear turned by chi."""
     return Vector(x * cos(chi) + y * sin(chi), -x * sin(chi) + y * cos(chi))
 
 
-@compiled
-def hub_coupling(hub1: Array, hub2: Array, rotations: int, axis1: Vector, axis2: Vector) -> Array:
-    """Coupling mass of the hubs' unknowns and the modes, (hub unknowns, modes), the supports' direction being axis1
-    (axis2) in the frame of the driver (driven gear): the modes turn with their gear, the supports do not."""
-    n1, n2 = len(hub1), len(hub2)
-    out = np.zeros((rotations + 2, n1 + n2))
-    for k in range(n1):
-        out[0, k] = hub1[k, 2]
-        out[rotations, k] = hub1[k, 0] * axis1.x + hub1[k, 1] * axis1.y
-    for k in range(n2):
-        if rotations == 2:
-            out[1, n1 + k] = -hub2[k, 2]
-        out[rotations + 1, n1 + k] = hub2[k, 0] * axis2.x + hub2[k, 1] * axis2.y
-    return out
-
-
-@compiled
-def support_axes(machine: Machine, theta1: float, theta2: float) -> tuple[Vector, Vector]:
-    """The supports' direction in the frames of driver and driven gear."""
+@compiled(forceinline=True)
+def write_hub_coupling(machine: Machine, theta1: float, theta2: float, out: Array) -> None:
+    """`hub_coupling` into `out`, whose other rows stay as they are."""
+    at, hub1, hub2 = machine.at, machine.hub1, machine.hub2
     x, y = machine.axis_x, machine.axis_y
     chi1, chi2 = theta1 + machine.law.driver.zero, machine.law.driven.zero - theta2 + pi
-    return seen_from(x, y, chi1), seen_from(x, y, chi2)
+    n1, n2 = len(hub1), len(hub2)
+    axis1, axis2 = seen_from(x, y, chi1), seen_from(x, y, chi2)
+    for k in range(n1):
+        out[at.driver, k] = hub1[k, 2]
+        out[at.y1, k] = hub1[k, 0] * axis1.x + hub1[k, 1] * axis1.y
+    for k in range(n2):
+        if at.driven >= 0:
+            out[at.driven, n1 + k] = -hub2[k, 2]
+        out[at.y2, n1 + k] = hub2[k, 0] * axis2.x + hub2[k, 1] * axis2.y
+    if at.x1 >= 0:
+        # Across the supports: their direction, turned clockwise.
+        for k in range(n1):
+            out[at.x1, k] = hub1[k, 0] * axis1.y - hub1[k, 1] * axis1.x
+        for k in range(n2):
+            out[at.x2, n1 + k] = hub2[k, 0] * axis2.y - hub2[k, 1] * axis2.x
+
+
+def hub_coupling(machine: Machine, theta1: float, theta2: float) -> Array:
+    """Coupling mass of the hubs' unknowns and the modes, (hubs, modes), at given gear angles: the modes turn with their
+    gear, the supports do not."""
+    out = np.zeros((machine.hubs, len(machine.squares)))
+    write_hub_coupling(machine, theta1, theta2, out)
+    return out
 
 
 def mass_matrix(machine: Machine, theta1: float, theta2: float) -> Array:
     """Mass matrix (d, d) at given gear angles."""
-    out = np.diag(machine.mass)
-    first = machine.rotations + 2
-    axis1, axis2 = support_axes(machine, theta1, theta2)
-    out[:first, first:] = hub_coupling(machine.hub1, machine.hub2, machine.rotations, axis1, axis2)
+    out, first = np.diag(machine.mass), machine.hubs
+    out[:first, first:] = hub_coupling(machine, theta1, theta2)
     out[first:, :first] = out[:first, first:].T
     return out
 
 
-@compiled
+@compiled(forceinline=True)
 def angles(machine: Machine, d: Array, t: float) -> tuple[float, float]:
     """Angles of driver and driven gear [rad] at time t."""
     theta1 = machine.speed1 * t + d[0]
     theta2 = machine.speed2 * t
-    return theta1, theta2 + d[1] if machine.rotations == 2 else theta2
+    return theta1, theta2 + d[machine.at.driven] if machine.at.driven >= 0 else theta2
 
 
-@compiled
+@compiled(forceinline=True)
+def centres(machine: Machine, d: Array) -> Vector:
+    """From the driver's centre to that of the driven gear [m]."""
+    at = machine.at
+    y, x = d[at.y2] - d[at.y1], d[at.x2] - d[at.x1] if at.x1 >= 0 else 0.0
+    return Vector(
+        machine.law.centre + machine.axis_x * y + machine.axis_y * x, machine.axis_y * y - machine.axis_x * x
+    )
+
+
+@compiled(forceinline=True)
+def write_rows(machine: Machine, pairs: Meetings, n: int, places: Places, rows: Array) -> None:
+    """`contact_rows` of the first n pairs into `rows`, whose other columns stay zero."""
+    hub, hubs, n1, n2 = machine.at, machine.hubs, len(machine.hub1), len(machine.hub2)
+    shapes1, shapes2 = machine.shapes1, machine.shapes2
+    z1, z2 = shapes1.shape[1], shapes2.shape[1]
+    for p in range(n):
+        k, at = pairs[p], places[p]
+        sign = 1.0 - 2.0 * k.side
+        rows[p, hub.driver] = -sign * k.lever1
+        if hub.driven >= 0:
+            rows[p, hub.driven] = sign * k.lever2
+        along = k.nx * machine.axis_x + k.ny * machine.axis_y
+        rows[p, hub.y1], rows[p, hub.y2] = -along, along
+        if hub.x1 >= 0:
+            across = k.nx * machine.axis_y - k.ny * machine.axis_x
+            rows[p, hub.x1], rows[p, hub.x2] = -across, across
+        one, i = shapes1[k.side, (-k.tooth) % z1], at.node1
+        for q in range(n1):
+            value = at.w01 * one[i, q] + at.w11 * one[i + 1, q]
+            rows[p, hubs + q] = value + at.w21 * one[i + 2, q] + at.w31 * one[i + 3, q]
+        two, i = shapes2[k.side, (k.tooth + k.side) % z2], at.node2
+        for q in range(n2):
+            value = at.w02 * two[i, q] + at.w12 * two[i + 1, q]
+            rows[p, hubs + n1 + q] = value + at.w22 * two[i + 2, q] + at.w32 * two[i + 3, q]
+
+
 def contact_rows(machine: Machine, pairs: Meetings) -> Array:
     """Derivative of every pair's gap by the unknowns, which is also the direction of its force; (n, d)."""
-    r = machine.rotations
-    n1, n2 = len(machine.omega1), len(machine.omega2)
-    k1, k2 = machine.law.k1, machine.law.k2
-    z1 = k1.modes_front.shape[1]
-    z2 = k2.modes_front.shape[1]
-    rows = np.zeros((len(pairs), r + 2 + n1 + n2))
-    for p in range(len(pairs)):
-        k = pairs[p]
-        sign = 1.0 - 2.0 * k.side
-        rows[p, 0] = -sign * k.lever1
-        if r == 2:
-            rows[p, 1] = sign * k.lever2
-        along = k.nx * machine.axis_x + k.ny * machine.axis_y
-        rows[p, r] = -along
-        rows[p, r + 1] = along
-        x1 = grid_position(k1, k.s1)
-        x2 = grid_position(k2, k.s2)
-        tooth1 = (-k.tooth) % z1
-        tooth2 = (k.tooth + k.side) % z2
-        for q in range(n1):
-            table = k1.modes_front if k.side == 0 else k1.modes_back
-            rows[p, r + 2 + q] = row_at(table[q, tooth1], x1)
-        for q in range(n2):
-            table = k2.modes_front if k.side == 0 else k2.modes_back
-            rows[p, r + 2 + n1 + q] = row_at(table[q, tooth2], x2)
+    rows, places = np.zeros((len(pairs), len(machine.mass))), np.zeros(len(pairs), PLACE)
+    find_places(machine.law, pairs, len(pairs), places)
+    write_rows(machine, pairs, len(pairs), places, rows)
     return rows
 
 
-@compiled
-def modal_flexibility(rows: Array, stiffness: Array, first: int) -> Array:
-    """Static flexibility of the kept modes (unknowns from `first` on) between the pairs [m/N], which the residual must
-    not count again."""
-    n = rows.shape[0]
-    out = np.zeros((n, n))
-    for k in range(first, rows.shape[1]):
-        for p in range(n):
-            for q in range(n):
-                out[p, q] += rows[p, k] * rows[q, k] / stiffness[k]
-    return out
-
-
-@compiled
-def reaction(hub: Array, pairs: Meetings, force: Array, acceleration: Array) -> float:
-    """Moment [N m] that holds the driven gear against its rotation where its speed is prescribed.
-
-    hub (modes, 3): coupling mass of the driven gear's modes, the last of the accelerations.
-    """
-    total = 0.0
-    for p in range(len(pairs)):
-        total += (1.0 - 2.0 * pairs[p].side) * pairs[p].lever2 * force[p]
-    first = len(acceleration) - len(hub)
-    for k in range(len(hub)):
-        total += hub[k, 2] * acceleration[first + k]
-    return total
+def modal_flexibility(machine: Machine, rows: Array) -> Array:
+    """Static flexibility of the kept modes between the pairs of `rows` [m/N], (n, n), which the residual must not count
+    again."""
+    modes = rows[:, machine.hubs :]
+    return np.asarray((modes / machine.squares) @ modes.T)

@@ -1,8 +1,4 @@
-"""Time integration of the reduced rig: generalised-alpha for the linear part, implicit contact with a damped residual.
-
-Chung and Hulbert (1993), eqs. 9-17. The flanks carry no mass: their residual flexibility obeys
-u + beta u' = R(F), integrated by the second-order backward difference, so contact does not chatter.
-"""
+"""Time integration of the reduced rig: from static equilibrium on, step by step, samples taken on the way."""
 
 from __future__ import annotations
 
@@ -11,29 +7,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.fem.contact.curve import lone_approach
-from gearbench.fem.contact.law import (
-    PAIRS,
-    Meetings,
-    contact_in,
-    coupling,
-    find_pairs,
-    off_flanks,
-    overlaps,
-    share_load,
-)
-from gearbench.fem.contact.static import MARGIN, ContactError, position, solve_torque
-from gearbench.fem.motion.machine import (
-    Machine,
-    angles,
-    contact_rows,
-    hub_coupling,
-    modal_flexibility,
-    reaction,
-    support_axes,
-)
-from gearbench.kernels.compiled import compiled
-from gearbench.kernels.small import arrow_factor, arrow_solve, arrow_times, plus, times
+from gearbench.fem.contact.law import off_flanks
+from gearbench.fem.motion.machine import Machine, angles, centres
+from gearbench.fem.motion.scheme import Scheme
+from gearbench.fem.motion.stage import Room, Stage, make_room, make_stage
+from gearbench.fem.motion.start import State
+from gearbench.fem.motion.step import Tried, try_step
+from gearbench.kernels.borrowed import borrowed
+from gearbench.kernels.compiled import INLINED, compiled
 
 Array = NDArray[np.float64]
 
@@ -45,67 +26,28 @@ class Samples(NamedTuple):
     angle_driven: Array
     y_driver: Array  # [m]
     y_driven: Array
+    x_driver: Array  # [m]; 0 where the centres do not move across their supports
+    x_driven: Array
+    torque_driver: Array  # that holds the driver at its speed [N m], where that is prescribed
     torque_driven: Array  # [N m]
     loaded: Array  # number of pairs that carry
+    divided: Array  # number of steps, of those that lead here, that had to be divided
 
 
 CHANNELS = len(Samples._fields)
+PARTS = 256  # into which a step is divided where contact is not found
 
 
-class Scheme(NamedTuple):
-    """Generalised-alpha parameters and step [s]."""
-
-    step: float
-    alpha_m: float
-    alpha_f: float
-    gamma: float
-    beta: float
-
-
-class State(NamedTuple):
-    """State of the integration at time `t` [s].
-
-    d, v, a, load (d,): unknowns, rates, accelerations and generalised forces; pairs (n,): tooth pairs near contact;
-    force [N], residual and older residual [m] (n,) of each.
-    """
+class Run(NamedTuple):
+    """Where an integration has come to, and how: time and last step [s], driver torque [N m], tooth pairs near contact;
+    the step at which contact was not found (-1: none) or, if off, left the modelled flanks."""
 
     t: float
-    d: Array
-    v: Array
-    a: Array
-    load: Array
-    pairs: Meetings
-    force: Array
-    residual: Array
-    older: Array
-
-
-class Prediction(NamedTuple):
-    """A step without new accelerations, arrays (d,): displacements and rates, the forces that the new accelerations
-    must balance, contact's new ones left out, and the diagonal of the effective mass that they act on."""
-
-    d: Array
-    v: Array
-    rest: Array
-    diagonal: Array
-
-
-class History(NamedTuple):
-    """Of pairs (n,): forces [N] and residuals [m] at the last step, and the residual [m] that they carry over."""
-
-    force: Array
-    residual: Array
-    memory: Array
-
-
-class Met(NamedTuple):
-    """Tooth pairs near contact: contact rows (n, d), overlaps (n,) [m] that rigid motion and modes leave, and residual
-    coupling (n, n) [m/N] of the flanks."""
-
-    pairs: Meetings
-    rows: Array
-    over: Array
-    cross: Array
+    lately: float
+    torque: float
+    pairs: int
+    failed: int
+    off: bool
 
 
 class Stepped(NamedTuple):
@@ -116,193 +58,52 @@ class Stepped(NamedTuple):
     converged: bool
 
 
-def make_scheme(step: float, spectral_radius: float) -> Scheme:
-    """Second-order generalised-alpha scheme with that spectral radius at infinite frequency."""
-    rho = spectral_radius
-    alpha_m, alpha_f = (2 * rho - 1) / (rho + 1), rho / (rho + 1)
-    return Scheme(step, alpha_m, alpha_f, 0.5 - alpha_m + alpha_f, 0.25 * (1 - alpha_m + alpha_f) ** 2)
+def staged(state: State) -> Stage:
+    """The stage of a state, to step from."""
+    stage, n = make_stage(len(state.d)), len(state.pairs)
+    stage.d[:], stage.v[:], stage.a[:], stage.load[:] = state.d, state.v, state.a, state.load
+    stage.pairs[:n], stage.force[:n], stage.before[:n] = state.pairs, state.force, state.before
+    stage.residual[:n], stage.older[:n] = state.residual, state.older
+    return stage
 
 
-def frequency_error(frequency: float, scheme: Scheme) -> float:
-    """Relative error of an undamped oscillator's frequency [Hz] under the scheme."""
-    w = 2 * np.pi * frequency
-    h = scheme.step
-    am, af, g, b = scheme.alpha_m, scheme.alpha_f, scheme.gamma, scheme.beta
-    # Unknowns d, v, a of the step; the equation of motion is taken between the old and the new state.
-    left = np.array([[1, 0, -b * h * h], [0, 1, -g * h], [(1 - af) * w * w, 0, 1 - am]])
-    right = np.array([[1, h, (0.5 - b) * h * h], [0, 1, (1 - g) * h], [-af * w * w, 0, -am]])
-    roots = np.linalg.eigvals(np.linalg.solve(left, right))
-    root = max(roots, key=lambda r: (abs(r.imag), abs(r)))
-    return abs(abs(np.angle(root)) / (w * h) - 1)
+def state_of(stage: Stage, run: Run) -> State:
+    """The state that a stage is at the end of a run."""
+    n = run.pairs
+    return State(
+        t=run.t,
+        d=stage.d.copy(),
+        v=stage.v.copy(),
+        a=stage.a.copy(),
+        load=stage.load.copy(),
+        pairs=stage.pairs[:n].copy(),
+        force=stage.force[:n].copy(),
+        before=stage.before[:n].copy(),
+        residual=stage.residual[:n].copy(),
+        older=stage.older[:n].copy(),
+        lately=run.lately,
+        torque=run.torque,
+    )
 
 
-def initial_state(machine: Machine, torque: float, t: float = 0.0) -> State:
-    """Static equilibrium under a constant driver torque [N m], the gears turning at their nominal speeds."""
-    law, r = machine.law, machine.rotations
-    size = len(machine.mass)
-    d = np.zeros(size)
-    k1, k2 = machine.stiffness[r : r + 2]
-    phase = machine.speed1 * t / law.driver.pitch
-    dte, y = 0.0, np.zeros(2)
-    for _ in range(30):
-        dte = solve_torque(law, phase, torque, dte, machine.axis_x * y, machine.axis_y * y)
-        theta1 = phase * law.driver.pitch + dte / law.driver.rb
-        found = position(
-            law,
-            theta1,
-            phase * law.driven.pitch,
-            machine.axis_x * y[0],
-            machine.axis_y * y[0],
-            machine.axis_x * y[1],
-            machine.axis_y * y[1],
-            np.zeros(PAIRS),
-        )
-        rows = contact_rows(machine, found.pairs)
-        push = rows.T @ found.force
-        new = np.array([push[r] / k1, push[r + 1] / k2])
-        done = np.max(np.abs(new - y)) <= 1e-9 * np.max(np.abs(new))
-        y = new
-        if done:
-            break
-    else:
-        raise ContactError(f"no static equilibrium on the supports at {torque:g} N m")
-    d[0] = dte / law.driver.rb
-    d[r : r + 2] = y
-    modes = slice(r + 2, size)
-    d[modes] = push[modes] / machine.stiffness[modes]
-    load = push.copy()
-    load[0] += torque
-    if r == 2:
-        load[1] -= torque * law.driven.rb / law.driver.rb
-    modal = modal_flexibility(rows, machine.stiffness, r + 2)
-    overlap = -found.pairs["gap"] - modal @ found.force
-    pushed = (coupling(law, found.pairs) - modal) @ found.force
-    residual = np.where(found.force > 0.0, overlap, pushed)
-    zero = np.zeros(size)
-    return State(t, d, zero, zero.copy(), load, found.pairs, found.force, residual, residual.copy())
-
-
-@compiled
-def predict(
-    mass: Array, damping: Array, stiffness: Array, corner: Array, scheme: Scheme, state: State, outer: Array
-) -> Prediction:
-    """What the next step would bring without new accelerations."""
-    h, am, af, gamma, beta = scheme.step, scheme.alpha_m, scheme.alpha_f, scheme.gamma, scheme.beta
-    late = 1.0 - af
-    size = len(mass)
-    d, v, rest, diagonal = np.empty(size), np.empty(size), np.empty(size), np.empty(size)
-    inertia = arrow_times(mass, corner, state.a)
-    for i in range(size):
-        d[i] = state.d[i] + h * state.v[i] + h * h * (0.5 - beta) * state.a[i]
-        v[i] = state.v[i] + h * (1.0 - gamma) * state.a[i]
-        rest[i] = late * outer[i] + af * state.load[i] - am * inertia[i]
-        rest[i] -= damping[i] * (late * v[i] + af * state.v[i]) + stiffness[i] * (late * d[i] + af * state.d[i])
-        diagonal[i] = (1.0 - am) * mass[i] + late * h * (gamma * damping[i] + beta * h * stiffness[i])
-    return Prediction(d, v, rest, diagonal)
-
-
-@compiled
-def history(state: State, cross: Array, pairs: Meetings, kappa: float) -> History:
-    """What the last step left of the pairs.
-
-    The backward difference of u + beta u' = R is (1 + 3 kappa) u = R + kappa (4 u_1 - u_2), kappa = beta/2h. Pairs
-    that are new come with the residual that their neighbours' forces hold them at.
-    """
-    n = len(cross)
-    force, known = np.zeros(n), np.zeros(n, np.bool_)
-    residual, memory = np.zeros(n), np.empty(n)
-    for p in range(n):
-        for q in range(len(state.pairs)):
-            if state.pairs[q].side == pairs[p].side and state.pairs[q].tooth == pairs[p].tooth:
-                force[p], residual[p], known[p] = state.force[q], state.residual[q], True
-                memory[p] = kappa * (4.0 * state.residual[q] - state.older[q])
-    for p in range(n):
-        if not known[p]:
-            for q in range(n):
-                residual[p] += cross[p, q] * force[q]
-            memory[p] = 3.0 * kappa * residual[p]
-        memory[p] /= 1.0 + 3.0 * kappa
-    return History(force, residual, memory)
-
-
-@compiled
-def meet(machine: Machine, d: Array, t: float) -> Met:
-    """Tooth pairs at the unknowns d."""
-    first = machine.rotations + 2
-    theta1, theta2 = angles(machine, d, t)
-    y = d[first - 1] - d[first - 2]
-    dx, dy = machine.law.centre + machine.axis_x * y, machine.axis_y * y
-    pairs = find_pairs(machine.law, theta1, theta2, dx, dy, MARGIN)
-    n = len(pairs)
-    rows = contact_rows(machine, pairs)
-    cross, modal = coupling(machine.law, pairs), modal_flexibility(rows, machine.stiffness, first)
-    over = overlaps(pairs)
-    for p in range(n):
-        for k in range(first, len(d)):
-            over[p] -= rows[p, k] * d[k]
-        for q in range(n):
-            cross[p, q] -= modal[p, q]
-    return Met(pairs, rows, over, cross)
-
-
-@compiled
 def take_step(machine: Machine, scheme: Scheme, state: State, torque: float) -> Stepped:
     """One step under the driver torque [N m] at its end."""
-    h, late, r = scheme.step, 1.0 - scheme.alpha_f, machine.rotations
-    square = scheme.beta * h * h
-    t = state.t + h
-    outer = np.zeros(len(state.d))
-    outer[0] = torque
-    if r == 2:
-        outer[1] = -torque * machine.law.driven.rb / machine.law.driver.rb
-    axis1, axis2 = support_axes(machine, *angles(machine, state.d, state.t))
-    corner = hub_coupling(machine.hub1, machine.hub2, r, axis1, axis2)
-    ahead = predict(machine.mass, machine.damping, machine.stiffness, corner, scheme, state, outer)
-    factor = arrow_factor(ahead.diagonal, corner, 1.0 - scheme.alpha_m)
-    a = arrow_solve(factor, ahead.diagonal, corner, 1.0 - scheme.alpha_m, ahead.rest)
-
-    met = meet(machine, plus(ahead.d, square, a), t)
-    n = len(met.pairs)
-    kappa = machine.beta / (2.0 * h)
-    gain = 1.0 / (1.0 + 3.0 * kappa)
-    past = history(state, met.cross, met.pairs, kappa)
-    flexibility = np.empty((n, n))
-    moved = [a] * n
-    for p in range(n):
-        met.over[p] -= past.memory[p]
-        moved[p] = arrow_solve(factor, ahead.diagonal, corner, 1.0 - scheme.alpha_m, met.rows[p])
-        shift = times(met.rows, moved[p])
-        for q in range(n):
-            flexibility[p, q] = gain * met.cross[p, q] + square * late * shift[q]
-    shared = share_load(machine.law.curves, met.pairs, met.over, flexibility, gain, past.force)
-    force = shared.force
-
-    load = outer
-    fresh = times(met.cross, force)
-    for p in range(n):
-        load = plus(load, force[p], met.rows[p])
-        a = plus(a, late * force[p], moved[p])
-        if force[p] > 0.0:
-            approach, _ = lone_approach(machine.law.curves, contact_in(met.pairs, p), force[p])
-            fresh[p] += approach
-        fresh[p] = past.memory[p] + gain * fresh[p]
-    d, v = plus(ahead.d, square, a), plus(ahead.v, h * scheme.gamma, a)
-    new = State(t, d, v, a, load, met.pairs, force, fresh, past.residual)
-    moment = -outer[1] if r == 2 else reaction(machine.hub2, met.pairs, force, a)
-    return Stepped(new, moment, shared.converged)
+    new, samples, run = advance(machine, scheme, state, np.array([torque]), 1)
+    return Stepped(new, float(columns(samples).torque_driven[0]), run.failed < 0)
 
 
-def advance(
-    machine: Machine, scheme: Scheme, state: State, torque: Array, substeps: int
-) -> tuple[State, Array, int]:
+def advance(machine: Machine, scheme: Scheme, state: State, torque: Array, substeps: int) -> tuple[State, Array, Run]:
     """Integrate over len(torque) steps, `torque` being the driver torque at the end of each.
 
     Returns the state at the end, samples (len(torque)/substeps, CHANNELS) taken after every `substeps` steps, named by
-    `columns`, and the step at which contact was not found (-1: none; -2 - n: at step n it left the modelled flanks).
+    `columns`, and how the run went. Where contact is not found in a step, that step is halved, and its halves again,
+    down to one part of PARTS, the torque in between being interpolated.
     """
     samples = np.zeros((len(torque) // substeps, CHANNELS))
-    state, failed = run(machine, scheme, state, torque, substeps, columns(samples))
-    return state, samples, failed
+    stages = staged(state), make_stage(len(state.d))
+    begin = Run(state.t, state.lately, state.torque, len(state.pairs), -1, False)
+    run = integrate(machine, scheme, *stages, begin, torque, substeps, columns(samples), make_room(machine))
+    return state_of(stages[0], run), samples, run
 
 
 def columns(samples: Array) -> Samples:
@@ -310,27 +111,72 @@ def columns(samples: Array) -> Samples:
     return Samples(*np.moveaxis(samples, -1, 0))
 
 
+@compiled(**INLINED)
+def take_over(new: Stage, old: Stage, n: int) -> None:
+    """Write a new stage with n pairs over the old one."""
+    for i in range(len(new.d)):
+        old.d[i], old.v[i], old.a[i], old.load[i] = new.d[i], new.v[i], new.a[i], new.load[i]
+    for p in range(n):
+        old.pairs[p] = new.pairs[p]
+        old.force[p], old.before[p], old.residual[p], old.older[p] = (
+            new.force[p], new.before[p], new.residual[p], new.older[p],
+        )  # fmt: skip
+
+
+@compiled(**INLINED)
+def sample(machine: Machine, now: Stage, run: Run, tried: Tried, k: int, out: Samples) -> bool:
+    """Fill row k of `out`; whether contact is on the modelled flanks."""
+    at = machine.at
+    theta1, theta2 = angles(machine, now.d, run.t)
+    out.angle_driver[k], out.angle_driven[k] = theta1, theta2
+    out.y_driver[k], out.y_driven[k] = now.d[at.y1], now.d[at.y2]
+    if at.x1 >= 0:
+        out.x_driver[k], out.x_driven[k] = now.d[at.x1], now.d[at.x2]
+    out.torque_driver[k], out.torque_driven[k] = tried.torque_driver, tried.torque_driven
+    for p in range(run.pairs):
+        out.loaded[k] += now.force[p] > 0.0
+    apart = centres(machine, now.d)
+    return not off_flanks(machine.law, theta1, theta2, apart.x, apart.y)
+
+
+@compiled(**INLINED)
+def part_of(scheme: Scheme, part: float) -> Scheme:
+    """The scheme with so small a part of its step."""
+    return Scheme(part * scheme.step, scheme.alpha_m, scheme.alpha_f, scheme.gamma, scheme.beta)
+
+
 @compiled
-def run(
-    machine: Machine, scheme: Scheme, state: State, torque: Array, substeps: int, out: Samples
-) -> tuple[State, int]:
-    """Fill `out` as `advance` says; returns the state at the end and where contact failed."""
-    r = machine.rotations
+def integrate(
+    machine: Machine, scheme: Scheme, now: Stage, new: Stage, begin: Run, torque: Array, substeps: int, out: Samples,
+    room: Room,
+) -> Run:  # fmt: skip
+    """Fill `out` as `advance` says; `now` is the stage at the beginning and becomes that at the end."""
+    machine, now, new, room, out = borrowed(machine), borrowed(now), borrowed(new), borrowed(room), borrowed(out)
+    t, lately, before, pairs, divided = begin.t, begin.lately, begin.torque, begin.pairs, 0
     for i in range(len(torque)):
-        step = take_step(machine, scheme, state, torque[i])
-        state = step.state
-        if not step.converged:
-            return state, i
+        tried = Tried(False, 0, 0.0, 0.0)
+        # Parts of the step: what is done of it, and what is tried next.
+        done, part, whole = 0, PARTS, True
+        while done < PARTS:
+            share = part / PARTS
+            at = torque[i] if part == PARTS else before + (torque[i] - before) * ((done + part) / PARTS)
+            tried = try_step(machine, part_of(scheme, share), now, pairs, new, t, lately, at, room)
+            if tried.found:
+                pairs, t, lately = tried.pairs, t + share * scheme.step, share * scheme.step
+                take_over(new, now, pairs)
+                done += part
+                if part < PARTS and done % (2 * part) == 0:
+                    part *= 2
+            elif part > 1:
+                part //= 2
+                divided += whole
+                whole = False
+            else:
+                return Run(t, lately, before, pairs, i, False)
+        before = torque[i]
         if (i + 1) % substeps == 0:
-            k = (i + 1) // substeps - 1
-            theta1, theta2 = angles(machine, state.d, state.t)
-            out.angle_driver[k], out.angle_driven[k] = theta1, theta2
-            out.y_driver[k], out.y_driven[k] = state.d[r], state.d[r + 1]
-            out.torque_driven[k] = step.torque_driven
-            apart = state.d[r + 1] - state.d[r]
-            dx, dy = machine.law.centre + machine.axis_x * apart, machine.axis_y * apart
-            if off_flanks(machine.law, theta1, theta2, dx, dy):
-                return state, -2 - i
-            for p in range(len(state.pairs)):
-                out.loaded[k] += state.force[p] > 0.0
-    return state, -1
+            run, k = Run(t, lately, before, pairs, i, True), (i + 1) // substeps - 1
+            out.divided[k], divided = divided, 0
+            if not sample(machine, now, run, tried, k, out):
+                return run
+    return Run(t, lately, before, pairs, -1, False)

@@ -10,9 +10,13 @@ import warnings
 from collections.abc import Callable, Sequence
 from multiprocessing.connection import Connection
 
+import numpy as np
+
 from gearbench.cli import run_command_line
+from gearbench.commands.checks import Got
 from gearbench.shell.failure import BAD_INPUT, DONE
 
+SEED = 20260713
 SECONDS = 300.0  # an example that takes longer hangs
 Example = Callable[[int], str | None]
 
@@ -83,3 +87,14 @@ def complaint(arguments: Sequence[str]) -> str | None:
     if code == DONE or (code == BAD_INPUT and len(refusals) == 1 and "Traceback" not in err):
         return None
     return f"exit {code} of `{' '.join(arguments)}`: {err.strip()[-400:]}"
+
+
+def generator(number: int, row: int) -> np.random.Generator:
+    """The stream of one example of one row: any finding can be had again by its number."""
+    return np.random.default_rng([SEED, row, number])
+
+
+def told(findings: list[str], tried: int, of: str) -> Got:
+    """Findings as a number, the first ones in words."""
+    words = "; ".join(findings[:3])
+    return Got(len(findings), f"{tried} {of}" + (f"; {words}" if words else ""))

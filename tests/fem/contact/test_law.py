@@ -7,10 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from gearbench.fem.contact.coupling import coupling
 from gearbench.fem.contact.curve import curve_at, lone_approach
 from gearbench.fem.contact.kinematics import EDGE1, EDGE2, ON_LINE, pair_contact
-from gearbench.fem.contact.law import contact_in, coupling, find_pairs, make_law, overlaps, share_load
+from gearbench.fem.contact.law import contact_in, find_pairs, make_law, overlaps
 from gearbench.fem.contact.line import line_contact
+from gearbench.fem.contact.sharing import share_load
 
 
 @pytest.mark.parametrize("swap", [False, True])

@@ -1,0 +1,1 @@
+"""The unreduced rig: every finite-element unknown of both gears integrated in time."""

@@ -1,0 +1,68 @@
+"""What a run of the unreduced rig hands out, sample by sample."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.fem.contact.law import off_flanks
+from gearbench.fem.full.machine import angles
+from gearbench.fem.full.transient import Integrator, State, take_step
+
+Array = NDArray[np.float64]
+
+
+class Samples(NamedTuple):
+    """Channels of a run; arrays (samples,)."""
+
+    angle_driver: Array  # [rad]
+    angle_driven: Array
+    y_driver: Array  # [m]
+    y_driven: Array
+    torque_driven: Array  # [N m]
+    loaded: Array  # number of pairs that carry
+
+
+CHANNELS = len(Samples._fields)
+
+
+class Run(NamedTuple):
+    """The state at the end, samples (n, CHANNELS), and what stopped the run early: contact that was not found, or that
+    left the modelled flanks."""
+
+    state: State
+    samples: Array
+    lost: bool
+    off: bool
+
+
+def columns(samples: Array) -> Samples:
+    """The columns of samples (..., CHANNELS) by their names."""
+    return Samples(*np.moveaxis(samples, -1, 0))
+
+
+def advance(integrator: Integrator, state: State, torque: Array, substeps: int = 1) -> Run:
+    """Integrate over len(torque) steps, `torque` [N m] being the driver torque at the end of each; a sample is taken
+    after every `substeps` steps."""
+    machine = integrator.machine
+    r = machine.rotations
+    samples = np.zeros((len(torque) // substeps, CHANNELS))
+    out = columns(samples)
+    for i, value in enumerate(torque):
+        step = take_step(integrator, state, float(value))
+        state = step.state
+        if not step.converged:
+            return Run(state, samples, True, False)
+        if (i + 1) % substeps:
+            continue
+        k, hub, at = i // substeps, state.d.hub, angles(machine, state.d.hub, state.t)
+        out.angle_driver[k], out.angle_driven[k] = at
+        out.y_driver[k], out.y_driven[k] = hub[r], hub[r + 1]
+        out.torque_driven[k] = step.torque_driven
+        out.loaded[k] = np.count_nonzero(state.force > 0.0)
+        dx, dy = machine.axis * (hub[r + 1] - hub[r])
+        if off_flanks(machine.law, at.driver, at.driven, machine.law.centre + dx, dy):
+            return Run(state, samples, False, True)
+    return Run(state, samples, False, False)

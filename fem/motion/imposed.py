@@ -1,0 +1,80 @@
+"""What is imposed on the reduced rig: torques of drive and load, corrections that are common to all tooth pairs."""
+
+from __future__ import annotations
+
+from math import cos, pi, sin
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.fem.contact.law import Meetings
+from gearbench.fem.motion.machine import Correction, Machine
+from gearbench.kernels.compiled import INLINED, compiled
+
+Array = NDArray[np.float64]
+
+
+@compiled(**INLINED)
+def impose(machine: Machine, torque: float, theta1: float, outer: Array) -> float:
+    """Write the generalised forces of drive and load into `outer`, under the driver torque [N m] at a rotation of the
+    driver; returns the load's torque without what balances losses [N m]."""
+    ripple, balance = machine.ripple, machine.balance
+    load = machine.law.driven.rb / machine.law.driver.rb * (balance.follow * torque + balance.constant * balance.mean)
+    if machine.driven_at >= 0:
+        outer[machine.driven_at] = torque
+        for i in range(len(ripple.order)):
+            outer[machine.driven_at] += ripple.torque[i] * cos(ripple.order[i] * theta1 + ripple.phase[i])
+    if machine.loaded_at >= 0:
+        outer[machine.loaded_at] = -load
+    return load
+
+
+class Excess(NamedTuple):
+    """Excess of all working flanks [m], and its derivative by the mesh phase [m]."""
+
+    value: float
+    slope: float
+
+
+@compiled(forceinline=True)
+def stiffness_factor(correction: Correction, phase: float, t: float) -> float:
+    """Factor on the mesh force at a mesh phase of the driven gear [cycles] and a time [s]."""
+    series = 1.0
+    for n in range(len(correction.stiffness_cos)):
+        angle = 2 * pi * (n + 1) * phase
+        series += correction.stiffness_cos[n] * cos(angle) + correction.stiffness_sin[n] * sin(angle)
+    passed = min(max(t / correction.duration, 0.0), 1.0)
+    return correction.scale * series * (1.0 + correction.drift * passed)
+
+
+@compiled(forceinline=True)
+def common_excess(correction: Correction, phase: float) -> Excess:
+    """Excess of all working flanks at a mesh phase of the driven gear [cycles]."""
+    value, slope = correction.error_mean, 0.0
+    for n in range(len(correction.error_cos)):
+        rate = 2 * pi * (n + 1)
+        one, two = correction.error_cos[n], correction.error_sin[n]
+        value += one * cos(rate * phase) + two * sin(rate * phase)
+        slope += rate * (two * cos(rate * phase) - one * sin(rate * phase))
+    return Excess(value, slope)
+
+
+@compiled(**INLINED)
+def thicken(pairs: Meetings, n: int, excess: float, slope: float) -> None:
+    """Move the working ones of n pairs together by an excess [m] whose derivative by the driven rotation is `slope`:
+    what tilts the common normal changes the driven gear's lever."""
+    for p in range(n):
+        k = pairs[p]
+        if k.side == 0:
+            k.gap -= excess
+            k.lever2 -= slope
+
+
+@compiled(**INLINED)
+def lean(machine: Machine, pairs: Meetings, n: int, out: Array) -> None:
+    """Write what the load's torque takes up per force of each of n pairs [m], where nothing else holds both rotations:
+    off the line of action the gears' levers are not in the ratio of their base circles."""
+    ratio, part = machine.law.driven.rb / machine.law.driver.rb, machine.balance.losses
+    for p in range(n):
+        out[p] = part * (1.0 - 2.0 * pairs[p].side) * (pairs[p].lever2 - ratio * pairs[p].lever1)

@@ -1,0 +1,355 @@
+"""One step of the reduced rig in time: generalised-alpha for the linear part, implicit contact with a damped residual.
+
+Chung and Hulbert (1993), eqs. 9-17. The flanks carry no mass: their residual flexibility obeys
+u + beta u' = R(F), integrated by the second-order backward difference, so contact does not chatter. Nothing is
+allocated: a step reads one `Stage`, writes another one, and works in a `Room`.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.fem.contact.coupling import couple, find_places
+from gearbench.fem.contact.law import meet
+from gearbench.fem.contact.sharing import share
+from gearbench.fem.contact.static import MARGIN
+from gearbench.fem.motion.imposed import common_excess, impose, lean, stiffness_factor, thicken
+from gearbench.fem.motion.machine import Machine, angles, centres, write_hub_coupling, write_rows
+from gearbench.fem.motion.scheme import Scheme
+from gearbench.fem.motion.stage import Room, Stage
+from gearbench.fem.motion.yielding import expect, linearise, rubs, settled, write_slides, yield_to, yields
+from gearbench.kernels.compiled import INLINED, ROUNDING, compiled
+from gearbench.kernels.small import invert
+
+Array = NDArray[np.float64]
+
+
+PASSES = 20  # in which forces that are not linear are linearised
+
+
+class Torques(NamedTuple):
+    """Torques on the outer ends of drive and load [N m]."""
+
+    driver: float
+    driven: float
+
+
+class Tried(NamedTuple):
+    """How a step went: whether contact was found, how many tooth pairs are near contact, the torque that holds the
+    driver at its speed, where that is prescribed, and the one on the driven gear, at the outer ends [N m]."""
+
+    found: bool
+    pairs: int
+    torque_driver: float
+    torque_driven: float
+
+
+@compiled(fastmath=ROUNDING, **INLINED)
+def predict(machine: Machine, scheme: Scheme, old: Stage, room: Room) -> None:
+    """What the next step would bring without new accelerations: d, v and rest of the room."""
+    h, am, af, gamma, beta = scheme.step, scheme.alpha_m, scheme.alpha_f, scheme.gamma, scheme.beta
+    late, hubs = 1.0 - af, machine.hubs
+    d, v, rest, corner = room.d, room.v, room.rest, room.corner
+    for i in range(len(d)):
+        d[i] = old.d[i] + h * old.v[i] + h * h * (0.5 - beta) * old.a[i]
+        v[i] = old.v[i] + h * (1.0 - gamma) * old.a[i]
+        rest[i] = late * room.outer[i] + af * old.load[i] - am * machine.mass[i] * old.a[i]
+    for i in range(hubs):
+        for k in range(len(room.soft)):
+            rest[i] -= am * corner[i, k] * old.a[hubs + k]
+            rest[hubs + k] -= am * corner[i, k] * old.a[i]
+        for j in range(hubs):
+            rest[i] -= machine.hub_damping[i, j] * (late * v[j] + af * old.v[j])
+            rest[i] -= machine.hub_stiffness[i, j] * (late * d[j] + af * old.d[j])
+    for k in range(len(room.soft)):
+        i = hubs + k
+        moving = machine.beta * (late * v[i] + af * old.v[i]) + late * d[i] + af * old.d[i]
+        rest[i] -= machine.squares[k] * moving
+
+
+@compiled(fastmath=ROUNDING, **INLINED)
+def factorise(machine: Machine, scheme: Scheme, room: Room) -> None:
+    """The effective mass, ready to be solved: soft, spread and inverse of the room."""
+    h, keep, hubs = scheme.step, 1.0 - scheme.alpha_m, machine.hubs
+    viscous = (1.0 - scheme.alpha_f) * h * scheme.gamma
+    elastic = (1.0 - scheme.alpha_f) * h * h * scheme.beta
+    corner, spread, soft, block = room.corner, room.spread, room.soft, room.block
+    for k in range(len(soft)):
+        soft[k] = 1.0 / (keep * machine.mass[hubs + k] + (viscous * machine.beta + elastic) * machine.squares[k])
+    for i in range(hubs):
+        for k in range(len(soft)):
+            spread[i, k] = keep * corner[i, k] * soft[k]
+    for i in range(hubs):
+        for j in range(hubs):
+            total = viscous * machine.hub_damping[i, j] + elastic * machine.hub_stiffness[i, j]
+            shared = 0.0
+            for k in range(len(soft)):
+                shared += spread[i, k] * corner[j, k]
+            block[i, j] = total - keep * shared + room.extra_block[i, j]
+        block[i, i] += keep * machine.mass[i]
+    for i in range(hubs):
+        if machine.held[i]:
+            for j in range(hubs):
+                block[i, j] = block[j, i] = 0.0
+            block[i, i] = 1.0
+    invert(block, room.inverse)
+    for i in range(hubs):
+        if machine.held[i]:
+            room.inverse[i, i] = 0.0
+
+
+@compiled(fastmath=ROUNDING, **INLINED)
+def accelerate(room: Room, push: Array, out: Array) -> None:
+    """Accelerations (d,) by generalised forces (d,)."""
+    hubs, modes = room.corner.shape
+    spread, soft, inverse = room.spread, room.soft, room.inverse
+    for i in range(hubs):
+        out[i] = 0.0
+    for j in range(hubs):
+        head = push[j]
+        for k in range(modes):
+            head -= spread[j, k] * push[hubs + k]
+        for i in range(hubs):
+            out[i] += inverse[i, j] * head
+    for k in range(modes):
+        value = push[hubs + k] * soft[k]
+        for i in range(hubs):
+            value -= spread[i, k] * out[i]
+        out[hubs + k] = value
+
+
+@compiled(fastmath=ROUNDING, **INLINED)
+def recall(old: Stage, known: int, new: Stage, n: int, machine: Machine, h: float, lately: float, room: Room) -> float:
+    """What the last step left of the n pairs of the new stage, of which it knew `known`: forces to expect and what they
+    were, held and memory; returns the part of a residual that follows the force at once.
+
+    The backward difference of u + beta u' = R with steps h, after `lately`, is
+    (1 + slow) u = R + beta/h ((1 + w) u_1 - w^2/(1 + w) u_2), w = h/lately, slow = beta/h (1 + 2 w)/(1 + w).
+    """
+    w = h / lately if lately > 0.0 else 1.0
+    rate = machine.beta / h
+    slow = rate * (1.0 + 2.0 * w) / (1.0 + w)
+    gain = 1.0 / (1.0 + slow)
+    for p in range(n):
+        new.before[p] = new.force[p] = 0.0
+        room.memory[p] = room.held[p] = 0.0
+        room.arrived[p], room.desk.known[p] = True, False
+        for q in range(known):
+            if old.pairs[q].side == new.pairs[p].side and old.pairs[q].tooth == new.pairs[p].tooth:
+                force = old.force[q]
+                ahead = force + w * (force - old.before[q])
+                new.before[p] = force
+                new.force[p] = ahead if 0.0 < ahead < 2.0 * force else force
+                room.held[p] = old.residual[q]
+                u1, u2 = old.residual[q], old.older[q]
+                room.memory[p] = gain * rate * ((1.0 + w) * u1 - w * w / (1.0 + w) * u2)
+                room.arrived[p] = False
+                break
+    return gain
+
+
+@compiled(fastmath=ROUNDING, **INLINED)
+def soften(
+    machine: Machine, scheme: Scheme, new: Stage, n: int, q: int, gain: float, soft: float, room: Room
+) -> None:
+    """Fill column q of cross and flexibility for n pairs; soft: one over the factor on the mesh force."""
+    late, hubs = 1.0 - scheme.alpha_f, machine.hubs
+    rows, moved = room.rows, room.moved
+    couple(machine.law, new.pairs, n, room.places, q, room.cross)
+    for i in range(rows.shape[1]):
+        room.push[i] = rows[q, i]
+    if machine.loaded_at >= 0:
+        room.push[machine.loaded_at] -= room.lean[q]
+    if rubs(machine):
+        for i in range(hubs):
+            room.push[i] += room.turned[q] * room.rub[q, i]
+    accelerate(room, room.push, moved[q])
+    for p in range(n):
+        modal = 0.0
+        for k in range(len(machine.squares)):
+            modal += rows[p, hubs + k] * rows[q, hubs + k] / machine.squares[k]
+        room.cross[p, q] = room.cross[p, q] * soft - modal
+        shift = 0.0
+        for i in range(rows.shape[1]):
+            shift += rows[p, i] * moved[q, i]
+        room.flexibility[p, q] = gain * room.cross[p, q] + scheme.beta * scheme.step * scheme.step * late * shift
+    room.desk.known[q] = True
+
+
+@compiled(fastmath=ROUNDING, **INLINED)
+def overlap(machine: Machine, new: Stage, n: int, gain: float, room: Room) -> None:
+    """Overlaps of n pairs that rigid motion, modes and what the residual carries over leave to new forces."""
+    slow = 1.0 - gain
+    for p in range(n):
+        if room.arrived[p]:
+            # A pair that is new comes with the residual that its neighbours' forces hold it at.
+            room.held[p] = 0.0
+            for q in range(n):
+                if new.before[q] > 0.0:
+                    room.held[p] += room.cross[p, q] * new.before[q]
+            room.memory[p] = slow * room.held[p]
+        over = -new.pairs[p].gap - room.memory[p]
+        for i in range(machine.hubs):
+            over -= room.rows[p, i] * (new.d[i] - room.sought[i])
+        for i in range(machine.hubs, len(new.d)):
+            over -= room.rows[p, i] * new.d[i]
+        room.over[p] = over
+
+
+@compiled(fastmath=ROUNDING, **INLINED)
+def press(machine: Machine, scheme: Scheme, new: Stage, n: int, gain: float, soft: float, room: Room) -> bool:
+    """The forces of n pairs; whether they were found. Only the columns of the flexibility that forces need are made:
+    first those of the forces to expect."""
+    column = 0
+    while True:
+        while column < n and not new.force[column] > 0.0:
+            column += 1
+        wanted = column
+        if column >= n:
+            if column == n:
+                overlap(machine, new, n, gain, room)
+                column += 1
+            shared = share(
+                machine.law.curves, new.pairs, n, room.over, room.flexibility, gain, soft, new.force, room.desk
+            )
+            if shared.wanted < 0:
+                return shared.found
+            wanted = shared.wanted
+        else:
+            column += 1
+        soften(machine, scheme, new, n, wanted, gain, soft, room)
+
+
+@compiled(fastmath=ROUNDING, **INLINED)
+def conclude(machine: Machine, scheme: Scheme, new: Stage, n: int, gain: float, room: Room) -> None:
+    """Unknowns, rates, accelerations, generalised forces and residuals under the forces that were found."""
+    h, late = scheme.step, 1.0 - scheme.alpha_f
+    for i in range(len(new.d)):
+        load, a = room.outer[i], new.a[i]
+        for p in range(n):
+            if new.force[p] > 0.0:
+                load += new.force[p] * room.rows[p, i]
+                a += late * new.force[p] * room.moved[p, i]
+        if i == machine.loaded_at:
+            for p in range(n):
+                load -= new.force[p] * room.lean[p]
+        new.load[i], new.a[i] = load, a
+        new.d[i] = room.d[i] + scheme.beta * h * h * a
+        new.v[i] = room.v[i] + scheme.gamma * h * a
+    for p in range(n):
+        pushed = 0.0
+        for q in range(n):
+            if new.force[q] > 0.0:
+                pushed += room.cross[p, q] * new.force[q]
+        if new.force[p] > 0.0:
+            pushed += room.desk.own[p]
+        new.residual[p] = room.memory[p] + gain * pushed
+        new.older[p] = room.held[p]
+
+
+@compiled(fastmath=ROUNDING, **INLINED)
+def torques(machine: Machine, new: Stage, n: int, load: float, room: Room) -> Torques:
+    """Torques on the outer ends of drive and load under the load's torque [N m] without its balance of losses."""
+    at, hubs = machine.at, machine.hubs
+    n1, n2 = len(machine.hub1), len(machine.hub2)
+    one, two, balanced, ratio = 0.0, 0.0, 0.0, machine.law.driven.rb / machine.law.driver.rb
+    for p in range(n):
+        sign = 1.0 - 2.0 * new.pairs[p].side
+        one += sign * new.pairs[p].lever1 * new.force[p]
+        two += sign * new.pairs[p].lever2 * new.force[p]
+        balanced += new.force[p] * room.lean[p]
+        if rubs(machine):
+            rubbed = room.turned[p] * new.force[p]
+            one += rubbed * room.arm1[p]
+            two += rubbed * room.arm2[p]
+            balanced += rubbed * machine.balance.losses * (room.arm2[p] - ratio * room.arm1[p])
+    for k in range(n1):
+        one += machine.hub1[k, 2] * new.a[hubs + k]
+    for k in range(n2):
+        two += machine.hub2[k, 2] * new.a[hubs + n1 + k]
+    stiffness, damping = machine.drive_shaft
+    if stiffness > 0.0:
+        one = -stiffness * new.d[at.driver] - damping * new.v[at.driver]
+    stiffness, damping = machine.load_shaft
+    if machine.loaded_at >= 0:
+        two = load + balanced
+    elif stiffness > 0.0:
+        two = stiffness * new.d[at.driven] + damping * new.v[at.driven]
+    return Torques(one, two)
+
+
+@compiled(fastmath=ROUNDING, **INLINED)
+def seek(machine: Machine, new: Stage, theta1: float, theta2: float, room: Room) -> int:
+    """Find the tooth pairs near contact at the unknowns of the new stage; returns how many."""
+    apart = centres(machine, new.d)
+    pitch = machine.law.driven.pitch
+    excess = common_excess(machine.correction, theta2 / pitch)
+    n = meet(machine.law, theta1, theta2, apart.x, apart.y, MARGIN + excess.value, new.pairs)
+    thicken(new.pairs, n, excess.value, excess.slope / pitch)
+    find_places(machine.law, new.pairs, n, room.places)
+    write_rows(machine, new.pairs, n, room.places, room.rows)
+    lean(machine, new.pairs, n, room.lean)
+    if rubs(machine):
+        write_slides(machine, new, n, apart, room)
+    for i in range(machine.hubs):
+        room.sought[i] = new.d[i]
+    return n
+
+
+@compiled(fastmath=ROUNDING, **INLINED)
+def let_go(machine: Machine, scheme: Scheme, new: Stage, room: Room) -> None:
+    """Accelerations and unknowns of the new stage without new contact forces."""
+    factorise(machine, scheme, room)
+    for i in range(len(new.d)):
+        room.push[i] = room.rest[i] + (room.extra[i] if i < machine.hubs else 0.0)
+    accelerate(room, room.push, new.a)
+    for i in range(len(new.d)):
+        new.d[i] = room.d[i] + scheme.beta * scheme.step * scheme.step * new.a[i]
+
+
+@compiled(fastmath=ROUNDING, **INLINED)
+def try_step(
+    machine: Machine, scheme: Scheme, old: Stage, known: int, new: Stage, t: float, lately: float, torque: float,
+    room: Room,
+) -> Tried:  # fmt: skip
+    """The stage a step after `old`, which is that of the time t [s], knows `known` pairs and came about by a step of
+    `lately` [s] (0: by rest), under the driver torque [N m] at the step's end."""
+    h = scheme.step
+    # The modes turn with their gear: the balance is that of the instant within the step at which it is struck.
+    late = (1.0 - scheme.alpha_f) * h
+    theta1, theta2 = angles(machine, old.d, t)
+    write_hub_coupling(machine, theta1 + late * machine.speed1, theta2 + late * machine.speed2, room.corner)
+    load = impose(machine, torque, theta1 + h * (machine.speed1 + old.v[0]), room.outer)
+    predict(machine, scheme, old, room)
+    n, gain, soft, found = 0, 1.0, 1.0, False
+    if yields(machine):
+        expect(machine, scheme, old, 0, room)
+        linearise(machine, scheme, new, 0, room)
+    # The first pass finds the pairs; where forces are not linear others follow until they are linearised where the step
+    # leads.
+    for turn in range(PASSES):
+        let_go(machine, scheme, new, room)
+        if turn == 0:
+            theta1, theta2 = angles(machine, new.d, t + h)
+            soft = 1.0 / stiffness_factor(machine.correction, theta2 / machine.law.driven.pitch, t + h)
+            n = seek(machine, new, theta1, theta2, room)
+            gain = recall(old, known, new, n, machine, h, lately, room)
+            if rubs(machine):
+                expect(machine, scheme, old, n, room)
+                linearise(machine, scheme, new, n, room)
+                continue
+        found = press(machine, scheme, new, n, gain, soft, room)
+        conclude(machine, scheme, new, n, gain, room)
+        if not found or not yields(machine) or settled(machine, new, n, room):
+            break
+        found = False
+        linearise(machine, scheme, new, n, room)
+        for p in range(n):
+            room.desk.known[p] = False
+    if yields(machine):
+        yield_to(machine, new, n, room)
+    held = torques(machine, new, n, load, room)
+    return Tried(found, n, held.driver, held.driven)
