@@ -8,6 +8,7 @@ from pathlib import Path
 
 import xarray as xr
 
+from gearbench.bench.refusals.stated import check_springs, check_stated
 from gearbench.diagnosis.advice import advice_of
 from gearbench.diagnosis.cause import Finding, find_cause
 from gearbench.diagnosis.effects.library import LIBRARY
@@ -101,7 +102,9 @@ def take_in(
     held_out: str | None = None,
     without: Sequence[str] = (),
 ) -> Inputs:
-    """Read and check the records. Raises DiagnosisError or RecordError, one sentence each."""
+    """Read and check the records. Raises DiagnosisError, RecordError or BenchError, one sentence each."""
+    check_stated(nominal, "a diagnosis")
+    check_springs(nominal, "a diagnosis")
     names = sorted((effect.name for effect in LIBRARY), key=rank_of)
     for name in without:
         if name not in names:

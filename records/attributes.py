@@ -1,4 +1,4 @@
-"""Numeric attributes of a record: numbers, and of the right kind."""
+"""Attributes of a record, each of its kind: numbers that may be computed with, and text."""
 
 from __future__ import annotations
 
@@ -21,6 +21,18 @@ POSITIVE = (
 )
 WHOLE = ("samples_per_period", "periods", "periods_averaged", "teeth_driver", "teeth_driven")
 FINITE = ("torque_mean", "settling_residual")
+# No quantity of a rig in SI units is larger; products of what is smaller do not overflow.
+LARGEST = 1e30
+TEXT = (
+    "schema",
+    "support_direction",
+    "driven_boundary",
+    "mesh_phase_origin",
+    "condition",
+    "model",
+    "warnings",
+    "provenance",
+)
 
 
 def numeric_attribute(attrs: Mapping[str, Any], name: str) -> float | None:
@@ -28,7 +40,7 @@ def numeric_attribute(attrs: Mapping[str, Any], name: str) -> float | None:
     if name not in attrs:
         return None
     raw = attrs[name]
-    if isinstance(raw, str | bytes) or np.size(raw) != 1:
+    if isinstance(raw, str | bytes | list | tuple) or np.size(raw) != 1 or np.iscomplexobj(raw):
         raise RecordError(f"attribute {name} = {_shown(raw)} is not a number")
     try:
         value = float(np.asarray(raw).reshape(())[()])
@@ -40,15 +52,34 @@ def numeric_attribute(attrs: Mapping[str, Any], name: str) -> float | None:
 
 
 def check_attributes(attrs: Mapping[str, Any]) -> None:
-    """Raise RecordError where a numeric attribute that is there is no number of its kind."""
+    """Raise RecordError where an attribute that is there is not of its kind."""
+    for name in TEXT:
+        if not isinstance(attrs.get(name, ""), str):
+            raise RecordError(f"attribute {name} = {_shown(attrs[name])} is not text")
+    _check_phases(attrs)
     for name in (*POSITIVE, *FINITE):
         value = numeric_attribute(attrs, name)
         if value is None:
             continue
         if name in POSITIVE and value <= 0:
             raise RecordError(f"attribute {name} = {value:g} must be positive and finite")
+        if abs(value) > LARGEST or (name in POSITIVE and value < 1 / LARGEST):
+            raise RecordError(f"attribute {name} = {value:g} must lie between {1 / LARGEST:g} and {LARGEST:g}")
         if name in WHOLE and value != round(value):
             raise RecordError(f"attribute {name} = {value:g} must be a whole number")
+
+
+def _check_phases(attrs: Mapping[str, Any]) -> None:
+    """mesh_phase: one number, or one for each realisation."""
+    if "mesh_phase" not in attrs:
+        return
+    try:
+        phases = np.asarray(attrs["mesh_phase"], dtype=float)
+    except (TypeError, ValueError):
+        phases = np.array([])
+    text = isinstance(attrs["mesh_phase"], str | bytes)
+    if text or phases.ndim > 1 or not phases.size or not np.isfinite(phases).all():
+        raise RecordError(f"attribute mesh_phase = {_shown(attrs['mesh_phase'])} is no number of cycles")
 
 
 def _shown(raw: Any) -> str:

@@ -90,10 +90,16 @@ def validate_record(record: xr.Dataset) -> None:
     gearbench.records.errors.RecordError: a record needs the coordinate time [s]
     """
     schema = record.attrs.get("schema")
-    if schema != SCHEMA:
+    if not isinstance(schema, str) or schema != SCHEMA:
         raise RecordError(f"schema is {schema!r}, but a record has schema {SCHEMA!r}")
     _check_sampling(record.attrs)
     _check_channel_sets(record)
+    phases = np.size(record.attrs.get("mesh_phase", 0.0))
+    if phases not in (1, record.sizes.get("realisation", 1)):
+        raise RecordError(
+            f"attribute mesh_phase has {phases} values, must be one, or one for each of"
+            f" {record.sizes.get('realisation', 1)} realisations"
+        )
     if "time" not in record.coords:
         raise RecordError("a record needs the coordinate time [s]")
     for name in record.data_vars:

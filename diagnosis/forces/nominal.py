@@ -87,6 +87,7 @@ def nominal_model(nominal: Case, load: float, mean: float) -> NominalModel:
         body(meshing.driven, rig.driven, density, "rig.driven"),
     )
     supports = (rig.support.driver, rig.support.driven)
+    held = [support.holding(one.mass) for support, one in zip(supports, bodies, strict=True)]
     coupling = rig.drive.coupling
     rotor = coupling.inertia if coupling else 0.0
     stiff = coupling.stiffness if coupling else None
@@ -106,7 +107,7 @@ def nominal_model(nominal: Case, load: float, mean: float) -> NominalModel:
         rotor=rotor,
         compliance=1.0 / stiff if stiff else 0.0,
         coupling_damping=coupling.damping if coupling and stiff else 0.0,
-        stiffness=(supports[0].stiffness, supports[1].stiffness),
+        stiffness=(held[0].stiffness, held[1].stiffness),
         damping=(supports[0].damping, supports[1].damping),
         exponent=(supports[0].exponent, supports[1].exponent),
         reference=_references(supports, mean / radii[0] * (cos(alpha) if tangential else 1.0)),
@@ -116,7 +117,7 @@ def nominal_model(nominal: Case, load: float, mean: float) -> NominalModel:
         friction=rig.friction.coefficient,
         transition=rig.friction.transition_speed,
         law=mesh_law(rig, nominal.simulation, load),
-        sd_stiffness=known.both("rig.support.{}.stiffness", [s.stiffness for s in supports], "support_stiffness"),
+        sd_stiffness=known.both("rig.support.{}.stiffness", [one.stiffness for one in held], "support_stiffness"),
         sd_damping=known.both("rig.support.{}.damping", [s.damping for s in supports], "support_damping"),
         sd_mass=known.both("rig.{}.mass", [b.mass for b in bodies], "mass"),
         sd_inertia=known.both("rig.{}.inertia", list(inertias), "inertia"),
@@ -134,7 +135,7 @@ def table_load(measurements: Sequence[Measurement]) -> float:
 
 def _references(supports: tuple[Support, Support], force: float) -> tuple[float, float]:
     """Deflections [m] at which the secant stiffness is the stated one; under `force` [N] if the case says linear."""
-    first, second = (s.reference_deflection if s.exponent else force / s.stiffness for s in supports)
+    first, second = (s.reference_deflection if s.exponent else force / s.holding(1.0).stiffness for s in supports)
     return first, second
 
 

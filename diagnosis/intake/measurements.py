@@ -25,9 +25,11 @@ from gearbench.diagnosis.intake.plausible import (
     check_against_nominal,
     check_same_rig,
     facts_of,
+    told_by_case,
 )
-from gearbench.diagnosis.intake.quality import NOISE_IN_WORDS, clipped, drift_of, noise_of
+from gearbench.diagnosis.intake.quality import NOISE_IN_WORDS, drift_of, noise_of
 from gearbench.records import read_record
+from gearbench.records.checks import CHECKS, check_record, clipped_channels, periods_repeat, same_samples
 from gearbench.rig import Case
 
 Array = NDArray[np.float64]
@@ -41,6 +43,8 @@ PHASE_FIT = 0.05
 UNSTEADY, TOO_UNSTEADY = 0.03, 0.25
 # Channels that are derived from others or are no signal of a sensor.
 DERIVED = ("mesh_phase", "dte", "force")
+# Repetitions are compared here, by hunting periods and channel by channel.
+DOOR = tuple(check for check in CHECKS if check is not periods_repeat)
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,19 +116,23 @@ def measurement(
 ) -> Measurement:
     """One record in memory as a measurement; `source` is what refusals call it (default: its name).
 
-    Raises DiagnosisError.
+    Raises DiagnosisError, and RecordError for a record that contradicts itself.
     """
     source = source or name
     facts = facts or facts_of(nominal)
-    condition, notes = check_against_nominal(record, name, source, facts)
-    frequency = _mesh_frequency(record, source, facts)
+    record, notes = told_by_case(record, source, facts)
+    doubts = [finding.sentence for finding in check_record(record, source, DOOR)]
+    _refuse_clipped(record, source)
+    condition, others = check_against_nominal(record, name, source, facts)
+    notes += [*doubts, *others]
+    frequency = _mesh_frequency(record, facts)
     samples, repetitions, cycles = _repetition(record, frequency, source, facts, notes)
     frequency = cycles * float(record.attrs["sampling_rate"]) / samples
     phase, known = _phase(record, frequency, facts, notes)
-    record = _completed(record, (samples, repetitions), frequency, float(phase[0]), facts)
+    record = _completed(record, (samples, repetitions), frequency, float(phase[0]))
     whole = {str(key): record[key].values[0, : repetitions * samples] for key in record.data_vars if key not in DERIVED}
     whole, zero = _departures(whole, phase, source, facts, notes)
-    whole = _usable(whole, record, source, notes)
+    whole = _usable(whole, notes)
     periods = {key: values.reshape(repetitions, samples) for key, values in whole.items()}
     drift = drift_of(periods, facts.base_radii, notes) if repetitions > 1 else 0.0
     if repetitions == 1:
@@ -187,19 +195,19 @@ def _names(records: Sequence[str | Path | xr.Dataset]) -> list[str]:
 
 
 def _refuse_copies(made: Sequence[Measurement], sources: Sequence[str]) -> None:
-    seen: dict[bytes, str] = {}
-    for one, source in zip(made, sources, strict=True):
-        content = b"".join(one.record[f"angle_{gear}"].values[0].tobytes() for gear in GEARS)
-        if content in seen:
-            raise DiagnosisError(f"records {seen[content]} and {source} hold the same samples: each one counts once")
-        seen[content] = source
+    found = same_samples([one.record.isel(realisation=[0]) for one in made])
+    if found is not None:
+        (first, _), (second, _) = found
+        raise DiagnosisError(
+            f"records {sources[first]} and {sources[second]} hold the same samples: each one counts once"
+        )
 
 
-def _mesh_frequency(record: xr.Dataset, source: str, facts: Facts) -> float:
+def _mesh_frequency(record: xr.Dataset, facts: Facts) -> float:
     """Mesh frequency [Hz]: the declared one, or the angles' own, rounded to whole teeth over the record."""
     if "mesh_period" in record.attrs:
         return 1.0 / float(record.attrs["mesh_period"])
-    frequency = angle_frequency(record, source, facts)
+    frequency = angle_frequency(record, facts)
     duration = record.sizes["time"] / float(record.attrs["sampling_rate"])
     cycles = round(frequency * duration)
     return cycles / duration if cycles and abs(frequency * duration - cycles) < PHASE_FIT else frequency
@@ -265,21 +273,9 @@ def _phase(record: xr.Dataset, frequency: float, facts: Facts, notes: list[str])
     return np.asarray(start + steps, dtype=np.float64), known
 
 
-def _completed(
-    record: xr.Dataset, repetition: tuple[int, int], frequency: float, start: float, facts: Facts
-) -> xr.Dataset:
-    """The record with repetitions for periods, and those attributes filled in that the case or the angles tell."""
-    known = {
-        "teeth_driver": facts.teeth[0],
-        "teeth_driven": facts.teeth[1],
-        "base_radius_driver": facts.base_radii[0],
-        "base_radius_driven": facts.base_radii[1],
-        "working_pressure_angle": facts.working_angle,
-        "support_direction": facts.direction,
-        "driven_boundary": facts.boundary,
-        "mesh_period": 1.0 / frequency,
-        "mesh_phase": start,
-    }
+def _completed(record: xr.Dataset, repetition: tuple[int, int], frequency: float, start: float) -> xr.Dataset:
+    """The record with repetitions for periods, and those attributes filled in that the angles tell."""
+    known = {"mesh_period": 1.0 / frequency, "mesh_phase": start}
     filled = {key: value for key, value in known.items() if key not in record.attrs}
     samples, repetitions = repetition
     whole = record.isel(time=slice(0, samples * repetitions))
@@ -319,20 +315,19 @@ def _departures(
     return departures, zero
 
 
-def _usable(whole: dict[str, Array], record: xr.Dataset, source: str, notes: list[str]) -> dict[str, Array]:
-    """The channels that carry a signal; clipped ones are refused, missing and dead ones said."""
-    for name, values in whole.items():
-        share = 0.0 if name.startswith("angle_") else clipped(values)
-        if share:
+def _refuse_clipped(record: xr.Dataset, source: str) -> None:
+    """What clipping leaves in a channel looks like an effect."""
+    for name, (share, _) in clipped_channels(record).items():
+        if name not in DERIVED:
             raise DiagnosisError(
                 f"{source}: channel {name} is clipped at {100 * share:.2g} % of its samples (limit 0)"
             )
-    kept = dict(whole)
-    for gear in GEARS:
-        name = f"y_{gear}"
-        if name in kept and np.ptp(kept[name]) == 0.0:
-            notes.append(f"{name} is constant, as of a dead sensor: it is left out")
-            del kept[name]
+
+
+def _usable(whole: dict[str, Array], notes: list[str]) -> dict[str, Array]:
+    """The channels that carry a signal; what missing ones cost is said."""
+    dead = {f"y_{gear}" for gear in GEARS if f"y_{gear}" in whole and np.ptp(whole[f"y_{gear}"]) == 0.0}
+    kept = {name: values for name, values in whole.items() if name not in dead}
     for name, loss in (
         ("y_driver", "what happens at the driver's support is seen only through the mesh"),
         ("y_driven", "what happens at the driven gear's support is seen only through the mesh"),

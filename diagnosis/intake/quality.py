@@ -1,4 +1,4 @@
-"""What a channel says about itself: noise and drift from repetition to repetition, clipping."""
+"""What a channel says about itself: noise and drift from repetition to repetition."""
 
 from __future__ import annotations
 
@@ -16,10 +16,6 @@ BEYOND_NOISE = 6.0
 LEVEL = 1e-3
 # Ratio of the scatter's rms in the noisiest half repetition to that in the quietest, beyond what chance makes of it.
 GROWTH = 1.2
-# Equal samples in a row, at an end of the range, that make a run; and how many such samples make clipping.
-RUN, FEWEST = 3, 6
-# A coarsely quantised signal lingers at its extremes: there, the last level must hold that many times as many.
-CROWD = 5.0
 
 
 def noise_of(repetitions: Array) -> float:
@@ -63,25 +59,6 @@ def drift_of(periods: Mapping[str, Array], base_radii: tuple[float, float], note
     return found
 
 
-def clipped(values: Array) -> float:
-    """Fraction of the samples (n,) that stand clipped at either end of the range; 0 if none do."""
-    if np.ptp(values) == 0.0:
-        return 0.0
-    total = 0
-    for end in (values.max(), values.min()):
-        at_end = values == end
-        count = int(at_end.sum())
-        if count < FEWEST or _longest_run(at_end) < RUN:
-            continue
-        levels, counts = np.unique(values, return_counts=True)
-        if levels.size < values.size / 4:  # quantised: equal samples are the rule
-            beside = counts[1:4] if end == levels[0] else counts[-4:-1]
-            if count < CROWD * max(1.0, float(beside.mean())):
-                continue
-        total += count
-    return total / values.size
-
-
 def _level_change(repetitions: Array) -> float:
     """Spread of the repetition means beyond what white noise explains; 0 within it."""
     means = repetitions.mean(axis=1)
@@ -98,8 +75,3 @@ def _growth(repetitions: Array, size: float) -> float:
     half = repetitions.shape[1] // 2
     rms = np.sqrt((change[:, : 2 * half].reshape(-1, half) ** 2).mean(axis=1))
     return float(rms.max() / max(rms.min(), LEVEL * size)) if rms.max() > LEVEL * size else 1.0
-
-
-def _longest_run(flags: NDArray[np.bool_]) -> int:
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], flags, [False])).astype(int)))
-    return int((edges[1::2] - edges[::2]).max()) if edges.size else 0

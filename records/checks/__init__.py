@@ -1,6 +1,21 @@
 """What a record alone can tell about itself: refused in a sentence, or warned of where it can be right."""
 
+from gearbench.records.checks.clipping import clipped_channels
+from gearbench.records.checks.copies import same_samples
 from gearbench.records.checks.door import CHECKS, check_record
-from gearbench.records.checks.finding import Finding
+from gearbench.records.checks.finding import ANGLE_UNITS, TORQUE_UNITS, Finding, unit_hint
+from gearbench.records.checks.look import mean_speed
+from gearbench.records.checks.periods import periods_repeat
 
-__all__ = ["CHECKS", "Finding", "check_record"]
+__all__ = [
+    "ANGLE_UNITS",
+    "CHECKS",
+    "TORQUE_UNITS",
+    "Finding",
+    "check_record",
+    "clipped_channels",
+    "mean_speed",
+    "periods_repeat",
+    "same_samples",
+    "unit_hint",
+]

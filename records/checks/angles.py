@@ -11,8 +11,8 @@ from gearbench.records.checks.look import GEARS, Look
 
 # Speeds against teeth, base radii against teeth.
 RATIO = 1e-3
-# Declared against measured mesh frequency, and cycles by which both may part over a short record.
-FREQUENCY, CYCLES = 2e-3, 0.1
+# Declared against measured mesh frequency, and cycles by which both may part over a period, beside what gears swing.
+FREQUENCY, CYCLES = 2e-3, 5e-3
 # Working pressure angles of involute gears [deg], base radii [m].
 WORKING_ANGLE_DEG = (5.0, 45.0)
 BASE_RADIUS = (1e-4, 20.0)
@@ -75,12 +75,13 @@ def angles_keep_mesh_period(look: Look) -> list[Finding]:
     if look.channel("angle_driver") is None or teeth is None or period is None or not look.speed("driver") > 0:
         return []
     got, declared = look.speed("driver") * teeth / (2 * pi), 1.0 / period
+    source = "mesh_period" if look.number("mesh_period") is not None else "mesh_phase"
     if abs(got / declared - 1) <= max(FREQUENCY, _slack(look)):
         return []
     return [
         Finding(
-            f"angle_driver and teeth_driver = {teeth:g} give a mesh frequency of {got:.5g} Hz, but mesh_period says"
-            f" {declared:.5g} Hz (limit {FREQUENCY:.1%}){unit_hint(got / declared, ANGLE_UNITS, 'the angles')}"
+            f"angle_driver and teeth_driver = {teeth:g} give a mesh frequency of {got:.5g} Hz, but {source} says"
+            f" {declared:.5g} Hz (limit {FREQUENCY:.1%}){unit_hint(got / declared, ANGLE_UNITS, 'the angles', 'are')}"
         )
     ]
 
@@ -119,18 +120,25 @@ def radii_fit_teeth(look: Look) -> list[Finding]:
 
 
 def _slack(look: Look) -> float:
-    """By what part the mean speed over a short record may err: some cycles, and what the gears swing.
+    """By what part the mean speed may err: some cycles over the record, and what the gears swing.
 
-    The slope that a sine of rms r feigns over a record is at most 6 sqrt(2) / pi r per record, below 3 r.
+    Over a single period the slope that a sine of rms r feigns is at most 6 sqrt(2) / pi r per record, below 3 r.
+    Several periods tell the speed by what is added from one to the next; what that varies by is its uncertainty.
     """
-    swings, cycles = [], []
+    periods = int(look.record.attrs["periods"])
+    slack = []
     for gear in GEARS:
         values, teeth = look.channel(f"angle_{gear}"), look.number(f"teeth_{gear}")
         if values is None or teeth is None:
             continue
-        turned = abs(look.speed(gear)) / look.rate * np.arange(values.size)
-        swings.append(float(np.std(values - turned)) * teeth / (2 * pi))
-        cycles.append(turned[-1] * teeth / (2 * pi))
-    if not cycles or not max(cycles) > 0:
+        to_cycles = teeth / (2 * pi)
+        if periods > 1:
+            steps = np.diff(values.reshape(periods, -1), axis=0)
+            wander, cycles = float(np.std(steps)), abs(float(steps.mean()))
+            slack.append((CYCLES + 3 * wander * to_cycles, cycles * to_cycles))
+        else:
+            turned = abs(look.speed(gear)) / look.rate * np.arange(values.size)
+            slack.append((CYCLES + 3 * float(np.std(values - turned)) * to_cycles, turned[-1] * to_cycles))
+    if not slack or not max(cycles for _, cycles in slack) > 0:
         return CYCLES
-    return (CYCLES + 3 * max(swings)) / max(cycles)
+    return max(wander for wander, _ in slack) / max(cycles for _, cycles in slack)

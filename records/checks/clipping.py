@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import sqrt
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from gearbench.records.checks.finding import Finding
@@ -12,10 +13,11 @@ from gearbench.records.checks.look import Look
 
 Array = NDArray[np.float64]
 
-# Equal samples in a row, at an end of the range, that make a run; and how many such samples make clipping.
-RUN, FEWEST = 3, 6
-# A coarsely quantised signal lingers at its extremes: there, the last level must hold that many times as many.
-CROWD = 5.0
+# Equal samples at an end of the range that make clipping, and how many times as many as the levels beside hold: a
+# signal that repeats itself meets its extreme in every period, a coarsely quantised one lingers there.
+FEWEST, CROWD = 6, 5.0
+# Levels closer than this part of the range are one.
+ROUNDING = 1e-9
 # A signal that spends this part of its time at its ends, such as a binary one, is made so and not clipped.
 MADE_SO = 0.95
 # A load torque that stands below this part of its largest value is the one of separated teeth.
@@ -24,12 +26,28 @@ CHANNELS = ("torque_driver", "torque_driven", "y_driver", "y_driven", "dte", "fo
 
 
 def not_clipped(look: Look) -> list[Finding]:
-    """No channel stands at the ends of its range; all realisations are looked at."""
+    """No channel stands at the ends of its range."""
     found = []
+    for name, (share, row) in clipped_channels(look.record).items():
+        error = lost_by_clipping(look.record[name].values[row]) * _share(look, name)
+        found.append(
+            Finding(
+                f"{name} is clipped at {share:.2g} of its samples (limit 0): what it lost there is missing from"
+                f" the response, about {error:.0%} of it",
+                refused=False,
+                error=error,
+            )
+        )
+    return found
+
+
+def clipped_channels(record: xr.Dataset) -> dict[str, tuple[float, int]]:
+    """Channels that stand clipped: part of the samples of the realisation that is worst, and its number."""
+    found = {}
     for name in CHANNELS:
-        if name not in look.record:
+        if name not in record:
             continue
-        rows = look.record[name].values
+        rows = record[name].values
         shares = [clipped_ends(values) for values in rows]
         if name == "torque_driven":  # at zero, the teeth have separated
             shares = [
@@ -37,18 +55,8 @@ def not_clipped(look: Look) -> list[Finding]:
                 for values, (high, low) in zip(rows, shares, strict=True)
             ]
         row = max(range(len(rows)), key=lambda number: sum(shares[number]))
-        worst = shares[row]
-        if not 0.0 < sum(worst) < MADE_SO:
-            continue
-        error = lost_by_clipping(rows[row]) * _share(look, name)
-        found.append(
-            Finding(
-                f"{name} is clipped at {sum(worst):.2g} of its samples (limit 0): what it lost there is missing from"
-                f" the response, about {error:.0%} of it",
-                refused=False,
-                error=error,
-            )
-        )
+        if 0.0 < sum(shares[row]) < MADE_SO:
+            found[name] = (sum(shares[row]), row)
     return found
 
 
@@ -99,18 +107,10 @@ def _share(look: Look, name: str) -> float:
 
 
 def _clipped_at(values: Array, end: float) -> float:
-    at_end = values == end
-    count = int(at_end.sum())
-    if count < FEWEST or _longest_run(at_end) < RUN:
+    count = int((values == end).sum())
+    if count < FEWEST:
         return 0.0
-    levels, counts = np.unique(values, return_counts=True)
-    if levels.size < values.size / 4:  # quantised: equal samples are the rule
-        beside = counts[1:4] if end == levels[0] else counts[-4:-1]
-        if count < CROWD * max(1.0, float(beside.mean())):
-            return 0.0
-    return count / values.size
-
-
-def _longest_run(flags: NDArray[np.bool_]) -> int:
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], flags, [False])).astype(int)))
-    return int((edges[1::2] - edges[::2]).max()) if edges.size else 0
+    # Of a periodic signal the same sample comes back but for rounding.
+    levels, counts = np.unique(np.round((values - end) / (ROUNDING * np.ptp(values))), return_counts=True)
+    beside = counts[1:4] if levels[0] == 0 else counts[-4:-1]
+    return count / values.size if count >= CROWD * max(1.0, float(beside.mean())) else 0.0

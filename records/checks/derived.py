@@ -15,8 +15,9 @@ Array = NDArray[np.float64]
 
 # Rms difference of what is stored from what the channels give, relative to the larger one's fluctuation ...
 STORED = 0.2
-# ... and of the means, relative to the larger of both and the fluctuation.
+# ... of the means, relative to the larger of both and the fluctuation; and a factor between both that is said.
 STORED_MEAN = 0.2
+FACTOR = 0.02
 # Response of the DTE to the force at excited lines [m/N], as an rms ratio: no gear train is as soft as 1e4 N/m, ...
 SOFTEST = 1e-4
 # ... no mesh stiffer than 50 N/(um mm) (ISO 6336-1 has 20 for steel) on a face WIDEST modules wide; above its
@@ -51,6 +52,7 @@ def stored_as_channels_have_it(look: Look) -> list[Finding]:
         level = max(abs(means[0]), abs(means[1]), swing)
         compare_means = name == "force" or look.zero_known
         if apart <= STORED * swing and not (compare_means and abs(means[0] - means[1]) > STORED_MEAN * level):
+            found += _factor_between(name, stored, computed, ", ".join(sources))
             continue
         unit = "m" if name == "dte" else "N"
         found.append(
@@ -63,6 +65,26 @@ def stored_as_channels_have_it(look: Look) -> list[Finding]:
     return found
 
 
+def _factor_between(name: str, stored: Array, computed: Array, sources: str) -> list[Finding]:
+    """A factor between two signals that the noise of neither makes: both regressions lie on one side of 1."""
+    one, two = stored - stored.mean(), computed - computed.mean()
+    cross = float(one @ two)
+    if not cross > 0.0:
+        return []
+    factors = sorted((cross / float(two @ two), float(one @ one) / cross))
+    off = factors[0] - 1 if factors[0] > 1 else factors[1] - 1
+    if factors[0] <= 1 <= factors[1] or abs(off) <= FACTOR:
+        return []
+    return [
+        Finding(
+            f"the stored {name} is {1 + off:.3g} times what {sources} of the same record give (limit {FACTOR:.0%}):"
+            " one of them has another gain",
+            refused=False,
+            error=abs(off),
+        )
+    ]
+
+
 def dte_alive(look: Look) -> list[Finding]:
     """A DTE that does not change is a dead channel, or one channel stored under two names."""
     found = []
@@ -70,9 +92,8 @@ def dte_alive(look: Look) -> list[Finding]:
         if values is None:
             continue
         largest = float(np.abs(values).max())
-        if name != "dte" and look.channel("angle_driver") is not None:
-            angle, radius = look.channel("angle_driver"), look.number("base_radius_driver")
-            assert angle is not None and radius is not None
+        angle, radius = look.channel("angle_driver"), look.number("base_radius_driver")
+        if name != "dte" and angle is not None and radius is not None:
             largest = max(largest, float(np.abs(angle).max()) * radius)
         if float(np.ptp(values)) <= ROUNDING * largest:
             found.append(Finding(f"{name} is constant ({values[0]:.4g} m): gears in mesh are never without motion"))
@@ -107,16 +128,15 @@ def swings_fit_the_teeth(look: Look) -> list[Finding]:
     """DTE and displacements stay within the size of a tooth."""
     most, limit = _largest_swing(look)
     found = []
-    for name, values in (
-        ("dte", look.channel("dte")),
-        ("the dte of angles and displacements", look.dte if "dte" not in look.record else None),
-        ("y_driver", look.channel("y_driver")),
-        ("y_driven", look.channel("y_driven")),
+    length = "is it in mm or um?"
+    for name, values, hint in (
+        ("y_driver", look.channel("y_driver"), length),
+        ("y_driven", look.channel("y_driven"), length),
+        ("dte", look.channel("dte"), length),
+        ("the dte of angles and displacements", None if "dte" in look.record else look.dte, "are the angles in rad?"),
     ):
         if values is not None and float(np.ptp(values)) > most:
-            found.append(
-                Finding(f"{name} swings by {np.ptp(values):.4g} m (limit {most:.3g} m, {limit}): is it in mm or um?")
-            )
+            found.append(Finding(f"{name} swings by {np.ptp(values):.4g} m (limit {most:.3g} m, {limit}): {hint}"))
     return found[:1]
 
 
@@ -126,8 +146,12 @@ def response_is_a_gears(look: Look) -> list[Finding]:
     if error is None or force is None or float(np.ptp(force)) <= 1e-9 * float(np.abs(force).max()):
         return []
     driving = look.spectrum(force)
-    lines = look.excited(driving)
-    ratio = float(np.linalg.norm(look.spectrum(error)[lines]) / np.linalg.norm(driving[lines]))
+    lines = look.excited(force)
+    swing = float(np.linalg.norm(look.spectrum(error)[lines]))
+    # A constant dte is said elsewhere.
+    if not lines.any() or swing <= 1e-9 * float(np.abs(error).max()):
+        return []
+    ratio = swing / float(np.linalg.norm(driving[lines]))
     module = _module(look)
     least = BY_MASS / (STIFFEST * WIDEST * (module or LARGEST_SWING))
     if least <= ratio <= SOFTEST:

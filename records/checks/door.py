@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import xarray as xr
 
 from gearbench.records.checks.angles import angles_keep_mesh_period, angles_roll, angles_unwrapped, radii_fit_teeth
+from gearbench.records.checks.boundary import boundary_as_declared, inertias_as_declared
 from gearbench.records.checks.clipping import not_clipped
 from gearbench.records.checks.contradictions import (
     clocks_agree,
@@ -15,6 +16,7 @@ from gearbench.records.checks.contradictions import (
     load_torque_alive,
     torques_fit_inertias,
 )
+from gearbench.records.checks.copies import realisations_differ
 from gearbench.records.checks.derived import (
     centres_alive,
     dte_alive,
@@ -33,6 +35,7 @@ Check = Callable[[Look], list[Finding]]
 
 # What is said first explains most: a record in degrees fails later checks too.
 CHECKS: tuple[Check, ...] = (
+    realisations_differ,
     radii_fit_teeth,
     angles_unwrapped,
     angles_roll,
@@ -49,13 +52,15 @@ CHECKS: tuple[Check, ...] = (
     stored_as_channels_have_it,
     response_is_a_gears,
     load_torque_alive,
+    boundary_as_declared,
+    inertias_as_declared,
     not_clipped,
     clocks_agree,
     periods_repeat,
 )
 
 
-def check_record(record: xr.Dataset, source: str = "") -> tuple[Finding, ...]:
+def check_record(record: xr.Dataset, source: str = "", checks: Sequence[Check] = CHECKS) -> tuple[Finding, ...]:
     """What must be said of a record that `validate_record` has passed: findings that are not refused.
 
     Each check uses the attributes and channels that are there and is silent where it cannot know. Raises RecordError
@@ -75,7 +80,7 @@ def check_record(record: xr.Dataset, source: str = "") -> tuple[Finding, ...]:
     """
     look = Look(record)
     found: list[Finding] = []
-    for check in CHECKS:
+    for check in checks:
         for finding in check(look):
             if finding.refused:
                 raise RecordError(f"{source}: {finding.sentence}" if source else finding.sentence)

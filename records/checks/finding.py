@@ -25,9 +25,9 @@ class Finding:
     error: float = 0.0
 
 
-def unit_hint(factor: float, units: dict[float, str], channel: str) -> str:
+def unit_hint(factor: float, units: dict[float, str], channel: str, verb: str = "is") -> str:
     """A guess at the unit of a channel from the factor by which it is off, as the end of a sentence."""
     for known, name in units.items():
         if abs(factor / known - 1) < UNIT_MATCH:
-            return f": is {channel} in {name}?"
+            return f": {verb} {channel} in {name}?"
     return ""

@@ -77,10 +77,8 @@ class Look:
         return None if angle is None else cos(angle)
 
     def speed(self, gear: str) -> float:
-        """Mean speed [rad/s] of a gear by a linear fit to its angle."""
-        values = self.record[f"angle_{gear}"].values[0]
-        steps = np.arange(values.size) - 0.5 * (values.size - 1)
-        return float(steps @ (values - values.mean()) / (steps @ steps)) * self.rate
+        """Mean speed [rad/s] of a gear."""
+        return mean_speed(self.record, gear)
 
     def swing(self, gear: str) -> Array | None:
         """Departure (samples,) [rad] of a gear's angle from steady rotation at the declared mesh period."""
@@ -101,8 +99,12 @@ class Look:
         if size.max() <= 1e-9 * np.abs(driving).sum():
             top = self.samples // 4
         step = max(1, top // MOST_LINES)
-        # An odd step meets even and odd lines, and with a comb its lines of either kind.
-        return np.arange(1, max(top, 2) + 1, step + 1 - step % 2)
+        # An odd step meets even and odd lines, and with most combs lines of theirs.
+        found = np.arange(1, max(top, 2) + 1, step + 1 - step % 2)
+        met = size[found] >= EXCITED * size.max()
+        excited = np.flatnonzero(size >= EXCITED * size.max())
+        excited = excited[(excited > 0) & (excited <= top)]
+        return found if met.any() else np.union1d(found, excited[:: max(1, excited.size // MOST_LINES)])
 
     @cached_property
     def omega(self) -> Array:
@@ -133,11 +135,23 @@ class Look:
         except TransmissionError:
             return self.channel("force")
 
-    def excited(self, force: Complexes) -> NDArray[np.bool_]:
-        """Which of `lines` the force excites; none where it is constant."""
-        size = np.abs(force)
-        return np.asarray((size >= EXCITED * size.max()) & (size > 0))
+    def excited(self, force: Array) -> NDArray[np.bool_]:
+        """Which of `lines` a force (samples,) excites; none where it is constant. What counts is the strongest of all
+        lines: those that are looked at may lie between the excited ones."""
+        size = np.abs(np.fft.rfft(force - force.mean()))
+        return np.asarray((size[self.lines] >= EXCITED * size.max()) & (size[self.lines] > 0))
 
     def spectrum(self, values: Array) -> Complexes:
         """DFT of values (samples,) on `lines`, divided by the number of samples."""
         return np.asarray(np.fft.rfft(values)[self.lines] / values.size)
+
+
+def mean_speed(record: xr.Dataset, gear: str) -> float:
+    """Mean speed [rad/s] of a gear in the first realisation: by how much its angle advances from period to period; with
+    a single period by a linear fit, which swings of the gear falsify."""
+    values, rate = record[f"angle_{gear}"].values[0], float(record.attrs["sampling_rate"])
+    periods = int(record.attrs["periods"])
+    if periods > 1:
+        values, rate = values.reshape(periods, -1).mean(axis=1), rate * periods / values.size
+    steps = np.arange(values.size) - 0.5 * (values.size - 1)
+    return float(steps @ (values - values.mean()) / (steps @ steps)) * rate

@@ -74,6 +74,10 @@ class Accounts:
         left = float(np.linalg.norm(target - stacked / scale @ found) / np.linalg.norm(target))
         return found / scale, np.abs(found) / np.linalg.norm(target), left
 
+    def force(self, gear: str) -> Complexes:
+        """Force (lines,) [N] on the mesh as a gear has it."""
+        return np.asarray(sum(self.gears[gear].values()))
+
     def _force(self, gear: str, channel: str, turn: Complexes) -> Complexes:
         parts = [part * turn if name == channel else part[None, :] for name, part in self.gears[gear].items()]
         return np.asarray(sum(parts) * np.ones_like(turn))

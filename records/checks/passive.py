@@ -47,7 +47,7 @@ def force_feeds_the_rig(look: Look) -> list[Finding]:
 
 def _cosine(look: Look, force: NDArray[np.float64], error: NDArray[np.float64]) -> float:
     driving = look.spectrum(force)
-    lines = look.excited(driving)
+    lines = look.excited(force)
     driving, rate = driving[lines], (1j * look.omega * look.spectrum(error))[lines]
     size = float(np.linalg.norm(driving) * np.linalg.norm(rate))
     return float(np.vdot(driving, rate).real) / size if size > 0 else 0.0

@@ -13,6 +13,9 @@ from gearbench.records.errors import RecordError
 # What a delayed channel lacks at an end may be taken from one excitation period further up to this part of a period.
 BORROWED = 0.1
 
+# A record sampled so much finer or coarser than its fastest channel has another unit of time.
+FINER = 100.0
+
 
 @dataclass(frozen=True)
 class Common:
@@ -42,6 +45,13 @@ def common_clock(signals: Sequence[Signal], attributes: Mapping[str, float | str
     """
     rate, samples = _rate(signals, attributes, notes)
     clocks = [signal.clock for signal in signals]
+    fastest = max(clock.rate for clock in clocks)
+    if not 1 / FINER < fastest / rate < FINER:
+        unit = "ms" if fastest < rate else "s"
+        raise RecordError(
+            f"the fastest channel has {fastest:.6g} Hz, where sampling_rate_hz = {rate:.6g} is declared (limit a factor"
+            f" {FINER:g}): is the time in {unit}, or the rate of another measurement?"
+        )
     reference = _reference(clocks, rate)
     skipped = float(attributes.get("start", 0.0))
     begin, end = max(clock.start for clock in clocks), min(clock.end for clock in clocks)

@@ -13,13 +13,26 @@ import gearbench as gb
 from gearbench.records import RecordError
 from gearbench.records.checks import check_record
 from gearbench.records.checks.clipping import clipped_ends, lost_by_clipping
+from gearbench.records.transmission_error import force_of_torques
 
 Change = Callable[[xr.Dataset], xr.Dataset]
 
 SHORT = ["experiment.realisations=1", "experiment.seed=5"]
 OVERDAMPED = ["rig.support.stiffness_n_per_m=6e6", "rig.support.damping_n_s_per_m=8e4"]
+SUPPORT = ["rig.support.stiffness_n_per_m=3e8", "rig.support.damping_n_s_per_m=2e4"]
+PAIR = [  # 16/48 of Luo et al. (2019), whose wheel weighs forty times what the pinion does
+    'rig.driver="gears/luo2019_z16.toml"',
+    'rig.driven="gears/luo2019_z48.toml"',
+    'rig.support.direction="tangential"',
+    "experiment.torque_mean_nm=60",
+    "experiment.multisine.amplitude_nm=15",
+    *SUPPORT,
+]
+NOISE = "noise_angle_urad={0}, noise_displacement_um={1}, noise_torque_nm={2}"
 RIGS = {
     "free": [],
+    "16/48": PAIR,
+    "16/48 noise": [*PAIR, f"rig.sensors={{ {NOISE.format(2, 0.1, 0.2)} }}"],
     "speed": ['rig.load.boundary="speed"'],
     "tangential": ['rig.support.direction="tangential"', 'rig.load.boundary="speed"'],
     "overdamped": [*OVERDAMPED, 'rig.load.boundary="speed"'],
@@ -36,7 +49,7 @@ def simulated(name: str) -> xr.Dataset:
 
 @pytest.fixture(scope="module")
 def rigs() -> dict[str, xr.Dataset]:
-    return {name: simulated(name) for name in ("free", "tangential", "overdamped")}
+    return {name: simulated(name) for name in ("free", "tangential", "overdamped", "16/48", "16/48 noise")}
 
 
 def bare(record: xr.Dataset) -> xr.Dataset:
@@ -103,7 +116,7 @@ REFUSED: list[tuple[Change, str]] = [
     (times("y_driver", 1e3), "in mm or um"),
     (times("y_driven", 1e-3), "in mm or um"),
     (times("angle_driven", 180 / np.pi), "is angle_driven in degrees"),
-    (lambda r: times("angle_driver", 57.29578)(times("angle_driven", 57.29578)(r)), "are? in degrees|is the angles"),
+    (lambda r: times("angle_driver", 57.29578)(times("angle_driven", 57.29578)(r)), "are the angles in degrees"),
     (times("angle_driver", -1.0), "angle_driver does not rise"),
     (
         lambda r: with_values(r, "angle_driver", r.angle_driver.values - 2 * np.pi * (r.angle_driver.values > 0.5)),
@@ -171,6 +184,86 @@ def test_a_late_channel_is_named_with_its_delay(rigs: dict[str, xr.Dataset], nam
     assert not found.refused and found.error > 0.1
 
 
+@pytest.mark.parametrize("rig", ["16/48", "16/48 noise"])
+@pytest.mark.parametrize("name", ["torque_driver", "angle_driver"])
+def test_one_sample_shows_beside_stiff_supports_and_under_noise(
+    rigs: dict[str, xr.Dataset], rig: str, name: str
+) -> None:
+    record = bare(rigs[rig])
+    values = record[name].values
+    ramp = 2 * np.pi / (16 * record.attrs["mesh_period"] * record.attrs["sampling_rate"]) * np.arange(values.shape[1])
+    ramp = ramp if name == "angle_driver" else 0 * ramp
+    later = np.roll(values - ramp, 1, axis=1) + ramp
+    found = [one for one in check_record(with_values(record, name, later)) if "does not repeat" not in one.sentence]
+    assert len(found) == 1 and f"{name} lags behind" in found[0].sentence and found[0].error > 0.1
+
+
+def test_a_boundary_that_the_gears_do_not_keep_is_said(rigs: dict[str, xr.Dataset]) -> None:
+    (found,) = check_record(bare(rigs["16/48"]).assign_attrs(driven_boundary="speed"))
+    assert 'driven_boundary = "speed", but the driven gear takes part' in found.sentence
+    held = bare(rigs["tangential"])
+    (found,) = check_record(held.assign_attrs(driven_boundary="torque"))
+    assert "turns as steadily as if it were held" in found.sentence
+    # T1 / rb1 is right; with equal gears of 3.6e-3 and 0.0163 kg m^2 at least the load's part is taken wrong.
+    right = held.torque_driver.values / held.attrs["base_radius_driver"]
+    wrong = force_of_torques(held.assign_attrs(driven_boundary="torque")).values
+    apart = float(np.std(wrong - right) / np.std(right))
+    assert found.error == pytest.approx(apart, rel=0.1) and apart > 0.05
+
+
+def test_inertias_that_do_not_balance_are_said_with_those_that_do(rigs: dict[str, xr.Dataset]) -> None:
+    # A load that does not answer the driver's torque, so that the force depends on the inertias.
+    record = under_steady_load(bare(rigs["free"]).drop_vars(["y_driver", "y_driven"]))
+    assert check_record(record) == ()
+    (found,) = [one for one in check_record(attribute("inertia_driver", 2.0)(record)) if "inertia_" in one.sentence]
+    declared = record.attrs["inertia_driver"]
+    assert f"inertia_driver = {2 * declared:.4g} kg m^2" in found.sentence and f"with {declared:.4g} " in found.sentence
+
+
+def under_steady_load(record: xr.Dataset) -> xr.Dataset:
+    """Gears that move unlike each other under a constant load; the driver's torque by Newton's second law."""
+    a = record.attrs
+    omega = 2 * np.pi * np.fft.rfftfreq(record.sizes["time"], 1 / a["sampling_rate"])
+    soft = 1 / (1 + (omega / 6000.0) ** 2)
+    swing = {}
+    for gear, part in (("driver", np.ones_like(omega)), ("driven", soft)):
+        ramp = 2 * np.pi / (a[f"teeth_{gear}"] * a["mesh_period"]) * record.time.values
+        swing[gear] = part * np.fft.rfft(record[f"angle_{gear}"].values - ramp)
+        turned = ramp + np.fft.irfft(swing[gear], n=ramp.size)
+        record = with_values(record, f"angle_{gear}", turned)
+    moments = {
+        gear: np.fft.irfft(-(omega**2) * swing[gear], n=record.sizes["time"]) * a[f"inertia_{gear}"] for gear in swing
+    }
+    load = np.full_like(record.torque_driven.values, record.torque_driven.values.mean())
+    force = (load + moments["driven"]) / a["base_radius_driven"]
+    record = with_values(record, "torque_driven", load)
+    return with_values(record, "torque_driver", force * a["base_radius_driver"] + moments["driver"])
+
+
+def test_the_same_realisation_twice_is_refused(rigs: dict[str, xr.Dataset]) -> None:
+    record = rigs["free"]
+    with pytest.raises(RecordError, match="realisations 0 and 1 hold the same samples"):
+        check_record(record.isel(realisation=[0, 0]))
+    with pytest.raises(RecordError, match="records 1 and 2 of 2 hold the same samples"):
+        gb.identify([record, record.copy()])
+
+
+@pytest.mark.parametrize("rig", ["free", "tangential", "16/48 noise"])
+def test_a_clock_or_mesh_period_off_by_a_hundredth_is_refused(rigs: dict[str, xr.Dataset], rig: str) -> None:
+    record = bare(rigs[rig])
+    with pytest.raises(RecordError, match="mesh_period says"):
+        check_record(attribute("mesh_period", 1.01)(record))
+    fast = attribute("sampling_rate", 1.01)(record.assign_coords(time=record.time / 1.01))
+    with pytest.raises(RecordError, match="mesh_period says"):
+        check_record(fast)
+
+
+def test_a_stored_signal_of_another_gain_is_said(rigs: dict[str, xr.Dataset]) -> None:
+    for rig in ("tangential", "16/48 noise"):
+        (found,) = [one for one in check_record(times("dte", 1.1)(rigs[rig])) if "stored" in one.sentence]
+        assert "the stored dte is 1.1 times" in found.sentence and found.error == pytest.approx(0.1, abs=0.02)
+
+
 def test_dead_channels_are_said(rigs: dict[str, xr.Dataset]) -> None:
     (dead,) = check_record(constant("torque_driven")(bare(rigs["free"])))
     assert "torque_driven is constant" in dead.sentence and dead.error == 1.0
@@ -178,6 +271,15 @@ def test_dead_channels_are_said(rigs: dict[str, xr.Dataset]) -> None:
     assert check_record(constant("torque_driven")(bare(rigs["tangential"]))) == ()
     (dead,) = check_record(constant("y_driver")(bare(rigs["free"])))
     assert "y_driver is constant" in dead.sentence and 0.1 < dead.error < 0.6
+
+
+@pytest.mark.parametrize("share", [0.01, 0.1])
+def test_few_clipped_samples_show(rigs: dict[str, xr.Dataset], share: float) -> None:
+    record = bare(rigs["16/48 noise"])
+    low, high = np.quantile(record.torque_driver.values, [share / 2, 1 - share / 2])
+    spoilt = with_values(record, "torque_driver", np.clip(record.torque_driver.values, low, high))
+    (found,) = [one for one in check_record(spoilt) if "clipped" in one.sentence]
+    assert f"clipped at {share:.2g} of" in found.sentence and 0.0 < found.error < 0.2
 
 
 @pytest.mark.parametrize("part", [0.5, 0.8])
@@ -196,6 +298,13 @@ def test_lost_by_clipping_of_a_sine() -> None:
     assert clipped_ends(values) == (0.0, 0.0)
 
 
+def test_a_quantised_signal_is_not_clipped() -> None:
+    assert clipped_ends(np.round(np.sin(np.arange(5000) / 7) * 20)) == (0.0, 0.0)
+    high, low = clipped_ends(np.minimum(np.round(np.sin(np.arange(5000) * np.pi / 250) * 200), 150))
+    # A sine stands above 3/4 of its height for (1 - 2 asin(0.75) / pi) / 2 of its time; the nearest step counts.
+    assert high == pytest.approx((1 - 2 * np.arcsin(0.7475) / np.pi) / 2, rel=0.02) and low == 0.0
+
+
 def test_periods_that_differ_are_told_as_a_share() -> None:
     record = simulated("noise")
     noise = record.dte.values.std() * 0.5 * np.random.default_rng(2).standard_normal(record.dte.shape)
@@ -203,10 +312,26 @@ def test_periods_that_differ_are_told_as_a_share() -> None:
     assert "the dte does not repeat" in found.sentence and "0.47 of its rms" in found.sentence
 
 
-def test_text_in_an_attribute_is_refused_by_name(rigs: dict[str, xr.Dataset]) -> None:
-    for name, value in (("inertia_driver", "2 kg"), ("mesh_period", [1.0, 2.0]), ("teeth_driven", "many")):
-        with pytest.raises(RecordError, match=f"attribute {name} = .* is not a number"):
-            gb.validate_record(rigs["free"].assign_attrs({name: value}))
+ODD: list[tuple[str, object, str]] = [
+    ("inertia_driver", "2 kg", "is not a number"),
+    ("mesh_period", [1.0, 2.0], "is not a number"),
+    ("teeth_driven", "many", "is not a number"),
+    ("working_pressure_angle", 0.3 + 1j, "is not a number"),
+    ("periods_averaged", np.nan, "must be finite"),
+    ("inertia_driven", 1e300, "must lie between"),
+    ("support_direction", np.zeros(3), "is not text"),
+    ("schema", np.zeros(3), "schema is|is not text"),
+    ("mesh_phase", "early", "is no number of cycles"),
+    ("mesh_phase", np.zeros(5), "has 5 values"),
+]
+
+
+@pytest.mark.parametrize(("name", "value", "words"), ODD, ids=[f"{name}-{words}" for name, _, words in ODD])
+def test_an_attribute_of_the_wrong_kind_is_refused_by_name(
+    rigs: dict[str, xr.Dataset], name: str, value: object, words: str
+) -> None:
+    with pytest.raises(RecordError, match=words):
+        gb.validate_record(rigs["free"].assign_attrs({name: value}))
 
 
 @pytest.mark.parametrize(

@@ -247,6 +247,7 @@ REFUSALS: dict[str, tuple[dict[str, Any], dict[str, Any], dict[str, Any], str]] 
     "clock falls": ({"t": np.where(np.arange(8000) == 300, 0.0, TIME)}, {}, {}, "does not rise at sample 300"),
     "short": ({}, {"periods": 3}, {}, "share 8000 samples at 8000 Hz, less than the 3 x 4000"),
     "wrong rate": ({}, {"time": None, "sampling_rate": 16000.0}, {}, "mesh frequency of 80 Hz, but 40 Hz is declared"),
+    "ms": ({"t": 1e3 * TIME}, {"sampling_rate": RATE}, {}, "has 8 Hz, where sampling_rate_hz = 8000 .*time in ms"),
     "unknown unit": ({}, {}, {"y_driver": {"unit": "furlong"}}, "unit 'furlong', which is not known"),
     "nm": ({}, {}, {"torque_driver": {"unit": "nm"}}, r"'nm' \(length\).*newton metres are written N m"),
     "wrong unit": ({}, {}, {"y_driver": {"unit": "kN"}}, r"'kN' \(force\), but the channel is a length in m"),
