@@ -2,7 +2,7 @@
 
 `excitation`: multisines and residue combs. `spectra`: from records to spectra of force and DTE. `lpm`: the local
 polynomial method. `truth`: periodic systems whose exact response is known. `response`: the dataset of a time-varying
-frequency response, natural frequencies against mesh phase.
+frequency response, natural frequencies against mesh phase. `feedback`: the mesh-feedback estimator.
 """
 
 from gearbench.identification.excitation.multisine import MultisineError, MultisineSignal, random_phase_multisine

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from math import sqrt
 from typing import Any, Literal
 
@@ -12,6 +12,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from gearbench.identification.feedback.estimate import mesh_feedback
+from gearbench.identification.feedback.frf import feedback_frf
 from gearbench.identification.lpm.accuracy import MISSING, Accuracy, RecordRule, expected_accuracy, record_rule
 from gearbench.identification.lpm.estimate import LpmResult, local_polynomial
 from gearbench.identification.lpm.local_solve import LpmError
@@ -22,12 +24,18 @@ from gearbench.identification.response.modes import itf_modes
 from gearbench.identification.spectra.joint import Spectra
 from gearbench.identification.spectra.records import record_spectra
 from gearbench.identification.truth.periodic import itf_from_htf
-from gearbench.records.checks import check_record
+from gearbench.records import RecordError
+from gearbench.records.checks import check_record, same_samples
 
 Progress = Callable[[float, str], None]
 
 # About this many output frequencies unless a step is given.
 OUTPUT_LINES = 1500
+METHODS = ("lpm", "mesh-feedback")
+# Expected error of mesh-feedback beyond which the local polynomial method is tried as well.
+SECOND_OPINION = 0.05
+# Equations of mesh-feedback beyond which further realisations are left out.
+ENOUGH = 20_000
 # Results beyond this expected error carry a warning.
 DOUBTFUL = 0.1
 
@@ -36,13 +44,14 @@ DOUBTFUL = 0.1
 class IdentificationSettings:
     """How to identify. None: chosen from the record.
 
-    method "lpm"; `harmonics` L (branches on each side), `order` R, `window` n (half-width in lines); `band`
+    method "lpm", the local polynomial method: `harmonics` L (branches on each side), `order` R, `window` n
+    (half-width in lines); or "mesh-feedback": `harmonics` of the mesh stiffness, order and window unused; `band`
     [Hz]: output frequencies (default: the excited band); `step`: lines between them; `phases`: of the ITF;
     `transient`: "estimate" polynomials for it, "none", or "auto": only where the record does not prove its
     steady state; `modes`: at most that many.
     """
 
-    method: Literal["lpm"] = "lpm"
+    method: Literal["lpm", "mesh-feedback"] = "lpm"
     harmonics: int | None = None
     order: int | None = None
     window: int | None = None
@@ -53,8 +62,11 @@ class IdentificationSettings:
     modes: int | None = None
 
     def __post_init__(self) -> None:
-        if self.method != "lpm":
-            raise LpmError(f"method = {self.method!r} is unknown; the only method is 'lpm'")
+        if self.method not in METHODS:
+            raise LpmError(f"method = {self.method!r} is unknown; methods are 'lpm' and 'mesh-feedback'")
+        for name in ("order", "window"):
+            if self.method != "lpm" and getattr(self, name) is not None:
+                raise LpmError(f"{name} = {getattr(self, name)} belongs to method 'lpm', not to {self.method!r}")
         if self.transient not in ("auto", "estimate", "none"):
             raise LpmError(f"transient = {self.transient!r} must be 'auto', 'estimate' or 'none'")
         limits = {"harmonics": 0, "order": 0, "window": 1, "step": 1, "phases": 1, "modes": 0}
@@ -88,7 +100,7 @@ def identify(
     >>> dict(frf["itf_re"].sizes), frf["itf_re"].attrs["units"]
     ({'frequency': 501, 'phase': 256}, 'm/N')
     >>> f"{frf.attrs['expected_error']:.0%}"
-    '11%'
+    '12%'
     """
     settings = settings or IdentificationSettings()
     report = progress or (lambda fraction, message: None)
@@ -101,6 +113,25 @@ def identify(
     doubts, cost = _doubts(records)
     band = settings.band or excited
     lines = output_lines(spectra, band, excited, settings.step)
+    given = [*doubts, *notes]
+    if settings.method == "mesh-feedback":
+        frf = _by_feedback(spectra, settings, lines, excited, given, cost, report)
+        if frf.attrs["expected_error"] > SECOND_OPINION:
+            frf = _second_opinion(frf, spectra, replace(settings, harmonics=None), lines, given, cost, report)
+    else:
+        frf = _by_polynomials(spectra, settings, lines, given, cost, report)
+    report(1.0, "identified")
+    return frf
+
+
+def _by_polynomials(
+    spectra: Spectra,
+    settings: IdentificationSettings,
+    lines: NDArray[np.int64],
+    notes: list[str],
+    cost: float,
+    report: Progress,
+) -> xr.Dataset:
     transient = settings.transient == "estimate" or (settings.transient == "auto" and not spectra.steady)
     report(0.1, "choosing branches, order and window")
     window = choose_window(
@@ -113,14 +144,75 @@ def identify(
     )
     result = local_polynomial(spectra, lines, window, progress=lambda part, message: report(0.2 + 0.7 * part, message))
     report(0.9, "modes")
-    frf = _dataset(spectra, settings, window, result, [*doubts, *notes], cost)
-    report(1.0, "identified")
-    return frf
+    return _dataset(spectra, settings, window, result, notes, cost)
+
+
+def _by_feedback(
+    spectra: Spectra,
+    settings: IdentificationSettings,
+    lines: NDArray[np.int64],
+    excited: tuple[float, float],
+    notes: list[str],
+    cost: float,
+    report: Progress,
+) -> xr.Dataset:
+    highest = round(excited[1] / spectra.spacing)
+    kept = min(spectra.realisations, max(1, -(-ENOUGH // highest)))
+    if kept < spectra.realisations:
+        notes = [*notes, f"mesh-feedback uses the first {kept} of {spectra.realisations} realisations: they are enough"]
+    part = replace(
+        spectra, force=spectra.force[:kept], dte=spectra.dte[:kept], start_phase=spectra.start_phase[:kept]
+    )
+    found = mesh_feedback(
+        part,
+        highest,
+        harmonics=settings.harmonics,
+        progress=lambda share, message: report(0.1 + 0.6 * share, message),
+    )
+    report(0.7, "response of the mesh-feedback model")
+    return feedback_frf(
+        part,
+        lines,
+        found,
+        phases=settings.phases,
+        modes=settings.modes,
+        notes=notes,
+        record=cost,
+        attributes={"method": settings.method, "settings": json.dumps(asdict(settings)), **_about(part)},
+    )
+
+
+def _second_opinion(
+    frf: xr.Dataset,
+    spectra: Spectra,
+    settings: IdentificationSettings,
+    lines: NDArray[np.int64],
+    notes: list[str],
+    cost: float,
+    report: Progress,
+) -> xr.Dataset:
+    """The local polynomial method's result where it expects to err less, else `frf`; both say so."""
+    expected = frf.attrs["expected_error"]
+    try:
+        other = _by_polynomials(spectra, replace(settings, method="lpm"), lines, notes, cost, report)
+    except LpmError:
+        return frf
+    if other.attrs["expected_error"] >= expected:
+        return frf
+    said = f"mesh-feedback expects to err by {expected:.1%} here (unexplained {frf.attrs['unexplained_error']:.1%})"
+    other.attrs["warnings"] = "\n".join(
+        [f"{said}: this is the result of the local polynomial method instead", other.attrs["warnings"]]
+    ).strip()
+    return other
 
 
 def _doubts(records: Sequence[xr.Dataset]) -> tuple[list[str], float]:
     """What is doubtful about the records, and the rms error that it may leave: records count alike, doubts about one
     are independent."""
+    copies = same_samples(records)
+    if copies is not None and copies[0][0] != copies[1][0]:
+        first, second = (place[0] + 1 for place in copies)
+        raise RecordError(f"records {first} and {second} of {len(records)} hold the same samples: each one counts once")
     sentences, power = [], 0.0
     for number, record in enumerate(records, start=1):
         source = f"record {number} of {len(records)}" if len(records) > 1 else ""
@@ -190,11 +282,7 @@ def _dataset(
         "expected_error_bound": accuracy.bound,
         "variance_sampled": result.variance_sampled,
         "variance_cross_terms": result.cross_terms,
-        "mesh_frequency": spectra.mesh_lines * spectra.spacing,
-        "mesh_lines": spectra.mesh_lines,
-        "realisations": spectra.realisations,
-        "joint_period": spectra.duration,
-        "periods_averaged": spectra.periods,
+        **_about(spectra),
         "warnings": "\n".join(warnings),
     }
     if rule is not None:
@@ -214,6 +302,16 @@ def _dataset(
         htf_variance=result.htf_variance,
         attributes=attributes,
     )
+
+
+def _about(spectra: Spectra) -> dict[str, Any]:
+    return {
+        "mesh_frequency": spectra.mesh_lines * spectra.spacing,
+        "mesh_lines": spectra.mesh_lines,
+        "realisations": spectra.realisations,
+        "joint_period": spectra.duration,
+        "periods_averaged": spectra.periods,
+    }
 
 
 def _relative_noise(spectra: Spectra, result: LpmResult) -> float | None:

@@ -11,7 +11,7 @@ from math import hypot
 import numpy as np
 
 from gearbench.identification.lpm.estimate import LpmResult
-from gearbench.identification.spectra.joint import Complexes, Floats, Spectra
+from gearbench.identification.spectra.joint import Floats, Spectra
 
 # E T_joint >= RULE (2L+1)(R+1) / B_3dB, T_joint of distinct excitation.
 RULE = 3.0
@@ -25,8 +25,8 @@ MISSING = 0.03
 class Accuracy:
     """Expected relative rms error of the ITF and what it is made of (all relative to the ITF's rms).
 
-    `variance`: from the residuals; `truncation`: branches beyond L, extrapolated from the decay of the
-    identified ones and no more than what the residual leaves room for; `record`: what doubtful channels of the
+    `variance`: from the residuals; `truncation`: branches beyond L, from what the residuals share with their
+    inputs; `record`: what doubtful channels of the
     records may cost; `expected`: all three together; `bound`: with the whole residual taken as missing response.
     """
 
@@ -65,7 +65,7 @@ def expected_accuracy(result: LpmResult, noise: float | None, record: float = 0.
     signal = max(power - spread, 0.1 * power)
     variance = np.sqrt(spread / signal)
     missing = np.sqrt(max(result.residual**2 - (noise or 0.0) ** 2, 0.0))
-    truncation = min(tail(result.htf, result.htf_variance), missing)
+    truncation = np.sqrt(max(result.missing, 0.0) / signal)
     return Accuracy(
         float(variance),
         float(truncation),
@@ -73,35 +73,6 @@ def expected_accuracy(result: LpmResult, noise: float | None, record: float = 0.
         hypot(variance, truncation, record),
         hypot(variance, missing, record),
     )
-
-
-def tail(htf: Complexes, variance: Floats) -> float:
-    """Part (relative rms) of an HTF (2L+1, frequency) beyond +-L, from a power law through its outer half.
-
-    Infinite when there are too few branches to extrapolate from or they do not decay.
-    """
-    limit = htf.shape[0] // 2
-    if limit < 4:
-        return np.inf
-    power = np.sum(np.abs(htf) ** 2 - variance, axis=1)
-    total = power.sum()
-    both = power[limit + 1 :] + power[limit - 1 :: -1]  # l = 1..L
-    order = np.arange(1, limit + 1)
-    # Means over the third and the last quarter: single branches may vanish, and noise is already subtracted.
-    inner, outer = order > limit / 2, order > 3 * limit / 4
-    inner &= ~outer
-    first, second = both[inner].mean(), both[outer].mean()
-    if total <= 0 or first <= 0:
-        return np.inf
-    # Where noise hides the last branches, they are taken to be as large as its uncertainty.
-    outside = np.abs(np.arange(-limit, limit + 1)) > 3 * limit / 4
-    second = max(second, float(np.sqrt(np.sum(variance[outside] ** 2)) / np.count_nonzero(outer)))
-    if second <= 0:
-        return 0.0
-    slope = np.log(first / second) / np.log(order[outer].mean() / order[inner].mean())
-    if slope <= 1.05:
-        return np.inf
-    return float(np.sqrt(second * order[outer].mean() ** slope * limit ** (1 - slope) / (slope - 1) / total))
 
 
 def record_rule(

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from gearbench.identification.lpm.local_solve import LocalFit
 from gearbench.identification.lpm.regression import Regression, Window
+from gearbench.identification.lpm.rows import WindowRows
 from gearbench.identification.spectra.joint import Complexes, Floats
 
 
@@ -40,11 +41,11 @@ class CrossCovariance:
         self.sums = np.zeros((shifts, int(place.max()) + 1), dtype=complex)
         self._kept: dict[int, tuple[int, float, Complexes]] = {}
 
-    def add(self, fit: LocalFit, centre: int, rows: NDArray[np.int64], noise: float) -> None:
-        """Take in the estimates on `rows` from the window around `centre` with residual variance `noise`."""
+    def add(self, fit: LocalFit, source: WindowRows, rows: NDArray[np.int64], noise: float) -> None:
+        """Take in the estimates on `rows` from the window of `source` with residual variance `noise`."""
         assert fit.factor is not None
-        window, d = self.window, self.regression.mesh_lines
-        matrix = self.regression.matrix(centre, window).reshape(-1, window.unknowns)
+        window, d, centre = self.window, self.regression.mesh_lines, source.centre
+        matrix = source.matrix().reshape(-1, window.unknowns)
         transfer = (matrix @ fit.factor) @ fit.factor.conj().T
         transfer = transfer.reshape(self.regression.experiments, window.width, window.order + 1, window.branches)
         for m in rows:

@@ -18,7 +18,9 @@ from numpy.typing import NDArray
 from gearbench.identification.lpm.covariance import CrossCovariance, diagonal_variance
 from gearbench.identification.lpm.gram import grams
 from gearbench.identification.lpm.local_solve import LocalFit, LpmError, solve_window
+from gearbench.identification.lpm.missing import MissingPower
 from gearbench.identification.lpm.regression import Regression, Window, prepare
+from gearbench.identification.lpm.rows import WindowRows
 from gearbench.identification.spectra.joint import Complexes, Floats, Spectra
 
 Lines = NDArray[np.int64]
@@ -28,6 +30,8 @@ CONDITION_EVERY = 32
 # Work [floating-point operations] spent on variances before they are sampled, and before cross terms are left out.
 VARIANCE_WORK = 2e10
 CROSS_WORK = 1e11
+# Windows whose residuals are searched for missing branches.
+SEARCHED = 200
 
 
 @dataclass(frozen=True)
@@ -35,7 +39,8 @@ class LpmResult:
     """Identified branches on the output lines.
 
     `lines` (F,); `htf`, `htf_variance` (2L+1, F), l = -L..L [m/N]; `itf_covariance` (Q+1, F): sums over l
-    of E[dG_l conj(dG_{l+q})], q = 0 first, which give the ITF's variance at any phase; `residual`: rms of
+    of E[dG_l conj(dG_{l+q})], q = 0 first, which give the ITF's variance at any phase; `missing`: estimated sum of
+    |G_l|^2 over the branches beyond L and the output lines (noise may make it negative); `residual`: rms of
     the residual over that of the response in the windows (degrees of freedom accounted for); `condition`:
     largest estimated condition number; `unknowns`, `equations`, `freedom`: of an inner window, transients
     included; `windows`: how many; `variance_sampled`: windows per computed variance; `cross_terms`:
@@ -46,6 +51,7 @@ class LpmResult:
     htf: Complexes
     htf_variance: Floats
     itf_covariance: Complexes
+    missing: float
     residual: float
     condition: float
     unknowns: int
@@ -102,8 +108,8 @@ def require_lines(spectra: Spectra, lines: Lines, window: Window) -> None:
 def require_equations(regression: Regression, centres: list[int], window: Window) -> None:
     """Raise LpmError with the numbers if a window has no equation to spare over its unknowns."""
     for centre in centres:
-        unknowns = int(regression.columns(centre, window).sum())
-        equations = regression.equations(centre, window)
+        rows = WindowRows(regression, centre, window)
+        unknowns, equations = rows.unknowns, rows.equations
         if equations > unknowns:
             continue
         experiments = regression.experiments
@@ -163,35 +169,39 @@ class _Sweep:
             self.cross_terms = "exact"
             self.cross = CrossCovariance(regression, window, self.place, shifts)
         self.residual = self.power = 0.0
+        self.missing = MissingPower(lines, regression.mesh_lines, regression.highest)
+        self.search_every = -(-len(centres) // SEARCHED)
         self.condition = 0.0
 
     def run(self, progress: Callable[[float, str], None] | None) -> LpmResult:
         """Solve every window."""
         last: Floats | None = None
         lines = [centre for centre, _ in self.centres]
-        for done, (index, gram) in enumerate(grams(self.regression, lines, self.window)):
+        for done, (index, source, gram) in enumerate(grams(self.regression, lines, self.window)):
             centre, rows = self.centres[index]
             want = done % self.sampled == 0 or last is None
             # Condition numbers: of the edges, where branches fade out, and of some windows in between.
             judged = index in (0, len(self.centres) - 1) or done % CONDITION_EVERY == 0
-            fit = solve_window(self.regression, centre, self.window, gram, want_factor=want, want_condition=judged)
+            fit = solve_window(source, gram, want_factor=want, want_condition=judged)
             if judged:
                 self.condition = max(self.condition, fit.condition)
             if want:
                 last = diagonal_variance(fit, self.window)
             assert last is not None
-            noise = self._account(fit, centre)
+            noise = self._account(fit, source)
             self._read(fit, centre, rows, noise * last)
+            if done % self.search_every == 0:
+                self.missing.add(fit, source, rows)
             if self.cross is not None:
-                self.cross.add(fit, centre, rows, noise)
+                self.cross.add(fit, source, rows, noise)
             if progress is not None and done % 16 == 0:
                 progress(done / len(self.centres), f"window {done + 1} of {len(self.centres)}")
         return self._result()
 
-    def _account(self, fit: LocalFit, centre: int) -> float:
+    def _account(self, fit: LocalFit, source: WindowRows) -> float:
         """Residual variance of the window; adds to the overall ratio of residual to response."""
         noise = fit.residual / fit.freedom
-        data = self.regression.data(centre, self.window)
+        data = source.data
         self.residual += noise
         self.power += float(np.sum(np.abs(data) ** 2)) / max(int(np.count_nonzero(data)), 1)
         return noise
@@ -217,17 +227,18 @@ class _Sweep:
     def _result(self) -> LpmResult:
         diagonal = self.variance.sum(axis=0)[None, :].astype(complex)
         cross = self.cross.sums if self.cross is not None else diagonal[:0]
-        middle = self.centres[len(self.centres) // 2][0]
+        middle = WindowRows(self.regression, self.centres[len(self.centres) // 2][0], self.window)
         transient = self.regression.experiments * (self.window.order + 1) if self.window.transient else 0
         return LpmResult(
             self.lines,
             self.htf,
             self.variance,
             np.concatenate([diagonal, cross]),
+            self.missing.total,
             float(np.sqrt(self.residual / self.power)) if self.power else 0.0,
             self.condition,
-            int(self.regression.columns(middle, self.window).sum()) + transient,
-            self.regression.equations(middle, self.window) + transient,
+            middle.unknowns + transient,
+            middle.equations + transient,
             len(self.centres),
             self.sampled,
             self.cross_terms,

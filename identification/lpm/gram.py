@@ -15,6 +15,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from gearbench.identification.lpm.regression import Regression, Window
+from gearbench.identification.lpm.rows import WindowRows
 from gearbench.identification.spectra.joint import Complexes
 
 # Centres of one residue class that share a table span at most this many mesh harmonics.
@@ -23,14 +24,18 @@ TABLE_SPAN = 200
 ELEMENT = 60.0
 
 
-def grams(regression: Regression, centres: Sequence[int], window: Window) -> Iterator[tuple[int, Complexes]]:
-    """(index of the centre, Gram matrix (unknowns, unknowns) without the transients' part), class by class.
+def grams(
+    regression: Regression, centres: Sequence[int], window: Window
+) -> Iterator[tuple[int, WindowRows, Complexes]]:
+    """(index of the centre, its rows, Gram matrix (unknowns, unknowns) without the transients' part), class by class.
 
     `centres` must rise.
     """
     d = regression.mesh_lines
-    for residue in range(d):
-        chosen = [index for index, centre in enumerate(centres) if centre % d == residue]
+    classes: dict[int, list[int]] = {}
+    for index, centre in enumerate(centres):
+        classes.setdefault(centre % d, []).append(index)
+    for _, chosen in sorted(classes.items()):
         while chosen:
             first = centres[chosen[0]]
             span = [index for index in chosen if centres[index] <= first + TABLE_SPAN * d]
@@ -40,7 +45,7 @@ def grams(regression: Regression, centres: Sequence[int], window: Window) -> Ite
 
 def _span(
     regression: Regression, centres: Sequence[int], span: list[int], window: Window
-) -> Iterator[tuple[int, Complexes]]:
+) -> Iterator[tuple[int, WindowRows, Complexes]]:
     """Gram matrices of centres of one residue class, the cheaper way."""
     first, last, d = centres[span[0]], centres[span[-1]], regression.mesh_lines
     size = (last - first) // d + window.branches
@@ -48,12 +53,14 @@ def _span(
     written = len(span) * 8.0 * regression.experiments * window.width * window.unknowns**2
     if written < shared:
         for index in span:
-            matrix = regression.matrix(centres[index], window, projected=False).reshape(-1, window.unknowns)
-            yield index, matrix.conj().T @ matrix
+            rows = WindowRows(regression, centres[index], window)
+            matrix = rows.matrix(projected=False).reshape(-1, window.unknowns)
+            yield index, rows, matrix.conj().T @ matrix
         return
     table = gram_table(regression, first, last, window)
     for index in span:
-        yield index, gram_of(table, (centres[index] - first) // d, window)
+        gram = gram_of(table, (centres[index] - first) // d, window)
+        yield index, WindowRows(regression, centres[index], window), gram
 
 
 def gram_table(regression: Regression, first: int, last: int, window: Window) -> Complexes:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import lapack
 
-from gearbench.identification.lpm.regression import Regression, Window
+from gearbench.identification.lpm.rows import WindowRows
 from gearbench.identification.spectra.joint import Complexes, Floats
 
 # Largest condition number of the regression that the normal equations are trusted with.
@@ -30,13 +30,15 @@ class LpmError(ValueError):
 
 @dataclass(frozen=True)
 class LocalFit:
-    """Solution of one window: coefficients (R+1, 2L+1), residual sum of squares, degrees of freedom.
+    """Solution of one window: coefficients (R+1, 2L+1), what is `left` (E, 2n+1) of the data, its sum of squares,
+    degrees of freedom.
 
     `factor` (unknowns, unknowns) is X with (A^H A)^-1 = X X^H, or None where it was not asked for;
     `condition` the estimated condition number of the scaled regression (NaN if not asked for).
     """
 
     coefficients: Complexes
+    left: Complexes
     residual: float
     freedom: int
     factor: Complexes | None
@@ -44,50 +46,47 @@ class LocalFit:
 
 
 def solve_window(
-    regression: Regression,
-    centre: int,
-    window: Window,
+    rows: WindowRows,
     gram: Complexes,
     *,
     want_factor: bool,
     want_condition: bool = False,
 ) -> LocalFit:
-    """Fit the window around line `centre`; `gram` is its Gram matrix without the transients' part (overwritten).
+    """Fit one window; `gram` is its Gram matrix without the transients' part (overwritten).
 
     Raises LpmError if the inputs are numerically dependent.
     """
-    if window.transient:
-        taken = regression.transient_products(centre, window)
+    if rows.window.transient:
+        taken = rows.transient_products()
         gram -= taken.conj().T @ taken
-    keep = regression.columns(centre, window).ravel()
-    freedom = regression.equations(centre, window) - int(keep.sum())
-    data = regression.data(centre, window)
+    keep = rows.columns.ravel()
+    freedom = rows.equations - rows.unknowns
     scale = _scale(gram, keep)
     kept = gram.copy() if want_condition else None
     # LAPACK reads the transposed, that is the conjugate matrix: solve the conjugate equations.
     triangle, failed = lapack.zpotrf(gram.T, lower=0, clean=0, overwrite_a=1)
     diagonal = np.abs(np.diagonal(triangle))
     if failed or diagonal.min() * CONDITION_LIMIT < diagonal.max():
-        return _solve_by_singular_values(regression, centre, window, data, keep, freedom)
+        return _solve_by_singular_values(rows, keep, freedom)
 
     def solved(right: Complexes) -> Complexes:
         reduced = (right.ravel() * keep * scale).conj()
         solution, _ = lapack.zpotrs(triangle, reduced, lower=0)
         return (solution.conj() * scale * keep).reshape(right.shape)
 
-    coefficients = solved(regression.adjoint(data, centre, window))
-    residual = data - regression.apply(coefficients, centre, window)
-    correction = solved(regression.adjoint(residual, centre, window))
+    coefficients = solved(rows.adjoint(rows.data))
+    residual = rows.data - rows.apply(coefficients)
+    correction = solved(rows.adjoint(residual))
     coefficients = coefficients + correction
     if np.linalg.norm(correction) > 1e-9 * np.linalg.norm(coefficients):
-        residual = data - regression.apply(coefficients, centre, window)
+        residual = rows.data - rows.apply(coefficients)
     factor, condition = None, np.nan
     if want_factor:
         inverse, _ = lapack.ztrtri(triangle, lower=0)
         factor = np.triu(inverse).conj() * (scale * keep)[:, None]
     if kept is not None:
         condition = _condition(kept.conj(), triangle)
-    return LocalFit(coefficients, _power(residual), freedom, factor, condition)
+    return LocalFit(coefficients, residual, _power(residual), freedom, factor, condition)
 
 
 def _scale(gram: Complexes, keep: np.ndarray) -> Floats:
@@ -124,21 +123,15 @@ def _condition(gram: Complexes, triangle: Complexes) -> float:
     return float(np.sqrt(top * bottom))
 
 
-def _solve_by_singular_values(
-    regression: Regression,
-    centre: int,
-    window: Window,
-    data: Complexes,
-    keep: np.ndarray,
-    freedom: int,
-) -> LocalFit:
-    matrix = regression.matrix(centre, window).reshape(data.size, window.unknowns)[:, keep]
+def _solve_by_singular_values(rows: WindowRows, keep: np.ndarray, freedom: int) -> LocalFit:
+    window, data = rows.window, rows.data
+    matrix = rows.matrix().reshape(data.size, window.unknowns)[:, keep]
     scale = 1.0 / np.maximum(np.linalg.norm(matrix, axis=0), np.finfo(float).tiny)
     left, strength, right = np.linalg.svd(matrix * scale, full_matrices=False)
     condition = float(strength[0] / max(strength[-1], np.finfo(float).tiny))
     if condition > SINGULAR:
         raise LpmError(
-            f"the inputs are numerically dependent around line {centre}: condition number {condition:.1e} exceeds"
+            f"the inputs are numerically dependent around line {rows.centre}: condition number {condition:.1e} exceeds"
             f" {SINGULAR:.0e}; excite with random phases, or lower harmonics = {window.harmonics} or order ="
             f" {window.order}"
         )
@@ -149,4 +142,5 @@ def _solve_by_singular_values(
     factor = np.zeros((window.unknowns, window.unknowns), dtype=complex)
     factor[np.ix_(keep, keep)] = inverse
     residual = data.ravel() - matrix @ solution
-    return LocalFit(coefficients.reshape(window.order + 1, -1), _power(residual), freedom, factor, condition)
+    left = residual.reshape(data.shape)
+    return LocalFit(coefficients.reshape(window.order + 1, -1), left, _power(left), freedom, factor, condition)

@@ -1,8 +1,7 @@
-"""The local regression of a periodically time-varying system, without ever writing it down.
+"""Spectra sorted for the local regression of a periodically time-varying system.
 
 Row m of the regression reads Y(m) = sum_j Gs_j(m) U(m + j d) + T(m), j = -l. Lines that differ by a multiple of d form
-a residue class; inside one, row m's regressors are 2L+1 successive elements: products with the regression are small
-matrix-vector products on views.
+a residue class; inside one, row m's regressors are 2L+1 successive elements of the input.
 
 Lines of residue class 0 carry the operating response, the same in each experiment. An orthogonal rotation of the
 experiments gathers it in the first one, whose class-0 rows are then dropped: the same as one free unknown a line. With
@@ -12,6 +11,7 @@ a single experiment that means leaving class 0 out.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -49,9 +49,16 @@ class Window:
         return (self.order + 1) * self.branches
 
     def basis(self) -> Floats:
-        """Legendre polynomials (2n+1, R+1) over the window."""
-        r = np.arange(-self.half_width, self.half_width + 1) / max(self.half_width, 1)
-        return np.asarray(legendre.legvander(r, self.order), dtype=float)
+        """Legendre polynomials (2n+1, R+1) over the window; read-only."""
+        return _basis(self.half_width, self.order)
+
+
+@lru_cache(maxsize=256)
+def _basis(half_width: int, order: int) -> Floats:
+    r = np.arange(-half_width, half_width + 1) / max(half_width, 1)
+    basis = np.asarray(legendre.legvander(r, order), dtype=float)
+    basis.setflags(write=False)
+    return basis
 
 
 @dataclass(frozen=True)
@@ -113,119 +120,34 @@ class Regression:
             for index, first in enumerate(lines[: min(d, window.width)])
         ]
 
-    def inputs(self, residue: int, first: int, count: int, window: Window) -> Complexes:
-        """Regressors (count, E, 2L+1) of successive rows of one residue class; a view."""
-        reach = window.harmonics
-        force, _ = self._sliding(reach)
-        return force[residue, :, first - reach : first - reach + count].transpose(1, 0, 2)
-
-    def excitation(self, residue: int, first: int, count: int, window: Window) -> NDArray[np.bool_]:
-        """Which regressors (count, 2L+1) of successive rows of one residue class are excited; a view."""
-        reach = window.harmonics
-        _, excited = self._sliding(reach)
-        return excited[residue, first - reach : first - reach + count]
-
-    def _sliding(self, reach: int) -> tuple[Complexes, NDArray[np.bool_]]:
-        """All runs of 2L+1 successive elements of `force` and `excited`, as views."""
+    def sliding(self, reach: int) -> tuple[Complexes, NDArray[np.bool_]]:
+        """All runs of 2 `reach` + 1 successive elements of `force` and `excited`, as views."""
         if reach not in self._views:
             width = 2 * reach + 1
             force = sliding_window_view(self.force, width, axis=2)
             self._views[reach] = force, sliding_window_view(self.excited, width, axis=1)
         return self._views[reach]
 
-    def data(self, centre: int, window: Window) -> Complexes:
-        """Y (E, 2n+1) of a window, transients projected out; without transients rows that no input excites are 0."""
-        data = np.empty((self.experiments, window.width), dtype=complex)
-        for residue, rows, first in self.runs(centre, window):
-            data[:, rows] = self.dte[residue][:, first : first + rows.size]
-            if not window.transient:
-                data[:, rows] *= self.excitation(residue, first, rows.size, window).any(axis=1)
-        return self.project(data, centre, window)
-
-    def project(self, data: Complexes, centre: int, window: Window) -> Complexes:
-        """`data` (E, 2n+1) without its part in the space of the transients' polynomials."""
-        if not window.transient:
-            return data
-        basis = self.transient_basis(centre, window)
-        data = data * (np.abs(basis).sum(axis=2) > 0)
-        return data - np.einsum("erp,ep->er", basis, np.einsum("erp,er->ep", basis.conj(), data))
-
     def transient_basis(self, centre: int, window: Window) -> Complexes:
         """Orthonormal polynomials (E, 2n+1, R+1) of the transients; 0 on rows that are left out."""
         key = (centre % self.mesh_lines, window)
         if key not in self._transients:
             r = np.arange(-window.half_width, window.half_width + 1)
-            turn = np.exp(-2j * np.pi * np.outer(self.start_phase, r) / self.mesh_lines)
-            columns = window.basis() * turn[:, :, None]
             operating = (centre + r) % self.mesh_lines == 0
-            columns[: self.operating_rows_lost, operating] = 0.0
-            left, strength, _ = np.linalg.svd(columns, full_matrices=False)
-            # Fewer rows than coefficients (all but a few left out): keep only the directions that exist.
-            self._transients[key] = left * (strength > 1e-10 * strength.max())[:, None, :]
+            if not operating.any():  # the same for all such centres
+                key = (-1, window)
+            if key not in self._transients:
+                self._transients[key] = self._transient_basis(operating, window)
         return self._transients[key]
 
-    def apply(self, coefficients: Complexes, centre: int, window: Window) -> Complexes:
-        """Model output (E, 2n+1) of the coefficients (R+1, 2L+1), transients projected out."""
-        local = window.basis() @ coefficients
-        output = np.empty((self.experiments, window.width), dtype=complex)
-        for residue, rows, first in self.runs(centre, window):
-            inputs = self.inputs(residue, first, rows.size, window)
-            output[:, rows] = (inputs @ local[rows, :, None])[:, :, 0].T
-        return self.project(output, centre, window)
-
-    def adjoint(self, data: Complexes, centre: int, window: Window) -> Complexes:
-        """Product (R+1, 2L+1) of the regression's conjugate transpose with (projected) data (E, 2n+1)."""
-        local = np.empty((window.width, window.branches), dtype=complex)
-        for residue, rows, first in self.runs(centre, window):
-            inputs = self.inputs(residue, first, rows.size, window)
-            local[rows] = (data[:, rows].T.conj()[:, None, :] @ inputs)[:, 0]
-        return np.asarray(window.basis().T @ local.conj(), dtype=complex)
-
-    def matrix(self, centre: int, window: Window, *, projected: bool = True) -> Complexes:
-        """The regression written down: (E, 2n+1, R+1, 2L+1); transients projected out unless told otherwise."""
-        inputs = np.empty((self.experiments, window.width, window.branches), dtype=complex)
-        for residue, rows, first in self.runs(centre, window):
-            inputs[:, rows] = self.inputs(residue, first, rows.size, window).transpose(1, 0, 2)
-        full = np.empty((self.experiments, window.width, window.order + 1, window.branches), dtype=complex)
-        np.multiply(inputs[:, :, None, :], window.basis()[None, :, :, None], out=full)
-        if window.transient and projected:
-            basis = self.transient_basis(centre, window)
-            full *= (np.abs(basis).sum(axis=2) > 0)[:, :, None, None]
-            full -= np.einsum("erp,epsj->ersj", basis, np.einsum("erp,ersj->epsj", basis.conj(), full))
-        return full
-
-    def columns(self, centre: int, window: Window) -> NDArray[np.bool_]:
-        """Which coefficients (R+1, 2L+1) the window can know: order p needs p+1 rows that excite the branch."""
-        count = np.zeros(window.branches, dtype=int)
-        for residue, rows, first in self.runs(centre, window):
-            if residue or self.experiments > self.operating_rows_lost:
-                count += self.excitation(residue, first, rows.size, window).sum(axis=0)
-        return np.arange(window.order + 1)[:, None] < count[None, :]
-
-    def equations(self, centre: int, window: Window) -> int:
-        """Complex equations of the window that are left once operating response and transients are taken out."""
-        total = 0
-        for residue, rows, first in self.runs(centre, window):
-            used = rows.size
-            if not window.transient:
-                used = int(self.excitation(residue, first, rows.size, window).any(axis=1).sum())
-            total += used * (self.experiments - (self.operating_rows_lost if residue == 0 else 0))
-        if window.transient:
-            basis = self.transient_basis(centre, window)
-            total -= int(np.count_nonzero(np.abs(basis).sum(axis=1) > 0))
-        return total
-
-    def transient_products(self, centre: int, window: Window) -> Complexes:
-        """Q^H A (E (R+1), unknowns): what the projection takes from the Gram matrix is its own Gram matrix."""
-        basis, order = window.basis(), window.order + 1
-        transient = self.transient_basis(centre, window).conj()
-        result = np.zeros((self.experiments, order, order, window.branches), dtype=complex)
-        for residue, rows, first in self.runs(centre, window):
-            inputs = self.inputs(residue, first, rows.size, window)
-            for own, row in enumerate(rows):
-                weight = transient[:, row, :, None] * basis[row]
-                result += weight[..., None] * inputs[own][:, None, None, :]
-        return result.reshape(-1, window.unknowns)
+    def _transient_basis(self, operating: NDArray[np.bool_], window: Window) -> Complexes:
+        r = np.arange(-window.half_width, window.half_width + 1)
+        turn = np.exp(-2j * np.pi * np.outer(self.start_phase, r) / self.mesh_lines)
+        columns = window.basis()[None] * turn[:, :, None]
+        columns[: self.operating_rows_lost, operating] = 0.0
+        left, strength, _ = np.linalg.svd(columns, full_matrices=False)
+        # Fewer rows than coefficients (all but a few left out): keep only the directions that exist.
+        return np.asarray(left * (strength > 1e-10 * strength.max())[:, None, :])
 
 
 def prepare(spectra: Spectra, *, transient: bool, reach: int) -> Regression:

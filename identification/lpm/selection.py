@@ -1,20 +1,27 @@
 """Choice of branches L, polynomial order R and window n: least predicted error of the ITF.
 
-A few windows, placed where the response is, are fitted with each candidate. The least of
+Trial windows, spread over all lines that hold response, are fitted with each candidate. The least of
 
-    mean over windows of s^2 (1 + P_u sum_l g_l),   s^2: residual per degree of freedom, g_l: Var G_l for s = 1,
+    mean over rows of s^2 (1 + P_u sum_l g_l),   s^2: residual per degree of freedom, g_l: Var G_l for s = 1,
 
 wins: the residual is what the branches miss (plus noise, the same for all), the second term what their
-estimation adds, in the same unit (P_u: power of an input line). This is Akaike's final prediction error
-(1969) with the true instead of the average leverage. MDL, which pays more for unknowns, chose models with
-1.2 to 1.5 times the error on the reference system. Candidates stay within what the record supports: more
-equations than unknowns by a margin, sidebands inside the spectra, a bounded amount of work.
+estimation adds, in the same unit (P_u: power of an input line); l runs over the branches that are read there. This is
+Akaike's final prediction error (1969) with the true instead of the average leverage. MDL, which pays more for unknowns,
+chose models with 1.2 to 1.5 times the error on the reference system. Candidates stay within what the record supports:
+more equations than unknowns by a margin, sidebands inside the spectra, a bounded amount of work.
+
+The error does not fall steadily with L: where the mesh frequency is not small against the natural frequencies, branches
+that lead from one resonance to the mirror image of another (l f_mesh = sum of two natural frequencies) count again
+after many that do not, and what they leave out lies in rows far outside the resonance that rules the response.
+Hence the whole ladder is climbed as long as the criterion stays within reach of the best, and rows count by
+themselves, not by their response.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,26 +30,35 @@ from gearbench.identification.lpm.covariance import diagonal_variance
 from gearbench.identification.lpm.estimate import needed_rows, plan_centres
 from gearbench.identification.lpm.gram import grams
 from gearbench.identification.lpm.local_solve import LpmError, solve_window
-from gearbench.identification.lpm.regression import Regression, Window, prepare
+from gearbench.identification.lpm.regression import EXCITATION_FLOOR, Regression, Window, prepare
+from gearbench.identification.lpm.rows import WindowRows
 from gearbench.identification.spectra.joint import Floats, Spectra
 
-LADDER = (0, 1, 2, 3, 4, 6, 8, 11, 16, 23, 32, 45, 64, 90, 128, 150, 181, 256)
-ORDERS = (1, 2, 3)
+LADDER = (0, 1, 2, 3, 4, 5, 6, 8, 10, 12, 15, 18, 22, 27, 33, 41, 50, 62, 77, 96, 120, 150, 187, 234)
+# The ladder is climbed with the first; the others are tried around the best rung, while they improve.
+ORDERS = (2, 3, 4, 5, 1)
 # Windows: the smallest that leaves this margin of equations over unknowns, and wider ones by this factor.
-MARGIN = 1.4
-WIDENING = 1.7
+MARGIN = 1.25
+WIDENING = 1.4
 # Widest half-window as part of the band.
-WIDEST = 0.05
+WIDEST = 0.1
 # Work of the whole identification [floating-point operations] that a candidate may cost.
 WORK = 3.0e11
 # Unknowns of a window beyond which no candidate is tried unasked.
 UNKNOWNS = 910
 # Trial windows: at least so many, and as many as bring the degrees of freedom to FREEDOM, up to a limit.
-TRIALS = 6
-FREEDOM = 800
-TRIALS_MAX = 60
-# How many rungs of a ladder may fail to improve before the climb ends.
-PATIENCE = 2
+TRIALS = 16
+FREEDOM = 1200
+TRIALS_MAX = 48
+# Part of the trial windows that lie evenly over all rows; the others share the response power.
+EVEN = 0.5
+# A climb ends after so many rungs in a row that are worse than the best by the factor HOPELESS.
+PATIENCE = 3
+HOPELESS = 3.0
+# Step in L around the best rung, as part of it.
+FINER = 0.08
+# A neighbour must bring the criterion down to this part of the best one's.
+WORTH = 0.98
 
 
 @dataclass(frozen=True)
@@ -69,44 +85,69 @@ def choose_window(
     ladder = [harmonics] if harmonics is not None else [value for value in LADDER if value <= reach]
     search = _search(spectra, lines, transient, max(ladder, default=0))
 
+    @cache
     def best_width(branches: int, polynomial: int) -> Choice | None:
         widths = [half_width] if half_width is not None else search.widths(branches, polynomial)
         windows = (Window(branches, polynomial, width, transient) for width in widths)
-        return _climb(search.judge(window) for window in windows if search.admits(window))
+        return _climb((search.judge(window) for window in windows if search.admits(window)), patience=1, hopeless=1.0)
 
-    climbs = [
-        _climb(best_width(branches, polynomial) for branches in ladder)
-        for polynomial in (ORDERS if order is None else (order,))
-    ]
-    best = min((choice for choice in climbs if choice), key=lambda choice: choice.error, default=None)
+    orders = ORDERS if order is None else (order,)
+    best: Choice | None = None
+    for polynomial in orders:
+        best = _climb(best_width(branches, polynomial) for branches in ladder)
+        if best is not None:
+            break
     if best is None or not np.isfinite(best.error):
         raise LpmError(_refusal(spectra, lines, harmonics, order, half_width))
+    # From the best rung to its neighbours in L, finer and finer, and to the other orders.
+    while better := _better(best, orders, ladder, best_width):
+        best = better
     return best.window
 
 
-def _climb(rungs: Iterable[Choice | None]) -> Choice | None:
-    """Best of the rungs, tried in order until PATIENCE in a row have not improved; None if there is none."""
+def _better(
+    best: Choice,
+    orders: Sequence[int],
+    ladder: list[int],
+    judge: Callable[[int, int], Choice | None],
+) -> Choice | None:
+    """The best of the neighbours in order and number of branches that improves on `best`, or None."""
+    branches, polynomial = best.window.harmonics, best.window.order
+    others = [(branches, p) for p in (polynomial - 1, polynomial + 1) if p in orders]
+    if len(ladder) > 1:
+        step = max(1, round(FINER * branches))
+        others += [(b, polynomial) for b in (branches - step, branches + step) if 0 <= b <= ladder[-1]]
+    found = [choice for choice in (judge(b, p) for b, p in others) if choice is not None]
+    leading = min(found, key=lambda choice: choice.error, default=best)
+    return leading if leading.error < WORTH * best.error else None
+
+
+def _climb(
+    rungs: Iterable[Choice | None], patience: int = PATIENCE, hopeless: float = HOPELESS
+) -> Choice | None:
+    """Best of the rungs, tried in order until `patience` in a row are worse than the best by the factor `hopeless`."""
     best: Choice | None = None
     failures = 0
     for choice in rungs:
         if choice is not None and (best is None or choice.error < best.error):
             best, failures = choice, 0
-        else:
-            failures += 1
-        if best is not None and failures >= PATIENCE:
+        elif best is not None:
+            failures = failures + 1 if choice is None or choice.error > hopeless * best.error else 0
+        if failures >= patience:
             break
     return best
 
 
 @dataclass(frozen=True)
 class _Search:
-    """What all candidates share: the regression, the output lines, and the response power up to each band line."""
+    """What all candidates share: the regression, the output lines, and of each row (1, 2, ..) that output lines reach
+    its `relevance`, the part of its sources that are output lines, and the `density` of trial windows."""
 
     regression: Regression
     lines: NDArray[np.int64]
     transient: bool
-    band: NDArray[np.int64]
-    power: Floats
+    relevance: Floats
+    density: Floats
     input_power: float
 
     def widths(self, harmonics: int, order: int) -> list[int]:
@@ -118,8 +159,8 @@ class _Search:
             middle = int(self.lines[self.lines.size // 2])
             if middle + width > self.regression.highest:
                 return False
-            unknowns, equations = _count(self.regression, middle, window)
-            return equations >= MARGIN * unknowns + 1
+            rows = WindowRows(self.regression, middle, window)
+            return rows.equations >= MARGIN * rows.unknowns + 1
 
         width = _least(supports, order + 1, widest)
         found = []
@@ -144,43 +185,60 @@ class _Search:
         Infinite if one of the windows cannot be solved. The standard error keeps small windows, whose residuals
         scatter, from winning by luck.
         """
-        total, freedom = 0.0, 0
+        total, freedom, sampled = 0.0, 0, 0.0
         at_centre = window.basis()[window.half_width]
         centres = self.trial_centres(window)
-        for index, gram in grams(self.regression, centres, window):
-            centre = centres[index]
-            unknowns, equations = _count(self.regression, centre, window)
-            if equations <= unknowns:
+        for _, rows, gram in grams(self.regression, centres, window):
+            row = rows.centre - 1
+            sampled += 1.0 / self.density[row]
+            if not rows.unknowns:  # no branch reaches so far: all is missing
+                total += self.relevance[row] / self.density[row] * rows.power
+                continue
+            if rows.equations <= rows.unknowns:
                 return Choice(window, np.inf)
             try:
-                fit = solve_window(self.regression, centre, window, gram, want_factor=True)
+                fit = solve_window(rows, gram, want_factor=True)
             except LpmError:
                 return Choice(window, np.inf)
-            spread = np.einsum("p,psj,s->", at_centre, diagonal_variance(fit, window), at_centre)
-            total += fit.residual / fit.freedom * (1.0 + self.input_power * spread)
+            spread = diagonal_variance(fit, window)[:, :, self.read(rows)]
+            spread = self.input_power * np.einsum("p,psj,s->", at_centre, spread, at_centre)
+            total += fit.residual / fit.freedom * (self.relevance[row] + spread) / self.density[row]
             freedom += fit.freedom
-        return Choice(window, total / len(centres) * (1.0 + 1.0 / np.sqrt(freedom)))
+        return Choice(window, total / sampled * (1.0 + 1.0 / np.sqrt(max(freedom, 1))))
+
+    def read(self, rows: WindowRows) -> NDArray[np.bool_]:
+        """Which branches (2L+1,) of a window's middle row belong to an output line: the others are never read."""
+        branch = np.arange(-rows.window.harmonics, rows.window.harmonics + 1)
+        source = np.abs(rows.centre + branch * self.regression.mesh_lines)
+        return (source >= self.lines[0]) & (source <= self.lines[-1])
 
     def trial_centres(self, window: Window) -> list[int]:
-        """Lines inside the output band that share its response power evenly, as many as the window needs."""
-        unknowns, equations = _count(self.regression, int(self.lines[self.lines.size // 2]), window)
-        count = int(np.clip(FREEDOM / max(equations - unknowns, 1), TRIALS, TRIALS_MAX))
-        targets = (np.arange(count) + 0.5) / count * self.power[-1]
-        centres = self.band[np.searchsorted(self.power, targets)]
-        return sorted({min(int(line), self.regression.highest - window.half_width) for line in centres})
+        """Rows drawn evenly from their density, as many as the window needs."""
+        middle = WindowRows(self.regression, int(self.lines[self.lines.size // 2]), window)
+        count = int(np.clip(FREEDOM / max(middle.equations - middle.unknowns, 1), TRIALS, TRIALS_MAX))
+        sums = np.cumsum(self.density)
+        centres = 1 + np.searchsorted(sums, (np.arange(count) + 0.5) / count * sums[-1])
+        return sorted({min(int(row), self.regression.highest - window.half_width) for row in centres})
 
 
 def _search(spectra: Spectra, lines: NDArray[np.int64], transient: bool, harmonics: int) -> _Search:
-    regression = prepare(spectra, transient=transient, reach=harmonics * spectra.mesh_lines)
-    band = np.arange(lines[0], lines[-1] + 1)
-    band = band[band % spectra.mesh_lines != 0] if spectra.mesh_lines > 1 else band
-    power = np.cumsum(np.mean(np.abs(spectra.dte[:, band]) ** 2, axis=0))
-    return _Search(regression, lines, transient, band, power, regression.input_power())
-
-
-def _count(regression: Regression, centre: int, window: Window) -> tuple[int, int]:
-    """Unknowns and equations of a window."""
-    return int(regression.columns(centre, window).sum()), regression.equations(centre, window)
+    d = spectra.mesh_lines
+    regression = prepare(spectra, transient=transient, reach=harmonics * d)
+    rows = np.arange(1, min(spectra.highest, int(lines[-1]) + harmonics * d) + 1)
+    read, excited = np.zeros((2, rows.size))
+    strength = np.abs(spectra.force).max(axis=0)
+    driven = strength > EXCITATION_FLOOR * strength[1:].max()
+    for branch in range(-harmonics, harmonics + 1):
+        source = np.abs(rows + branch * d)
+        known = (source > 0) & (source <= spectra.highest)
+        hit = known & driven[np.where(known, source, 0)]
+        excited += hit
+        read += hit & (source >= lines[0]) & (source <= lines[-1])
+    relevance = read / np.maximum(excited, 1.0)
+    power = relevance * np.mean(np.abs(spectra.dte[:, rows]) ** 2, axis=0) * (rows % d != 0 if d > 1 else 1.0)
+    even = relevance > 0
+    density = EVEN * even / even.sum() + (1.0 - EVEN) * power / power.sum()
+    return _Search(regression, lines, transient, relevance, density, regression.input_power())
 
 
 def _least(holds: Callable[[int], bool], low: int, high: int) -> int | None:

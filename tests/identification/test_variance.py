@@ -69,10 +69,10 @@ def test_itf_variance_of_overlapping_windows_by_brute_force() -> None:
     cross = CrossCovariance(regression, window, place, shifts=6)
     plan = plan_centres(needed_rows(lines, 3, 2), window, spectra.highest)
     diagonal = np.zeros(4)
-    for index, gram in grams(regression, [centre for centre, _ in plan], window):
+    for index, rows_of_window, gram in grams(regression, [centre for centre, _ in plan], window):
         centre, rows = plan[index]
-        fit = solve_window(regression, centre, window, gram, want_factor=True)
-        cross.add(fit, centre, rows, 1.0)
+        fit = solve_window(rows_of_window, gram, want_factor=True)
+        cross.add(fit, rows_of_window, rows, 1.0)
         unit = diagonal_variance(fit, window)
         for m in rows:
             weight = window.basis()[m - centre + 12]

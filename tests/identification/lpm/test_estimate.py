@@ -8,6 +8,7 @@ from gearbench.identification.lpm.estimate import LpmResult, local_polynomial, p
 from gearbench.identification.lpm.gram import gram_of, gram_table, grams
 from gearbench.identification.lpm.local_solve import LpmError, solve_window
 from gearbench.identification.lpm.regression import Regression, Window, prepare
+from gearbench.identification.lpm.rows import WindowRows
 from gearbench.identification.spectra.joint import Spectra
 
 HIGHEST = 120
@@ -113,7 +114,7 @@ def test_odd_grid_leaves_even_rows_out() -> None:
     assert result.residual < 1e-10
     regression = prepare(spectra, transient=False, reach=8)
     # Of the 17 lines around line 50 (even, no multiple of 4 is odd) 8 are odd: 8 x 4 equations.
-    assert regression.equations(50, Window(2, 1, 8, transient=False)) == 8 * 4
+    assert WindowRows(regression, 50, Window(2, 1, 8, transient=False)).equations == 8 * 4
 
 
 def test_branch_zero_alone_is_the_time_invariant_case() -> None:
@@ -150,9 +151,10 @@ def test_filter_from_rest_needs_the_transient() -> None:
 def fitted(regression: Regression, window: Window, centre: int) -> tuple[np.ndarray, np.ndarray, float]:
     """Coefficients and residual power from `solve_window`, coefficients by dense least squares."""
     gram = gram_of(gram_table(regression, centre, centre, window), 0, window)
-    fit = solve_window(regression, centre, window, gram, want_factor=True, want_condition=True)
-    matrix = regression.matrix(centre, window).reshape(-1, window.unknowns)
-    dense = np.linalg.lstsq(matrix, regression.data(centre, window).ravel(), rcond=None)[0]
+    rows = WindowRows(regression, centre, window)
+    fit = solve_window(rows, gram, want_factor=True, want_condition=True)
+    matrix = rows.matrix().reshape(-1, window.unknowns)
+    dense = np.linalg.lstsq(matrix, rows.data.ravel(), rcond=None)[0]
     scaled = matrix / np.linalg.norm(matrix, axis=0)
     assert fit.condition == pytest.approx(np.linalg.cond(scaled), rel=0.1)
     inverse = np.linalg.pinv(matrix.conj().T @ matrix)
@@ -171,22 +173,23 @@ def test_shared_gram_matrices_solve_the_written_down_regression(transient: bool)
     regression = prepare(spectra, transient=transient, reach=32)
     centres = [37 + 16 * index for index in range(4)]
     table = gram_table(regression, centres[0], centres[-1], window)
-    found = dict(grams(regression, centres, window))
+    found = {index: gram for index, _, gram in grams(regression, centres, window)}
     for index in range(4):
         centre = centres[index]
-        matrix = regression.matrix(centre, window).reshape(-1, window.unknowns)
+        rows = WindowRows(regression, centre, window)
+        matrix = rows.matrix().reshape(-1, window.unknowns)
         gram = gram_of(table, index, window)
         assert found[index] == pytest.approx(gram, abs=1e-12 * np.abs(gram).max())
         if transient:
-            taken = regression.transient_products(centre, window)
+            taken = rows.transient_products()
             gram = gram - taken.conj().T @ taken
         assert gram == pytest.approx(matrix.conj().T @ matrix, abs=1e-10 * np.abs(gram).max())
         normal, dense, residual = fitted(regression, window, centre)
         assert normal == pytest.approx(dense, abs=1e-10 * np.abs(dense).max())
-        left = regression.data(centre, window).ravel() - matrix @ dense
+        left = rows.data.ravel() - matrix @ dense
         assert residual == pytest.approx(np.linalg.norm(left) ** 2, rel=1e-9)
         # Every nuisance direction costs one equation: rank of the projected space.
-        assert regression.equations(centre, window) == _rank_of_rows(regression, centre, window)
+        assert rows.equations == _rank_of_rows(regression, centre, window)
 
 
 def _rank_of_rows(regression: Regression, centre: int, window: Window) -> int:
@@ -195,7 +198,8 @@ def _rank_of_rows(regression: Regression, centre: int, window: Window) -> int:
     kept = np.ones(shape)
     kept[: regression.operating_rows_lost, (centre + np.arange(-9, 10)) % 16 == 0] = 0.0
     rows = np.eye(kept.size) * kept.ravel()
-    projected = [regression.project(r.reshape(shape).astype(complex), centre, window).ravel() for r in rows]
+    source = WindowRows(regression, centre, window)
+    projected = [source.project(r.reshape(shape).astype(complex)).ravel() for r in rows]
     return int(np.linalg.matrix_rank(np.array(projected), tol=1e-9))
 
 

@@ -1,0 +1,92 @@
+"""Spectra as the mesh-feedback equations see them: lines in residue classes, in units of about one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.identification.lpm.regression import prepare
+from gearbench.identification.spectra.joint import Complexes, Floats, Spectra
+
+# Lines beyond the excited ones that are kept, as part of the highest: their sidebands act back on the excited ones.
+MARGIN = 0.05
+
+
+@dataclass(frozen=True)
+class ClassData:
+    """Two-sided lines of the residue classes 0..d/2 (the others are their complex conjugates).
+
+    `lines` (C, S), 0 where `valid` is False; `force` and `dte` (C, S, E) over `force_unit` [N] and `dte_unit` [m];
+    `weight` (C,): 1, or 1/sqrt(2) for classes that are their own mirror image and hold every equation twice.
+    `omega` (C, S): angular frequency over `omega_unit` [rad/s]. `excited`: highest excited line. `equations`: complex
+    ones, each counted once.
+    """
+
+    lines: NDArray[np.int64]
+    valid: NDArray[np.bool_]
+    force: Complexes
+    dte: Complexes
+    weight: Floats
+    mesh_lines: int
+    spacing: float
+    excited: int
+    top: int
+    force_unit: float
+    dte_unit: float
+    equations: float
+
+    @property
+    def omega_unit(self) -> float:
+        """Angular frequency of the highest line [rad/s]."""
+        return float(2 * np.pi * self.top * self.spacing)
+
+    @property
+    def omega(self) -> Floats:
+        """Angular frequency of each line over `omega_unit`."""
+        return np.asarray(self.lines / self.top, dtype=float)
+
+    @property
+    def stiffness_unit(self) -> float:
+        """Unit of stiffness [N/m]."""
+        return self.force_unit / self.dte_unit
+
+
+def class_data(spectra: Spectra, excited: int) -> ClassData:
+    """Lines up to a little beyond the highest `excited` one, without the operating response (class 0 of its records).
+
+    Records are shifted to mesh phase 0 as in the local polynomial method.
+    """
+    regression = prepare(spectra, transient=False, reach=0)
+    d, top = spectra.mesh_lines, min(spectra.highest, int((1.0 + MARGIN) * excited))
+    classes = np.arange(d // 2 + 1)
+    reach = top // d + 1
+    position = np.arange(-reach, reach + 1)
+    lines = classes[:, None] + position * d
+    valid = np.abs(lines) <= top
+    at = np.clip(position + regression.origin, 0, regression.force.shape[2] - 1)
+    force, dte = (
+        np.where(valid[:, :, None], source[classes][:, :, at].transpose(0, 2, 1), 0.0)
+        for source in (regression.force, regression.dte)
+    )
+    own = (2 * classes) % d == 0
+    present = np.abs(dte).sum(axis=1) > 0  # (C, E): the operating response's record is gone from class 0
+    equations = float(np.sum(valid.sum(axis=1)[:, None] * present * np.where(own, 0.5, 1.0)[:, None]))
+    force_unit, dte_unit = (
+        float(np.sqrt(np.sum(np.abs(x) ** 2) / max(np.count_nonzero(x), 1))) or 1.0 for x in (force, dte)
+    )
+    return ClassData(
+        np.where(valid, lines, 0),
+        valid,
+        np.asarray(force / force_unit, dtype=complex),
+        np.asarray(dte / dte_unit, dtype=complex),
+        np.where(own, np.sqrt(0.5), 1.0),
+        d,
+        spectra.spacing,
+        excited,
+        top,
+        force_unit,
+        dte_unit,
+        equations,
+    )

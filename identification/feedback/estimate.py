@@ -1,0 +1,155 @@
+"""The mesh-feedback estimator: from spectra to D, N, k(theta), c(theta), and the response that follows from them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.identification.feedback.data import ClassData, class_data
+from gearbench.identification.feedback.functions import Fractions, Splines, common_poles
+from gearbench.identification.feedback.model import Model
+from gearbench.identification.feedback.refine import Refined, linearised, refined
+from gearbench.identification.feedback.start import first_model
+from gearbench.identification.lpm.local_solve import LpmError
+from gearbench.identification.spectra.joint import Complexes, Spectra
+
+Progress = Callable[[float, str], None]
+
+# Harmonics of the mesh unless given; their prior keeps those that the record does not show small.
+HARMONICS = 100
+# Intervals of the splines that assume nothing about D and N, decrease of the cost at which their rounds end, and pairs
+# of common poles that are tried after them.
+INTERVALS = 30
+ROUGH_SETTLED = 0.2
+# Splines are trusted to no better than this part of D and N.
+ROUGH = 0.01
+PAIRS = 6
+FITTED_POINTS = 1200
+# A model with more parameters must improve the criterion (Akaike 1974) by so much.
+GAIN = 4.0
+# Decrease of the cost at which rounds end while numbers of poles are compared.
+COMPARED = 0.02
+# Where further pairs of poles are tried, as parts of the excited band, and their damping ratio.
+PLACES = (0.08, 0.14, 0.2, 0.26, 0.32, 0.38, 0.44, 0.52, 0.6, 0.7, 0.85)
+PLACED_DAMPING = 0.03
+# Added to the scaled Gram matrix there: the common factor of all parameters is free.
+FIRMNESS = 1e-9
+
+
+@dataclass(frozen=True)
+class Feedback:
+    """The data, and the refined model of least criterion."""
+
+    data: ClassData
+    refined: Refined
+
+    @property
+    def model(self) -> Model:
+        """The model, in units of the data."""
+        return self.refined.model
+
+
+def mesh_feedback(
+    spectra: Spectra, excited: int, *, harmonics: int | None = None, progress: Progress | None = None
+) -> Feedback:
+    """Identify the mesh-feedback model from all lines up to the highest `excited` one.
+
+    `harmonics` L of the mesh. Raises LpmError where the record holds fewer equations than unknowns.
+    """
+    report = progress or (lambda part, message: None)
+    data = class_data(spectra, excited)
+    count = min(harmonics if harmonics is not None else HARMONICS, data.lines.shape[1] - 1)
+    basis = Splines(INTERVALS)
+    unknowns = 4 * (INTERVALS + 3) + 4 * count
+    if data.equations < unknowns:
+        raise LpmError(
+            f"under-determined: {unknowns} unknowns of the mesh-feedback model against {data.equations:.0f} equations;"
+            " record longer or more realisations"
+        )
+    report(0.0, "mesh feedback: first model")
+    best = refined(first_model(data, basis, count), data, ROUGH_SETTLED)
+    splines = best
+    for pairs in range(1, PAIRS + 1):
+        report(pairs / (PAIRS + 1), f"mesh feedback: {pairs} pair(s) of poles")
+        found = isinstance(best.model.basis, Fractions)
+        trial = refined(extended(best.model, data) if found else rational(splines, data, pairs), data, COMPARED)
+        if criterion(trial, data) < criterion(best, data) - GAIN:
+            best = trial
+        elif found:
+            break
+    report(1.0, "mesh feedback: last rounds")
+    return Feedback(data, refined(best.model, data))
+
+
+def criterion(fit: Refined, data: ClassData) -> float:
+    """Akaike's criterion: twice the equations times the log of their residual, plus twice the parameters of D and N.
+
+    The mesh's harmonics are the same for all that are compared, and held by their prior.
+    """
+    return 2 * data.equations * float(np.log(fit.noise * fit.freedom)) + 2 * fit.model.free
+
+
+def rational(fit: Refined, data: ClassData, pairs: int) -> Model:
+    """The model with partial fractions of `pairs` common poles fitted to the D and N of another one, where it knows
+    them."""
+    model = fit.model
+    lowest = int(np.abs(data.lines[np.abs(data.force).max(axis=2) > 0]).min())
+    position: NDArray[np.float64] = np.linspace(max(lowest, 1), data.excited, FITTED_POINTS) / data.top
+    values = model.basis.at(position)
+    weights = []
+    for first, coefficients in ((0, model.d), (model.d.size, model.n)):
+        own = slice(first, first + coefficients.size)
+        variance = np.einsum("fi,ij,fj->f", values, fit.covariance[own, own], values.conj(), optimize=True).real
+        weights.append(1.0 / np.sqrt(np.maximum(variance, 0.0) + (ROUGH * np.abs(values @ coefficients)) ** 2))
+    d, n = model.functions(position)
+    poles = common_poles(position, [d, n], weights, pairs)
+    fractions = Fractions(poles).at(position)
+    of_d, of_n = (_fitted(fractions, f, weight) for f, weight in zip((d, n), weights, strict=True))
+    return Model(Fractions(poles), of_d, of_n, model.k, model.c)
+
+
+def extended(model: Model, data: ClassData) -> Model:
+    """The model with one more pair of poles where, of PLACES, it lowers the output error most to first order."""
+    kept, count = model.basis.poles, len(PLACES)
+    placed = np.array(PLACES) * data.excited / data.top * (1j - PLACED_DAMPING)
+    basis = Fractions(np.concatenate([kept, placed]))
+    wide_d, wide_n = (_spread(x, kept.size, count) for x in (model.d, model.n))
+    start = Model(basis, wide_d, wide_n, model.k, model.c)
+    gram, right = linearised(start, data)
+    size, pairs = start.d.size, kept.size + count
+    new = np.array([[3 + kept.size + place, 3 + pairs + kept.size + place] for place in range(count)])
+    new = np.concatenate([new, size + new], axis=1)  # (places, 4): residues of D and N
+    poles = 2 * size + np.arange(2 * pairs).reshape(2, pairs)[:, kept.size :]
+    others = np.setdiff1d(np.arange(right.size), np.concatenate([new.ravel(), poles.ravel()]))
+    best, chosen, residues = 0.0, 0, np.zeros(4)
+    for place in range(count):
+        own = np.concatenate([others, new[place]])
+        part = gram[np.ix_(own, own)]
+        scale = np.sqrt(np.maximum(np.diagonal(part), np.finfo(float).tiny))
+        part = part / scale / scale[:, None]
+        part[np.diag_indices_from(part)] += FIRMNESS
+        step = np.linalg.solve(part, right[own] / scale)
+        gain = float(step @ (right[own] / scale))
+        if gain > best:
+            best, chosen, residues = gain, place, (step / scale)[-4:]
+    pair = kept.size + 1
+    d, n = (_spread(x, kept.size, 1) for x in (model.d, model.n))
+    for coefficients, (real, imaginary) in ((d, residues[:2]), (n, residues[2:])):
+        coefficients[3 + kept.size], coefficients[3 + pair + kept.size] = real, imaginary
+    return Model(Fractions(np.append(kept, placed[chosen])), d, n, model.k, model.c)
+
+
+def _spread(coefficients: NDArray[np.float64], kept: int, more: int) -> NDArray[np.float64]:
+    """Coefficients of `kept` pairs of poles with zeros for `more` of them."""
+    head, real, imaginary = np.split(coefficients, [3, 3 + kept])
+    none = np.zeros(more)
+    return np.concatenate([head, real, none, imaginary, none])
+
+
+def _fitted(values: Complexes, response: Complexes, weight: NDArray[np.float64]) -> NDArray[np.float64]:
+    matrix, target = values * weight[:, None], response * weight
+    stacked = np.concatenate([matrix.real, matrix.imag])
+    return np.asarray(np.linalg.lstsq(stacked, np.concatenate([target.real, target.imag]), rcond=None)[0])

@@ -1,0 +1,166 @@
+"""Gauss-Newton on the output error Y - A^-1 N U, with a prior on how fast the mesh's harmonics decay.
+
+    d(A^-1 N U) = A^-1 (dN U - dA Y^),  Y^ = A^-1 N U: columns are made from the model's response, not from the measured
+    one, so that noise does not bias them.
+
+The harmonics of a piecewise smooth stiffness fall like 1/l (with edges of finite width faster): k_l has the prior
+variance tau^2 / l^2, c_l likewise. tau follows from the estimate itself (MacKay 1992, evidence approximation).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+
+from gearbench.identification.feedback.data import ClassData
+from gearbench.identification.feedback.model import Model, Operator
+from gearbench.identification.feedback.start import gauged
+from gearbench.identification.spectra.joint import Complexes, Floats
+
+ROUNDS = 12
+# Relative decrease of the cost at which the rounds end.
+SETTLED = 1e-3
+HALVINGS = 6
+TINY = 1e-11
+# Weight of the row that keeps the common factor of all parameters where it is.
+GAUGE = 1e3
+
+
+@dataclass(frozen=True)
+class Refined:
+    """Model, the residual of its response (C, S, E) in units of the data, `noise` variance per complex equation,
+    `covariance` (P, P) of the real parameters, and `freedom`: complex equations less parameters."""
+
+    model: Model
+    left: Complexes
+    noise: float
+    covariance: Floats
+    freedom: float
+
+
+def response(model: Model, data: ClassData, operator: Operator | None = None) -> Complexes:
+    """Y^ = A^-1 N U (C, S, E)."""
+    operator = operator or Operator(model, data.omega, data.valid)
+    source = operator.n[:, :, None] * data.force
+    return np.stack([operator.solve(index, source[index]) for index in range(source.shape[0])])
+
+
+def refined(model: Model, data: ClassData, settled: float = SETTLED) -> Refined:
+    """The model of least output error, from a first one; rounds end at a relative decrease of the cost by `settled`."""
+    operator = Operator(model, data.omega, data.valid)
+    predicted = response(model, data, operator)
+    cost = _cost(data, predicted)
+    prior = _prior(model, None)
+    for _ in range(ROUNDS):
+        gram, right = _normal(model, data, operator, predicted)
+        freedom = _freedom(data, model)
+        noise = cost / freedom
+        step, covariance = _step(model, gram, right, noise, prior)
+        trial, operator_of, of_trial, cost_of = _shortened(model, step, data, cost)
+        if cost_of > cost * (1 + SETTLED):
+            break  # no step along this direction helps
+        before, cost = cost, cost_of
+        model, operator, predicted, prior = trial, operator_of, of_trial, _prior(trial, covariance)
+        if before - cost < settled * before:
+            break
+    left = (data.dte - predicted) * data.valid[:, :, None]
+    return Refined(model, left, cost / _freedom(data, model), covariance, _freedom(data, model))
+
+
+def linearised(model: Model, data: ClassData) -> tuple[Floats, Floats]:
+    """J^T J and J^T r of the output error of a model."""
+    operator = Operator(model, data.omega, data.valid)
+    return _normal(model, data, operator, response(model, data, operator))
+
+
+def output_error(model: Model, data: ClassData) -> float:
+    """Sum over the equations of |Y - A^-1 N U|^2, each counted once; infinite where the model has no response."""
+    return _cost(data, response(model, data))
+
+
+def _shortened(
+    model: Model, step: Floats, data: ClassData, cost: float
+) -> tuple[Model, Operator, Complexes, float]:
+    """The model after the step, or the first of ever shorter ones that does not raise the cost."""
+    scale = 1.0
+    for _ in range(HALVINGS):
+        trial = gauged(model.moved(model.vector() + scale * step), data)
+        operator = Operator(trial, data.omega, data.valid)
+        predicted = response(trial, data, operator)
+        found = _cost(data, predicted)
+        if found < cost * (1 + SETTLED):
+            break
+        scale *= 0.3
+    return trial, operator, predicted, found
+
+
+def _cost(data: ClassData, predicted: Complexes) -> float:
+    left = (data.dte - predicted) * data.weight[:, None, None] * data.valid[:, :, None]
+    left = left * (np.abs(data.dte).sum(axis=1, keepdims=True) > 0)
+    value = float(np.sum(left.real**2 + left.imag**2))
+    return value if np.isfinite(value) else np.inf
+
+
+def _freedom(data: ClassData, model: Model) -> float:
+    return max(data.equations - 0.5 * model.vector().size, 1.0)
+
+
+def _prior(model: Model, covariance: Floats | None) -> Floats:
+    """Prior precision of each real parameter; 0 for those of D and N."""
+    harmonics = model.harmonics
+    order = np.arange(1, harmonics + 1)
+    free = model.free
+    precision = np.zeros(free + 4 * harmonics)
+    spread = np.zeros(4 * harmonics) if covariance is None else np.diagonal(covariance)[free:]
+    for first, values in ((0, model.k), (2 * harmonics, model.c)):
+        own = spread[first : first + 2 * harmonics].reshape(2, harmonics)
+        size = np.mean(order**2 * (values.real**2 + values.imag**2 + own[0] + own[1])) / 2
+        for part in (0, 1):
+            start = free + first + part * harmonics
+            precision[start : start + harmonics] = order**2 / max(size, np.finfo(float).tiny)
+    return precision
+
+
+def _normal(model: Model, data: ClassData, operator: Operator, predicted: Complexes) -> tuple[Floats, Floats]:
+    """J^T J and J^T r of the stacked real equations."""
+    count = model.vector().size
+    gram, right = np.zeros((count, count)), np.zeros(count)
+    for index in range(data.lines.shape[0]):
+        omega, valid = data.omega[index], data.valid[index]
+        values = model.basis.at(omega)
+        for experiment in range(data.dte.shape[2]):
+            measured = data.dte[index, :, experiment]
+            if not measured.any():
+                continue
+            y = predicted[index, :, experiment] * valid
+            u = data.force[index, :, experiment]
+            columns = -model.columns(values, omega, y, u)
+            columns = operator.solve(index, columns * valid[:, None]) * data.weight[index]
+            own = valid & (omega >= 0) if 2 * data.weight[index] ** 2 <= 1.01 else valid
+            columns, left = columns[own], ((measured - predicted[index, :, experiment]) * data.weight[index])[own]
+            if own is not valid:
+                columns, left = columns * np.sqrt(2.0), left * np.sqrt(2.0)
+            stacked = np.concatenate([columns.real, columns.imag])
+            gram += stacked.T @ stacked
+            right += stacked.T @ np.concatenate([left.real, left.imag])
+    return gram, right
+
+
+def _step(model: Model, gram: Floats, right: Floats, noise: float, prior: Floats) -> tuple[Floats, Floats]:
+    """Step of all real parameters and their covariance. `noise` is the variance of a complex equation."""
+    vector = model.vector()
+    precision = 2.0 / noise
+    total = precision * gram + np.diag(prior)
+    pull = precision * right - prior * vector
+    direction = model.scale_direction()
+    size = np.sqrt(np.maximum(np.diagonal(total), TINY * np.diagonal(total).max()))
+    total = total / size / size[:, None]
+    total[np.diag_indices_from(total)] += TINY
+    scaled = direction * size
+    scaled /= np.linalg.norm(scaled)
+    total += GAUGE * np.outer(scaled, scaled)
+    factor = cho_factor(total, lower=True)
+    covariance = cho_solve(factor, np.eye(size.size)) / size / size[:, None]
+    return cho_solve(factor, pull / size) / size, covariance

@@ -1,0 +1,118 @@
+"""What a mesh-feedback model says: HTF, its variance, stiffness and damping against phase, and how far it fits."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.identification.feedback.data import ClassData
+from gearbench.identification.feedback.estimate import Feedback
+from gearbench.identification.feedback.functions import Fractions
+from gearbench.identification.feedback.model import Model, Operator
+from gearbench.identification.spectra.joint import Complexes, Floats
+
+# Draws of the parameters from their covariance, and output lines on which they are followed.
+DRAWS = 16
+FOLLOWED = 40
+# Equations of a window in which residuals are compared with the inputs.
+COMPARED = 80
+# Sidebands beyond the record's lines that a rational D is trusted with.
+BEYOND = 24
+
+
+def htf_on(model: Model, data: ClassData, lines: NDArray[np.int64], harmonics: int, ratio: float = 1.0) -> Complexes:
+    """HTF (2H+1, F) [m/N], l = -H..H, on lines of the record by harmonic balance; 0 beyond `furthest_line`.
+
+    `ratio`: mesh frequency over that of the record, which D, N, k and c do not depend on.
+    """
+    result = np.zeros((2 * harmonics + 1, lines.size), dtype=complex)
+    step, furthest = data.mesh_lines * ratio, furthest_line(model, data)
+    for residue in np.unique(np.round(lines % step, 9)):
+        chosen = np.flatnonzero(np.abs(np.round(lines % step, 9) - residue) < 1e-8)
+        first = int(np.ceil((-furthest - residue) / step))
+        last = int(np.floor((furthest - residue) / step))
+        omega = (residue + step * np.arange(first, last + 1))[None] / data.top
+        operator = Operator(model, omega, np.ones(omega.shape, dtype=bool))
+        place = np.round((lines[chosen] - residue) / step).astype(int) - first
+        right = np.zeros((omega.size, chosen.size), dtype=complex)
+        right[place, np.arange(chosen.size)] = operator.n[0, place]
+        solved = operator.solve(0, right) / data.stiffness_unit
+        for branch in range(-harmonics, harmonics + 1):
+            row = place + branch
+            inside = (row >= 0) & (row < omega.size)
+            result[branch + harmonics, chosen[inside]] = solved[row[inside], np.flatnonzero(inside)]
+    return result
+
+
+def furthest_line(model: Model, data: ClassData) -> int:
+    """Highest line of sidebands in the harmonic balance: partial fractions reach beyond those of the record."""
+    if not isinstance(model.basis, Fractions):
+        return data.top
+    return min(2 * data.top, data.top + BEYOND * data.mesh_lines)
+
+
+def followed(lines: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Some of the output lines, on which the drawn models are solved."""
+    step = max(1, -(-lines.size // FOLLOWED))
+    return np.unique(np.append(lines[::step], lines[-1]))
+
+
+def drawn_models(found: Feedback) -> list[Model]:
+    """Models with parameters drawn from their covariance."""
+    model, rng = found.model, np.random.default_rng(0)
+    covariance = found.refined.covariance
+    values, vectors = np.linalg.eigh(0.5 * (covariance + covariance.T))
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    return [model.moved(model.vector() + root @ rng.standard_normal(values.size)) for _ in range(DRAWS)]
+
+
+def along_phase(model: Model, data: ClassData, phases: int) -> tuple[Floats, Floats]:
+    """Mesh stiffness [N/m] and damping [N s/m] (phases,) on uniform phases.
+
+    k_0 and c_0 are what D tends to at frequency 0: Re D, and Im D over the angular frequency. c_0 counts the damping
+    of a shaft to ground as the mesh's.
+    """
+    turn = np.exp(2j * np.pi * np.outer(np.arange(phases) / phases, np.arange(1, model.harmonics + 1)))
+    lowest = int(np.abs(data.lines[np.abs(data.force).max(axis=2) > 0]).min())
+    position = np.linspace(lowest, lowest + 0.05 * (data.excited - lowest), 16) / data.top
+    d, _ = model.functions(position)
+    # D = k_0 + j w c_0 - w^2 m + ..: straight lines through its parts.
+    k_0 = float(np.polyfit(position**2, d.real, 1)[1])
+    c_0 = float(np.sum(d.imag * position) / np.sum(position**2))
+    stiffness = (k_0 + 2 * (turn @ model.k).real) * data.stiffness_unit
+    damping = (c_0 + 2 * (turn @ model.c).real) * data.stiffness_unit / data.omega_unit
+    return stiffness, damping
+
+
+def unexplained(found: Feedback, band: tuple[int, int]) -> float:
+    """Estimated sum over the lines k of the `band` and all branches of |error of G_l(k)|^2 [m^2/N^2].
+
+    It is what the residuals share with the inputs, less what noise would (docs/identification.md, "How far a result
+    goes").
+    """
+    data, d = found.data, found.data.mesh_lines
+    size = 2 * data.top + 1
+    left, force = (np.zeros((size, data.dte.shape[2]), dtype=complex) for _ in range(2))
+    for target, source in ((left, found.refined.left), (force, data.force)):
+        target[data.lines[data.valid] + data.top] = source[data.valid]
+        target[-data.lines[data.valid] + data.top] = source[data.valid].conj()
+    counted = np.abs(left) > 0
+    width = max(3, COMPARED // data.dte.shape[2])
+    total = 0.0
+    for first in range(data.top + 1, size - width + 1, width):
+        rows = np.arange(first, first + width)
+        middle = first + width // 2 - data.top
+        reach = (band[1] + middle) // d + 1
+        branch = np.arange(-reach, reach + 1)
+        source = np.abs(middle + branch * d)
+        branch = branch[(source >= band[0]) & (source <= band[1])]
+        at = rows[:, None] + branch * d
+        known = (at >= 0) & (at < size)
+        inputs = force[np.where(known, at, 0)] * known[:, :, None] * counted[rows][:, None, :]
+        power = np.sum(np.abs(inputs) ** 2, axis=(0, 2))
+        product = np.einsum("rje,re->j", inputs.conj(), left[rows])
+        noise = float(np.sum(np.abs(left[rows]) ** 2)) / max(int(counted[rows].sum()), 1)
+        good = power > 0
+        share = np.sum((np.abs(product[good]) ** 2 / power[good] - noise) / power[good])
+        total += width * float(share)
+    return total / data.stiffness_unit**2

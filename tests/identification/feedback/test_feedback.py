@@ -1,0 +1,177 @@
+"""Mesh feedback: its response against the exact ITF, its estimates against the rig that made the record."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from shared.ptv import periodic_filter
+from shared.reference_rig import ReferenceRig, reference_record
+
+from gearbench.identification import IdentificationSettings, LpmError, identify, itf
+from gearbench.identification.feedback.data import ClassData, class_data
+from gearbench.identification.feedback.functions import Basis, Fractions, Splines, common_poles
+from gearbench.identification.feedback.model import Model
+from gearbench.identification.feedback.refine import response
+from gearbench.identification.feedback.result import along_phase, htf_on
+from gearbench.identification.spectra.records import record_spectra
+from gearbench.identification.truth.monodromy import exact_itf
+from gearbench.identification.truth.periodic import itf_from_htf
+from gearbench.records.record import make_record
+
+RIG = ReferenceRig(mesh_frequency=64.0, edge=0.1)
+BAND = (800.0, 1600.0)
+
+
+def relative(a: np.ndarray, b: np.ndarray) -> float:
+    return float(np.linalg.norm(a - b) / np.linalg.norm(b))
+
+
+def noisy_record(noise: float, seed: int = 0) -> xr.Dataset:
+    return reference_record(
+        RIG, realisations=1, duration=1.0, band=(2.0, 2600.0), noise=noise, start_phase=0.3, seed=seed
+    )
+
+
+@pytest.fixture(scope="module")
+def record() -> xr.Dataset:
+    return noisy_record(0.01)
+
+
+@pytest.fixture(scope="module")
+def identified(record: xr.Dataset) -> xr.Dataset:
+    settings = IdentificationSettings(method="mesh-feedback", harmonics=30, band=BAND, phases=64, step=4)
+    return identify([record], settings)
+
+
+def stiffness_and_damping(phases: int) -> tuple[np.ndarray, np.ndarray]:
+    k = RIG.stiffness(np.arange(phases) / phases)
+    return k, 2 * RIG.mesh_ratio * np.sqrt(k * RIG.mass)
+
+
+def rig_model(data: ClassData) -> Model:
+    """The reference rig's own D = 1/P2 + k_0 + s c_0 and N = P1/P2 in partial fractions, k and c by FFT."""
+    position = np.linspace(1, data.top, 1500) / data.top
+    s = 1j * position * data.omega_unit
+    torsion = 1.0 / (RIG.mass * s**2)
+    supports = sum(
+        1.0 / (m * s**2 + 2 * RIG.support_ratio * np.sqrt(k * m) * s + k)
+        for m, k in zip(RIG.centre_mass, RIG.support_stiffness, strict=True)
+    )
+    k, c = (np.fft.fft(x) / 4096 for x in stiffness_and_damping(4096))
+    d = (1.0 / (torsion + supports) + k[0].real + s * c[0].real) / data.stiffness_unit
+    n = torsion / (torsion + supports)
+    weight = 1.0 / np.abs(d)
+    poles = common_poles(position, [d, n], [weight, weight], 2)
+    values = Fractions(poles).at(position)
+
+    def fitted(f: np.ndarray) -> np.ndarray:
+        stacked = np.concatenate([(values * weight[:, None]).real, (values * weight[:, None]).imag])
+        target = np.concatenate([(f * weight).real, (f * weight).imag])
+        found = np.linalg.lstsq(stacked, target, rcond=None)[0]
+        assert relative(values @ found, f) < 1e-8
+        return found
+
+    unit = data.stiffness_unit
+    return Model(Fractions(poles), fitted(d), fitted(n), k[1:41] / unit, c[1:41] * data.omega_unit / unit)
+
+
+def test_partial_fractions_of_the_rig_give_its_exact_response(record: xr.Dataset) -> None:
+    """D and N in closed form: harmonic balance on the lines of a record against the monodromy, k and c back again."""
+    spectra, excited, _ = record_spectra([record], sidebands=40)
+    data = class_data(spectra, round(excited[1]))
+    model = rig_model(data)
+    lines = np.arange(900, 1300, 57)
+    found = itf_from_htf(htf_on(model, data, lines, 60), 64)
+    wanted = exact_itf(RIG.system(512), lines.astype(float), np.arange(64) / 64)
+    assert relative(found, wanted) < 1e-3
+    k, c = along_phase(model, data, 64)
+    exact_k, exact_c = stiffness_and_damping(64)
+    assert relative(k, exact_k) < 2e-3
+    assert relative(c, exact_c) < 2e-2  # the supports damp a little at low frequency, too
+    # The response to the record's own force is the record without its noise.
+    left = (data.dte - response(model, data))[1:]
+    assert np.sqrt(np.mean(np.abs(left) ** 2) / np.mean(np.abs(data.dte[1:]) ** 2)) < 0.02
+
+
+def test_derivatives_of_the_equations(record: xr.Dataset) -> None:
+    """Columns against differences of A Y - N U, term by term written down."""
+    spectra, excited, _ = record_spectra([record], sidebands=40)
+    data = class_data(spectra, round(excited[1]))
+    model = rig_model(data)
+    index = 5
+    omega, y, u = data.omega[index], data.dte[index, :, 0], data.force[index, :, 0]
+
+    def equation(vector: np.ndarray) -> np.ndarray:
+        moved = model.moved(vector)
+        d, n = moved.functions(omega)
+        total = d * y - n * u
+        for row in range(omega.size):
+            for order in range(1, moved.harmonics + 1):
+                for source, k, c in (
+                    (row - order, moved.k[order - 1], moved.c[order - 1]),
+                    (row + order, moved.k[order - 1].conj(), moved.c[order - 1].conj()),
+                ):
+                    if 0 <= source < omega.size:
+                        total[row] += (k + 1j * omega[source] * c) * y[source]
+        return total
+
+    columns = model.columns(model.basis.at(omega), omega, y, u)
+    vector = model.vector()
+    for parameter in (0, 3, 5, 8, 10, 12, 15, 17, 18, 25, 60, 100, 150):
+        step = np.zeros(vector.size)
+        step[parameter] = 1e-5 * max(abs(vector[parameter]), 1e-2)
+        slope = (equation(vector + step) - equation(vector - step)) / (2 * step[parameter])
+        assert slope == pytest.approx(columns[:, parameter], abs=1e-5 * np.abs(columns[:, parameter]).max() + 1e-12)
+
+
+def test_poles_of_a_known_rational_function() -> None:
+    position = np.linspace(0.01, 1, 400)
+    poles = np.array([-0.01 + 0.4j, -0.02 + 0.7j])
+    basis = Fractions(poles)
+    d = basis.at(position) @ np.array([1.0, 0.1, 2.0, 0.02, 0.03, -0.01, 0.02])
+    n = basis.at(position) @ np.array([1.0, 0.0, 0.0, 0.01, -0.02, 0.01, 0.0])
+    found = common_poles(position, [d, n], [np.ones(400)] * 2, 2)
+    assert np.sort_complex(found) == pytest.approx(np.sort_complex(poles), abs=1e-9)
+
+
+@pytest.mark.parametrize("basis", [Splines(7), Fractions(np.array([-0.1 + 0.5j]))])
+def test_bases_are_those_of_real_systems(basis: Basis) -> None:
+    position = np.array([0.1, 0.35, 0.8])
+    assert basis.at(-position) == pytest.approx(basis.at(position).conj())
+
+
+def test_reference_rig_at_40_db(identified: xr.Dataset) -> None:
+    """One second, one realisation: a tenth of what the local polynomial method errs by, and it knows."""
+    exact = exact_itf(RIG.system(512), identified.frequency.values[::5], np.arange(64) / 64)
+    error = relative(itf(identified).values[::5], exact)
+    assert identified.attrs["method"] == "mesh-feedback"
+    assert error < 0.02
+    assert 0.6 < identified.attrs["expected_error"] / error < 1.6
+    k, _ = stiffness_and_damping(64)
+    assert relative(identified.mesh_stiffness.values, k) < 0.02
+    actual = np.sqrt(np.mean((identified.mesh_stiffness.values - k) ** 2))
+    assert actual < 2.5 * np.sqrt(identified.mesh_stiffness_var.values.mean())
+
+
+def test_record_that_no_mesh_force_explains_is_told() -> None:
+    """A random time-varying filter: the residual follows the force, and the local polynomial method takes over."""
+    system = periodic_filter(2, 32, taps=6)
+    force = np.random.default_rng(4).standard_normal((3, 1600))
+    given = {"sampling_rate": 1.0, "samples_per_period": 1600, "periods": 1, "mesh_period": 32.0, "mesh_phase": 0.0}
+    record = make_record(
+        {"dte": 1e-9 * system.response(force), "force": force}, {**given, "settling_residual": 0.0}
+    )
+    frf = identify([record], IdentificationSettings(method="mesh-feedback", phases=32, band=(0.05, 0.4)))
+    assert frf.attrs["method"] == "lpm"
+    assert "mesh-feedback expects to err by" in frf.attrs["warnings"]
+    assert "local polynomial method instead" in frf.attrs["warnings"]
+
+
+def test_settings_of_the_other_method_are_refused() -> None:
+    with pytest.raises(LpmError, match="order = 2 belongs to method 'lpm'"):
+        IdentificationSettings(method="mesh-feedback", order=2)
+
+
+def test_short_record_is_refused() -> None:
+    short = noisy_record(0.01).isel(time=slice(0, 128)).assign_attrs(samples_per_period=128)
+    with pytest.raises(LpmError, match=r"under-determined: \d+ unknowns of the mesh-feedback model"):
+        identify([short], IdentificationSettings(method="mesh-feedback"))
