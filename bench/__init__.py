@@ -2,9 +2,9 @@
 
 `models`: the list of models; `protocol`: what a model is; `experiment`: one experiment, whatever the model. `plan`:
 schedule, torque, settling and workers. `record`: what a record says of its rig, sensors. `refusals`: what cannot be
-asked for, found before work begins. `linear`, `nonlinear`, `elastic`: the models. `stress`: fields and root stress.
-`results`: frequency responses of cases, single numbers, comparisons. `export`: models for other programs. `conversion`:
-measured files become records.
+asked for, found before work begins. `linear`, `nonlinear`, `elastic`, `full`: the models. `stress`: fields and root
+stress. `results`: frequency responses of cases, single numbers, comparisons. `export`: models for other programs.
+`conversion`: measured files become records.
 """
 
 from __future__ import annotations

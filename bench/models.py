@@ -30,8 +30,14 @@ def _reduced(case: Case) -> Model:
     return Reduced()
 
 
+def _full(case: Case) -> Model:
+    from gearbench.bench.full.model import Unreduced
+
+    return Unreduced()
+
+
 # Values of simulation.model, and what a case with that value runs on.
-MODELS: Mapping[str, Callable[[Case], Model]] = {"lumped": _lumped, "reduced": _reduced}
+MODELS: Mapping[str, Callable[[Case], Model]] = {"lumped": _lumped, "reduced": _reduced, "full": _full}
 
 
 def model_for(case: Case, name: str | None = None) -> tuple[Case, Model]:

@@ -36,7 +36,8 @@ class Drive(NamedTuple):
 
 class Channels(NamedTuple):
     """Channels (n,) of a record over n samples, in SI units, before any sensor. Angles are what is left of them when
-    both gears turn steadily, unless the model says that they are `absolute`."""
+    both gears turn steadily, unless the model says that they are `absolute`. x is None where no centre moves across its
+    support, torque_driver where it is the commanded one."""
 
     torque_driven: Array
     angle_driver: Array
@@ -45,6 +46,9 @@ class Channels(NamedTuple):
     y_driven: Array
     dte: Array
     force: Array
+    x_driver: Array | None = None
+    x_driven: Array | None = None
+    torque_driver: Array | None = None
 
 
 class Prepared(Protocol[State]):
@@ -91,6 +95,9 @@ class Prepared(Protocol[State]):
 
     def apart(self, outputs: Array) -> NDArray[np.bool_] | None:
         """Samples (samples,) in which no teeth touch; None for a model that does not let go."""
+
+    def divided(self, outputs: Array) -> int | None:
+        """Steps that had to be divided to be solved; None for a model that never does that."""
 
 
 class Model(Protocol):

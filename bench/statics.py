@@ -12,6 +12,7 @@ from gearbench.bench.models import model_for
 from gearbench.bench.plan.schedule import ProgressReport
 from gearbench.bench.record.static import load_key
 from gearbench.bench.refusals.gears import check_gears
+from gearbench.bench.refusals.stated import mean_torque
 from gearbench.rig import Case
 
 MOST_POSITIONS = 65_536
@@ -52,7 +53,7 @@ def static(
     if cycles > 1 and not solver.elastic:
         name = solver.name
         raise BenchError(f"cycles = {cycles} must be 1 for the model {name}, which has no teeth of their own at rest")
-    unit, values = ("m", dte) if len(dte) else ("N m", torque or (case.experiment.torque_mean,))
+    unit, values = ("m", dte) if len(dte) else ("N m", torque or (mean_torque(case),))
     loads = np.asarray(values, dtype=float)
     key, scale = load_key(unit)
     for load in loads * scale:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from gearbench.bench.plan.schedule import ProgressReport, Schedule
 from gearbench.bench.protocol import Model, Note
 from gearbench.bench.record.static import Loads
-from gearbench.bench.refusals.effects import ELASTIC_KEYS, refuse_effects
+from gearbench.bench.refusals.effects import ELASTIC_KEYS, MOVING_KEYS, refuse_effects
 from gearbench.geometry.mesh.sector import refuse_crack
 from gearbench.rig import Case
 
@@ -33,7 +33,7 @@ class Reduced(Model):
 
         for name, gear in (("rig.driver", case.rig.driver), ("rig.driven", case.rig.driven)):
             refuse_crack(gear, case.simulation.element, name, "simulation.element")
-        refuse_effects(case.rig, self.title, represented=ELASTIC_KEYS)
+        refuse_effects(case.rig, self.title, represented=ELASTIC_KEYS.union(MOVING_KEYS))
         check_mean_torque(case)
 
     def prepare(self, case: Case, plan: Schedule, note: Note) -> Elastic:

@@ -17,8 +17,18 @@ from gearbench.fem.contact.static import position, static_cycle
 from gearbench.fem.contact.store import stored_law
 from gearbench.fem.gear.body import CondensedGear
 from gearbench.fem.gear.store import stored_gear
-from gearbench.fem.motion.machine import Machine, contact_rows, make_machine, mass_matrix
-from gearbench.fem.motion.transient import frequency_error, make_scheme
+from gearbench.fem.motion.hubs import hubs_at_rest, spring_tangent
+from gearbench.fem.motion.imposed import stiffness_factor
+from gearbench.fem.motion.machine import (
+    Machine,
+    contact_rows,
+    damping_matrix,
+    make_machine,
+    mass_matrix,
+    modal_flexibility,
+    stiffness_matrix,
+)
+from gearbench.fem.motion.scheme import frequency_error, make_scheme
 from gearbench.geometry import Body, Pair
 from gearbench.geometry.mesh.sector import refuse_crack
 from gearbench.lumped.linear.time_step import FREQUENCY_ERROR, STEPS_PER_MESH
@@ -57,33 +67,41 @@ def elastic_rig(
     return ElasticRig(rig, meshing, (driver, driven), bodies, law)
 
 
-def machine_for(elastic: ElasticRig, mesh_frequency: float) -> Machine:
-    """Equations of motion at a mesh frequency [Hz]."""
-    return make_machine(elastic.rig, elastic.pair, elastic.law, elastic.gears, elastic.bodies, mesh_frequency)
+def machine_for(
+    elastic: ElasticRig, mesh_frequency: float, mean_torque: float = 0.0, duration: float = 1.0
+) -> Machine:
+    """Equations of motion at a mesh frequency [Hz], mean torque [N m] and duration of the record [s]."""
+    e = elastic
+    return make_machine(e.rig, e.pair, e.law, e.gears, e.bodies, mesh_frequency, mean_torque, duration)
 
 
 def natural_frequencies(machine: Machine, torque: float, phase: float) -> Array:
-    """Frequencies [Hz] of the rig's oscillatory eigenvalues, linearised about static equilibrium.
+    """Frequencies [Hz] of the rig's oscillatory eigenvalues, linearised about static equilibrium, without friction.
 
     The supports' damping is part of them: it may be so strong that their motions do not oscillate.
     """
-    law = machine.law
-    dte = static_cycle(law, np.array([phase]), torque=[torque]).transmission_error[0, 0]
+    law, hubs = machine.law, machine.hubs
+    factor = stiffness_factor(machine.correction, phase, 0.0)
+    dte = static_cycle(law, np.array([phase]), torque=[torque / factor]).transmission_error[0, 0]
     theta1 = phase * law.driver.pitch + dte / law.driver.rb
     theta2 = phase * law.driven.pitch
     found = position(law, theta1, theta2, 0.0, 0.0, 0.0, 0.0, np.zeros(PAIRS))
     rows = contact_rows(machine, found.pairs)[found.active]
     # Modes are unknowns of their own here, so the pairs keep only the residual's flexibility.
-    modal = rows[:, machine.rotations + 2 :]
-    squares = machine.stiffness[machine.rotations + 2 :]
-    residual = found.flexibility[np.ix_(found.active, found.active)] - (modal / squares) @ modal.T
-    stiffness = np.diag(machine.stiffness) + rows.T @ np.linalg.solve(residual, rows)
-    mass = mass_matrix(machine, theta1, theta2)
+    residual = found.flexibility[np.ix_(found.active, found.active)] / factor - modal_flexibility(machine, rows)
+    stiffness = stiffness_matrix(machine) + rows.T @ np.linalg.solve(residual, rows)
+    push = factor * found.force[found.active] @ rows[:, :hubs]
+    rest = hubs_at_rest(machine.hub_stiffness, machine.springs, machine.at, machine.held, push)
+    stiffness[:hubs, :hubs] += spring_tangent(machine.springs, rest)
+    moving = np.ones(len(machine.mass), np.bool_)
+    moving[:hubs] = ~machine.held
+    keep = np.ix_(moving, moving)
+    mass, damping = mass_matrix(machine, theta1, theta2)[keep], damping_matrix(machine)[keep]
     size = len(mass)
     system = np.block(
         [
             [np.zeros((size, size)), np.eye(size)],
-            [-np.linalg.solve(mass, stiffness), -np.linalg.solve(mass, np.diag(machine.damping))],
+            [-np.linalg.solve(mass, stiffness[keep]), -np.linalg.solve(mass, damping)],
         ]
     )
     values = np.linalg.eigvals(system)

@@ -9,19 +9,38 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.bench.elastic.rig import ElasticRig, choose_substeps, elastic_rig, machine_for
+from gearbench.bench.elastic.together import under_excitation, under_ripple
 from gearbench.bench.errors import BenchError
 from gearbench.bench.plan.excitation import Torque
 from gearbench.bench.plan.schedule import Schedule
 from gearbench.bench.plan.settling import Keep
 from gearbench.bench.protocol import Channels, Drive, Note
-from gearbench.bench.record.channels import dte_of, force_of, support_factor, turned_by
+from gearbench.bench.record.attributes import turning_inertias
+from gearbench.bench.record.channels import (
+    across_factor,
+    dte_of,
+    generalised_force,
+    moves_across,
+    support_factor,
+    turned_by,
+)
 from gearbench.fem.contact.curve import EDGE_SEPARATION
 from gearbench.fem.motion.machine import Machine
-from gearbench.fem.motion.transient import CHANNELS, Scheme, advance, columns, initial_state, make_scheme
-from gearbench.fem.motion.transient import State as Step
+from gearbench.fem.motion.scheme import Scheme, make_scheme
+from gearbench.fem.motion.start import State as Step
+from gearbench.fem.motion.start import initial_state
+from gearbench.fem.motion.transient import CHANNELS, PARTS, advance, columns
 from gearbench.rig import Case
 
 Array = NDArray[np.float64]
+
+
+LIMITS = (
+    "forces of unbalance, also of eccentric gears, are left out",
+    "friction acts on the hubs: the flanks' displacement along their tangent is not followed",
+    "a varying factor on the mesh force neither gives nor takes work through the rotation",
+    "Coriolis and centrifugal forces of the elastic displacement relative to the hubs are left out",
+)
 
 
 class State(NamedTuple):
@@ -31,6 +50,7 @@ class State(NamedTuple):
     sample: int
     step: Step
     here: Array
+    begins: bool = False  # at rest, whatever the excitation
 
 
 @dataclass(frozen=True)
@@ -65,7 +85,8 @@ class Elastic:
 
     @property
     def attributes(self) -> dict[str, Any]:
-        return {}
+        one, two = turning_inertias(self.elastic.rig, self.elastic.pair)
+        return {"limits": "; ".join(LIMITS), "inertia_driver": one, "inertia_driven": two}
 
     def drive(self, torque: Torque) -> Drive:
         period = torque.sample(self.samples_per_period * self.substeps)
@@ -74,20 +95,24 @@ class Elastic:
 
     def start(self, sample: int) -> State:
         step = initial_state(self.machine, self.mean_torque, sample / self.sampling_rate)
-        return State(sample, step, np.zeros(CHANNELS))
+        return State(sample, under_ripple(self.machine, step), np.zeros(CHANNELS), begins=True)
 
     def advance(self, drive: Drive, state: State, samples: int) -> tuple[State, Array]:
         first, steps = state.sample * self.substeps, samples * self.substeps
         torque = np.take(drive.fine, np.arange(first, first + steps), mode="wrap")
-        step, outputs, failed = advance(self.machine, self.scheme, state.step, torque, self.substeps)
-        if failed < -1:
+        begin = state.step
+        if state.begins:
+            begin = under_excitation(self.machine, begin, drive.fine, self.scheme.step, first)
+        step, outputs, run = advance(self.machine, self.scheme, begin, torque, self.substeps)
+        if run.off:
             raise BenchError(
                 f"at t = {step.t:.6g} s the teeth overlap where contact leaves the modelled flanks: lower"
                 " experiment.torque_mean_nm or the multisine"
             )
-        if failed >= 0:
+        if run.failed >= 0:
             raise BenchError(
-                f"contact was not found at t = {step.t:.6g} s; more simulation.substeps than {self.substeps} may help"
+                f"contact was not found at t = {step.t:.6g} s, in steps of {self.scheme.step / PARTS:.2g} s either:"
+                " the motion diverges, or forces are far beyond what the flanks can carry"
             )
         if not np.isfinite(outputs).all():
             raise BenchError(f"the integration diverged before t = {step.t:.6g} s")
@@ -97,11 +122,15 @@ class Elastic:
     def dte(self, outputs: Array) -> Array:
         out = columns(outputs)
         turned = turned_by(self.elastic.pair, out.angle_driver, out.angle_driven)
-        return dte_of(turned, out.y_driver, out.y_driven, support_factor(self.elastic.rig, self.elastic.pair))
+        rig, meshing = self.elastic.rig, self.elastic.pair
+        across = (out.x_driver, out.x_driven, across_factor(rig, meshing)) if moves_across(rig) else ()
+        return dte_of(turned, out.y_driver, out.y_driven, support_factor(rig, meshing), *across)
 
     def channels(self, outputs: Array, torque: Array) -> Channels:
         """Raises BenchError where the flanks overlapped further than tip edges are followed."""
-        dte, out = self.dte(outputs), columns(outputs)
+        dte, out, rig = self.dte(outputs), columns(outputs), self.elastic.rig
+        across, held = moves_across(rig), rig.drive.boundary == "speed"
+        applied = out.torque_driver if held else torque
         most = EDGE_SEPARATION * self.elastic.pair.driver.module
         if dte.max() > most:
             raise BenchError(
@@ -115,8 +144,14 @@ class Elastic:
             y_driver=out.y_driver,
             y_driven=out.y_driven,
             dte=dte,
-            force=force_of(torque, self.elastic.pair),
+            force=generalised_force(rig, self.elastic.pair, applied, out.torque_driven),
+            x_driver=out.x_driver if across else None,
+            x_driven=out.x_driven if across else None,
+            torque_driver=applied if held else None,
         )
+
+    def divided(self, outputs: Array) -> int:
+        return int(columns(outputs).divided.sum())
 
     def apart(self, outputs: Array) -> NDArray[np.bool_]:
         return np.asarray(columns(outputs).loaded == 0)
@@ -125,7 +160,9 @@ class Elastic:
 def prepare(case: Case, plan: Schedule, note: Note) -> Elastic:
     """Gears condensed, contact tabulated, step chosen. Raises GeometryError, ContactError or BenchError."""
     elastic = elastic_rig(case.rig, case.simulation, note)
-    machine = machine_for(elastic, plan.mesh_frequency)
+    machine = machine_for(
+        elastic, plan.mesh_frequency, case.experiment.torque_mean, (plan.record_samples - 1) / plan.sampling_rate
+    )
     substeps = choose_substeps(machine, case, plan)
     return Elastic(
         elastic=elastic,

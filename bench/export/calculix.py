@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from gearbench.bench.elastic.rig import ElasticRig, elastic_rig
 from gearbench.bench.errors import BenchError
+from gearbench.bench.refusals.stated import mean_torque
 from gearbench.fem.contact.kinematics import CORNER1, CORNER2, EDGE1, EDGE2, ON_LINE, Contact
 from gearbench.fem.contact.law import PAIRS, contact_in
 from gearbench.fem.contact.static import position, solve_torque, static_cycle
@@ -109,7 +110,7 @@ def contact_model(
             raise BenchError(f"{f'{key} = {value:g} {unit}'.rstrip()} must be {limit}")
     elastic = elastic_rig(case.rig, case.simulation)
     if dte is None:
-        wanted = case.experiment.torque_mean if torque is None else torque
+        wanted = mean_torque(case) if torque is None else torque
         dte = solve_torque(elastic.law, phase, wanted)
     cycle = static_cycle(elastic.law, np.array([phase]), dte=[dte])  # refuses what leaves the flanks
     torques = float(cycle.torque_driver[0, 0]), float(cycle.torque_driven[0, 0])

@@ -97,6 +97,9 @@ class LinearRig:
     def apart(self, outputs: Array) -> None:
         """A heavily loaded mesh: the model has no backlash."""
 
+    def divided(self, outputs: Array) -> None:
+        """All steps are alike."""
+
 
 def tables_for(model: Lumped, plan: Schedule, substeps: int) -> Tables:
     """Mesh tables of the shortest run that holds whole numbers of steps and of mesh periods."""

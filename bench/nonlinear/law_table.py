@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from gearbench.bench.elastic.rig import ElasticRig, elastic_rig
 from gearbench.bench.errors import BenchError
 from gearbench.bench.refusals.load_range import largest_torque
-from gearbench.fem.contact.law import EDGE_SEPARATION, PAIRS, Law, newton_step
+from gearbench.fem.contact.law import EDGE_SEPARATION, PAIRS, Law
+from gearbench.fem.contact.sharing import newton_step
 from gearbench.fem.contact.static import position, static_cycle
 from gearbench.fem.gear.store import cached, key_for
 from gearbench.geometry import Pair, pair
@@ -124,8 +125,8 @@ def _tangent_shares(law: Law, phases: Array, dte: Array, first: int, share: Arra
         for p in range(len(found.pairs)):
             column = found.pairs[p].tooth - first
             if found.pairs[p].side == 0 and found.active[p] and 0 <= column < share.shape[1]:
-                share[i, column] = stiff[p, 0]
-                total += stiff[p, 0]
+                share[i, column] = stiff[p]
+                total += stiff[p]
         for column in range(share.shape[1]):
             share[i, column] /= total
 

@@ -10,15 +10,23 @@ from numpy.typing import NDArray
 
 from gearbench.bench.errors import BenchError
 from gearbench.bench.nonlinear.law_table import mesh_law
-from gearbench.bench.nonlinear.run import HEADROOM, Setup, make_setup, turning_inertia
+from gearbench.bench.nonlinear.run import HEADROOM, Setup, make_setup
 from gearbench.bench.plan.schedule import schedule
 from gearbench.bench.plan.settling import change
 from gearbench.bench.protocol import Drive
-from gearbench.bench.record.attributes import experiment_attributes, joined, lost_contact, rig_attributes
+from gearbench.bench.record.attributes import (
+    experiment_attributes,
+    joined,
+    lost_contact,
+    rig_attributes,
+    shown_mean,
+    turning_inertias,
+)
 from gearbench.bench.record.channels import mesh_phases, sensed, with_rotation
-from gearbench.bench.record.sensors import Signal, check_delays, delayed, repeated
+from gearbench.bench.record.sensors import check_delays, filter_delay, imposed, repeated
 from gearbench.geometry import pair
 from gearbench.lumped.nonlinear.law import MeshLaw
+from gearbench.lumped.nonlinear.rest import mesh_direction
 from gearbench.records import make_record
 from gearbench.rig import Case, Experiment, Sensors
 
@@ -32,38 +40,47 @@ PERIODS_MAX = 6
 def replay(case: Case, record: xr.Dataset, law: MeshLaw | None = None, realisation: int = 0) -> xr.Dataset:
     """One steady period of the case's rig under the record's torque, speed, sampling and starting mesh phase.
 
-    The torque is the mean over the record's periods of one realisation, as a trigonometric sum; where the rig's torque
-    sensor lags, the torque on the rig leads what was recorded. Delays of the rig's sensors are applied, noise is not.
-    Where teeth differ and the excitation period does not hold all pairings, the result is as long as they take.
+    The torque is the mean over the record's periods of one realisation, as a trigonometric sum; gain, delay and filter
+    of the rig's torque sensor are taken back for the torque on the rig. What the rig's sensors do is applied, but for
+    noise and quantisation. Where teeth differ and the excitation period does not hold all pairings, the result is as
+    long as they take; where the mesh stiffness drifts, as long as the record.
     Attribute `settling_residual` is the change of the DTE over the last two periods; a motion that does not settle is
     returned with a warning. Raises BenchError for a record that says too little.
     """
+    if case.rig.drive.boundary != "torque":
+        raise BenchError(
+            f'a replay imposes the recorded driver torque, which rig.drive.boundary = "{case.rig.drive.boundary}" does'
+            ' not let act: set "torque"'
+        )
     rate, samples, periods = (record.attrs[key] for key in ("sampling_rate", "samples_per_period", "periods"))
     samples, periods, rate = int(samples), int(periods), float(rate)
     torque = record["torque_driver"].values[realisation].reshape(periods, samples).mean(axis=0)
-    torque = delayed(Signal(torque[None]), -case.rig.sensors.delay_torque_driver, rate).swing[0]
+    torque = imposed(torque[None], case.rig.sensors, rate)[0]
     frequency, phase = _rotation(case, record, realisation)
     experiment = _experiment(case.experiment, torque, frequency, rate, samples, periods)
     case = case.model_copy(update={"experiment": experiment})
     meshing = pair(case.rig)
     law = law or mesh_law(case.rig, case.simulation, HEADROOM * float(np.abs(torque).max()))
     plan = schedule(experiment, case.rig)
-    check_delays(case.rig, plan.repeats, plan.repeat_time)
+    check_delays(case.rig, plan.wraps, plan.repeat_time)
     setup = make_setup(case, plan, law, phase)
     force = resampled(torque, 2 * setup.substeps * samples) / meshing.driver.base_radius
     outputs, residual = _settled(setup, Drive(torque, force))
     applied = repeated(torque, len(outputs))
-    swings = {"torque_driver": applied, **setup.channels(outputs, applied)._asdict()}
-    rows = {name: values[None] for name, values in swings.items()}
+    swings = {**setup.channels(outputs, applied)._asdict(), "torque_driver": applied}
+    rows = {name: values[None] for name, values in swings.items() if values is not None}
     quiet = case.rig.model_copy(update={"sensors": _quiet(case.rig.sensors)})
-    seen = with_rotation(sensed(rows, quiet, meshing, plan, samples=len(outputs), seed=0), plan, phase)
+    shown = sensed(rows, quiet, meshing, plan, samples=len(outputs), seed=0, first=phase)
+    seen = with_rotation(shown, plan, phase)
     seen["mesh_phase"] = mesh_phases(plan, len(outputs), phase)[None]
     unsettled = None if residual <= TOLERANCE else f"the DTE still changes by {residual:.3g} from period to period"
     lost = int(setup.apart(outputs).sum())
+    inertias = turning_inertias(case.rig, meshing)
     attributes = {
         **rig_attributes(case.rig, meshing),
-        **experiment_attributes(plan, len(outputs) // samples, float(torque.mean())),
-        "inertia_driver": turning_inertia(case.rig, meshing),
+        **experiment_attributes(plan, len(outputs) // samples, shown_mean(case.rig, float(torque.mean()))),
+        "inertia_driver": inertias[0],
+        "inertia_driven": inertias[1],
         "mesh_period": 1.0 / frequency,
         "settling_residual": residual,
         "contact_lost_samples": lost,
@@ -76,8 +93,9 @@ def replay(case: Case, record: xr.Dataset, law: MeshLaw | None = None, realisati
 
 
 def _quiet(sensors: Sensors) -> Sensors:
-    """The sensors without their noise."""
-    return sensors.model_copy(update={name: 0.0 for name in Sensors.model_fields if name.startswith("noise")})
+    """The sensors without their noise and steps."""
+    names = [name for name in Sensors.model_fields if name.startswith(("noise", "quantisation"))]
+    return sensors.model_copy(update=dict.fromkeys(names, 0.0))
 
 
 def resampled(period: Array, points: int) -> Array:
@@ -98,7 +116,9 @@ def _rotation(case: Case, record: xr.Dataset, realisation: int) -> tuple[float, 
     elif record.attrs.get("mesh_phase_origin") == "geometry" and "angle_driven" in record:
         angle = record["angle_driven"].values[realisation] * case.rig.driven.teeth / (2 * np.pi)
         speed, first = (float(value) for value in np.polyfit(np.arange(angle.size), angle, 1))
-        first += speed * rate * case.rig.sensors.delay_angle_driven
+        sensors = case.rig.sensors
+        late = sensors.delay_angle_driven + (filter_delay(sensors.filter) if sensors.filter is not None else 0.0)
+        first += speed * rate * late
     else:
         raise BenchError(
             'the record has no channel mesh_phase, and mesh_phase_origin is not "geometry": its mesh phase is unknown'
@@ -122,13 +142,16 @@ def _experiment(
 
 
 def _settled(setup: Setup, drive: Drive) -> tuple[Array, float]:
-    """Outputs (samples, 7) of one repetition after free vibrations have died out, and how steady it is."""
+    """Outputs (samples, n) of one repetition after free vibrations have died out, and how steady it is; of a rig that
+    drifts, what is left of free vibrations."""
     mean = float(drive.fine.mean())
     block = setup.block_samples
     decay = setup.model.slowest_decay(mean)
     early = min(ceil(log(1 / TRANSIENT) / max(decay, 1e-9) * setup.sampling_rate), block)
     begin, _ = setup.advance(drive, setup.at_rest(mean, -early), early)
     end, outputs = setup.advance(drive, begin, block)
+    if setup.model.rig.mesh.stiffness_drift:
+        return outputs, TRANSIENT
     residual = _unsteady(setup, begin.values, end.values, outputs)
     for _ in range(PERIODS_MAX):
         if residual <= TOLERANCE:
@@ -141,9 +164,9 @@ def _settled(setup: Setup, drive: Drive) -> tuple[Array, float]:
 
 def _unsteady(setup: Setup, start: Array, end: Array, outputs: Array) -> float:
     """How far the state has not come back, in deflection over its standard deviation and velocity likewise."""
-    mesh = np.array([1.0, setup.model.factor, -setup.model.factor, -1.0])
+    mesh = mesh_direction(setup.model.constants(), setup.model.structure)
     dte = setup.dte(outputs)
     scale = max(float(dte.std()), 1e-6 * abs(float(dte.mean())))
     rate = max(float(np.diff(dte).std()) * setup.sampling_rate, 1e-6 * scale)
-    moved, sped = (end - start)[:4] @ mesh, (end - start)[5:9] @ mesh
+    moved, sped = (end - start)[: mesh.size] @ mesh, (end - start)[mesh.size :] @ mesh
     return float(max(abs(moved) / scale, abs(sped) / rate))

@@ -1,7 +1,7 @@
 """A rig made ready for the non-linear lumped model, and its steps through tables of what varies with rotation.
 
 Channels are what sensors on the rig would show: torque_driver is the commanded torque, without ripple. All excitation
-periods are recorded, since their noise differs. What the model leaves out is listed in `lumped.nonlinear.model.LIMITS`
+periods are recorded, since their noise differs. What the model leaves out is listed in `NonLinear.limits`
 and in the record's attribute `limits`.
 """
 
@@ -14,21 +14,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.bench.nonlinear.law_table import mesh_law
+from gearbench.bench.nonlinear.together import under_excitation, under_ripple
 from gearbench.bench.plan.excitation import Torque
 from gearbench.bench.plan.schedule import Schedule
 from gearbench.bench.plan.settling import Keep
 from gearbench.bench.plan.substeps import runge_kutta_substeps
 from gearbench.bench.protocol import Channels, Drive
-from gearbench.bench.record.attributes import bodies_of
-from gearbench.bench.record.channels import dte_of, force_of, turned_by
+from gearbench.bench.record.attributes import turning_inertias
+from gearbench.bench.record.channels import dte_of, generalised_force, moves_across, turned_by
 from gearbench.bench.refusals.effects import refuse_unknown
 from gearbench.geometry import Pair, pair
 from gearbench.lumped.nonlinear.law import MeshLaw
-from gearbench.lumped.nonlinear.model import COORDINATES, LIMITS, Coordinates, NonLinear, nonlinear_model
-from gearbench.lumped.nonlinear.step import columns, integrate
+from gearbench.lumped.nonlinear.model import NonLinear, nonlinear_model
+from gearbench.lumped.nonlinear.step import Outputs, columns, integrate
 from gearbench.lumped.nonlinear.tables import Motion, Table, tables
 from gearbench.lumped.stiffness.potential_energy import outside_foundation_fit
-from gearbench.rig import Case, Experiment, Rig
+from gearbench.rig import Case, Experiment
 
 Array = NDArray[np.float64]
 
@@ -37,10 +38,11 @@ HEADROOM = 2.0  # largest tabulated over largest applied load: resonances load t
 
 
 class State(NamedTuple):
-    """The integrator's state (2 COORDINATES,) at a sample of the record."""
+    """The integrator's state (2 size,) at a sample of the record."""
 
     sample: int
     values: Array
+    begins: bool = False  # at rest, whatever the excitation
 
 
 @dataclass(frozen=True)
@@ -59,6 +61,7 @@ class Setup:
     warnings: tuple[str, ...]
     table: Table | None = None
     first_phase: float = 0.0
+    record_samples: int = 1  # over which the mesh stiffness drifts
 
     keep: ClassVar[Keep] = "one"
     piece: ClassVar[int] = 0
@@ -89,8 +92,9 @@ class Setup:
 
     @property
     def attributes(self) -> dict[str, Any]:
-        about = {"mesh": "non-linear", "limits": "; ".join(LIMITS)}
-        return {**about, "inertia_driver": turning_inertia(self.model.rig, self.meshing)}
+        about = {"mesh": "non-linear", "limits": "; ".join(self.model.limits)}
+        one, two = turning_inertias(self.model.rig, self.meshing)
+        return {**about, "inertia_driver": one, "inertia_driven": two}
 
     def phase_at(self, sample: int) -> float:
         """Mesh phase [cycles] of a sample."""
@@ -98,15 +102,21 @@ class Setup:
 
     def table_for(self, start: int, samples: int) -> Table:
         """Table of `samples` samples from sample `start`."""
-        return tables(
+        entries = 2 * self.substeps * samples
+        table = tables(
             self.model,
             Motion(
                 cycles=samples * self.cycles_per_sample,
-                entries=2 * self.substeps * samples,
+                entries=entries,
                 step=self.step,
                 first_phase=self.phase_at(start),
             ),
         )
+        drift = self.model.rig.mesh.stiffness_drift
+        if not drift:
+            return table
+        passed = (start + np.arange(entries + 1) / (2 * self.substeps)) / max(self.record_samples - 1, 1)
+        return table._replace(gain=table.gain * (1.0 + drift * np.clip(passed, 0.0, 1.0)))
 
     def drive(self, torque: Torque) -> Drive:
         fine = torque.sample(2 * self.substeps * self.samples_per_period)
@@ -115,9 +125,20 @@ class Setup:
     def start(self, sample: int) -> State:
         return self.at_rest(self.mean_force, sample)
 
+    def resume(self, state: State) -> State:
+        """A state of another speed at a whole repetition of the mesh, as the start of this one."""
+        return State(0, state.values)
+
+    def mesh_force(self, outputs: Array) -> Array:
+        """Force of the mesh (samples,) [N]."""
+        return columns(outputs).mesh_force
+
     def advance(self, drive: Drive, state: State, samples: int) -> tuple[State, Array]:
-        start, values = state
+        start, values = state.sample, state.values
         stop = start + samples
+        if state.begins and self.model.rig.load.boundary == "inertia":
+            entry = 2 * self.substeps * start
+            values = values + under_excitation(self.model, drive.fine, self.step / 2, entry % drive.fine.size)
         # Whole repetitions are counted from 0 again, so that they all read the same table.
         after = stop if stop < 0 else stop % self.block_samples
         if self.table is not None and start == 0 and samples == self.block_samples:
@@ -145,54 +166,43 @@ class Setup:
 
     def dte(self, outputs: Array) -> Array:
         out = columns(outputs)
-        return dte_of(out.u1 - out.u2, out.y1, out.y2, self.model.factor)
+        return self._dte(out.u1 - out.u2, out)
+
+    def _dte(self, turned: Array, out: Outputs) -> Array:
+        across = (out.x1, out.x2, self.model.slide) if moves_across(self.model.rig) else ()
+        return dte_of(turned, out.y1, out.y2, self.model.factor, *across)
 
     def channels(self, outputs: Array, torque: Array) -> Channels:
         out = columns(outputs)
         r1, r2 = self.model.base_radii
         one, two = out.u1 / r1, out.u2 / r2
+        across, held = moves_across(self.model.rig), self.model.rig.drive.boundary == "speed"
+        load, applied = out.load_force * r2, out.drive_force * r1 if held else torque
         return Channels(
-            torque_driven=out.load_force * r2,
+            torque_driven=load,
             angle_driver=one,
             angle_driven=two,
             y_driver=out.y1,
             y_driven=out.y2,
-            dte=dte_of(turned_by(self.meshing, one, two), out.y1, out.y2, self.model.factor),
-            force=force_of(torque, self.meshing),
+            dte=self._dte(turned_by(self.meshing, one, two), out),
+            force=generalised_force(self.model.rig, self.meshing, applied, load),
+            x_driver=out.x1 if across else None,
+            x_driven=out.x2 if across else None,
+            torque_driver=applied if held else None,
         )
 
     def apart(self, outputs: Array) -> NDArray[np.bool_]:
         return np.asarray(columns(outputs).mesh_force == 0)
+
+    def divided(self, outputs: Array) -> None:
+        """All steps are alike."""
 
     def at_rest(self, mean_force: float, sample: int) -> State:
         """Static equilibrium under the mean force [N] at a sample."""
         table = self.table_for(sample, 1)
         phase = self.phase_at(sample)
         state = self.model.equilibrium(mean_force, float(table.excess[0]), float(table.gain[0]), phase)
-        return State(sample, state + self._common_motion(phase))
-
-    def _common_motion(self, phase: float) -> Array:
-        """Motion of both gears together under ripple: nothing holds it back, so it must begin right."""
-        ripple, moved, moving = self.model.rig.drive.ripple, 0.0, 0.0
-        if ripple is None or not self.model.free:
-            return np.zeros(2 * COORDINATES)
-        total = sum(self.model.masses[:3])
-        radius, z1 = self.model.base_radii[0], self.model.rig.driver.teeth
-        speed = 2 * np.pi * self.mesh_frequency / z1
-        for order, size, angle in zip(ripple.orders, ripple.amplitude, ripple.phase, strict=True):
-            turn = 2 * np.pi * order * phase / z1 + angle
-            rate = order * speed
-            push = size / radius / total
-            moved -= push * np.cos(turn) / rate**2
-            moving += push * np.sin(turn) / rate
-        common = (Coordinates(u1=size, y1=0.0, y2=0.0, u2=size, w=size) for size in (moved, moving))
-        return np.concatenate([*common])
-
-
-def turning_inertia(rig: Rig, meshing: Pair) -> float:
-    """Inertia [kg m^2] of the driver and of a rotor that turns with it."""
-    coupling, inertia = rig.drive.coupling, bodies_of(rig, meshing)[0].inertia
-    return inertia + coupling.inertia if coupling is not None and coupling.stiffness is None else inertia
+        return State(sample, state + under_ripple(self.model, self.mesh_frequency, phase), begins=True)
 
 
 def largest_load(experiment: Experiment) -> float:
@@ -213,7 +223,7 @@ def make_setup(case: Case, plan: Schedule, law: MeshLaw | None = None, first_pha
     refuse_unknown(rig)
     law = law or mesh_law(rig, simulation, largest_load(experiment))
     model = nonlinear_model(rig, meshing, law)
-    fastest = model.fastest_rate(experiment.torque_mean / meshing.driver.base_radius)
+    fastest = model.fastest_rate(experiment.torque_mean / meshing.driver.base_radius, np.pi * plan.sampling_rate)
     tabled = simulation.mesh_stiffness == "potential-energy"
     setup = Setup(
         model=model,
@@ -223,9 +233,10 @@ def make_setup(case: Case, plan: Schedule, law: MeshLaw | None = None, first_pha
         sampling_rate=plan.sampling_rate,
         samples_per_period=plan.samples_per_period,
         cycles_per_sample=plan.cycles_per_sample,
-        block_samples=plan.repeat_periods * plan.samples_per_period,
+        block_samples=(plan.periods if plan.drifts else plan.repeat_periods) * plan.samples_per_period,
         warnings=tuple(outside_foundation_fit(rig, meshing)) if tabled else (),
         first_phase=first_phase,
+        record_samples=plan.record_samples,
     )
     if not plan.repeats or 2 * setup.substeps * setup.block_samples > MOST_ENTRIES:
         return setup

@@ -7,18 +7,22 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from gearbench.bench.nonlinear.law_table import mesh_law
+from gearbench.bench.record.attributes import turning_inertias
 from gearbench.bench.record.static import Loads, load_key, static_dataset
 from gearbench.bench.refusals.effects import refuse_unknown
 from gearbench.bench.refusals.load_range import check_dte
 from gearbench.fem.contact.curve import LOAD_RANGE
 from gearbench.geometry import Pair, pair
 from gearbench.lumped.nonlinear.law import MeshLaw
-from gearbench.lumped.nonlinear.model import COORDINATES, NonLinear, nonlinear_model
+from gearbench.lumped.nonlinear.model import NonLinear, nonlinear_model
+from gearbench.lumped.nonlinear.rest import inverse_masses, mesh_direction
 from gearbench.lumped.nonlinear.tables import Motion, tables
 from gearbench.rig import Case
 from gearbench.rig.neutral import sound_gear
 
 Array = NDArray[np.float64]
+
+_U1, _Y1, _Y2, _U2, _W, _LOAD, _HOUSING = range(7)  # among lumped.nonlinear.coordinates.NAMES
 
 BISECTIONS = 60
 STIFFEST = 20e9  # stiffness of the stiffest imaginable teeth per face width [N/m^2]
@@ -88,24 +92,45 @@ def linearised_matrices(case: Case, meshing: Pair, phases: int) -> tuple[Array, 
     tangent = gain * law.evaluate(deflection(law, force / gain, phase), phase)[1]
     seen = _relative(model)
     back = np.linalg.pinv(seen)
-    size, n = COORDINATES, len(seen)
+    size, n = model.size, len(seen)
     a = np.zeros((phases, 2 * n, 2 * n))
     a[:, :n, n:] = np.eye(n)
     for row, stiffness in zip(a, tangent, strict=True):
         full = model.linearised(float(stiffness), force)
         row[n:, :n] = seen @ full[size:, :size] @ back
         row[n:, n:] = seen @ full[size:, size:] @ back
-    c = model.constants()
-    push = np.array([c.rigid * c.inverse_u1, 0.0, 0.0, -c.inverse_u2, c.inverse_w])
-    g = model.factor
-    dte = np.array([1.0, g, -g, -1.0, 0.0]) @ back
-    return a, np.concatenate([np.zeros(n), seen @ push]), np.concatenate([dte, np.zeros(n)])
+    dte = mesh_direction(model.constants(), model.structure) @ back
+    return a, np.concatenate([np.zeros(n), seen @ _push(model)]), np.concatenate([dte, np.zeros(n)])
+
+
+def _push(model: NonLinear) -> Array:
+    """Accelerations of the coordinates per generalised force [1/kg]: the driver's torque, and the load's where it
+    balances that."""
+    c, s = model.constants(), model.structure
+    push = np.zeros(model.size)
+    push[_U1], push[_W] = c.rigid * c.inverse_u1, c.inverse_w
+    if s is None:
+        push[_U2] = -c.inverse_u2
+    else:
+        push[_U2], push[_LOAD] = -s.follow * s.rigid_load * c.inverse_u2, -s.follow * s.inverse_load
+    if model.rig.load.boundary == "inertia":
+        # The force then is less than that of the driver's torque alone: the load's does not help it.
+        one, two = turning_inertias(model.rig, pair(model.rig))
+        (r1, r2) = model.base_radii
+        push *= 1 + (one / r1**2) / (two / r2**2)
+    return push
 
 
 def _relative(model: NonLinear) -> Array:
-    """Relative displacements (n, COORDINATES) of the coordinates that move."""
-    rows = np.eye(COORDINATES)
-    if model.free:
-        seen = [rows[0] - rows[3], rows[1], rows[2]]
-        return np.array([*seen, rows[4] - rows[0]] if model.elastic_shaft else seen)
-    return rows[[0, 1, 2, 4]] if model.elastic_shaft else rows[:3]
+    """Relative displacements (n, size) of the coordinates that move: of what turns, and of the centres."""
+    rows, moves = np.eye(model.size), inverse_masses(model.constants(), model.structure) > 0
+    if not model.free:
+        return np.asarray(rows[moves])
+    seen = [rows[_U1] - rows[_U2], rows[_Y1], rows[_Y2]]
+    if moves[_W]:
+        seen.append(rows[_W] - rows[_U1])
+    if model.structure is not None:
+        if moves[_LOAD]:
+            seen.append(rows[_U2] - rows[_LOAD])
+        seen += [rows[i] for i in range(_HOUSING, model.size) if moves[i]]
+    return np.array(seen)

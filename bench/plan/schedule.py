@@ -25,7 +25,7 @@ class Schedule:
     `samples_per_period` samples; the record has `periods` of them. A block is what is run at a time: a repetition, or
     the whole record where that is shorter; it holds `mesh_cycles` mesh periods. `sampling_rate` in Hz, speeds in rad/s,
     each positive in its gear's own direction; `repeat_cycles` is the number of mesh cycles after which the same teeth
-    meet again.
+    meet again. A rig that `drifts` never repeats exactly.
     """
 
     sampling_rate: float
@@ -36,16 +36,22 @@ class Schedule:
     speed_driver: float
     speed_driven: float
     repeat_cycles: int = 1
+    drifts: bool = False
+
+    @property
+    def wraps(self) -> bool:
+        """Whether the record is at least as long as what repeats, but for a slow drift."""
+        return self.repeat_periods <= self.periods
 
     @property
     def repeats(self) -> bool:
         """Whether the record is at least as long as what repeats."""
-        return self.repeat_periods <= self.periods
+        return self.wraps and not self.drifts
 
     @property
     def block_periods(self) -> int:
         """Excitation periods of one block."""
-        return min(self.repeat_periods, self.periods)
+        return self.periods if self.drifts else min(self.repeat_periods, self.periods)
 
     @property
     def blocks(self) -> int:
@@ -105,7 +111,8 @@ def schedule(experiment: Experiment, rig: Rig) -> Schedule:
     repeat = cycles_to_repeat(rig)
     whole = experiment.periods * repeat
     repeat_periods = whole // gcd(whole, cycles)
-    block_periods = min(repeat_periods, experiment.periods)
+    drifts = rig.mesh.stiffness_drift != 0.0
+    block_periods = experiment.periods if drifts else min(repeat_periods, experiment.periods)
     mesh_cycles = block_periods * cycles // experiment.periods
     frequency = mesh_cycles / (block_periods * period)
     return Schedule(
@@ -117,16 +124,19 @@ def schedule(experiment: Experiment, rig: Rig) -> Schedule:
         speed_driver=2 * pi * frequency / rig.driver.teeth,
         speed_driven=2 * pi * frequency / rig.driven.teeth,
         repeat_cycles=repeat,
+        drifts=drifts,
     )
 
 
 def cycles_to_repeat(rig: Rig) -> int:
     """Mesh cycles after which the same teeth with the same errors meet again: 1 where all are alike, the teeth of the
-    gear whose teeth differ, or, where those of both do, the hunting period. Ripple of the drive counts as a difference
-    of the driver's teeth. Raises GeometryError for a grade that ISO 1328-1 has no tolerance for."""
+    gear whose teeth differ, or, where those of both do, the hunting period. Ripple of the drive and the run-out of an
+    encoder count as a difference of that gear's teeth. Raises GeometryError for a grade that ISO 1328-1 has no
+    tolerance for."""
     ripple = rig.drive.ripple
     driver = _differs(rig.driver, "rig.driver") or (ripple is not None and any(ripple.amplitude))
-    driven = _differs(rig.driven, "rig.driven")
+    driver = driver or rig.sensors.encoder_runout_driver > 0
+    driven = _differs(rig.driven, "rig.driven") or rig.sensors.encoder_runout_driven > 0
     return lcm(rig.driver.teeth if driver else 1, rig.driven.teeth if driven else 1)
 
 

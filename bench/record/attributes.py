@@ -6,7 +6,7 @@ from typing import Any
 
 from gearbench.bench.plan.schedule import Schedule
 from gearbench.geometry import Body, Pair, body
-from gearbench.rig import Rig
+from gearbench.rig import Coupling, Rig
 
 
 def bodies_of(rig: Rig, meshing: Pair) -> tuple[Body, Body]:
@@ -16,6 +16,19 @@ def bodies_of(rig: Rig, meshing: Pair) -> tuple[Body, Body]:
         body(meshing.driver, rig.driver, density, "rig.driver"),
         body(meshing.driven, rig.driven, density, "rig.driven"),
     )
+
+
+def turning_inertias(rig: Rig, meshing: Pair) -> tuple[float, float]:
+    """Inertias [kg m^2] of driver and driven gear and of what turns with them, but for what is held at its speed."""
+    one, two = bodies_of(rig, meshing)
+    return (
+        one.inertia + _rigidly(rig.drive.coupling, rig.drive.boundary),
+        two.inertia + _rigidly(rig.load.coupling, rig.load.boundary),
+    )
+
+
+def _rigidly(coupling: Coupling | None, boundary: str) -> float:
+    return coupling.inertia if coupling is not None and coupling.stiffness is None and boundary != "speed" else 0.0
 
 
 def rig_attributes(rig: Rig, meshing: Pair) -> dict[str, Any]:
@@ -34,6 +47,11 @@ def rig_attributes(rig: Rig, meshing: Pair) -> dict[str, Any]:
     }
 
 
+def shown_mean(rig: Rig, torque_mean: float) -> float:
+    """Mean torque [N m] that the record states: what its sensor shows."""
+    return torque_mean * rig.sensors.gain_torque_driver
+
+
 def experiment_attributes(plan: Schedule, periods: int, torque_mean: float) -> dict[str, Any]:
     """Record attributes of sampling and mesh period [s], of a record that holds that many excitation periods."""
     return {
@@ -44,6 +62,13 @@ def experiment_attributes(plan: Schedule, periods: int, torque_mean: float) -> d
         "mesh_phase_origin": "geometry",
         "torque_mean": torque_mean,
     }
+
+
+def divided_steps(divided: int, total: int) -> str | None:
+    """A sentence for a record with steps that had to be divided, else None."""
+    if not divided:
+        return None
+    return f"{divided} of {total} integration steps were divided, because contact changes too fast for whole ones there"
 
 
 def lost_contact(lost: int, total: int) -> str | None:
@@ -64,7 +89,7 @@ def unlike_periods(plan: Schedule) -> str | None:
         f"mesh periods differ from one another, so the rig repeats after {plan.repeat_cycles} mesh periods"
         f" ({plan.repeat_cycles * plan.mesh_period:.4g} s)"
     )
-    return after if plan.repeats else f"{after}, longer than the record: none of its excitation periods is like another"
+    return after if plan.wraps else f"{after}, longer than the record: none of its excitation periods is like another"
 
 
 def joined(*warnings: str | None) -> str | None:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from math import cos
+from math import cos, pi, sin
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.bench.plan.schedule import Schedule
-from gearbench.bench.record.sensors import Signal, measured
+from gearbench.bench.record.attributes import turning_inertias
+from gearbench.bench.record.sensors import Signal, encoder_error, measured
 from gearbench.geometry import Pair
 from gearbench.rig import Rig
 
@@ -20,9 +21,29 @@ def support_factor(rig: Rig, meshing: Pair) -> float:
     return 1.0 if rig.support.direction == "line-of-action" else cos(meshing.working_pressure_angle)
 
 
-def dte_of(turned: Array, y_driver: Array, y_driven: Array, factor: float) -> Array:
-    """DTE [m] from what both rotations contribute, rb1 theta1 - rb2 theta2 [m], and the supports' motions [m]."""
-    return np.asarray(turned + factor * (y_driver - y_driven))
+def across_factor(rig: Rig, meshing: Pair) -> float:
+    """What a centre's motion across its support [m] contributes to the DTE [m]."""
+    return 0.0 if rig.support.direction == "line-of-action" else sin(meshing.working_pressure_angle)
+
+
+def moves_across(rig: Rig) -> bool:
+    """Whether a gear's centre moves across its support, so that a record has channels x."""
+    return rig.support.driver.across is not None or rig.support.driven.across is not None
+
+
+def dte_of(
+    turned: Array,
+    y_driver: Array,
+    y_driven: Array,
+    factor: float,
+    x_driver: Array | None = None,
+    x_driven: Array | None = None,
+    across: float = 0.0,
+) -> Array:
+    """DTE [m] from what both rotations contribute, rb1 theta1 - rb2 theta2 [m], and the centres' motions [m] along the
+    supports and, where there are any, across them."""
+    along = np.asarray(turned + factor * (y_driver - y_driven))
+    return along if x_driver is None or x_driven is None else along + across * (x_driver - x_driven)
 
 
 def turned_by(meshing: Pair, angle_driver: Array, angle_driven: Array) -> Array:
@@ -36,25 +57,43 @@ def force_of(torque_driver: Array, meshing: Pair) -> Array:
     return np.asarray(torque_driver / meshing.driver.base_radius)
 
 
-def has_sensors(rig: Rig) -> bool:
-    """Whether sensors delay or disturb anything."""
-    return any(getattr(rig.sensors, name) for name in type(rig.sensors).model_fields)
+def generalised_force(rig: Rig, meshing: Pair, driver: Array, driven: Array) -> Array:
+    """Generalised force [N] of both torques [N m]: the driver's alone where the load's balances it or is its reaction,
+    else of both on all that turns with the gears."""
+    if rig.drive.boundary != "speed" and rig.load.boundary != "inertia":
+        return force_of(driver, meshing)
+    (r1, r2), (j1, j2) = (meshing.driver.base_radius, meshing.driven.base_radius), turning_inertias(rig, meshing)
+    mass = j1 * j2 / (j1 * r2**2 + j2 * r1**2)
+    return np.asarray(mass * (r1 * driver / j1 + r2 * driven / j2))
 
 
 def sensed(
-    swings: dict[str, Array], rig: Rig, meshing: Pair, plan: Schedule, *, samples: int, seed: int
+    swings: dict[str, Array], rig: Rig, meshing: Pair, plan: Schedule, *, samples: int, seed: int, first: float = 0.0
 ) -> dict[str, Array]:
-    """Motions (realisations, n) that repeat, as the rig's sensors show them over `samples` samples; DTE and force are
-    those of the measured channels. Angles are without the steady rotation."""
+    """Motions (realisations, n) that repeat, as the rig's sensors show them over `samples` samples from the mesh phase
+    `first` [cycles] on; DTE and force are those of the measured channels. Angles are without the steady rotation."""
     speeds = {"angle_driver": plan.speed_driver, "angle_driven": plan.speed_driven}
     signals = {name: Signal(swing, speeds.get(name, 0.0)) for name, swing in swings.items()}
+    for gear, teeth in (("driver", rig.driver.teeth), ("driven", rig.driven.teeth)):
+        if getattr(rig.sensors, f"encoder_runout_{gear}"):
+            swing, ramp = signals[f"angle_{gear}"].swing, speeds[f"angle_{gear}"]
+            rotation = 2 * pi / teeth * mesh_phases(plan, swing.shape[-1], first)
+            signals[f"angle_{gear}"] = Signal(swing + encoder_error(rig.sensors, gear, rotation), ramp)
     found = measured(
-        signals, rig, plan.sampling_rate, seed=seed, samples=samples, samples_per_period=plan.samples_per_period
+        signals,
+        rig,
+        plan.sampling_rate,
+        seed=seed,
+        samples=samples,
+        samples_per_period=plan.samples_per_period,
+        block=plan.block_samples if plan.wraps else 0,
+        start=first / plan.cycles_per_sample / plan.sampling_rate,
     )
     out = {name: signal.swing for name, signal in found.items()}
     turned = turned_by(meshing, out["angle_driver"], out["angle_driven"])
-    out["dte"] = dte_of(turned, out["y_driver"], out["y_driven"], support_factor(rig, meshing))
-    out["force"] = force_of(out["torque_driver"], meshing)
+    across = out.get("x_driver"), out.get("x_driven"), across_factor(rig, meshing)
+    out["dte"] = dte_of(turned, out["y_driver"], out["y_driven"], support_factor(rig, meshing), *across)
+    out["force"] = generalised_force(rig, meshing, out["torque_driver"], out["torque_driven"])
     return out
 
 
@@ -63,10 +102,12 @@ def mesh_phases(plan: Schedule, samples: int, first: float = 0.0) -> Array:
     return np.asarray(first + np.arange(samples) * plan.cycles_per_sample)
 
 
-def with_rotation(swings: dict[str, Array], plan: Schedule, first: float = 0.0) -> dict[str, Array]:
+def with_rotation(
+    swings: dict[str, Array], plan: Schedule, first: float = 0.0, times: float = 1.0
+) -> dict[str, Array]:
     """The channels with the steady rotation of both gears, which turn by `first` [cycles] of the mesh before the first
-    sample."""
+    sample; `times` -1 takes it off."""
     count = swings["angle_driver"].shape[-1]
     time = (np.arange(count) + first / plan.cycles_per_sample) / plan.sampling_rate
     speeds = {"angle_driver": plan.speed_driver, "angle_driven": plan.speed_driven}
-    return {**swings, **{name: swings[name] + speed * time for name, speed in speeds.items()}}
+    return {**swings, **{name: swings[name] + times * speed * time for name, speed in speeds.items()}}

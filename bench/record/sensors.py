@@ -1,29 +1,37 @@
-"""What the measuring chain makes of a rig's motions: delays of single channels and white noise."""
+"""What the measuring chain makes of a rig's motions, channel by channel: delay, anti-alias filter, gain, white noise
+and quantisation. Encoder run-out, which needs to know the rotation, comes before them (`encoder_error`)."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TypeVar
+from functools import partial
+from math import pi
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.bench.errors import BenchError
-from gearbench.rig import Rig
+from gearbench.rig import Rig, Sensors
 
 Array = NDArray[np.float64]
 Scalar = TypeVar("Scalar", bound=np.generic)
 
-# Channels in the order of their noise streams, and the field of their noise.
+# Channels in the order of their noise streams, and the kind of their noise and quantisation.
 CHANNELS = {
-    "torque_driver": "noise_torque",
-    "torque_driven": "noise_torque",
-    "angle_driver": "noise_angle",
-    "angle_driven": "noise_angle",
-    "y_driver": "noise_displacement",
-    "y_driven": "noise_displacement",
+    "torque_driver": "torque",
+    "torque_driven": "torque",
+    "angle_driver": "angle",
+    "angle_driven": "angle",
+    "y_driver": "displacement",
+    "y_driven": "displacement",
+    "x_driver": "displacement",
+    "x_driven": "displacement",
 }
+
+FILTER_ORDER = 8
+LEFT = 0.05
 
 
 @dataclass(frozen=True)
@@ -38,28 +46,112 @@ def delayed(signal: Signal, delay: float, sampling_rate: float) -> Signal:
     """The signal of a sensor that lags by `delay` [s]: its spectrum turned, exact below half the sampling rate."""
     if delay == 0.0:
         return signal
-    samples = signal.swing.shape[-1]
-    turn = np.exp(-2j * np.pi * np.fft.rfftfreq(samples, 1 / sampling_rate) * delay)
+    frequency = np.fft.rfftfreq(signal.swing.shape[-1], 1 / sampling_rate)
+    return Signal(answered(signal.swing, np.exp(-2j * np.pi * frequency * delay)) - signal.ramp * delay, signal.ramp)
+
+
+def filtered(signal: Signal, corner: float | None, sampling_rate: float) -> Signal:
+    """The signal behind the anti-alias filter: its steady state, so that no sample is ahead of its cause, and a ramp
+    lags by the filter's delay. What was folded in sampling stays."""
+    if corner is None:
+        return signal
+    frequency = np.fft.rfftfreq(signal.swing.shape[-1], 1 / sampling_rate)
+    swing = answered(signal.swing, filter_response(frequency, corner))
+    return Signal(swing - signal.ramp * filter_delay(corner), signal.ramp)
+
+
+def answered(swing: Array, response: NDArray[np.complex128]) -> Array:
+    """What repeats (..., n), its spectrum times the response (n // 2 + 1,)."""
+    samples = swing.shape[-1]
+    response = response.copy()
     if samples % 2 == 0:
-        turn[-1] = turn[-1].real  # what is sampled of the highest line
-    swing = np.fft.irfft(np.fft.rfft(signal.swing, axis=-1) * turn, n=samples, axis=-1)
-    return Signal(swing - signal.ramp * delay, signal.ramp)
+        response[-1] = response[-1].real  # what is sampled of the highest line
+    return np.asarray(np.fft.irfft(np.fft.rfft(swing, axis=-1) * response, n=samples, axis=-1))
+
+
+def filter_response(frequency: NDArray[np.floating[Any]], corner: float) -> NDArray[np.complex128]:
+    """Response (n,) of the anti-alias filter at frequencies (n,) [Hz], its corner in Hz: an analogue low-pass, 3 dB
+    down at the corner (Butterworth, Wireless Engineer 7, 1930)."""
+    poles = _poles(corner)
+    return np.asarray(np.prod(-poles / (2j * pi * np.asarray(frequency)[..., None] - poles), axis=-1))
+
+
+def filter_delay(corner: float) -> float:
+    """Delay [s] of the anti-alias filter far below its corner [Hz]."""
+    return float((-1.0 / _poles(corner)).real.sum())
+
+
+def _poles(corner: float) -> NDArray[np.complex128]:
+    number = np.arange(FILTER_ORDER)
+    return np.asarray(2 * pi * corner * np.exp(1j * pi * (2 * number + 1 + FILTER_ORDER) / (2 * FILTER_ORDER)))
+
+
+def imposed(recorded: Array, sensors: Sensors, sampling_rate: float) -> Array:
+    """The driver torque (..., n) on the rig, which repeats, from what its sensor recorded: gain, delay and filter taken
+    back. Where the filter leaves less than LEFT of a line, the line stays as it is."""
+    gain, corner = sensors.gain_torque_driver, sensors.filter
+    torque = recorded / gain if gain != 1.0 else recorded
+    torque = delayed(Signal(torque), -sensors.delay_torque_driver, sampling_rate).swing
+    if corner is None:
+        return torque
+    response = filter_response(np.fft.rfftfreq(torque.shape[-1], 1 / sampling_rate), corner)
+    response[np.abs(response) < LEFT] = 1.0
+    return answered(torque, np.reciprocal(response))
+
+
+def encoder_error(sensors: Sensors, gear: str, rotation: Array) -> Array:
+    """Error (n,) [rad] of the encoder of "driver" or "driven" at rotations (n,) [rad] of that gear."""
+    size = getattr(sensors, f"encoder_runout_{gear}")
+    return np.asarray(size * np.cos(rotation - getattr(sensors, f"encoder_runout_{gear}_phase")))
 
 
 def measured(
-    signals: Mapping[str, Signal], rig: Rig, sampling_rate: float, *, seed: int, samples: int, samples_per_period: int
+    signals: Mapping[str, Signal],
+    rig: Rig,
+    sampling_rate: float,
+    *,
+    seed: int,
+    samples: int,
+    samples_per_period: int,
+    block: int = 0,
+    start: float = 0.0,
 ) -> dict[str, Signal]:
-    """Signals as the rig's sensors give them, `samples` long: delayed, repeated, then noise of its own for every
-    channel, realisation and excitation period."""
-    out = {}
-    for number, name in enumerate(CHANNELS):
-        signal = delayed(signals[name], getattr(rig.sensors, f"delay_{name}"), sampling_rate)
-        swing = repeated(signal.swing, samples)
-        level = getattr(rig.sensors, CHANNELS[name])
+    """Signals as the rig's sensors give them, `samples` long: delayed, filtered, repeated, with their gain, then noise
+    of its own for every channel, realisation and excitation period, then in steps.
+
+    block: samples after which swings repeat (0: their length). start [s]: time of the first sample, since ramps began.
+    """
+    sensors, out = rig.sensors, {}
+    time = start + np.arange(samples) / sampling_rate
+    for number, (name, kind) in enumerate(CHANNELS.items()):
+        if name not in signals:
+            continue
+        delay = getattr(sensors, f"delay_{name}", 0.0)
+        late = _periodically(partial(delayed, delay=delay, sampling_rate=sampling_rate), signals[name], block)
+        signal = _periodically(partial(filtered, corner=sensors.filter, sampling_rate=sampling_rate), late, block)
+        swing, ramp = repeated(signal.swing, samples), signal.ramp
+        gain = getattr(sensors, f"gain_{name}", 1.0)
+        if gain != 1.0:
+            swing = gain * swing
+        level, step = getattr(sensors, f"noise_{kind}"), getattr(sensors, f"quantisation_{kind}")
         if level > 0.0:
             swing = swing + level * _noise(seed, number, swing.shape, samples_per_period)
-        out[name] = Signal(swing, signal.ramp)
+        if step > 0.0:
+            swing = step * np.round((swing + ramp * time) / step) - ramp * time
+        out[name] = Signal(swing, ramp)
     return out
+
+
+def _periodically(change: Callable[[Signal], Signal], signal: Signal, block: int) -> Signal:
+    """A change of what repeats after `block` samples, in a signal that need not hold whole blocks: what is left over is
+    taken from as many blocks at its end."""
+    samples = signal.swing.shape[-1]
+    whole = samples // block * block if block else samples
+    rest = samples - whole if whole else 0
+    if not rest:
+        return change(signal)
+    first, last = (change(Signal(part, signal.ramp)) for part in (signal.swing[..., :whole], signal.swing[..., rest:]))
+    return Signal(np.concatenate([first.swing, last.swing[..., -rest:]], axis=-1), signal.ramp)
 
 
 def repeated(values: NDArray[Scalar], samples: int) -> NDArray[Scalar]:
@@ -79,13 +171,23 @@ def _noise(seed: int, channel: int, shape: tuple[int, int], samples_per_period: 
     return out
 
 
+def sensor_attributes(rig: Rig, names: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """Attributes of the named channels that a data sheet of the measuring chain would state."""
+    corner = rig.sensors.filter
+    if corner is None:
+        return {}
+    about = {"filter_hz": corner, "filter": f"Butterworth, order {FILTER_ORDER}", "delay": filter_delay(corner)}
+    return {name: dict(about) for name in names if name in CHANNELS}
+
+
 def check_delays(rig: Rig, repeats: bool, seconds: float) -> None:
-    """Refuse delays of channels in a record that does not repeat: nothing tells what came before it."""
+    """Refuse delays and filters of channels in a record that does not repeat: nothing tells what came before it."""
     if repeats:
         return
-    for name in CHANNELS:
-        if getattr(rig.sensors, f"delay_{name}"):
-            raise BenchError(
-                f"rig.sensors.delay_{name}_us needs a record that repeats: what differs from tooth to tooth does so"
-                f" after {seconds:g} s, so periods x samples_per_period / sampling_rate_hz must be at least that"
-            )
+    keys = [f"delay_{name}" for name in CHANNELS if getattr(rig.sensors, f"delay_{name}", 0.0)]
+    found = [f"{key}_us" for key in keys] + (["filter_hz"] if rig.sensors.filter is not None else [])
+    if found:
+        raise BenchError(
+            f"rig.sensors.{found[0]} needs a record that repeats: what differs from tooth to tooth does so"
+            f" after {seconds:g} s, so periods x samples_per_period / sampling_rate_hz must be at least that"
+        )

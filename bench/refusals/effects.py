@@ -12,18 +12,21 @@ from gearbench.rig.value import key_of
 # Keys of a gear that move its flanks: what finite elements represent, but for what changes stiffness.
 FLANK_KEYS = frozenset(f"rig.{side}.{key_of(Gear, name)}" for side in ("driver", "driven") for name in FLANK_FIELDS)
 
-# What finite elements represent: the flanks, and a crack that is in the mesh.
+# What finite elements represent beside the flanks at rest: a crack that is in the mesh.
 ELASTIC_KEYS = FLANK_KEYS | {f"rig.{side}.crack.length_mm" for side in ("driver", "driven")}
+
+# What they represent in motion: all but a crack that is a number only.
+MOVING_KEYS = ("rig.support.", "rig.housing", "rig.drive.", "rig.load.", "rig.friction.", "rig.mesh.")
 
 # What the non-linear lumped model represents; a key counts with all keys below it.
 LUMPED = tuple(
     f"rig.{key}"
     for key in (
         *(f"{side}.{name}" for side in ("driver", "driven") for name in ("pitch_error_um", "runout_um", "crack")),
-        "support.driver.exponent",
-        "support.driven.exponent",
-        "drive.coupling",
-        "drive.ripple",
+        *(f"support.{side}.{name}" for side in ("driver", "driven") for name in ("exponent", "across")),
+        "housing",
+        *("drive.boundary", "drive.coupling", "drive.ripple"),
+        *("load.boundary", "load.coupling"),
         "friction.coefficient",
         "mesh.",
         "sensors.",
@@ -37,9 +40,12 @@ def is_nonlinear(case: Case) -> bool:
 
 
 def refuse_effects(rig: Rig, model: str, tables: tuple[str, ...] = ("rig",), represented: Collection[str] = ()) -> None:
-    """Raise BenchError for the first effect, in the given tables of a case, that a model cannot represent."""
+    """Raise BenchError for the first effect, in the given tables of a case, that a model cannot represent. Sensors are
+    the bench's, whatever the model."""
     for key in effects_in(rig):
-        if any(key.startswith(table) for table in tables) and key not in represented:
+        if key.startswith("rig.sensors."):
+            continue
+        if any(key.startswith(table) for table in tables) and not represents(key, represented):
             if _is_crack(key, "crack"):
                 raise BenchError(
                     f"the {model} does not represent {key}.stiffness_loss: give the crack itself, length_mm and"
@@ -49,6 +55,11 @@ def refuse_effects(rig: Rig, model: str, tables: tuple[str, ...] = ("rig",), rep
                 f"the {model} does not represent {key}: leave it at its neutral value, or set simulation.model ="
                 ' "lumped", which has it'
             )
+
+
+def represents(key: str, represented: Collection[str]) -> bool:
+    """Whether a key is among those represented, or below one that ends in a dot."""
+    return key in represented or any(one.endswith(".") and key.startswith(one) for one in represented)
 
 
 def _is_crack(key: str, field: str) -> bool:

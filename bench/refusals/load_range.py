@@ -18,7 +18,8 @@ def largest_torque(meshing: Pair) -> float:
 
 def check_mean_torque(case: Case) -> None:
     """Raise BenchError for a mean torque of a case beyond the modelled loads."""
-    check_torque(elastic_pair(case.rig), case.experiment.torque_mean, "experiment.torque_mean_nm")
+    if case.stated:
+        check_torque(elastic_pair(case.rig), case.experiment.torque_mean, "experiment.torque_mean_nm")
 
 
 def check_torque(meshing: Pair, torque: float, key: str) -> None:

@@ -103,7 +103,7 @@ def _results(name: str, found: dict[str, xr.Dataset], where: str) -> Results:
 
 def _read(path: Path) -> xr.Dataset:
     found = read_dataset(path, error=BenchError)
-    return read_record(path) if found.attrs.get("schema") == RECORD_SCHEMA else found
+    return read_record(path) if str(found.attrs.get("schema")) == RECORD_SCHEMA else found
 
 
 def align(one: Results, two: Results) -> tuple[Results, str]:

@@ -68,7 +68,7 @@ def run_numbers(
 def support_corner(case: Case) -> float | None:
     """Lowest corner frequency k/(2 pi c) [Hz] of the supports; None where they are not damped."""
     supports = (case.rig.support.driver, case.rig.support.driven)
-    corners = [support.stiffness / (2 * pi * support.damping) for support in supports if support.damping]
+    corners = [one.stiffness / (2 * pi * one.damping) for one in supports if one.stiffness and one.damping]
     return min(corners, default=None)
 
 

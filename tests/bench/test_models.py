@@ -18,11 +18,12 @@ from gearbench.bench.plan.schedule import ProgressReport, Schedule
 from gearbench.bench.plan.settling import Keep
 from gearbench.bench.protocol import Channels, Drive, Model, Note
 from gearbench.bench.record.channels import force_of
+from gearbench.bench.record.sensors import filter_delay, filter_response
 from gearbench.bench.record.static import Loads, static_dataset
 from gearbench.bench.statics import static
 from gearbench.cases import case_path
 from gearbench.geometry import Pair, pair
-from gearbench.rig import Case, Simulation, read_case
+from gearbench.rig import Case, Sensors, Simulation, read_case
 
 Array = NDArray[np.float64]
 STIFFNESS = 1e8
@@ -77,6 +78,9 @@ class PreparedSpring:
     def apart(self, outputs: Array) -> NDArray[np.bool_]:
         return outputs[:, 0] < 0
 
+    def divided(self, outputs: Array) -> None:
+        """All steps are alike."""
+
 
 class Spring(Model):
     """A mesh without mass."""
@@ -118,7 +122,7 @@ def test_a_case_runs_on_the_model_of_its_name(case: Case) -> None:
     for name in (*MODELS, "spring"):
         chosen, model = model_for(case, name)
         assert (chosen.simulation.model, model.name) == (name, name)
-    with pytest.raises(BenchError, match=r"simulation\.model = 'magic' is not one of lumped, reduced, spring"):
+    with pytest.raises(BenchError, match=r"simulation\.model = 'magic' is not one of lumped, reduced, full, spring"):
         model_for(case, "magic")
 
 
@@ -133,6 +137,38 @@ def test_a_new_model_gets_its_experiment_for_nothing(case: Case) -> None:
     assert record.attrs["repeats_after_mesh_cycles"] == 62
     assert "longer than the record" in record.attrs["warnings"] and "only a spring" in record.attrs["warnings"]
     assert record["mesh_phase"].values[0, 0] == 0.0 and record.attrs["contact_lost_samples"] == 0
+
+
+def test_a_model_of_absolute_angles_gets_its_sensors_for_nothing(case: Case) -> None:
+    # The spring follows its torque at once, so that every channel is known as a sum of lines.
+    sound = case.rig.driven.model_copy(update={"runout": 0.0})
+    sensors = Sensors(delay_angle_driver=70e-6, filter=3000.0, gain_torque_driver=1.1)
+    plain, seen = (
+        simulate(case.model_copy(update={"rig": case.rig.model_copy(update=fields)}), "spring")
+        for fields in ({"driven": sound}, {"driven": sound, "sensors": sensors})
+    )
+    time = plain["time"].values
+    speed = 2 * np.pi * case.experiment.mesh_frequency_for(62) / 62
+    response = filter_response(np.fft.rfftfreq(time.size, time[1] - time[0]), 3000.0)
+    turn = np.exp(-2j * np.pi * np.fft.rfftfreq(time.size, time[1] - time[0]) * 70e-6)
+
+    def through(name: str, ramp: float, delay: NDArray[np.complex128] | float) -> Array:
+        swing = plain[name].values - ramp * time
+        return np.asarray(np.fft.irfft(np.fft.rfft(swing) * response * delay, n=time.size) + ramp * time)
+
+    late = filter_delay(3000.0)
+    driver = through("angle_driver", speed, turn) - speed * (late + 70e-6)
+    np.testing.assert_allclose(seen["angle_driver"].values, driver, atol=1e-9)
+    np.testing.assert_allclose(seen["torque_driver"].values, 1.1 * through("torque_driver", 0.0, 1.0), atol=1e-4)
+    # The encoder's error returns after a turn, longer than this record: neither delay nor filter would be known.
+    turning = sensors.model_copy(update={"encoder_runout_driven": 30e-6})
+    with pytest.raises(BenchError, match="needs a record that repeats"):
+        longer = case.rig.model_copy(update={"driven": sound, "sensors": turning})
+        simulate(case.model_copy(update={"rig": longer}), "spring")
+    alone = case.rig.model_copy(update={"driven": sound, "sensors": Sensors(encoder_runout_driven=30e-6)})
+    turned = simulate(case.model_copy(update={"rig": alone}), "spring")
+    error = turned["angle_driven"].values - plain["angle_driven"].values
+    np.testing.assert_allclose(error, np.broadcast_to(30e-6 * np.cos(speed * turned["time"].values), error.shape))
 
 
 def test_realisations_that_settle_at_different_times_are_brought_to_one_start(

@@ -13,6 +13,7 @@ from gearbench.bench.nonlinear.law_table import mesh_law
 from gearbench.bench.plan.schedule import cycles_to_repeat
 from gearbench.bench.statics import static
 from gearbench.rig import (
+    Across,
     Case,
     Coupling,
     Crack,
@@ -21,8 +22,11 @@ from gearbench.rig import (
     Experiment,
     Friction,
     Gear,
+    Housing,
+    Load,
     MeshCorrection,
     Multisine,
+    OutputShaft,
     Rig,
     Ripple,
     Sensors,
@@ -87,6 +91,15 @@ NEUTRAL: dict[str, dict[str, Any]] = {
     "noise": {"sensors": Sensors(noise_angle=0.0, noise_displacement=0.0, noise_torque=0.0)},
     "mesh scale": {"mesh": MeshCorrection(stiffness_scale=1.0, stiffness_cos=(0.0, 0.0), stiffness_sin=(0.0, 0.0))},
     "mesh error": {"mesh": MeshCorrection(error_mean=0.0, error_cos=(0.0,), error_sin=(0.0,))},
+    "drift": {"mesh": MeshCorrection(stiffness_drift=0.0)},
+    "load shaft": {"load": Load(coupling=OutputShaft(inertia=0.02))},
+    "across and housing": {"support": supports(across=None), "housing": None},
+    "gain": {"sensors": Sensors(gain_torque_driver=1.0, gain_torque_driven=1.0)},
+    "filter": {"sensors": Sensors(filter=None)},
+    "encoder run-out": {"sensors": Sensors(encoder_runout_driver=0.0, encoder_runout_driver_phase=1.0)},
+    "quantisation": {
+        "sensors": Sensors(quantisation_angle=0.0, quantisation_displacement=0.0, quantisation_torque=0.0)
+    },
 }
 
 # Every effect at work, and the smallest relative change of the DTE that it makes here.
@@ -104,6 +117,14 @@ EFFECTS: dict[str, tuple[dict[str, Any], float]] = {
     "mesh scale": ({"mesh": MeshCorrection(stiffness_scale=1.05)}, 0.02),
     "mesh shape": ({"mesh": MeshCorrection(stiffness_cos=(0.05,), stiffness_sin=(0.0,))}, 0.005),
     "mesh error": ({"mesh": MeshCorrection(error_mean=1e-6)}, 0.02),
+    "drift": ({"mesh": MeshCorrection(stiffness_drift=0.05)}, 0.01),
+    "load shaft": ({"load": Load(coupling=OutputShaft(stiffness=1e5))}, 0.05),
+    "housing": ({"housing": Housing(mass=20.0, stiffness=1e9, damping=1e3)}, 0.002),
+    "across": ({"support": supports(across=Across(stiffness=1e8, damping=1e3))}, 0.02),
+    "free load": ({"load": Load(boundary="inertia")}, 0.02),
+    "filter delay": ({"sensors": Sensors(filter=2000.0)}, 1e-3),
+    "encoder run-out": ({"sensors": Sensors(encoder_runout_driven=20e-6)}, 0.05),
+    "quantisation noise": ({"sensors": Sensors(quantisation_angle=1e-5)}, 1e-3),
 }
 
 
@@ -241,6 +262,7 @@ def test_lost_contact_is_said() -> None:
         ({"driver": {"pitch_error": (1e-6, *(0.0,) * 19)}, "driven": {"runout": 1e-6}}, 60),
         ({"driven": {"crack": Crack(tooth=2, stiffness_loss=0.1)}}, 30),
         ({"drive": Drive(ripple=Ripple(orders=(1,), amplitude=(1.0,), phase=(0.0,)))}, 20),
+        ({"sensors": Sensors(encoder_runout_driven=1e-6)}, 30),
     ],
 )
 def test_after_how_many_teeth_a_rig_repeats(values: dict[str, Any], cycles: int) -> None:
@@ -284,11 +306,16 @@ def test_a_rig_at_rest_shows_its_errors() -> None:
     np.testing.assert_allclose(again["torque"].values, stiffness * 8e-6 * found.attrs["base_radius_driver"], rtol=5e-3)
 
 
-@pytest.mark.parametrize("effect", sorted(EFFECTS.keys() - {"pitch error", "run-out"}))
+SEEN = {name for name, (fields, _) in EFFECTS.items() if "sensors" in fields}
+
+
+@pytest.mark.parametrize("effect", sorted(EFFECTS.keys() - {"pitch error", "run-out"} - SEEN))
 def test_finite_elements_refuse_what_they_do_not_represent(effect: str) -> None:
+    """In motion only a crack that is a number, at rest also the corrections of the mesh."""
     case = make_case(**EFFECTS[effect][0])
-    with pytest.raises(BenchError, match=r"element model does not represent rig\.[a-z_.]+: (leave|give)"):
-        simulate(case, "reduced")
+    if {"driver", "driven"} & set(EFFECTS[effect][0]):
+        with pytest.raises(BenchError, match=r"element model does not represent rig\.[a-z_.]+: (leave|give)"):
+            simulate(case, "reduced")
     if {"driver", "driven", "mesh"} & set(EFFECTS[effect][0]):
         with pytest.raises(BenchError, match="static finite-element solution does not represent"):
             static(case, "reduced")

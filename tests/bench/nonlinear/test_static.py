@@ -14,14 +14,17 @@ from gearbench.bench.statics import static
 from gearbench.geometry import pair
 from gearbench.identification.truth.monodromy import exact_itf
 from gearbench.rig import (
+    Across,
     Case,
     Coupling,
     Drive,
     Experiment,
     Gear,
+    Housing,
     Load,
     MeshCorrection,
     Multisine,
+    OutputShaft,
     Rig,
     Ripple,
     Simulation,
@@ -32,15 +35,28 @@ from gearbench.rig import (
 SAMPLES, RATE = 1024, 10240.0
 
 
-def make_case(boundary: str, drive: Drive, **experiment: Any) -> Case:
+ACROSS = Across(stiffness=7e7, damping=2e3, coupling=1e7)
+HOUSING = Housing(mass=12.0, stiffness=4e8, damping=5e3)
+SHAFT = OutputShaft(inertia=4e-3, stiffness=3e4, damping=1.0)
+
+
+def make_case(
+    boundary: str,
+    drive: Drive,
+    shaft: OutputShaft | None = None,
+    housing: Housing | None = None,
+    across: Across | None = None,
+    **experiment: Any,
+) -> Case:
     gear = {"module": 3e-3, "face_width": 0.02, "thinning": 30e-6}
-    support = Support(stiffness=1e8, damping=3e3, exponent=0.3, reference_deflection=20e-6)
+    support = Support(stiffness=1e8, damping=3e3, exponent=0.3, reference_deflection=20e-6, across=across)
     rig = Rig(
         driver=Gear(teeth=20, hub_radius=15e-3, inertia=5e-4, mass=2.0, **gear),
         driven=Gear(teeth=30, hub_radius=25e-3, inertia=3e-3, mass=3.0, **gear),
         support=Supports(driver=support, driven=support),
         drive=drive,
-        load=Load(boundary=boundary),
+        load=Load(boundary=boundary, coupling=shaft),
+        housing=housing,
         mesh=MeshCorrection(stiffness_scale=0.9),
     )
     run: dict[str, Any] = {
@@ -57,15 +73,28 @@ def make_case(boundary: str, drive: Drive, **experiment: Any) -> Case:
     return Case(name="test", rig=rig, experiment=Experiment(**run), simulation=simulation)
 
 
-@pytest.mark.parametrize(("boundary", "stiffness"), [("speed", None), ("speed", 2e4), ("torque", 2e4)])
-def test_linearised_response_is_what_a_small_multisine_excites(boundary: str, stiffness: float | None) -> None:
+@pytest.mark.parametrize(
+    ("boundary", "stiffness", "structure", "states"),
+    [
+        ("speed", None, {}, 6),
+        ("speed", 2e4, {}, 8),
+        ("torque", 2e4, {}, 8),
+        ("speed", 2e4, {"shaft": SHAFT, "housing": HOUSING, "across": ACROSS}, 16),
+        ("torque", 2e4, {"shaft": SHAFT, "housing": HOUSING}, 12),
+        ("inertia", None, {"across": ACROSS}, 10),
+        ("inertia", 2e4, {"shaft": SHAFT, "across": ACROSS}, 14),
+    ],
+)
+def test_linearised_response_is_what_a_small_multisine_excites(
+    boundary: str, stiffness: float | None, structure: dict[str, Any], states: int
+) -> None:
     drive = Drive(coupling=Coupling(inertia=2e-3, stiffness=stiffness))
     # Supports stiffen with load: only a small excitation sees the tangent at the mean torque.
-    small = make_case(boundary, drive, multisine=Multisine(amplitude=0.02, band=(10.0, 3000.0), crest=2.5))
-    still = make_case(boundary, drive)
+    small = make_case(boundary, drive, **structure, multisine=Multisine(amplitude=0.02, band=(10.0, 3000.0), crest=2.5))
+    still = make_case(boundary, drive, **structure)
     found = simulate(small)["dte"].values[0] - simulate(still)["dte"].values[0]
     system = lumped_periodic_system(small)
-    assert system.states == (8 if stiffness else 6)
+    assert system.states == states
     signal = torque_realisation(small.experiment, 0, small.rig).signal
     assert signal is not None
     number = np.arange(SAMPLES)
@@ -73,8 +102,24 @@ def test_linearised_response_is_what_a_small_multisine_excites(boundary: str, st
     itf = exact_itf(system, signal.lines / signal.period, kept / SAMPLES, steps=system.phases)
     turn = np.exp(2j * np.pi * np.outer(signal.lines, number) / SAMPLES)
     force = signal.spectrum / pair(small.rig).driver.base_radius
+    if boundary == "inertia":
+        # The load's torque stays, and only a part of the driver's acts on the mesh.
+        force *= force_part(small)
     expected = np.einsum("k,kn,kn->n", force, itf[:, place], turn).real
     assert np.linalg.norm(found - expected) < 0.02 * np.linalg.norm(expected)
+
+
+def force_part(case: Case) -> float:
+    """What 1 N on the driver's base circle is as a generalised force, by the record of a larger multisine."""
+    loud = case.experiment.model_copy(update={"multisine": Multisine(amplitude=10.0, band=(10.0, 3000.0), crest=2.5)})
+    record = simulate(case.model_copy(update={"experiment": loud}))
+    alone = record["torque_driver"].values / record.attrs["base_radius_driver"]
+    j1, j2 = record.attrs["inertia_driver"], record.attrs["inertia_driven"]
+    r1, r2 = record.attrs["base_radius_driver"], record.attrs["base_radius_driven"]
+    part = (r1**2 / j1) / (r1**2 / j1 + r2**2 / j2)
+    assert np.ptp(record["force"].values) == pytest.approx(part * np.ptp(alone), rel=1e-9)
+    assert record["force"].values.mean() == pytest.approx(alone.mean(), rel=1e-9)
+    return part
 
 
 def test_ripple_moves_free_gears_together_without_drift() -> None:

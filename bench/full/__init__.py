@@ -1,0 +1,1 @@
+"""The unreduced finite-element model: all unknowns of both gears in time."""

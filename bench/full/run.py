@@ -1,0 +1,157 @@
+"""A rig made ready for the unreduced finite-element model, and its steps in time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.bench.elastic.rig import ElasticRig, choose_substeps, elastic_rig, machine_for
+from gearbench.bench.errors import BenchError
+from gearbench.bench.plan.excitation import Torque
+from gearbench.bench.plan.schedule import Schedule
+from gearbench.bench.plan.settling import Keep
+from gearbench.bench.protocol import Channels, Drive, Note
+from gearbench.bench.record.channels import dte_of, force_of, support_factor, turned_by
+from gearbench.fem.contact.curve import EDGE_SEPARATION
+from gearbench.fem.full.gear import FullGear, make_gear
+from gearbench.fem.full.machine import Machine, make_machine
+from gearbench.fem.full.record import CHANNELS, advance, columns
+from gearbench.fem.full.start import initial_state
+from gearbench.fem.full.transient import Integrator, make_integrator
+from gearbench.fem.full.transient import State as Step
+from gearbench.fem.motion.scheme import make_scheme
+from gearbench.rig import Case, Rig, Simulation
+
+Array = NDArray[np.float64]
+
+
+class State(NamedTuple):
+    """The integrator's state at a sample of the record, and the outputs (CHANNELS,) there, which it hands out at the
+    end of a step; unknown (zeros) where a simulation begins."""
+
+    sample: int
+    step: Step
+    here: Array
+
+
+@dataclass(frozen=True)
+class Full:
+    """Equations of motion of a rig under one time scheme, shared by all realisations. Every block is recorded."""
+
+    elastic: ElasticRig
+    integrator: Integrator
+    substeps: int
+    mean_torque: float
+    sampling_rate: float
+    samples_per_period: int
+
+    keep: ClassVar[Keep] = "every"
+    piece: ClassVar[int] = 8
+    absolute: ClassVar[bool] = True
+    decay: ClassVar[float | None] = None
+    warnings: ClassVar[tuple[str, ...]] = ()
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        one, two = self.integrator.machine.gears
+        return {
+            "model": "full",
+            "substeps": self.substeps,
+            "unknowns_driver": one.free,
+            "unknowns_driven": two.free,
+        }
+
+    @property
+    def attributes(self) -> dict[str, Any]:
+        return {}
+
+    def drive(self, torque: Torque) -> Drive:
+        period = torque.sample(self.samples_per_period * self.substeps)
+        # Entry k of the shifted signal is the torque at the end of step k.
+        return Drive(period[:: self.substeps].copy(), np.roll(period, -1))
+
+    def start(self, sample: int) -> State:
+        step = initial_state(self.integrator.machine, self.mean_torque, sample / self.sampling_rate)
+        return State(sample, step, np.zeros(CHANNELS))
+
+    def advance(self, drive: Drive, state: State, samples: int) -> tuple[State, Array]:
+        first, steps = state.sample * self.substeps, samples * self.substeps
+        torque = np.take(drive.fine, np.arange(first, first + steps), mode="wrap")
+        run = advance(self.integrator, state.step, torque, self.substeps)
+        if run.off:
+            raise BenchError(
+                f"at t = {run.state.t:.6g} s the teeth overlap where contact leaves the modelled flanks: lower"
+                " experiment.torque_mean_nm or the multisine"
+            )
+        if run.lost:
+            raise BenchError(f"the full model found no contact forces at t = {run.state.t:.6g} s")
+        if not np.isfinite(run.samples).all():
+            raise BenchError(f"the integration diverged before t = {run.state.t:.6g} s")
+        here = np.vstack([state.here[None], run.samples[:-1]])
+        return State(state.sample + samples, run.state, run.samples[-1]), here
+
+    def dte(self, outputs: Array) -> Array:
+        out = columns(outputs)
+        turned = turned_by(self.elastic.pair, out.angle_driver, out.angle_driven)
+        return dte_of(turned, out.y_driver, out.y_driven, support_factor(self.elastic.rig, self.elastic.pair))
+
+    def channels(self, outputs: Array, torque: Array) -> Channels:
+        """Raises BenchError where the flanks overlapped further than tip edges are followed."""
+        dte, out = self.dte(outputs), columns(outputs)
+        most = EDGE_SEPARATION * self.elastic.pair.driver.module
+        if dte.max() > most:
+            raise BenchError(
+                f"the DTE reaches {1e6 * dte.max():.4g} um, beyond the {1e6 * most:.4g} um to which contact off the"
+                " line of action is modelled for this module: lower experiment.torque_mean_nm or the multisine"
+            )
+        return Channels(
+            torque_driven=out.torque_driven,
+            angle_driver=out.angle_driver,
+            angle_driven=out.angle_driven,
+            y_driver=out.y_driver,
+            y_driven=out.y_driven,
+            dte=dte,
+            force=force_of(torque, self.elastic.pair),
+        )
+
+    def apart(self, outputs: Array) -> NDArray[np.bool_]:
+        return np.asarray(columns(outputs).loaded == 0)
+
+    def divided(self, outputs: Array) -> None:
+        """All steps are alike."""
+
+
+def full_gears(rig: Rig, simulation: Simulation, note: Note) -> tuple[FullGear, FullGear]:
+    """Both gears meshed, assembled and factorised. Raises GeometryError."""
+    note("assembling the driver")
+    driver = make_gear(rig.driver, rig.material, simulation.element_size)
+    if rig.driven == rig.driver:
+        return driver, driver
+    note("assembling the driven gear")
+    return driver, make_gear(rig.driven, rig.material, simulation.element_size)
+
+
+def full_machine(elastic: ElasticRig, gears: tuple[FullGear, FullGear], mesh_frequency: float) -> Machine:
+    """Equations of motion at a mesh frequency [Hz]."""
+    return make_machine(elastic.rig, elastic.pair, elastic.law, gears, elastic.bodies, mesh_frequency)
+
+
+def prepare(case: Case, plan: Schedule, note: Note) -> Full:
+    """Contact tabulated, gears assembled, step chosen, effective matrices factorised. Raises GeometryError,
+    ContactError or BenchError."""
+    elastic = elastic_rig(case.rig, case.simulation, note)
+    substeps = choose_substeps(machine_for(elastic, plan.mesh_frequency), case, plan)
+    machine = full_machine(elastic, full_gears(case.rig, case.simulation, note), plan.mesh_frequency)
+    note("factorising the effective matrices")
+    scheme = make_scheme(1.0 / (plan.sampling_rate * substeps), case.simulation.spectral_radius)
+    return Full(
+        elastic=elastic,
+        integrator=make_integrator(machine, scheme),
+        substeps=substeps,
+        mean_torque=case.experiment.torque_mean,
+        sampling_rate=plan.sampling_rate,
+        samples_per_period=plan.samples_per_period,
+    )

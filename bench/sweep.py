@@ -1,0 +1,201 @@
+"""Speed up and down at constant torque: what the mesh answers at every speed, each begun from the one before.
+
+Whatever the model: it needs to hand a state on to another speed and to tell the force of its mesh (`Sweepable`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import ceil, log, pi
+from typing import Any, NamedTuple, Protocol, runtime_checkable
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from gearbench.bench.errors import BenchError
+from gearbench.bench.models import model_for
+from gearbench.bench.plan.excitation import Torque
+from gearbench.bench.plan.schedule import ProgressReport, schedule
+from gearbench.bench.plan.settling import change
+from gearbench.bench.protocol import Model, Prepared
+from gearbench.bench.record.attributes import turning_inertias
+from gearbench.bench.refusals.gears import check_gears
+from gearbench.geometry import pair
+from gearbench.lumped.stiffness.dynamic_factor import deviations, dynamic_factor, resonance_speed
+from gearbench.lumped.stiffness.iso6336 import iso_stiffness
+from gearbench.rig import Case, Rig
+
+Array = NDArray[np.float64]
+
+SAMPLES = 128  # of a mesh period
+CYCLES = 16  # mesh periods of a look: subharmonics down to a sixteenth show as lines of their own
+TRANSIENT = 1e-3  # of its size, that free vibrations keep before the first look
+TOLERANCE = 1e-3  # change of the DTE from look to look, over its standard deviation
+LOOKS = 12  # after which a motion counts as one that does not settle
+DIRECTIONS = ("up", "down")
+
+
+@runtime_checkable
+class Sweepable(Protocol):
+    """What a `Prepared` offers beside, for a sweep."""
+
+    def resume(self, state: Any) -> Any:
+        """A state that another speed ended with, as the start of this one at mesh phase 0."""
+
+    def mesh_force(self, outputs: Array) -> Array:
+        """Force of the mesh (samples,) [N] along the line of action."""
+
+
+class Look(NamedTuple):
+    """What is kept of a speed: rms of the DTE about its mean [m], its mean [m], largest mesh force over the static one,
+    part of the time without contact, change from look to look, amplitudes (orders,) [m]."""
+
+    dte_rms: float
+    dte_mean: float
+    dynamic_factor: float
+    contact_loss: float
+    residual: float
+    spectrum: Array
+
+
+def sweep(
+    case: Case, speeds: Sequence[float], model: str | None = None, progress: ProgressReport | None = None
+) -> xr.Dataset:
+    """Steady answer to the mean torque at driver speeds [rad/s], upwards and then downwards.
+
+    Variables over (direction, speed): dte_rms, dte_mean [m], dynamic_factor, contact_loss, residual, settled; and
+    dte_amplitude (direction, speed, order) [m], order in mesh orders. iso_dynamic_factor (speed): K_v by ISO 6336-1
+    Method B. Raises BenchError for a model that cannot be swept.
+    """
+    report = progress or (lambda fraction, note: None)
+    case, solver = model_for(_still(case), model)
+    check_gears(case.rig)
+    solver.refuse(case)
+    rising = sorted(speeds)
+    if not rising or not rising[0] > 0:
+        raise BenchError("a sweep needs at least one speed above 0")
+    looks: dict[str, list[Look]] = {}
+    last: Any = None
+    for number, direction in enumerate(DIRECTIONS):
+        order = rising if direction == "up" else rising[::-1]
+        looks[direction] = []
+        for at, speed in enumerate(order):
+            report((number + at / len(order)) / 2, f"{direction}, {speed * 30 / pi:.0f} rpm")
+            look, last = _look(case, solver, speed, last)
+            looks[direction].append(look)
+    looks["down"].reverse()
+    return _dataset(case, solver, np.array(rising), looks)
+
+
+def _still(case: Case) -> Case:
+    experiment = case.experiment.model_copy(update={"multisine": None})
+    return case.model_copy(update={"experiment": experiment, "conditions": ()})
+
+
+def _at(case: Case, speed: float) -> Case:
+    """The case at a driver speed [rad/s], sampled in step with the mesh."""
+    frequency = speed * case.rig.driver.teeth / (2 * pi)
+    values = {"mesh_frequency": None, "speed_driver": speed, "sampling_rate": SAMPLES * frequency}
+    values |= {"samples_per_period": SAMPLES * CYCLES, "periods": 1}
+    return case.model_copy(update={"experiment": case.experiment.model_copy(update=values)})
+
+
+def _look(case: Case, solver: Model, speed: float, before: Any) -> tuple[Look, Any]:
+    """One speed, from the state `before` that another one ended with (None: from rest), and the state at its end."""
+    there = _at(case, speed)
+    prepared = solver.prepare(there, schedule(there.experiment, there.rig), lambda note: None)
+    if not isinstance(prepared, Sweepable):
+        raise BenchError(
+            f"the {solver.title} of this case cannot be swept over speed: set simulation.model = \"lumped\" and"
+            ' simulation.mesh_stiffness = "finite-element"'
+        )
+    drive = prepared.drive(Torque(there.experiment.torque_mean))
+    state = prepared.start(0) if before is None else prepared.resume(before)
+    rate = there.experiment.sampling_rate
+    wait = ceil(log(1 / TRANSIENT) / max(prepared.decay or 1e3, 1.0) * rate / (SAMPLES * CYCLES))
+    block = SAMPLES * CYCLES
+    outputs: Array | None = None
+    residual = np.inf
+    for _ in range(LOOKS):
+        for _ in range(wait if outputs is None else max(wait // 4, 1)):
+            state, earlier = prepared.advance(drive, state, block)
+        state, outputs = prepared.advance(drive, state, block)
+        residual = change(prepared.dte(earlier), prepared.dte(outputs))
+        if residual <= TOLERANCE:
+            break
+    assert outputs is not None
+    return _measured(prepared, prepared, outputs, residual, there), state
+
+
+def _measured(prepared: Prepared[Any], mesh: Sweepable, outputs: Array, residual: float, case: Case) -> Look:
+    dte, apart = prepared.dte(outputs), prepared.apart(outputs)
+    static = case.experiment.torque_mean / pair(case.rig).driver.base_radius
+    return Look(
+        dte_rms=float(dte.std()),
+        dte_mean=float(dte.mean()),
+        dynamic_factor=float(mesh.mesh_force(outputs).max()) / static,
+        contact_loss=0.0 if apart is None else float(apart.mean()),
+        residual=residual,
+        spectrum=2 * np.abs(np.fft.rfft(dte - dte.mean()))[: SAMPLES * CYCLES // 4] / dte.size,
+    )
+
+
+def iso_factors(case: Case, speeds: Array) -> tuple[Array, float]:
+    """K_v by ISO 6336-1 Method B at driver speeds (n,) [rad/s], and the resonance speed of the driver [rad/s]."""
+    rig, meshing = case.rig, pair(case.rig)
+    width = 1e3 * meshing.face_width
+    force = case.experiment.torque_mean / meshing.driver.base_radius
+    found = iso_stiffness(rig, meshing, force)
+    radii = meshing.driver.base_radius, meshing.driven.base_radius
+    one, two = (j / r**2 / width for j, r in zip(turning_inertias(rig, meshing), radii, strict=True))
+    resonance = resonance_speed(rig.driver.teeth, found.mesh, (one, two)) * pi / 30
+    tangential = 2 * case.experiment.torque_mean / (rig.driver.module * rig.driver.teeth)  # at the reference circle
+    load = tangential / width
+    b = deviations(load, found.single, **_errors(rig))
+    return np.array([dynamic_factor(speed / resonance, load, meshing.contact_ratio, b) for speed in speeds]), resonance
+
+
+def _errors(rig: Rig) -> dict[str, float]:
+    """Deviations that ISO asks for [um]: of the gear that has more, and the tip relief of the one that has less."""
+    gears = (rig.driver, rig.driven)
+    pitch = [np.abs(np.diff([*gear.pitch_error, *gear.pitch_error[:1]])).max(initial=0.0) for gear in gears]
+    form = [float(np.ptp(gear.profile_form)) if gear.profile_form else abs(gear.profile_slope) for gear in gears]
+    relief = min(gear.tip_relief for gear in gears)
+    return {"base_pitch": 1e6 * max(pitch), "profile": 1e6 * max(form), "tip_relief": 1e6 * relief}
+
+
+def _dataset(case: Case, solver: Model, speeds: Array, looks: dict[str, list[Look]]) -> xr.Dataset:
+    iso, resonance = iso_factors(case, speeds)
+    units = {"dte_rms": "m", "dte_mean": "m", "dynamic_factor": "1", "contact_loss": "1", "residual": "1"}
+    both = {
+        name: (
+            ("direction", "speed"),
+            np.array([[getattr(one, name) for one in looks[d]] for d in DIRECTIONS]),
+            {"units": unit},
+        )
+        for name, unit in units.items()
+    }
+    spectra = np.array([[one.spectrum for one in looks[d]] for d in DIRECTIONS])
+    order = np.arange(spectra.shape[-1]) / CYCLES
+    return xr.Dataset(
+        {
+            **both,
+            "settled": (("direction", "speed"), (both["residual"][1] <= TOLERANCE).astype(float), {"units": "1"}),
+            "dte_amplitude": (("direction", "speed", "order"), spectra, {"units": "m"}),
+            "iso_dynamic_factor": (("speed",), iso, {"units": "1"}),
+        },
+        coords={
+            "direction": list(DIRECTIONS),
+            "speed": ("speed", speeds, {"units": "rad/s"}),
+            "order": ("order", order, {"units": "mesh orders"}),
+        },
+        attrs={
+            "schema": "gearbench-sweep/1",
+            "model": case.simulation.model,
+            "title": solver.title,
+            "torque_mean": case.experiment.torque_mean,
+            "teeth_driver": case.rig.driver.teeth,
+            "iso_resonance_speed": resonance,
+        },
+    )

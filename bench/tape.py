@@ -1,0 +1,192 @@
+"""What a simulation has done so far, kept on disk, so that an interrupted one goes on where it was, bit for bit.
+
+A simulation asks for outputs stretch by stretch, and everything that it decides follows from them. So it is enough to
+keep the outputs and, now and then, the state: who plays the kept outputs back and goes on from the last state makes
+the same decisions and ends with the same record.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+import threading
+import time
+import zipfile
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.bench.plan.settling import Steady
+from gearbench.files import FileError, write_text, write_whole
+
+Array = NDArray[np.float64]
+State = TypeVar("State")
+
+# Seconds between two looks at the disk: what an interruption may cost.
+INTERVAL = 5.0
+
+_ABOUT = "about.json"
+_BROKEN = (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, NotImplementedError, SyntaxError)
+
+
+class Shelf:
+    """A folder of what one simulation has done; `identity` is all that decides its course.
+
+    The folder appears with the first thing to keep, after `interval` seconds; that of another simulation is emptied,
+    and files of another origin are refused with FileError. A disk that takes no more costs the checkpoints, not the
+    simulation. Mutable and shared by threads: it is a recorder.
+    """
+
+    def __init__(self, folder: Path, identity: str, interval: float = INTERVAL) -> None:
+        self.folder, self.interval = folder, interval
+        self._identity = identity
+        self._lock = threading.Lock()
+        self._ended: dict[int, Steady] = {}
+        self._flushed = time.monotonic()
+        self._full = False
+        if folder.exists() and self._owner() != identity:
+            if self._owner() is None and (not folder.is_dir() or any(folder.iterdir())):
+                raise FileError(f"{folder} is of another origin: it must not exist, or hold what a simulation kept")
+            self.clear()
+
+    def clear(self) -> None:
+        """Remove the folder: the simulation has ended and its record is safe."""
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+    def tape(self, name: str, start: Any) -> Tape:
+        """The tape of that name; `start` is a state like those that it keeps."""
+        return Tape(self, name, start)
+
+    def ended(self, number: int) -> Steady | None:
+        """What an earlier simulation ended realisation `number` with."""
+        with suppress(*_BROKEN), np.load(self._end(number), allow_pickle=False) as kept:
+            scatter = kept["scatter"] if "scatter" in kept.files else None
+            residual, periods, first = float(kept["residual"]), int(kept["settling_periods"]), int(kept["first"])
+            return Steady(kept["outputs"], residual, periods, first, scatter)
+        return None
+
+    def end(self, number: int, steady: Steady) -> None:
+        """Keep what a realisation ended with, on disk before long; its tapes are needed no more."""
+        with self._lock:
+            self._ended[number] = steady
+            due = time.monotonic() - self._flushed >= self.interval
+        if due:
+            self.flush()
+
+    def flush(self) -> None:
+        """Write the ends that are not on disk yet."""
+        with self._lock:
+            ended, self._ended = self._ended, {}
+            self._flushed = time.monotonic()
+        for number, steady in ended.items():
+            arrays = {name: value for name, value in vars(steady).items() if value is not None}
+            self.write(self._end(number).name, arrays)
+            for path in self.folder.glob(f"tape-{number}-*.npz"):
+                path.unlink(missing_ok=True)
+
+    def write(self, name: str, arrays: Mapping[str, Any]) -> None:
+        """One file of arrays in the folder."""
+        with self._lock:
+            if self._full:
+                return
+            try:
+                if not self.folder.exists():
+                    self.folder.mkdir()
+                    write_text(self.folder / _ABOUT, json.dumps({"identity": self._identity}) + "\n")
+                write_whole(self.folder / name, lambda path: np.savez(path, **arrays))
+            except OSError:
+                self._full = True
+
+    def _end(self, number: int) -> Path:
+        return self.folder / f"end-{number}.npz"
+
+    def _owner(self) -> str | None:
+        with suppress(OSError, ValueError):
+            about = json.loads((self.folder / _ABOUT).read_text(encoding="utf-8"))
+            return str(about.get("identity")) if isinstance(about, dict) else None
+        return None
+
+
+class Tape:
+    """One course of states and outputs: what was kept is played back by `take`, what follows is kept by `put`.
+
+    Mutable: it is a recorder. One thread uses it. `state` is that at the end of what was taken or put.
+    """
+
+    def __init__(self, shelf: Shelf, name: str, start: Any) -> None:
+        self.state = start
+        self._shelf, self._name, self._start = shelf, name, start
+        self._segments = 0
+        self._played: Array | None = None
+        self._pending: list[Array] = []
+        self._flushed = time.monotonic()
+
+    def take(self, count: int) -> Array | None:
+        """The next `count` samples (count, n) that were kept; None where there are no more."""
+        if self._played is None or not len(self._played):
+            self._played = self._load()
+        if self._played is None:
+            return None
+        taken, self._played = self._played[:count], self._played[count:]
+        return taken
+
+    def put(self, state: Any, outputs: Array) -> None:
+        """Keep outputs (samples, n) and the state at their end, on disk before long."""
+        self._pending.append(outputs)
+        self.state = state
+        if time.monotonic() - self._flushed >= self._shelf.interval:
+            self.flush()
+
+    def flush(self) -> None:
+        """Write what is not on disk yet."""
+        if not self._pending:
+            return
+        arrays = {f"state{i}": leaf for i, leaf in enumerate(leaves(self.state))}
+        self._shelf.write(self._file(self._segments), {"outputs": np.concatenate(self._pending), **arrays})
+        self._segments += 1
+        self._pending = []
+        self._flushed = time.monotonic()
+
+    def _load(self) -> Array | None:
+        """Outputs of the next segment. A damaged one ends the tape: it and all that follow are removed."""
+        path = self._shelf.folder / self._file(self._segments)
+        with suppress(*_BROKEN), np.load(path, allow_pickle=False) as kept:
+            outputs = kept["outputs"]
+            state = restored(self._start, iter([kept[f"state{i}"] for i in range(len(kept.files) - 1)]))
+            if len(outputs):
+                self._segments += 1
+                self.state = state
+                return outputs
+        number = self._segments
+        while (path := self._shelf.folder / self._file(number)).exists():
+            path.unlink()
+            number += 1
+        return None
+
+    def _file(self, segment: int) -> str:
+        return f"tape-{self._name}-{segment}.npz"
+
+
+def leaves(state: Any) -> list[NDArray[Any]]:
+    """The arrays and numbers of a state: an array, a number, or a NamedTuple of such."""
+    if isinstance(state, tuple):
+        return [leaf for part in state for leaf in leaves(part)]
+    return [np.asarray(state)]
+
+
+def restored(like: State, values: Iterator[NDArray[Any]]) -> State:
+    """A state of the same kind as `like`, from what `leaves` gave. Raises ValueError if it does not fit."""
+    if isinstance(like, tuple):
+        parts = [restored(part, values) for part in like]
+        make: Any = getattr(type(like), "_make", type(like))
+        return make(parts)
+    leaf = next(values, None)
+    if leaf is None:
+        raise ValueError("too few values for the state")
+    if isinstance(like, np.ndarray):
+        return leaf.view(like.dtype)  # type: ignore[return-value]
+    return type(like)(leaf.item())  # type: ignore[call-arg]
