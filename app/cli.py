@@ -23,6 +23,7 @@ from gearbench.commands.run import run
 from gearbench.commands.schema import schema
 from gearbench.commands.simulate import simulate
 from gearbench.commands.static import static
+from gearbench.commands.sweep import sweep
 from gearbench.commands.validate import validate
 from gearbench.shell.failure import INTERRUPTED, guarded, show_warning
 from gearbench.shell.options import expand_lists
@@ -36,7 +37,8 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
-for command in (run, simulate, static, convert, identify, compare, diagnose, check, mesh, cases, schema, validate):
+COMMANDS = (run, simulate, static, sweep, convert, identify, compare, diagnose, check, mesh, cases, schema, validate)
+for command in COMMANDS:
     app.command()(command)
 app.add_typer(challenge)
 

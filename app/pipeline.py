@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from gearbench.bench.results.summary import run_numbers
 from gearbench.geometry.pair.zones import contact_span, fewest_pairs, zone_label
+from gearbench.shell.checkpoints import checkpoints_of
 from gearbench.shell.failure import InputError
 from gearbench.shell.output import Output, claimed, fingerprint
 from gearbench.shell.progress import Silent, Steps
@@ -83,10 +84,12 @@ def run(case: Case, out: str | Path, *, force: bool = False, progress: Steps | N
     '5.53 um'
     """
     from gearbench.bench.readiness import check_case
+    from gearbench.bench.refusals.stated import check_stated
     from gearbench.records.provenance import source_digest
     from gearbench.rig import dump_case
 
     # What cannot be run is refused before a folder is made.
+    check_stated(case, "a run")
     check_case(case)
     for _, one in case.experiments():
         if one.experiment.multisine is None:
@@ -118,7 +121,13 @@ def run_experiment(job: Job) -> dict[str, Any]:
     statics = job.dataset(
         "static.nc", read_dataset, lambda: static(case, positions=POSITIONS, progress=progress), write_dataset
     )
-    record = job.dataset("record.nc", read_record, lambda: simulate(case, progress=progress), write_record)
+    with checkpoints_of(job.output.path(job.name("record.nc"))) as checkpoints:
+        record = job.dataset(
+            "record.nc",
+            read_record,
+            lambda: simulate(case, progress=progress, checkpoints=checkpoints),
+            write_record,
+        )
     modes: dict[str, xr.Dataset] = {}
     results = {"identified": job.dataset("frf.nc", read_frf, lambda: identify_case(case, record, progress), write_frf)}
     if not model_for(case)[1].elastic:

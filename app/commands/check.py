@@ -9,6 +9,7 @@ import typer
 
 from gearbench.shell.options import CaseArgument, JsonOption, SetOption, load_case, print_json
 from gearbench.words.combs import comb_data, comb_lines, comb_reports
+from gearbench.words.rig import effect_lines
 
 
 def check(
@@ -23,19 +24,22 @@ def check(
     """Print the data sheet of a case: diameters, contact ratio, sliding, backlash, gauges, masses; or what is wrong.
 
     What mesh, static and simulate would refuse is refused here, but for what only a solution can show.
-    For a comb multisine also its residue and which kinds of response then share lines.
+    The rig's effects are named by their keys. For a comb multisine also its residue and which kinds of response then
+    share lines.
     """
     loaded = load_case(case, settings)
     from gearbench.bench.elastic.crack import crack_lines
     from gearbench.bench.readiness import check_case
     from gearbench.geometry import data_sheet
+    from gearbench.rig import effects_in
 
     rows = data_sheet(loaded.rig, [1e-3 * number for number in diameter or []])
     check_case(loaded)
-    combs = comb_reports(loaded.experiments())
+    combs = comb_reports(loaded.experiments() if loaded.stated else [])
     if as_json:
         data = {row.name: {"value": row.value, "unit": row.unit} for row in rows}
-        print_json({"case": loaded.name, "data": data, "combs": [comb_data(comb) for comb in combs]})
+        effects = list(effects_in(loaded.rig))
+        print_json({"case": loaded.name, "data": data, "effects": effects, "combs": [comb_data(one) for one in combs]})
         return
     typer.echo(f"{loaded.name}\n")
     shared = [row for row in rows if not row.name.startswith(("driver ", "driven "))]
@@ -48,6 +52,9 @@ def check(
         if name != row.name:
             both = f"{_figure(row.value):>12} {_figure(driven[name]):>12}"
             typer.echo(f"  {name:<46} {both}  {row.unit}".rstrip())
+    effects_said = effect_lines(loaded.rig)
+    if effects_said:
+        typer.echo("\n  " + "\n  ".join(effects_said))
     for line in crack_lines(loaded.rig, loaded.simulation.element_size, loaded.simulation.modes):
         typer.echo(f"\n  {line}")
     for comb in combs:

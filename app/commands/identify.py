@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 def identify(
     records: Annotated[list[Path], typer.Argument(metavar="RECORD...", help="records: realisations of one condition")],
     out: Annotated[Path, typer.Option("--out", help="frequency response to write (NetCDF-4)")],
-    method: Annotated[Literal["lpm"], typer.Option("--method", help="estimator")] = "lpm",
+    method: Annotated[Literal["lpm", "mesh-feedback"], typer.Option("--method", help="estimator")] = "lpm",
     band_hz: Annotated[
         tuple[float, float] | None, typer.Option("--band-hz", help="identified band; absent: the excited one")
     ] = None,
@@ -44,7 +44,7 @@ def identify(
     with Progress("identify") as progress:
         progress.step("reading")
         loaded = [gb.read_record(path) for path in records]
-        progress.step("local polynomial method")
+        progress.step("mesh feedback" if method == "mesh-feedback" else "local polynomial method")
         found = gb.identify(loaded, settings, progress=progress)
         gb.write_frf(found, out)
     summary = frf_summary(found, out)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from gearbench.shell.checkpoints import checkpoints_of
 from gearbench.shell.options import CaseArgument, JsonOption, ModelOption, SetOption, check_out, load_case, print_json
 from gearbench.shell.progress import Progress
 
@@ -24,7 +25,8 @@ def simulate(
     """Carry out the experiment of a case on a model and write the record.
 
     A case with condition tables has one record for each: `--out DIR/record.nc` writes
-    DIR/record-NAME.nc, NAME being the name of the condition.
+    DIR/record-NAME.nc, NAME being the name of the condition. A simulation that was interrupted or killed goes on
+    where it was when the same command is given again.
     """
     loaded = load_case(case, settings)
     check_out(out, [case])
@@ -36,8 +38,9 @@ def simulate(
     with Progress(f"simulate {loaded.name}") as progress:
         for experiment, path in experiments(loaded, out):
             progress.step(path.name)
-            record = gb.simulate(experiment, model, progress)
-            gb.write_record(record, path)
+            with checkpoints_of(path) as checkpoints:
+                record = gb.simulate(experiment, model, progress, checkpoints=checkpoints)
+                gb.write_record(record, path)
             summaries.append(record_summary(record, path))
     if as_json:
         print_json(summaries if loaded.conditions else summaries[0])

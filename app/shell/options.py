@@ -67,12 +67,14 @@ def check_picture(path: Path, inputs: Sequence[Path | str] = (), option: str = "
 
 def load_case(name: str, settings: Sequence[str] | None) -> Case:
     """The case in a file or, where there is no such file, the shipped case of that name; values that smell of another
-    unit are questioned on stderr."""
+    unit are questioned on stderr, and what the file leaves out is said there."""
     import gearbench as gb
     from gearbench.rig.casefile.smells import smells
     from gearbench.shell.failure import say
 
     case = gb.read_case(name, settings or ())
+    for line in case.assumed:
+        say(f"assumed: {line}")
     for question in smells(case):
         say(f"warning: {question}")
     return case

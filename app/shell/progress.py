@@ -48,10 +48,10 @@ class Progress:
     def __enter__(self) -> Progress:
         if sys.stderr.isatty():
             from rich.console import Console
-            from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
+            from rich.progress import BarColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
             from rich.progress import Progress as Bar
 
-            columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+            columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), TimeRemainingColumn())
             self._bar = Bar(*columns, console=Console(stderr=True), transient=True)
             self._bar.start()
         return self
@@ -79,7 +79,14 @@ class Progress:
             self._bar.update(self._task, completed=fraction, total=1.0, description=text)
         elif now - self._spoke >= _SECONDS_BETWEEN_LINES:
             self._spoke = now
-            self._line(f"{self._step}{f', {note}' if note else ''}: {100 * fraction:.0f} %")
+            self._line(f"{self._step}{f', {note}' if note else ''}: {100 * fraction:.0f} %{self._left(now, fraction)}")
+
+    def _left(self, now: float, fraction: float) -> str:
+        """How long the step will still take, as far as its pace so far tells."""
+        if fraction < 0.02:
+            return ""
+        seconds = (now - self._began) * (1 - fraction) / fraction
+        return f", {seconds:.0f} s left" if seconds < 120 else f", {seconds / 60:.0f} min left"
 
     def _close_step(self, done: bool) -> None:
         if not self._step:

@@ -1,0 +1,23 @@
+"""Where a command keeps what a simulation has done so far: a folder beside the record that it will write."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from gearbench.shell.failure import say
+
+
+@contextmanager
+def checkpoints_of(record: Path) -> Iterator[Path]:
+    """The folder RECORD.part; it is removed when the record is written, and an interruption says that it is there."""
+    folder = record.with_name(f"{record.name}.part")
+    try:
+        yield folder
+    except KeyboardInterrupt:
+        if folder.exists():
+            say(f"what is done is kept in {folder}: the same command goes on from there")
+        raise
+    shutil.rmtree(folder, ignore_errors=True)

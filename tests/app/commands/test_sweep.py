@@ -1,0 +1,38 @@
+"""`sweep`: its file, its pictures, its refusals."""
+
+from __future__ import annotations
+
+from math import pi
+from pathlib import Path
+
+import pytest
+
+from gearbench.cli import run_command_line
+from gearbench.records import read_dataset
+
+# A mesh that needs no finite elements, on the non-linear model.
+SETTINGS = (
+    'simulation.mesh_stiffness="rectangular"',
+    "simulation.stiffness_single_n_per_m=2.5e8",
+    "simulation.stiffness_double_n_per_m=3.5e8",
+    "rig.mesh.stiffness_scale=1.0001",
+    "rig.damping.mesh_ratio=0.1",
+)
+
+
+def test_the_command_writes_numbers_and_pictures(tmp_path: Path) -> None:
+    out, picture, orders = tmp_path / "sweep.nc", tmp_path / "sweep.png", tmp_path / "orders.png"
+    settings = [word for setting in SETTINGS for word in ("--set", setting)]
+    span = ["--from-rpm", "300", "--to-rpm", "900", "--points", "3"]
+    command = ["sweep", "rig_62", "--out", str(out), "--figure", str(picture), "--waterfall", str(orders)]
+    assert run_command_line([*command, *span, *settings]) == 0
+    found = read_dataset(out)
+    assert found.sizes["speed"] == 3 and found.attrs["schema"] == "gearbench-sweep/1"
+    assert found["speed"].values * 30 / pi == pytest.approx([300.0, 600.0, 900.0])
+    assert picture.stat().st_size > 10_000 and orders.stat().st_size > 10_000
+
+
+def test_speeds_that_do_not_rise_are_refused(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    command = ["sweep", "rig_62", "--out", str(tmp_path / "a.nc"), "--from-rpm", "900", "--to-rpm", "300"]
+    assert run_command_line(command) == 2
+    assert "--from-rpm 900 must be greater than 0 and less than --to-rpm 300" in capsys.readouterr().err
