@@ -17,7 +17,9 @@ from gearbench.cases import case_path
 from gearbench.fem.contact.law import make_law
 from gearbench.fem.contact.static import static_cycle
 from gearbench.fem.gear.body import condense
-from gearbench.fem.motion.transient import advance, initial_state, make_scheme
+from gearbench.fem.motion.scheme import make_scheme
+from gearbench.fem.motion.start import initial_state
+from gearbench.fem.motion.transient import advance
 from gearbench.rig import read_case
 
 

@@ -34,7 +34,7 @@ FUNCTIONS: dict[str, tuple[str, ...]] = {
     "read_frf": ("path",),
     "read_record": ("path",),
     "run": ("case", "out", "force", "progress"),
-    "simulate": ("case", "model", "progress"),
+    "simulate": ("case", "model", "progress", "checkpoints"),
     "static": ("case", "model", "torque", "dte", "positions", "cycles", "progress"),
     "validate_record": ("record",),
     "write_frf": ("dataset", "path"),

@@ -1,8 +1,9 @@
-"""Local polynomial method and exact response on the reference system."""
+"""Local polynomial method, mesh feedback and exact response on the reference system."""
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import lru_cache, partial
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,7 @@ from gearbench.identification import (
 BAND = (700.0, 2500.0)
 FREQUENCIES = np.arange(BAND[0], BAND[1] + 1, 4.0)
 PHASES = 512
+METHODS: tuple[tuple[Literal["lpm", "mesh-feedback"], float], ...] = (("lpm", 0.025), ("mesh-feedback", 0.01))
 
 
 @lru_cache(maxsize=1)
@@ -40,6 +42,33 @@ def lpm_error(harmonics: int) -> float:
     settings = IdentificationSettings(harmonics=harmonics, order=1, window=4, band=BAND, step=4, phases=PHASES)
     found = itf(identify([record], settings))
     return relative(found.sel(frequency=FREQUENCIES).values, truth())
+
+
+@lru_cache(maxsize=1)
+def sparse_truth() -> NDArray[np.complex128]:
+    """Exact ITF at 2 Hz on every 8th of FREQUENCIES."""
+    return truth()[::8]
+
+
+def feedback_error(noise: float) -> float:
+    """Mesh feedback from one second of one realisation at 2 Hz; `noise` over the response."""
+    record = reference_record(ReferenceRig(), realisations=1, duration=1.0, noise=noise)
+    settings = IdentificationSettings(method="mesh-feedback", band=BAND, step=4, phases=PHASES, modes=0)
+    found = itf(identify([record], settings))
+    return relative(found.sel(frequency=FREQUENCIES[::8]).values, sparse_truth())
+
+
+@lru_cache(maxsize=6)
+def at_speed(mesh_frequency: float, method: Literal["lpm", "mesh-feedback"]) -> float:
+    """Error with all choices left to the program, from one multisine of 4 s at 40 dB."""
+    rig = ReferenceRig(mesh_frequency=mesh_frequency)
+    record = reference_record(
+        rig, realisations=1, duration=4.0, sampling_rate=16000.0, band=(1.0, 5000.0), noise=0.01
+    )
+    frequency = FREQUENCIES[::8]
+    settings = IdentificationSettings(method=method, band=BAND, step=16, phases=128, modes=0)
+    found = itf(identify([record], settings)).sel(frequency=frequency).values
+    return relative(found, exact_itf(rig.system(512), frequency, np.arange(128) / 128))
 
 
 def formulations() -> float:
@@ -64,6 +93,13 @@ def peer() -> float:
 CHECKS = [
     Check("lpm-100", "LPM, reference system, 100 x 1 s, noise-free: L = 100", 0.04, "", lambda: lpm_error(100)),
     Check("lpm-150", "LPM, reference system, 100 x 1 s, noise-free: L = 150", 0.006, "", lambda: lpm_error(150)),
+    Check("mesh-feedback-40db", "mesh-feedback ITF, 1 s, 2 Hz, 40 dB", 0.01, "", lambda: feedback_error(0.01)),
+    Check("mesh-feedback-30db", "mesh-feedback ITF, 1 s, 2 Hz, 30 dB", 0.04, "", lambda: feedback_error(10**-1.5)),
+    *(
+        Check(f"{method}-{mesh}hz", f"{method}, {mesh} Hz mesh, 4 s, 40 dB", reach, "", partial(at_speed, mesh, method))
+        for method, reach in METHODS
+        for mesh in (50, 200, 500)
+    ),
     Check("exact-itf", "exact ITF: monodromy against harmonic balance", 1e-8, "", formulations),
     Check("frozen-itf", "frozen against exact ITF: distance from the stated 16 %", 0.01, "", frozen),
     Check("lpm-peer", "PTV-LPM against sdynpy's LPM fed with shifted spectra", 10.0, "times", peer, least=True),

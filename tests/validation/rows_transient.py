@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 from gearbench.bench.elastic.rig import ElasticRig, elastic_rig, machine_for
 from gearbench.commands.checks import Check
 from gearbench.fem.contact.static import static_cycle
-from gearbench.fem.motion.transient import advance, columns, initial_state, make_scheme
+from gearbench.fem.motion.scheme import make_scheme
+from gearbench.fem.motion.start import initial_state
+from gearbench.fem.motion.transient import advance, columns
 from gearbench.rig import Gear, Rig, Simulation, Support, Supports
 
 Array = NDArray[np.float64]
@@ -40,10 +42,10 @@ def quasi_static() -> float:
     machine = machine_for(bench, frequency)
     state = initial_state(machine, torque)
     steps = int(rate / frequency)
-    _, samples, failed = advance(
+    _, samples, run = advance(
         machine, make_scheme(1 / (rate * substeps), 0.8), state, np.full(steps * substeps, torque), substeps
     )
-    assert failed < 0
+    assert run.failed < 0
     law = bench.law
     along = cos(bench.pair.working_pressure_angle)
     seen = columns(samples)
@@ -66,8 +68,8 @@ def end_state(steps: int, duration: float = 4e-3) -> Array:
     scheme = make_scheme(duration / steps, 0.8)
     at = np.arange(1, steps + 1) / steps
     varying = torque * (1 + 0.2 * np.sin(np.pi * at) ** 2 * np.sin(8 * np.pi * at))
-    state, _, failed = advance(machine, scheme, initial_state(machine, torque), varying, 1)
-    assert failed < 0
+    state, _, run = advance(machine, scheme, initial_state(machine, torque), varying, 1)
+    assert run.failed < 0
     return np.asarray(state.d[:3])
 
 

@@ -1,0 +1,158 @@
+"""A step of torque on a pair in contact, computed by CalculiX: the model that `mesh --out pair.inp` writes, in time.
+
+The flanks just touch. The driver's hub, whose inertia is that of the case, is let go under a torque and vibrates on the
+teeth. Nothing of our dynamics is in it, and of our contact law only where the mesh is fine.
+
+    OMP_NUM_THREADS=1 python torque_step.py --work FOLDER [--across 5] [--penalty 1] [--steps 48] [--alpha -0.05]
+
+adds one run to torque_step.json: times [s] and transmission errors [m].
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import subprocess
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gearbench.bench.export import calculix
+from gearbench.geometry import body
+from gearbench.geometry.export.calculix import deck_text
+from gearbench.geometry.mesh.grading import Grading
+from gearbench.geometry.mesh.values import GearMesh
+from gearbench.geometry.tooth.profile import profile
+from gearbench.rig import Case, read_case
+
+HERE = Path(__file__).parent
+RESULT = HERE / "torque_step.json"
+CASE = HERE / "torque_step.toml"
+TORQUE = 30.0  # driver torque after the step [N m]
+DURATION = 1.28e-3  # [s], two periods of the first mode
+# A cube of 1 mm that holds the driver's hub moves along x by its angle, so that its mass [t] is an inertia [t mm^2].
+TO_TONNE_MM2 = 1e9
+
+
+def mesh_inertia(mesh: GearMesh, density: float, width: float) -> float:
+    """Polar inertia [kg m^2] of a mesh of quadratic triangles, by three-point quadrature of its exact map."""
+    a, b = 1 / 6, 2 / 3
+    total = 0.0
+    for x, y in ((a, a), (b, a), (a, b)):
+        z = 1 - x - y
+        shape = np.array([z * (2 * z - 1), x * (2 * x - 1), y * (2 * y - 1), 4 * z * x, 4 * x * y, 4 * y * z])
+        d_x = np.array([1 - 4 * z, 4 * x - 1, 0, 4 * (z - x), 4 * y, -4 * y])
+        d_y = np.array([1 - 4 * z, 0, 4 * y - 1, -4 * x, 4 * x, 4 * (z - y)])
+        nodes = mesh.points[mesh.cells]
+        at, one, two = (np.einsum("a,eac->ec", f, nodes) for f in (shape, d_x, d_y))
+        area = one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]
+        total += float(np.sum(np.sum(at**2, axis=1) * area)) / 6
+    return density * width * total
+
+
+def _coarsen(across: float) -> None:
+    """Set how fine the exported mesh is: elements over half the width of contact, and coarser teeth than for torque at
+    rest, because there are a hundred increments to solve."""
+    calculix.ACROSS = across
+    calculix.NEAR, calculix.NEAR_GRADING = 1 / 4, Grading(growth=0.45, fine_tips=False)
+
+
+def dynamic_deck(case: Case, across: float, penalty: float, steps: int, alpha: float) -> tuple[str, float]:
+    """The input of CalculiX, and the static transmission error [m] of the torque."""
+    _coarsen(across)
+    model = calculix.contact_model(case, 0.0, torque=TORQUE)
+    deck = replace(model.deck, head=("A step of torque on a pair in contact.",))
+    text = deck_text(deck)
+    gear, density = case.rig.driver, case.rig.material.density
+    inertia = body(profile(gear), gear, density, "rig.driver").inertia
+    hub = inertia - mesh_inertia(deck.gears[0].mesh, density, gear.face_width)
+    text = text.replace("*MATERIAL, NAME=GEARS\n", f"*MATERIAL, NAME=GEARS\n*DENSITY\n{1e-12 * density:.12g}\n")
+    for name, mass in (("DRIVER", TO_TONNE_MM2 * 1e-6 * hub), ("DRIVEN", 1e-3)):
+        text = text.replace(f"*MATERIAL, NAME=CUBE_{name}\n", f"*MATERIAL, NAME=CUBE_{name}\n*DENSITY\n{mass:.12g}\n")
+    head, *_ = re.split(r"(?=\*\* Step \d)", text)
+    head = re.sub(r"(PRESSURE-OVERCLOSURE=LINEAR\n)(\S+)", lambda m: f"{m[1]}{penalty * float(m[2]):.6g}", head)
+    return head + "\n".join(_dynamic_step(steps, alpha)) + "\n", model.dte
+
+
+def _dynamic_step(steps: int, alpha: float) -> list[str]:
+    held = [line for name in ("DRIVER", "DRIVEN") for line in (f"HUB_{name}, 1, 1", f"MOMENT_{name}, 2, 3")]
+    held += [f"ANGLE_{name}, 2, 3" for name in ("DRIVER", "DRIVEN")] + ["MOMENT_DRIVEN, 1, 1"]
+    return [
+        f"*STEP, INC={2 * steps}, NLGEOM",
+        f"*DYNAMIC, DIRECT, ALPHA={alpha:g}",
+        f"{DURATION / steps:.12g}, {DURATION:.12g}",
+        "*CONTROLS, PARAMETERS=TIME INCREMENTATION",
+        "4, 8, 9, 150, 10, 4, , 5, , ",
+        "*BOUNDARY",
+        *held,
+        "*CLOAD",
+        f"MOMENT_DRIVER, 1, {1e3 * TORQUE / 4:.12g}",
+        "*NODE PRINT, NSET=MOMENT_DRIVER",
+        "U",
+        # CalculiX follows the energy of contact in time, and wants that asked for.
+        "*EL FILE, FREQUENCY=10000",
+        "ENER",
+        "*END STEP",
+    ]
+
+
+def angles_in(text: str) -> tuple[list[float], list[float]]:
+    """Times [s] of the dynamic step and angles [rad] of the driver's hub, from the .dat file."""
+    times, found = [], []
+    for block in re.split(r"displacements \(vx,vy,vz\) for set MOMENT_DRIVER and time", text)[1:]:
+        lines = [line.split() for line in block.splitlines() if line.split()]
+        times.append(float(lines[0][0]))
+        found.append(float(np.mean([float(row[1]) for row in lines[1:] if len(row) == 4])))
+    return times, found
+
+
+def run(work: Path, case: Case, settings: dict[str, Any]) -> dict[str, Any]:
+    """One run of CalculiX. Raises RuntimeError where it fails."""
+    work.mkdir(parents=True, exist_ok=True)
+    text, dte = dynamic_deck(case, **settings)
+    (work / "step.inp").write_text(text)
+    before = time.perf_counter()
+    done = subprocess.run(["ccx", "step"], cwd=work, capture_output=True, text=True, check=False)
+    (work / "step.log").write_text(done.stdout)
+    times, turned = angles_in((work / "step.dat").read_text())
+    if len(times) < settings["steps"]:
+        raise RuntimeError(f"CalculiX stopped after {len(times)} of {settings['steps']} increments")
+    base = profile(case.rig.driver).base_radius
+    start = times[0] - DURATION / settings["steps"]
+    return {
+        **settings,
+        "nodes": text.count("\n") and sum(len(g.points) for g in _meshes(case, settings["across"])),
+        "seconds": round(time.perf_counter() - before, 1),
+        "static_um": 1e6 * dte,
+        "time": [round(t - start, 12) for t in times],
+        "dte_um": [round(1e6 * base * angle, 9) for angle in turned],
+    }
+
+
+def _meshes(case: Case, across: float) -> list[GearMesh]:
+    _coarsen(across)
+    return [gear.mesh for gear in calculix.contact_model(case, 0.0, torque=TORQUE).deck.gears]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--work", type=Path, required=True)
+    parser.add_argument("--across", type=float, default=5.0)
+    parser.add_argument("--penalty", type=float, default=1.0)
+    parser.add_argument("--steps", type=int, default=48)
+    parser.add_argument("--alpha", type=float, default=-0.05)
+    given = parser.parse_args()
+    settings = {name: getattr(given, name) for name in ("across", "penalty", "steps", "alpha")}
+    case = read_case(CASE)
+    stored = json.loads(RESULT.read_text()) if RESULT.exists() else {"program": "CalculiX 2.20", "runs": []}
+    stored["runs"] = [r for r in stored["runs"] if any(r[k] != v for k, v in settings.items())]
+    stored["runs"].append(run(given.work, case, settings))
+    RESULT.write_text(json.dumps(stored, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()
