@@ -310,7 +310,8 @@ def let_go(machine: Machine, scheme: Scheme, new: Stage, room: Room) -> None:
         new.d[i] = room.d[i] + scheme.beta * scheme.step * scheme.step * new.a[i]
 
 
-@compiled(fastmath=ROUNDING, **INLINED)
+# Taken into its one caller before types are inferred: compiled apart it would be compiled twice.
+@compiled(inline="always")
 def try_step(
     machine: Machine, scheme: Scheme, old: Stage, known: int, new: Stage, t: float, lately: float, torque: float,
     room: Room,

@@ -99,7 +99,8 @@ def advance(machine: Machine, scheme: Scheme, state: State, torque: Array, subst
     `columns`, and how the run went. Where contact is not found in a step, that step is halved, and its halves again,
     down to one part of PARTS, the torque in between being interpolated.
     """
-    samples = np.zeros((len(torque) // substeps, CHANNELS))
+    # Every column in one piece, however many rows: other strides would be compiled anew.
+    samples = np.zeros((CHANNELS, len(torque) // substeps)).T
     stages = staged(state), make_stage(len(state.d))
     begin = Run(state.t, state.lately, state.torque, len(state.pairs), -1, False)
     run = integrate(machine, scheme, *stages, begin, torque, substeps, columns(samples), make_room(machine))

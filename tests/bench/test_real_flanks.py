@@ -72,6 +72,7 @@ def at_rest(file: Path) -> xr.Dataset:
     return static(make(file, PITCH, *RELIEF, *RUNOUT), positions=100, cycles=TEETH)
 
 
+@pytest.mark.validation
 def test_the_slow_transient_is_the_static_response(file: Path, at_rest: xr.Dataset) -> None:
     """Both periods of six mesh cycles make one turn of both gears, which is what repeats."""
     record = simulate(make(file, PITCH, *RELIEF, *RUNOUT))

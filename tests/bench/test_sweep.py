@@ -51,6 +51,7 @@ def resonance(stiffness: float) -> float:
     return float(np.sqrt(stiffness / MESH_MASS)) / 62
 
 
+@pytest.mark.validation
 def test_teeth_that_part_soften_the_mesh_and_the_answer_jumps() -> None:
     case = make_case("rig.damping.mesh_ratio=0.008", "rig.support.damping_n_s_per_m=1e3")
     speeds = resonance(3.1e8) * np.linspace(0.86, 1.08, 23)

@@ -107,6 +107,7 @@ def test_a_corner_out_of_reach_is_left_alone(rig: Any, gear: Any) -> None:
     assert all(tooth.corner == -1.0 for tooth in teeth_of(found))
 
 
+@pytest.mark.validation
 def test_static_cycle_of_an_undercut_pair(rig: Any, gear: Any) -> None:
     """Contact comes and goes over the corner without a jump, and the cycle reads the same from the wheel's side."""
     pinion, wheel = gear(10, hub_radius=7e-3, thinning=0.0), gear(30, hub_radius=25e-3, thinning=0.0)

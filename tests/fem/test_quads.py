@@ -70,6 +70,7 @@ def torque(rig: Rig, size: float, element: Element) -> np.ndarray:
     return static_cycle(law, PHASES, dte=[15e-6]).torque_driver[0]
 
 
+@pytest.mark.validation
 def test_torque_is_that_of_triangles(gear: Any, rig: Any) -> None:
     """Over the whole cycle to 0.1 % on gears that differ in teeth, shift and hub; rows_static halves the mesh."""
     driver = gear(19, profile_shift=0.2, hub_radius=13e-3)
@@ -78,6 +79,7 @@ def test_torque_is_that_of_triangles(gear: Any, rig: Any) -> None:
     np.testing.assert_allclose(found, torque(case, 1 / 6, "triangle"), rtol=1e-3)
 
 
+@pytest.mark.validation
 def test_modes_are_those_of_triangles(gear: Any) -> None:
     quads = condense(gear(), STEEL, 0.5e-3, 8, "quadrilateral")
     triangles = condense(gear(), STEEL, 0.5e-3, 8)

@@ -84,7 +84,7 @@ def test_any_pair_is_made_or_refused_in_a_sentence(rig: Rig) -> None:
         assert not np.isinf(row.value) or "sliding" in row.name
 
 
-@settings(max_examples=60, **SETTLED)
+@settings(max_examples=25, **SETTLED)
 @given(likely_pair())
 def test_no_pair_that_is_made_overlaps(rig: Rig) -> None:
     try:
@@ -130,7 +130,7 @@ def _between_all(tooth: Profile, part: np.ndarray) -> np.ndarray:
     return tooth.rho_form + part * (tooth.rho_end - tooth.rho_form)
 
 
-@settings(max_examples=60, **SETTLED)
+@settings(max_examples=20, **SETTLED)
 @given(likely_gear())
 def test_the_mesh_of_every_gear_is_valid(gear: Gear) -> None:
     tooth = made(gear)

@@ -118,6 +118,7 @@ def test_identify_refuses_in_one_sentence(done: Path, tmp_path: Path, capsys: py
     assert not Path(out).exists()
 
 
+@pytest.mark.validation
 def test_compare_with_a_stiffer_rig(done: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     other, out = tmp_path / "heavy", tmp_path / "compared"
     heavy = small(experiment__torque_mean_nm="300")

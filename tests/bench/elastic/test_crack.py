@@ -29,6 +29,7 @@ def rig(driver: Crack | None = None, driven: Crack | None = None) -> Rig:
 CUT = Crack(tooth=3, length=1.2e-3, direction=radians(60))
 
 
+@pytest.mark.validation
 def test_the_loss_makes_the_lumped_tooth_grow_by_what_the_crack_adds() -> None:
     wheel, material = gear(CUT), Material()
     shape = profile(wheel)

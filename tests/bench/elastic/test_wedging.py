@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 
 import numpy as np
+import pytest
 
 import gearbench as gb
 from gearbench.geometry import pair
@@ -19,6 +20,7 @@ def said(thinning_um: float) -> tuple[str, float]:
     return str(found.attrs.get("warnings", "")), float(found["load_share"].sum("pair").min())
 
 
+@pytest.mark.validation
 def test_wedged_teeth_are_said_and_the_backlash_named_frees_them() -> None:
     words, least = said(0.0)
     assert "the teeth wedge" in words and least < 0.9

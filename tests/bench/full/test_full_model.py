@@ -37,6 +37,7 @@ def case_with(*settings: str) -> Case:
     return read_case(case_path("quick_fe"), [*SETTINGS, *settings])
 
 
+@pytest.mark.validation
 def test_record_is_close_to_the_reduced_model_s() -> None:
     case = case_with()
     full, reduced = simulate(case, "full"), simulate(case, "reduced")

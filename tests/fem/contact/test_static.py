@@ -155,6 +155,7 @@ def test_te_vanishes_with_the_load(unequal: Any) -> None:
     assert np.all(te[0] > 1e-3 / TORQUE * te[1])
 
 
+@pytest.mark.validation
 def test_plane_strain_is_stiffer_as_converged_pairs_are(gear: Any, twins: Any) -> None:
     """Physics 4: 7.5-8.4 %."""
     strain = Material(state="plane-strain")

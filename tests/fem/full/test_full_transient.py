@@ -100,6 +100,7 @@ def test_flanks_store_what_they_take(build: Callable[..., Machine]) -> None:
     assert np.abs(taken - (stored[1:] - stored[0])).max() < 1e-4 * np.ptp(stored)
 
 
+@pytest.mark.validation
 def test_order_of_the_step_is_two(build: Callable[..., Machine]) -> None:
     """Steps h, h/2, h/4 against h/16: the driver's rotation under a torque that swells, one pair in contact."""
     machine, duration = build(5.0, beta=1e-6, damping=2e3, stiffness=5e7, inertia=2e-3), 1.6e-3

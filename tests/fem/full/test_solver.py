@@ -113,6 +113,7 @@ def test_patches_move_smoothly(own: Any) -> None:
     assert rough[0] / rough[1] == pytest.approx(4.0, rel=0.1)
 
 
+@pytest.mark.validation
 def test_modes_of_the_gear_free_of_supports(own: Any, whole: Any) -> None:
     """Natural frequencies of hub and gear together, by inverse iteration with our own solver and Schur complement,
     against scipy's of the whole mesh whose hub nodes follow a rigid body."""

@@ -44,6 +44,7 @@ def test_flank_kernels_are_reciprocal(small: CondensedGear) -> None:
 REFINEMENT = [(1 / 4, 5e-4), (1 / 8, 2.5e-4), (1 / 12, 1.5e-4)]
 
 
+@pytest.mark.validation
 def test_the_kernel_converges_with_the_mesh(gear: Any) -> None:
     wheel = gear()
     fine = condense(wheel, STEEL, wheel.module / 20, 0)
@@ -185,6 +186,7 @@ def cut_sector(points: np.ndarray, triangles: np.ndarray, teeth: int, hub_radius
     return SectorMesh(points, triangles, teeth, low, high, hub, np.empty((0, 3), dtype=np.int64))
 
 
+@pytest.mark.validation
 def test_the_energy_of_a_loaded_tooth_converges_at_order_four(gear: Any) -> None:
     """A smooth body load on one tooth; quadratic elements halve twice on the same curved geometry.
 

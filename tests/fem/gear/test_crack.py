@@ -87,6 +87,7 @@ def teeth(gear: Any) -> dict[float, CondensedGear]:
     return {part: condense(cracked(gear(), part * 3e-3), STEEL, 0.5e-3, 0) for part in (0.01, 0.02, 0.3, 0.6)}
 
 
+@pytest.mark.validation
 def test_the_crack_vanishes_with_the_square_of_its_length(teeth: dict[float, CondensedGear]) -> None:
     """A short edge crack takes energy in proportion to a^2: what it adds does so too, and goes to nothing."""
     added = [np.abs(teeth[part].crack.extra).max() for part in (0.01, 0.02)]  # type: ignore[union-attr]
@@ -110,6 +111,7 @@ def test_longer_cracks_soften_more_and_reciprocity_holds(teeth: dict[float, Cond
     assert least > -1e-4 * most
 
 
+@pytest.mark.validation
 def test_mesh_halved(teeth: dict[float, CondensedGear], gear: Any) -> None:
     fine = condense(cracked(gear(), 0.9e-3), STEEL, 0.25e-3, 0)
     coarse = teeth[0.3]

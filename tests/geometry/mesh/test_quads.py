@@ -100,6 +100,7 @@ def solid_volumes(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
     return (polygon + parabolas) * height
 
 
+@pytest.mark.validation
 @pytest.mark.parametrize("element", ["triangle", "quadrilateral"])
 def test_swept_gear_has_the_volume_of_its_profile(tmp_path: Path, gear: MakeGear, element: str) -> None:
     one = gear(teeth=12, profile_shift=0.3)

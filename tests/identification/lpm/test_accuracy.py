@@ -127,6 +127,7 @@ def test_choice_refuses_what_no_window_supports() -> None:
         choose_window(spectra, LINES, transient=False, harmonics=8, order=4)
 
 
+@pytest.mark.validation
 def test_choice_at_high_mesh_frequency_takes_the_branches_that_mirror_resonances() -> None:
     """500 Hz mesh: branches that lead from one resonance to the mirror image of another count again after many that do
     not. Error against the exact ITF, within a quarter of the best of many prescribed choices."""

@@ -334,16 +334,24 @@ def test_an_attribute_of_the_wrong_kind_is_refused_by_name(
         gb.validate_record(rigs["free"].assign_attrs({name: value}))
 
 
+SETTINGS = gb.IdentificationSettings(harmonics=40, order=2, window=8, band=(500.0, 2500.0), phases=32)
+
+
+@pytest.fixture(scope="module")
+def measured() -> tuple[xr.Dataset, xr.Dataset]:
+    """A record that nothing is wrong with, and what is identified from it."""
+    record = bare(gb.simulate(gb.read_case("quick_lumped", ["experiment.realisations=40"])))
+    return record, gb.identify([record], SETTINGS)
+
+
 @pytest.mark.parametrize(
     "change",
     [clip("torque_driver", 0.5), clip("torque_driver", 0.8), late("torque_driver", 1), late("torque_driver", 3)],
     ids=["clipped at half", "clipped at 0.8", "one sample late", "three samples late"],
 )
-def test_expected_error_covers_what_is_only_warned_of(change: Change) -> None:
-    case = gb.read_case("quick_lumped", ["experiment.realisations=40"])
-    record = bare(gb.simulate(case))
-    settings = gb.IdentificationSettings(harmonics=40, order=2, window=8, band=(500.0, 2500.0), phases=32)
-    sound, spoilt = gb.identify([record], settings), gb.identify([change(record)], settings)
+def test_expected_error_covers_what_is_only_warned_of(measured: tuple[xr.Dataset, xr.Dataset], change: Change) -> None:
+    record, sound = measured
+    spoilt = gb.identify([change(record)], SETTINGS)
     error = np.linalg.norm(gb.itf(spoilt) - gb.itf(sound)) / np.linalg.norm(gb.itf(sound))
     assert error < 2.0 * spoilt.attrs["expected_error"]
     assert spoilt.attrs["expected_error"] > 1.5 * sound.attrs["expected_error"]
