@@ -133,6 +133,7 @@ def test_static_cycle_of_an_undercut_pair(rig: Any, gear: Any) -> None:
         assert np.abs(np.diff(te)).max() < 0.02 * te.max() and np.abs(np.diff(share)).max() < 0.02
 
 
+@pytest.mark.validation
 def test_equal_undercut_gears_change_roles(rig: Any, gear: Any) -> None:
     """Both flanks end on corners, and before a tip edge passes its mate's corner it lies on the flank beyond. Seen in a
     mirror driver and driven gear of an equal pair change roles: T1 at a phase is T2 at the mirrored one."""

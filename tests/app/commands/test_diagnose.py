@@ -192,6 +192,7 @@ def test_whatever_a_name_holds_stays_text() -> None:
     assert sum(wild in word for word in held.words) == 6  # title, p, li, th, td, legend
 
 
+@pytest.mark.validation
 def test_the_place_and_the_probability_are_told_without_an_effect(
     records: list[Path], tmp_path: Path, asked: dict, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -22,7 +22,7 @@ SMALL = {
     "experiment.samples_per_period": "2048",
     "experiment.sampling_rate_hz": "8192",
     "experiment.multisine.band_hz": "[4, 2500]",
-    "identification.band_hz": "[4, 2500]",
+    "identification.band_hz": "[4, 1400]",
     "identification.harmonics": "12",
     "identification.order": "1",
     "identification.window": "6",
@@ -93,7 +93,7 @@ def test_same_case_resumes_and_another_is_refused(done: Path, capsys: pytest.Cap
 
 def test_identify_gives_what_the_run_gave(done: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "frf.nc"
-    arguments = ["identify", str(done / "record.nc"), "--out", str(out), "--band-hz", "4", "2500", "--json"]
+    arguments = ["identify", str(done / "record.nc"), "--out", str(out), "--band-hz", "4", "1400", "--json"]
     arguments += ["--harmonics", "12", "--order", "1", "--window", "6"]
     assert run_command_line(arguments) == 0
     assert json.loads(capsys.readouterr().out)["unknowns"] == 50  # (2 x 12 + 1) branches x 2 coefficients

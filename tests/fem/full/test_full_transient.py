@@ -83,6 +83,7 @@ def test_energy_is_accounted_for_at_every_step(build: Callable[..., Machine], ra
     assert abs(total.frame) < 1e-3 * total.work
 
 
+@pytest.mark.validation
 def test_numerical_loss_falls_with_the_square_of_the_step(build: Callable[..., Machine]) -> None:
     lost = []
     for steps in (40, 80, 160):

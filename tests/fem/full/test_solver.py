@@ -48,6 +48,7 @@ def whole(own: tuple[Gear, FullGear]) -> tuple[csr_matrix, csr_matrix, csr_matri
     return stiffness * width, mass * (width * density), to_field, mesh.points
 
 
+@pytest.mark.validation
 def test_sectors_give_the_solution_of_the_whole_mesh(own: Any, whole: Any) -> None:
     """Random forces on every unknown of every sector; scipy's factors of the gear in one piece are the truth."""
     _, full = own

@@ -42,6 +42,7 @@ def dofs(nodes: np.ndarray) -> np.ndarray:
     return (2 * np.asarray(nodes)[:, None] + np.arange(2)).ravel()
 
 
+@pytest.mark.validation
 def test_ring_with_one_cracked_sector_equals_the_full_mesh(coarse: Any) -> None:
     """Forces on the cracked tooth and on others, cuts included, and a moving hub; one mesh of all, solved directly."""
     teeth, sound = coarse.full.teeth, coarse.sector
@@ -95,6 +96,7 @@ def test_the_crack_vanishes_with_the_square_of_its_length(teeth: dict[float, Con
     assert added[0] < 2e-3 * np.abs(teeth[0.01].front).max()
 
 
+@pytest.mark.validation
 def test_longer_cracks_soften_more_and_reciprocity_holds(teeth: dict[float, CondensedGear]) -> None:
     extras = [gear.crack.extra for gear in teeth.values()]  # type: ignore[union-attr]
     for extra in extras:

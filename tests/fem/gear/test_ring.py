@@ -111,6 +111,7 @@ def modes(coarse: Any) -> Any:
     return found, shapes, free, np.sqrt(squares), vectors, csr_matrix(mass)
 
 
+@pytest.mark.validation
 def test_mode_frequencies_are_those_of_the_full_mesh(modes: Any) -> None:
     found, _, _, omega, _, _ = modes
     np.testing.assert_allclose([m.omega for m in found], omega, rtol=1e-8)

@@ -66,6 +66,7 @@ def test_pressures_carry_the_static_solutions_moments(unequal: Any, phase: float
             assert np.hypot(*p.strips.force) * 0.02 == pytest.approx(one.force, rel=2e-3)
 
 
+@pytest.mark.validation
 def test_sectors_equal_the_whole_gear_solved_at_once(coarse: Any, unequal: Any) -> None:
     """Same loads on the full mesh, assembled by scikit-fem and solved directly."""
     gear = elastic_gear(coarse.gear, STEEL, coarse.gear.module / 3)

@@ -64,6 +64,7 @@ def test_dxf_holds_both_outlines_in_contact(tmp_path: Path, bench: Rig) -> None:
     assert "DRIVER_BORE" not in circles
 
 
+@pytest.mark.validation
 def test_step_holds_both_solids(tmp_path: Path, bench: Rig, capfd: pytest.CaptureFixture[str]) -> None:
     import gmsh
 

@@ -61,6 +61,7 @@ def test_smooth_monodromy_converges_with_order_four() -> None:
     assert orders == pytest.approx(4.0, abs=0.3)
 
 
+@pytest.mark.validation
 def test_piecewise_itf_against_runge_kutta() -> None:
     """Response to cos(w t) of a rectangular k(t), integrated until it repeats: Re of G exp(j w t)."""
     phases, period, frequency = 8, 1 / 160, 480.0
