@@ -48,8 +48,8 @@ class Shelf:
         self._ended: dict[int, Steady] = {}
         self._flushed = time.monotonic()
         self._full = False
-        if folder.exists() and self._owner() != identity:
-            if self._owner() is None and (not folder.is_dir() or any(folder.iterdir())):
+        if folder.exists() and (owner := _owner(folder)) != identity:
+            if owner is None and (not folder.is_dir() or any(folder.iterdir())):
                 raise FileError(f"{folder} is of another origin: it must not exist, or hold what a simulation kept")
             self.clear()
 
@@ -104,11 +104,20 @@ class Shelf:
     def _end(self, number: int) -> Path:
         return self.folder / f"end-{number}.npz"
 
-    def _owner(self) -> str | None:
-        with suppress(OSError, ValueError):
-            about = json.loads((self.folder / _ABOUT).read_text(encoding="utf-8"))
-            return str(about.get("identity")) if isinstance(about, dict) else None
-        return None
+
+
+def discard(folder: Path) -> None:
+    """Remove the folder of a simulation that has ended; one that no simulation has made stays as it is."""
+    if _owner(folder) is not None:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _owner(folder: Path) -> str | None:
+    """The identity of the simulation that has made a folder."""
+    with suppress(OSError, ValueError):
+        about = json.loads((folder / _ABOUT).read_text(encoding="utf-8"))
+        return str(about["identity"]) if isinstance(about, dict) and "identity" in about else None
+    return None
 
 
 class Tape:

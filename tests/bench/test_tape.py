@@ -12,7 +12,7 @@ import xarray as xr
 
 import gearbench as gb
 from gearbench.bench import experiment
-from gearbench.bench.tape import Shelf, leaves, restored
+from gearbench.bench.tape import Shelf, discard, leaves, restored
 from gearbench.files import FileError
 from gearbench.rig import Case
 
@@ -114,6 +114,17 @@ def test_foreign_files_stay(tmp_path: Path) -> None:
     with pytest.raises(FileError, match="another origin"):
         gb.simulate(LINEAR, checkpoints=tmp_path)
     assert (tmp_path / "thesis.tex").exists()
+
+
+def test_only_what_a_simulation_made_is_discarded(tmp_path: Path) -> None:
+    mine, kept = tmp_path / "mine.part", tmp_path / "record.nc.part"
+    mine.mkdir()
+    (mine / "about.json").write_text('{"title": "years of work"}')
+    interrupted(LINEAR, kept, 1)
+    assert (kept / "about.json").exists()
+    discard(mine)
+    discard(kept)
+    assert mine.exists() and not kept.exists()
 
 
 def test_states_come_back_as_they_were() -> None:
