@@ -9,10 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gearbench.bench.results.summary import run_numbers
+from gearbench.files import fingerprint
 from gearbench.geometry.pair.zones import contact_span, fewest_pairs, zone_label
 from gearbench.shell.checkpoints import checkpoints_of
 from gearbench.shell.failure import InputError
-from gearbench.shell.output import Output, claimed, fingerprint
+from gearbench.shell.output import Output, claimed
 from gearbench.shell.progress import Silent, Steps
 from gearbench.words.summary import honest_warning, summary_text
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -34,6 +33,7 @@ from gearbench.bench.record.sensors import check_delays, repeated, sensor_attrib
 from gearbench.bench.refusals.gears import check_gears
 from gearbench.bench.refusals.stated import check_stated
 from gearbench.bench.tape import Shelf, Tape
+from gearbench.files import fingerprint
 from gearbench.geometry import pair
 from gearbench.records import make_record, provenance
 from gearbench.records.provenance import source_digest
@@ -91,13 +91,8 @@ def simulate(
     shape = (case.experiment.realisations, kept_samples(plan, prepared.keep))
     # Filled row by row as realisations end: a hundred long ones are large, and must not be in memory twice.
     channels = {"torque_driver": np.empty(shape)}
-    shelf = None if checkpoints is None else Shelf(Path(checkpoints), _identity(case))
+    shelf = None if checkpoints is None else Shelf(Path(checkpoints), fingerprint(dump_case(case), source_digest()))
     return _record(case, plan, prepared, channels, _realise(case, plan, prepared, channels, report, shelf))
-
-
-def _identity(case: Case) -> str:
-    """Digest of all that decides what a simulation does."""
-    return hashlib.sha256(f"{dump_case(case)}\0{source_digest()}".encode()).hexdigest()
 
 
 def _realise(

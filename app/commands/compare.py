@@ -7,8 +7,9 @@ from typing import Annotated
 
 import typer
 
+from gearbench.files import fingerprint
 from gearbench.shell.options import JsonOption, print_json
-from gearbench.shell.output import claimed, fingerprint
+from gearbench.shell.output import claimed
 
 
 def compare(

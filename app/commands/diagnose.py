@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Callable
 from functools import partial
@@ -11,8 +10,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from gearbench.files import digest_of, fingerprint
 from gearbench.shell.options import JsonOption, SetOption, load_case, print_json
-from gearbench.shell.output import Output, claimed, digest_of, fingerprint
+from gearbench.shell.output import Output, claimed
 from gearbench.shell.progress import Progress
 
 if TYPE_CHECKING:
@@ -139,7 +139,7 @@ def _about(inputs: Inputs) -> tuple[tuple[str, str], ...]:
     from gearbench.records.provenance import package_version, source_digest
     from gearbench.rig import dump_case
 
-    case = hashlib.sha256(dump_case(inputs.nominal).encode()).hexdigest()
+    case = fingerprint(dump_case(inputs.nominal))
     return (
         ("gearbench", package_version()),
         ("sources (SHA-256)", source_digest()[:16]),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import fcntl
-import hashlib
 import json
 import os
 from collections.abc import Callable, Iterator
@@ -12,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from gearbench.files import remove_strays, write_text, write_whole
+from gearbench.files import digest_of, remove_strays, write_text, write_whole
 from gearbench.shell.failure import InputError
 
 _MARK = "run.json"
@@ -63,17 +62,6 @@ class Output:
     def set_mark(self, mark: dict[str, Any]) -> None:
         """Replace that in one step."""
         write_text(self.path(_MARK), json.dumps(mark, indent=2) + "\n")
-
-
-def digest_of(path: Path) -> str:
-    """SHA-256 (hex) of a file."""
-    with path.open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()
-
-
-def fingerprint(*parts: str) -> str:
-    """One digest of all that decides a run: the case, the sources, the options."""
-    return hashlib.sha256("\0".join(parts).encode()).hexdigest()
 
 
 @contextmanager

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from functools import lru_cache
 from math import ceil, log, pi
 from pathlib import Path
@@ -18,6 +17,7 @@ from gearbench.fem.contact.law import EDGE_SEPARATION, PAIRS, Law
 from gearbench.fem.contact.sharing import newton_step
 from gearbench.fem.contact.static import position, static_cycle
 from gearbench.fem.gear.store import cached, key_for
+from gearbench.files import digest_of
 from gearbench.geometry import Pair, pair
 from gearbench.geometry.tooth.profile import involute
 from gearbench.kernels.compiled import compiled
@@ -97,7 +97,7 @@ def _table_load(meshing: Pair, load_max: float) -> float:
 @lru_cache(maxsize=1)
 def _source() -> str:
     """Hash of this file: tables that another state of it has solved are not taken from disk."""
-    return hashlib.sha256(Path(__file__).read_bytes()).hexdigest()
+    return digest_of(Path(__file__))
 
 
 @compiled

@@ -173,14 +173,6 @@ def table_at(table: Array, x: float, y: float) -> float:
     return table_between(table, place_at(x), place_at(y))
 
 
-@compiled
-def row_at(row: Array, x: float) -> float:
-    """Cubic value of a (n,) row at grid position x."""
-    j = first_node(x)
-    b0, b1, b2, b3 = lagrange(x - j)
-    return b0 * row[j] + b1 * row[j + 1] + b2 * row[j + 2] + b3 * row[j + 3]
-
-
 @compiled(forceinline=True)
 def cross_between(kernel: Kernel, side_load: int, load: Place, side: int, at: Place, teeth_apart: int) -> float:
     """Inward displacement at a place of one flank per total force at another, `teeth_apart` teeth ccw [m/N].
@@ -213,9 +205,3 @@ def crack_between(kernel: Kernel, side_load: int, load: int, at_load: Place, sid
     if kernel.cracked < 0 or abs(a) > reach or abs(b) > reach:
         return 0.0
     return table_between(kernel.extra[a + reach, b + reach, side_load, side], at_load, at)
-
-
-@compiled
-def crack_flexibility(kernel: Kernel, side_load: int, load: int, x_load: float, side: int, tooth: int, x: float):
-    """`crack_between` grid positions."""
-    return crack_between(kernel, side_load, load, place_at(x_load), side, tooth, place_at(x))

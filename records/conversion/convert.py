@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -12,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
+from gearbench.files import digest_of
 from gearbench.records.conversion.attributes import (
     Attributes,
     declared_mesh_period,
@@ -148,7 +148,7 @@ def _divided(column: Column, length: int, total: int, channel_map: ChannelMap) -
 
 
 def _origin(paths: Sequence[str | Path], source: Source, channel_map: ChannelMap, attributes: Attributes) -> str:
-    files = [{"name": Path(path).name, "sha256": _digest(Path(path))} for path in paths]
+    files = [{"name": Path(path).name, "sha256": digest_of(Path(path))} for path in paths]
     settings = {
         "converted": files,
         "format": source.format,
@@ -156,11 +156,3 @@ def _origin(paths: Sequence[str | Path], source: Source, channel_map: ChannelMap
         "attributes": json.loads(json.dumps(attributes)),
     }
     return provenance("", None, settings)
-
-
-def _digest(path: Path) -> str:
-    digest = hashlib.sha256()
-    with path.open("rb") as stream:
-        while block := stream.read(2**20):
-            digest.update(block)
-    return digest.hexdigest()

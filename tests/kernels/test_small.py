@@ -1,11 +1,12 @@
-"""Small dense and arrow-shaped systems against numpy."""
+"""Small dense systems against numpy."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from gearbench.kernels.small import arrow_factor, arrow_solve, arrow_times, eliminate, plus, times
+from gearbench.kernels.compiled import compiled
+from gearbench.kernels.small import eliminate, invert, solve_in_place
 
 
 @pytest.mark.parametrize(("n", "m"), [(1, 1), (3, 1), (5, 2), (40, 3), (0, 1)])
@@ -20,21 +21,31 @@ def test_elimination_changes_rows_at_a_zero_pivot() -> None:
     np.testing.assert_allclose(eliminate(system)[:, 0], [1.0, 2.0])
 
 
-def test_arrow() -> None:
-    rng = np.random.default_rng(4)
-    corner, diagonal = rng.standard_normal((3, 9)), 20.0 + rng.random(12)
-    matrix = np.diag(diagonal)
-    matrix[:3, 3:], matrix[3:, :3] = corner, corner.T
-    x = rng.standard_normal(12)
-    np.testing.assert_allclose(arrow_times(diagonal, corner, x), matrix @ x)
-    half = np.diag(diagonal) + 0.5 * (matrix - np.diag(diagonal))
-    factor = arrow_factor(diagonal, corner, 0.5)
-    np.testing.assert_allclose(factor, np.linalg.inv(half)[:3, :3], rtol=1e-9)
-    np.testing.assert_allclose(arrow_solve(factor, diagonal, corner, 0.5, x), np.linalg.solve(half, x), rtol=1e-9)
+@compiled
+def solved(system: np.ndarray, n: int) -> None:
+    solve_in_place(system, n)
 
 
-def test_products() -> None:
-    rng = np.random.default_rng(5)
-    a, x = rng.standard_normal((4, 6)), rng.standard_normal(6)
-    np.testing.assert_allclose(times(a, x), a @ x)
-    np.testing.assert_allclose(plus(x, -2.0, a[0]), x - 2 * a[0])
+@compiled
+def inverted(matrix: np.ndarray, inverse: np.ndarray) -> None:
+    invert(matrix, inverse)
+
+
+@pytest.mark.parametrize("n", [1, 2, 7])
+def test_solution_in_place_uses_only_its_part(n: int) -> None:
+    system = np.random.default_rng(n).standard_normal((9, 9))
+    system[0, 0] = 0.0 if n > 1 else 2.0  # rows have to change places
+    wanted = np.linalg.solve(system[:n, :n], system[:n, n])
+    rest = system[n:].copy()
+    solved(system, n)
+    np.testing.assert_allclose(system[:n, n], wanted, rtol=1e-9)
+    np.testing.assert_array_equal(system[n:], rest)
+
+
+@pytest.mark.parametrize("n", [1, 3, 8])
+def test_inverse(n: int) -> None:
+    matrix = np.random.default_rng(n).standard_normal((n, n))
+    matrix[0, 0] = 0.0 if n > 1 else 2.0
+    wanted, inverse = np.linalg.inv(matrix), np.empty((n, n))
+    inverted(matrix.copy(), inverse)
+    np.testing.assert_allclose(inverse, wanted, rtol=1e-9, atol=1e-12)

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from gearbench.files import fingerprint
 from gearbench.shell.failure import InputError
-from gearbench.shell.output import claimed, fingerprint
+from gearbench.shell.output import claimed
 
 
 def test_resumes_the_same_and_refuses_another(tmp_path: Path) -> None:
