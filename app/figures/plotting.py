@@ -63,9 +63,11 @@ def closed(phase: Array, values: Array, period: float = 1.0) -> tuple[Array, Arr
 
 
 def phase_axis(axes: Any, period: float = 1.0, label: str = PHASE) -> None:
-    """Mesh phase as abscissa: from 0 to the end of the period, with a tick at both."""
+    """Mesh phase as abscissa: from 0 to the end of the period, with a tick at both and round numbers between."""
     axes.set_xlim(0.0, period)
-    axes.set_xticks(np.linspace(0.0, period, 6 if period <= 1.0 else min(int(np.ceil(period)), 8) + 1))
+    step = 0.2 if period <= 1.0 else next(s for e in range(9) for s in (10**e, 2 * 10**e, 5 * 10**e) if 8 * s >= period)
+    between = np.arange(0.0, period - step / 2, step)
+    axes.set_xticks([*between, period])
     axes.set_xlabel(label)
 
 

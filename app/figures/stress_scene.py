@@ -65,7 +65,8 @@ def render_fields(fields: PairFields, module: float, path: Path) -> None:
     quadratic = {pyvista.CellType.QUADRATIC_TRIANGLE: fields.mesh.cells}
     scene: Any = pyvista.Plotter(off_screen=True, shape=(1, 2), window_size=[1600, 850], border=False)
     (x, y), half = view(fields, module)
-    names = ("von Mises\n[MPa]", "principal\n[MPa]")
+    # What each shows its heading says. The first line of a title is outside of its box; two of one name share a bar.
+    names = ("\nMPa", "\n MPa")
     values = (fields.von_mises, fields.principal[:, 0])
     for column, (name, value, top) in enumerate(zip(names, values, limits(fields, module), strict=True)):
         grid = pyvista.UnstructuredGrid(quadratic, points)
