@@ -91,7 +91,8 @@ def _draw_curves(path: Path, title: str, unit: str, curves: list[tuple[str, Arra
     with figure(panels, 1, (8.0, 4.4 + 1.6 * (panels - 1)), sharex=True, squeeze=False) as (drawing, axes):
         for number, (colour, (name, curve)) in enumerate(zip((BLUE, ORANGE), curves, strict=True)):
             panel = axes[number % panels, 0]
-            panel.plot(*closed(phase, curve), color=colour, label=f"{'ab'[number]}: {name}")
+            # The first one broad, so that it is seen where both are the same.
+            panel.plot(*closed(phase, curve), color=colour, lw=(3.0, 1.2)[number], label=f"{'ab'[number]}: {name}")
             panel.set_ylabel(unit)
             panel.margins(y=0.25)
             panel.legend(loc="upper center", ncols=2)
