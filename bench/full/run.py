@@ -60,6 +60,7 @@ class Full:
         return {
             "model": "full",
             "substeps": self.substeps,
+            "contact": "penalty" if self.integrator.machine.surfaces else "law",
             "unknowns_driver": one.free,
             "unknowns_driven": two.free,
         }
@@ -134,9 +135,11 @@ def full_gears(rig: Rig, simulation: Simulation, note: Note) -> tuple[FullGear, 
     return driver, make_gear(rig.driven, rig.material, simulation.element_size)
 
 
-def full_machine(elastic: ElasticRig, gears: tuple[FullGear, FullGear], mesh_frequency: float) -> Machine:
-    """Equations of motion at a mesh frequency [Hz]."""
-    return make_machine(elastic.rig, elastic.pair, elastic.law, gears, elastic.bodies, mesh_frequency)
+def full_machine(
+    elastic: ElasticRig, gears: tuple[FullGear, FullGear], mesh_frequency: float, surfaces: bool = False
+) -> Machine:
+    """Equations of motion at a mesh frequency [Hz]; surfaces: whether the meshes' own surfaces touch."""
+    return make_machine(elastic.rig, elastic.pair, elastic.law, gears, elastic.bodies, mesh_frequency, surfaces)
 
 
 def prepare(case: Case, plan: Schedule, note: Note) -> Full:
@@ -144,7 +147,8 @@ def prepare(case: Case, plan: Schedule, note: Note) -> Full:
     ContactError or BenchError."""
     elastic = elastic_rig(case.rig, case.simulation, note)
     substeps = choose_substeps(machine_for(elastic, plan.mesh_frequency), case, plan)
-    machine = full_machine(elastic, full_gears(case.rig, case.simulation, note), plan.mesh_frequency)
+    gears = full_gears(case.rig, case.simulation, note)
+    machine = full_machine(elastic, gears, plan.mesh_frequency, case.simulation.contact == "penalty")
     note("factorising the effective matrices")
     scheme = make_scheme(1.0 / (plan.sampling_rate * substeps), case.simulation.spectral_radius)
     return Full(

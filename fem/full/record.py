@@ -61,7 +61,7 @@ def advance(integrator: Integrator, state: State, torque: Array, substeps: int =
         out.angle_driver[k], out.angle_driven[k] = at
         out.y_driver[k], out.y_driven[k] = hub[r], hub[r + 1]
         out.torque_driven[k] = step.torque_driven
-        out.loaded[k] = np.count_nonzero(state.force > 0.0)
+        out.loaded[k] = len(np.unique(state.pairs[["side", "tooth"]][state.force > 0.0]))
         dx, dy = machine.axis * (hub[r + 1] - hub[r])
         if off_flanks(machine.law, at.driver, at.driven, machine.law.centre + dx, dy):
             return Run(state, samples, False, True)

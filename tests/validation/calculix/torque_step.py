@@ -102,7 +102,7 @@ def _dynamic_step(steps: int, alpha: float) -> list[str]:
         "*NODE PRINT, NSET=MOMENT_DRIVER",
         "U",
         # CalculiX follows the energy of contact in time, and wants that asked for.
-        "*EL FILE, FREQUENCY=10000",
+        "*EL FILE",
         "ENER",
         "*END STEP",
     ]
