@@ -117,7 +117,7 @@ def _look(case: Case, solver: Model, speed: float, before: Any) -> tuple[Look, A
     drive = prepared.drive(Torque(there.experiment.torque_mean))
     state = prepared.start(0) if before is None else prepared.resume(before)
     rate = there.experiment.sampling_rate
-    wait = ceil(log(1 / TRANSIENT) / max(prepared.settling, 1.0) * rate / (SAMPLES * CYCLES))
+    wait = max(ceil(log(1 / TRANSIENT) / max(prepared.settling, 1.0) * rate / (SAMPLES * CYCLES)), 1)
     block = SAMPLES * CYCLES
     outputs: Array | None = None
     residual = np.inf
