@@ -17,6 +17,7 @@ from gearbench.bench.plan.settling import Keep
 from gearbench.bench.protocol import Channels, Drive, Note
 from gearbench.bench.record.attributes import turning_inertias
 from gearbench.bench.record.channels import (
+    PAIRS,
     across_factor,
     dte_of,
     generalised_force,
@@ -64,6 +65,7 @@ class Elastic:
     mean_torque: float
     sampling_rate: float
     samples_per_period: int
+    teeth: bool = False  # whether a record holds tooth forces
 
     keep: ClassVar[Keep] = "every"
     piece: ClassVar[int] = 512
@@ -164,6 +166,7 @@ class Elastic:
             x_driver=out.x_driver if across else None,
             x_driven=out.x_driven if across else None,
             torque_driver=applied if held else None,
+            tooth_force={name: getattr(out, name) for name in (*PAIRS, "back")} if self.teeth else None,
         )
 
     def divided(self, outputs: Array) -> int:
@@ -188,4 +191,5 @@ def prepare(case: Case, plan: Schedule, note: Note) -> Elastic:
         mean_torque=case.experiment.torque_mean,
         sampling_rate=plan.sampling_rate,
         samples_per_period=plan.samples_per_period,
+        teeth=case.simulation.outputs == "teeth",
     )

@@ -14,7 +14,7 @@ from gearbench.bench.plan.excitation import Torque
 from gearbench.bench.plan.schedule import Schedule
 from gearbench.bench.plan.settling import Keep
 from gearbench.bench.protocol import Channels, Drive, Note
-from gearbench.bench.record.channels import dte_of, force_of, support_factor, turned_by
+from gearbench.bench.record.channels import PAIRS, dte_of, force_of, support_factor, turned_by
 from gearbench.fem.contact.curve import EDGE_SEPARATION
 from gearbench.fem.full.gear import FullGear, make_gear
 from gearbench.fem.full.machine import Machine, make_machine
@@ -47,6 +47,7 @@ class Full:
     mean_torque: float
     sampling_rate: float
     samples_per_period: int
+    teeth: bool = False  # whether a record holds tooth forces
 
     keep: ClassVar[Keep] = "every"
     piece: ClassVar[int] = 8
@@ -116,6 +117,7 @@ class Full:
             y_driven=out.y_driven,
             dte=dte,
             force=force_of(torque, self.elastic.pair),
+            tooth_force={name: getattr(out, name) for name in (*PAIRS, "back")} if self.teeth else None,
         )
 
     def apart(self, outputs: Array) -> NDArray[np.bool_]:
@@ -158,4 +160,5 @@ def prepare(case: Case, plan: Schedule, note: Note) -> Full:
         mean_torque=case.experiment.torque_mean,
         sampling_rate=plan.sampling_rate,
         samples_per_period=plan.samples_per_period,
+        teeth=case.simulation.outputs == "teeth",
     )
