@@ -28,7 +28,7 @@ from gearbench.bench.record.attributes import (
     shown_mean,
     unlike_periods,
 )
-from gearbench.bench.record.channels import mesh_phases, sensed, with_rotation
+from gearbench.bench.record.channels import mesh_phases, sensed, tooth_channels, with_rotation
 from gearbench.bench.record.sensors import check_delays, repeated, sensor_attributes
 from gearbench.bench.refusals.gears import check_gears
 from gearbench.bench.refusals.stated import check_stated
@@ -130,7 +130,9 @@ def _realise(
                 shelf.end(number, steady)
         torque = repeated(drive.torque, len(steady.outputs))
         channels["torque_driver"][number] = torque
-        for name, values in prepared.channels(steady.outputs, torque)._asdict().items():
+        found = prepared.channels(steady.outputs, torque)
+        teeth = tooth_channels(found.tooth_force) if found.tooth_force is not None else {}
+        for name, values in {**found._asdict(), "tooth_force": None, **teeth}.items():
             if values is not None:
                 with lock:
                     rows = channels.setdefault(name, np.empty_like(channels["torque_driver"]))
@@ -219,8 +221,10 @@ def _record(
     if has_sensors(case.rig):
         seed = case.experiment.seed
         swings = with_rotation(channels, plan, begin, -1.0) if prepared.absolute else channels
+        teeth = {name: values for name, values in channels.items() if name.startswith(("tooth_force_", "load_share_"))}
         channels = sensed(swings, case.rig, meshing, plan, samples=samples, seed=seed, first=begin)
         channels = with_rotation(channels, plan, begin) if prepared.absolute else channels
+        channels |= teeth  # no sensor sees them
     channels = {name: repeated(values, samples) for name, values in channels.items()}
     channels = channels if prepared.absolute else with_rotation(channels, plan)
     phase = mesh_phases(plan, samples, begin)

@@ -43,10 +43,20 @@ MODELS: Mapping[str, Callable[[Case], Model]] = {"lumped": _lumped, "reduced": _
 def model_for(case: Case, name: str | None = None) -> tuple[Case, Model]:
     """The case with its simulation.model replaced by `name` (absent: its own), and the model that it runs on.
 
-    Raises BenchError for an unknown model.
+    Raises BenchError for an unknown model, and for a contact or outputs that only others have.
     """
     name = name or case.simulation.model
     if name not in MODELS:
         raise BenchError(f"simulation.model = {name!r} is not one of {', '.join(MODELS)}")
+    if case.simulation.contact == "penalty" and name != "full":
+        raise BenchError(
+            f'simulation.contact = "penalty" is of the model "full" only, and simulation.model = "{name}": set one of'
+            " them"
+        )
+    if case.simulation.outputs == "teeth" and name == "lumped":
+        raise BenchError(
+            'simulation.outputs = "teeth" needs tooth pairs of their own, which simulation.model = "lumped" lacks: set'
+            ' "motion", or the model "reduced" or "full"'
+        )
     chosen = case.model_copy(update={"simulation": case.simulation.model_copy(update={"model": name})})
     return chosen, MODELS[name](chosen)

@@ -37,7 +37,8 @@ class Drive(NamedTuple):
 class Channels(NamedTuple):
     """Channels (n,) of a record over n samples, in SI units, before any sensor. Angles are what is left of them when
     both gears turn steadily, unless the model says that they are `absolute`. x is None where no centre moves across its
-    support, torque_driver where it is the commanded one."""
+    support, torque_driver where it is the commanded one; tooth_force [N]: of working flanks by the names of
+    `record.channels.PAIRS`, and of back flanks, where they are asked for."""
 
     torque_driven: Array
     angle_driver: Array
@@ -49,6 +50,7 @@ class Channels(NamedTuple):
     x_driver: Array | None = None
     x_driven: Array | None = None
     torque_driver: Array | None = None
+    tooth_force: Mapping[str, Array] | None = None
 
 
 class Prepared(Protocol[State]):

@@ -40,8 +40,12 @@ DIRECTIONS = ("up", "down")
 class Sweepable(Protocol):
     """What a `Prepared` offers beside, for a sweep."""
 
+    @property
+    def settling(self) -> float:
+        """Slowest rate [1/s] at which free vibrations die out."""
+
     def resume(self, state: Any) -> Any:
-        """A state that another speed ended with, as the start of this one at mesh phase 0."""
+        """A state that another speed ended with, after whole mesh periods, as the start of this one."""
 
     def mesh_force(self, outputs: Array) -> Array:
         """Force of the mesh (samples,) [N] along the line of action."""
@@ -107,13 +111,13 @@ def _look(case: Case, solver: Model, speed: float, before: Any) -> tuple[Look, A
     prepared = solver.prepare(there, schedule(there.experiment, there.rig), lambda note: None)
     if not isinstance(prepared, Sweepable):
         raise BenchError(
-            f"the {solver.title} of this case cannot be swept over speed: set simulation.model = \"lumped\" and"
-            ' simulation.mesh_stiffness = "finite-element"'
+            f"the {solver.title} of this case cannot be swept over speed: set simulation.model = \"reduced\", or"
+            ' "lumped" and simulation.mesh_stiffness = "finite-element"'
         )
     drive = prepared.drive(Torque(there.experiment.torque_mean))
     state = prepared.start(0) if before is None else prepared.resume(before)
     rate = there.experiment.sampling_rate
-    wait = ceil(log(1 / TRANSIENT) / max(prepared.decay or 1e3, 1.0) * rate / (SAMPLES * CYCLES))
+    wait = max(ceil(log(1 / TRANSIENT) / max(prepared.settling, 1.0) * rate / (SAMPLES * CYCLES)), 1)
     block = SAMPLES * CYCLES
     outputs: Array | None = None
     residual = np.inf

@@ -32,6 +32,8 @@ PREFIX_UNITS: dict[str, str] = {
     "speed_": "rad/s",
     "support_force_": "N",
     "temperature_": "K",
+    "tooth_force_": "N",
+    "load_share_": "1",
 }
 
 # A record serves identification when it holds one of these sets; dte and force are computed from the second.

@@ -100,6 +100,12 @@ class Simulation(Value):
     element: Literal["triangle", "quadrilateral"] = quantity(
         "triangle", doc="elements of the condensed gears; stress is always found on triangles, cracks need them"
     )
+    contact: Literal["law", "penalty"] = quantity(
+        "law", doc="full model: the contact law's flanks, or the elements' own surfaces by augmented Lagrange"
+    )
+    outputs: Literal["motion", "teeth"] = quantity(
+        "motion", doc="motion, or teeth: the record holds their forces and load shares too (reduced and full model)"
+    )
     modes: int = quantity(8, ge=0, le=60, doc="fixed-hub modes kept per gear (reduced model)")
     spectral_radius: float = quantity(
         0.9, ge=0.0, le=1.0, doc="generalised-alpha spectral radius at infinite frequency (reduced and full model)"

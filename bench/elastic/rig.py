@@ -17,7 +17,7 @@ from gearbench.fem.contact.static import position, static_cycle
 from gearbench.fem.contact.store import stored_law
 from gearbench.fem.gear.body import CondensedGear
 from gearbench.fem.gear.store import stored_gear
-from gearbench.fem.motion.hubs import hubs_at_rest, spring_tangent
+from gearbench.fem.motion.hubs import ABSENT, hubs_at_rest, spring_tangent
 from gearbench.fem.motion.imposed import stiffness_factor
 from gearbench.fem.motion.machine import (
     Machine,
@@ -80,6 +80,24 @@ def natural_frequencies(machine: Machine, torque: float, phase: float) -> Array:
 
     The supports' damping is part of them: it may be so strong that their motions do not oscillate.
     """
+    values = eigenvalues(machine, torque, phase)
+    return np.sort(np.abs(values[values.imag > 1e-6 * np.abs(values)])) / (2 * pi)
+
+
+def slowest_decay(machine: Machine, torque: float, phase: float, highest: float) -> float:
+    """Slowest rate [1/s] at which free vibrations below a frequency [Hz] die out, linearised likewise.
+
+    The turning of both gears together, where nothing holds it back, is no vibration.
+    """
+    values = eigenvalues(machine, torque, phase)
+    values = values[np.argsort(np.abs(values))]
+    free = machine.driven_at != ABSENT and machine.loaded_at != ABSENT
+    values = values[2:] if free else values
+    return float(-values[np.abs(values) <= 2 * pi * highest].real.max(initial=-np.inf))
+
+
+def eigenvalues(machine: Machine, torque: float, phase: float) -> NDArray[np.complex128]:
+    """Eigenvalues [1/s] of the rig about static equilibrium under a driver torque [N m] at a mesh phase [cycles]."""
     law, hubs = machine.law, machine.hubs
     factor = stiffness_factor(machine.correction, phase, 0.0)
     dte = static_cycle(law, np.array([phase]), torque=[torque / factor]).transmission_error[0, 0]
@@ -104,8 +122,7 @@ def natural_frequencies(machine: Machine, torque: float, phase: float) -> Array:
             [-np.linalg.solve(mass, stiffness[keep]), -np.linalg.solve(mass, damping)],
         ]
     )
-    values = np.linalg.eigvals(system)
-    return np.sort(np.abs(values[values.imag > 1e-6 * np.abs(values)])) / (2 * pi)
+    return np.asarray(np.linalg.eigvals(system))
 
 
 def choose_substeps(machine: Machine, case: Case, plan: Schedule) -> int:

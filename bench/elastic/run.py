@@ -8,7 +8,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.bench.elastic.rig import ElasticRig, choose_substeps, elastic_rig, machine_for
+from gearbench.bench.elastic.rig import ElasticRig, choose_substeps, elastic_rig, machine_for, slowest_decay
 from gearbench.bench.elastic.together import under_excitation, under_ripple
 from gearbench.bench.errors import BenchError
 from gearbench.bench.plan.excitation import Torque
@@ -17,6 +17,7 @@ from gearbench.bench.plan.settling import Keep
 from gearbench.bench.protocol import Channels, Drive, Note
 from gearbench.bench.record.attributes import turning_inertias
 from gearbench.bench.record.channels import (
+    PAIRS,
     across_factor,
     dte_of,
     generalised_force,
@@ -64,6 +65,7 @@ class Elastic:
     mean_torque: float
     sampling_rate: float
     samples_per_period: int
+    teeth: bool = False  # whether a record holds tooth forces
 
     keep: ClassVar[Keep] = "every"
     piece: ClassVar[int] = 512
@@ -96,6 +98,22 @@ class Elastic:
     def start(self, sample: int) -> State:
         step = initial_state(self.machine, self.mean_torque, sample / self.sampling_rate)
         return State(sample, under_ripple(self.machine, step), np.zeros(CHANNELS), begins=True)
+
+    def resume(self, state: State) -> State:
+        """A state of another speed at a whole mesh period, as the start of this one: the rotation stays, and with it
+        which teeth meet and where their gears' modes stand."""
+        return state._replace(step=state.step._replace(t=state.sample / self.sampling_rate))
+
+    @property
+    def settling(self) -> float:
+        """Slowest rate [1/s] at which free vibrations that samples show die out, about rest."""
+        highest = self.sampling_rate / 4
+        return min(slowest_decay(self.machine, self.mean_torque, phase, highest) for phase in (0.0, 0.5))
+
+    def mesh_force(self, outputs: Array) -> Array:
+        """Force of the mesh (samples,) [N]: of working flanks less that of back flanks."""
+        out = columns(outputs)
+        return np.asarray(out.leaving + out.middle + out.entering - out.back)
 
     def advance(self, drive: Drive, state: State, samples: int) -> tuple[State, Array]:
         first, steps = state.sample * self.substeps, samples * self.substeps
@@ -148,6 +166,7 @@ class Elastic:
             x_driver=out.x_driver if across else None,
             x_driven=out.x_driven if across else None,
             torque_driver=applied if held else None,
+            tooth_force={name: getattr(out, name) for name in (*PAIRS, "back")} if self.teeth else None,
         )
 
     def divided(self, outputs: Array) -> int:
@@ -172,4 +191,5 @@ def prepare(case: Case, plan: Schedule, note: Note) -> Elastic:
         mean_torque=case.experiment.torque_mean,
         sampling_rate=plan.sampling_rate,
         samples_per_period=plan.samples_per_period,
+        teeth=case.simulation.outputs == "teeth",
     )

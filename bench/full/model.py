@@ -30,6 +30,8 @@ class Unreduced(Model):
     def refuse(self, case: Case) -> None:
         from gearbench.bench.refusals.load_range import check_mean_torque
 
+        if case.simulation.contact == "penalty":
+            refuse_effects(case.rig, f'{self.title} with simulation.contact = "penalty"')
         refuse_effects(case.rig, self.title, represented=FLANK_KEYS)
         check_mean_torque(case)
 
@@ -39,7 +41,8 @@ class Unreduced(Model):
         return prepare(case, plan, note)
 
     def static(self, case: Case, loads: Loads, phase: Array, report: ProgressReport) -> xr.Dataset:
-        """That of the reduced model: at rest both obey the same contact law, whatever their meshes."""
+        """That of the reduced model: at rest both obey the same contact law, whatever their meshes. It stands beside
+        a simulation with contact = "penalty" too, whose own surfaces it does not know."""
         from gearbench.bench.elastic.static import static_reduced
 
         return static_reduced(case, loads, phase, report)

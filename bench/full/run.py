@@ -14,7 +14,7 @@ from gearbench.bench.plan.excitation import Torque
 from gearbench.bench.plan.schedule import Schedule
 from gearbench.bench.plan.settling import Keep
 from gearbench.bench.protocol import Channels, Drive, Note
-from gearbench.bench.record.channels import dte_of, force_of, support_factor, turned_by
+from gearbench.bench.record.channels import PAIRS, dte_of, force_of, support_factor, turned_by
 from gearbench.fem.contact.curve import EDGE_SEPARATION
 from gearbench.fem.full.gear import FullGear, make_gear
 from gearbench.fem.full.machine import Machine, make_machine
@@ -47,6 +47,7 @@ class Full:
     mean_torque: float
     sampling_rate: float
     samples_per_period: int
+    teeth: bool = False  # whether a record holds tooth forces
 
     keep: ClassVar[Keep] = "every"
     piece: ClassVar[int] = 8
@@ -60,6 +61,7 @@ class Full:
         return {
             "model": "full",
             "substeps": self.substeps,
+            "contact": "penalty" if self.integrator.machine.surfaces else "law",
             "unknowns_driver": one.free,
             "unknowns_driven": two.free,
         }
@@ -115,6 +117,7 @@ class Full:
             y_driven=out.y_driven,
             dte=dte,
             force=force_of(torque, self.elastic.pair),
+            tooth_force={name: getattr(out, name) for name in (*PAIRS, "back")} if self.teeth else None,
         )
 
     def apart(self, outputs: Array) -> NDArray[np.bool_]:
@@ -134,9 +137,11 @@ def full_gears(rig: Rig, simulation: Simulation, note: Note) -> tuple[FullGear, 
     return driver, make_gear(rig.driven, rig.material, simulation.element_size)
 
 
-def full_machine(elastic: ElasticRig, gears: tuple[FullGear, FullGear], mesh_frequency: float) -> Machine:
-    """Equations of motion at a mesh frequency [Hz]."""
-    return make_machine(elastic.rig, elastic.pair, elastic.law, gears, elastic.bodies, mesh_frequency)
+def full_machine(
+    elastic: ElasticRig, gears: tuple[FullGear, FullGear], mesh_frequency: float, surfaces: bool = False
+) -> Machine:
+    """Equations of motion at a mesh frequency [Hz]; surfaces: whether the meshes' own surfaces touch."""
+    return make_machine(elastic.rig, elastic.pair, elastic.law, gears, elastic.bodies, mesh_frequency, surfaces)
 
 
 def prepare(case: Case, plan: Schedule, note: Note) -> Full:
@@ -144,7 +149,8 @@ def prepare(case: Case, plan: Schedule, note: Note) -> Full:
     ContactError or BenchError."""
     elastic = elastic_rig(case.rig, case.simulation, note)
     substeps = choose_substeps(machine_for(elastic, plan.mesh_frequency), case, plan)
-    machine = full_machine(elastic, full_gears(case.rig, case.simulation, note), plan.mesh_frequency)
+    gears = full_gears(case.rig, case.simulation, note)
+    machine = full_machine(elastic, gears, plan.mesh_frequency, case.simulation.contact == "penalty")
     note("factorising the effective matrices")
     scheme = make_scheme(1.0 / (plan.sampling_rate * substeps), case.simulation.spectral_radius)
     return Full(
@@ -154,4 +160,5 @@ def prepare(case: Case, plan: Schedule, note: Note) -> Full:
         mean_torque=case.experiment.torque_mean,
         sampling_rate=plan.sampling_rate,
         samples_per_period=plan.samples_per_period,
+        teeth=case.simulation.outputs == "teeth",
     )

@@ -87,6 +87,11 @@ class Setup:
         return self.model.slowest_decay(self.mean_force)
 
     @property
+    def settling(self) -> float:
+        """That rate as a sweep asks for it."""
+        return self.decay
+
+    @property
     def settings(self) -> dict[str, Any]:
         return {"model": "lumped", "mesh": "non-linear", "substeps": self.substeps}
 

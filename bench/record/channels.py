@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import cos, pi, sin
 
 import numpy as np
@@ -14,6 +15,9 @@ from gearbench.geometry import Pair
 from gearbench.rig import Rig
 
 Array = NDArray[np.float64]
+
+# Tooth pairs of a record: the one nearest the pitch point, the one that has passed it and the one that comes next.
+PAIRS = ("leaving", "middle", "entering")
 
 
 def support_factor(rig: Rig, meshing: Pair) -> float:
@@ -65,6 +69,15 @@ def generalised_force(rig: Rig, meshing: Pair, driver: Array, driven: Array) -> 
     (r1, r2), (j1, j2) = (meshing.driver.base_radius, meshing.driven.base_radius), turning_inertias(rig, meshing)
     mass = j1 * j2 / (j1 * r2**2 + j2 * r1**2)
     return np.asarray(mass * (r1 * driver / j1 + r2 * driven / j2))
+
+
+def tooth_channels(forces: Mapping[str, Array]) -> dict[str, Array]:
+    """Channels of tooth forces (n,) [N] by `PAIRS` and "back", and the working pairs' shares of the load; a share is 0
+    while no working flanks touch."""
+    total = np.sum([forces[name] for name in PAIRS], axis=0)
+    carried = np.where(total > 0.0, total, 1.0)
+    shares = {f"load_share_{name}": forces[name] / carried for name in PAIRS}
+    return {**{f"tooth_force_{name}": force for name, force in forces.items()}, **shares}
 
 
 def sensed(

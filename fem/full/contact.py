@@ -48,23 +48,27 @@ class Pressed(NamedTuple):
         reach = (len(table) - 1) // 2
         n = len(self.sectors)
         out = np.zeros((n, n))
-        for p in range(n):
-            for q in range(n):
-                apart = (self.sectors[p] - self.sectors[q] + teeth // 2) % teeth - teeth // 2
+        groups = [(int(j), np.flatnonzero(self.sectors == j)) for j in np.unique(self.sectors)]
+        for j, here in groups:
+            for k, there in groups:
+                apart = (j - k + teeth // 2) % teeth - teeth // 2
                 if abs(apart) <= reach:
-                    out[p, q] = self.patches[q] @ table[apart + reach] @ self.patches[p]
+                    moved = self.patches[there] @ table[apart + reach] @ self.patches[here].T
+                    out[np.ix_(here, there)] = moved.T
         return out
 
 
 class Met(NamedTuple):
     """Tooth pairs near contact: derivative (n, h) of their gaps by the hub unknowns, where they press on both gears,
-    rigid overlaps (n,) [m], and coupling (n, n) [m/N] that the meshes lack."""
+    rigid overlaps (n,) [m], coupling (n, n) [m/N] that the meshes lack, and the lever (n,) [m] by which a force turns
+    the driven gear on."""
 
     pairs: Meetings
     rows: Array
     pressed: tuple[Pressed, Pressed]
     over: Array
     cross: Array
+    lever: Array
 
 
 def meet(machine: Machine, at: Angles, y: Array) -> Met:
@@ -84,7 +88,8 @@ def met_pairs(machine: Machine, pairs: Meetings) -> Met:
     cross = coupling(machine.law, pairs)
     for gear, on in zip(machine.gears, pressed, strict=True):
         cross = cross - on.between(gear.compliance, gear.teeth)
-    return Met(pairs, hub_rows(machine, pairs), pressed, overlaps(pairs), cross)
+    lever = (1.0 - 2.0 * pairs["side"]) * pairs["lever2"]
+    return Met(pairs, hub_rows(machine, pairs), pressed, overlaps(pairs), cross, lever)
 
 
 def press(gear: FullGear, teeth: Index, s: Array, side: Index) -> Pressed:

@@ -31,7 +31,8 @@ class Machine:
 
     gears: driver, driven gear; rotations: 1 where the driven speed is prescribed, 2 where both gears turn freely; axis
     (2,): direction of the support motion; mass, damping, stiffness (h,): of the hubs' unknowns, the gears' whole mass
-    included; speeds: nominal [rad/s]; beta [s]: stiffness-proportional damping.
+    included; speeds: nominal [rad/s]; beta [s]: stiffness-proportional damping; surfaces: whether the meshes' own
+    surfaces touch, not the contact law's flanks.
     """
 
     law: Law
@@ -43,6 +44,7 @@ class Machine:
     stiffness: Array
     speeds: tuple[float, float]
     beta: float
+    surfaces: bool = False
 
     @property
     def hubs(self) -> int:
@@ -56,9 +58,15 @@ class Machine:
 
 
 def make_machine(
-    rig: Rig, pair: Pair, law: Law, gears: tuple[FullGear, FullGear], bodies: tuple[Body, Body], mesh_frequency: float
+    rig: Rig,
+    pair: Pair,
+    law: Law,
+    gears: tuple[FullGear, FullGear],
+    bodies: tuple[Body, Body],
+    mesh_frequency: float,
+    surfaces: bool = False,
 ) -> Machine:
-    """The model of a rig at a mesh frequency [Hz]; gears and bodies: driver first."""
+    """The model of a rig at a mesh frequency [Hz]; gears and bodies: driver first; surfaces: as in `Machine`."""
     rotations = 1 if rig.load.boundary == "speed" else 2
     supports = rig.support.driver.holding(bodies[0].mass), rig.support.driven.holding(bodies[1].mass)
     alpha = pair.working_pressure_angle if rig.support.direction == "line-of-action" else 0.0
@@ -73,6 +81,7 @@ def make_machine(
         stiffness=np.concatenate([still, [support.stiffness for support in supports]]),
         speeds=(2 * pi * mesh_frequency / gears[0].teeth, 2 * pi * mesh_frequency / gears[1].teeth),
         beta=rig.damping.beta,
+        surfaces=surfaces,
     )
 
 

@@ -23,6 +23,10 @@ class Samples(NamedTuple):
     y_driven: Array
     torque_driven: Array  # [N m]
     loaded: Array  # number of pairs that carry
+    leaving: Array  # force of the working flanks [N] of the pair that has passed the pitch point by a pitch or so
+    middle: Array  # of the pair nearest the pitch point
+    entering: Array  # of the pair that comes to it next
+    back: Array  # of all back flanks
 
 
 CHANNELS = len(Samples._fields)
@@ -61,7 +65,12 @@ def advance(integrator: Integrator, state: State, torque: Array, substeps: int =
         out.angle_driver[k], out.angle_driven[k] = at
         out.y_driver[k], out.y_driven[k] = hub[r], hub[r + 1]
         out.torque_driven[k] = step.torque_driven
-        out.loaded[k] = np.count_nonzero(state.force > 0.0)
+        out.loaded[k] = len(np.unique(state.pairs[["side", "tooth"]][state.force > 0.0]))
+        apart = state.pairs["tooth"] - np.floor(at.driven / machine.law.driven.pitch + 0.5)
+        working = state.pairs["side"] == 0
+        for name, chosen in (("leaving", apart < 0), ("middle", apart == 0), ("entering", apart > 0)):
+            getattr(out, name)[k] = state.force[working & chosen].sum()
+        out.back[k] = state.force[~working].sum()
         dx, dy = machine.axis * (hub[r + 1] - hub[r])
         if off_flanks(machine.law, at.driver, at.driven, machine.law.centre + dx, dy):
             return Run(state, samples, False, True)

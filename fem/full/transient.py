@@ -19,6 +19,7 @@ from gearbench.fem.contact.sharing import share_load
 from gearbench.fem.full.contact import Met, meet
 from gearbench.fem.full.gear import Effective, effective
 from gearbench.fem.full.machine import Machine, angles, hub_motions
+from gearbench.fem.full.penalty import TOLERANCE, closed_points, near_surfaces, softness
 from gearbench.fem.motion.scheme import Scheme
 
 Array = NDArray[np.float64]
@@ -236,10 +237,63 @@ def residual_of(machine: Machine, met: Met, force: Array) -> Array:
     return out
 
 
+class Step(NamedTuple):
+    """A step before its contact forces are known: the hubs' Schur complement, what old accelerations bring, the hubs'
+    accelerations (h,) without contact, their unknowns (h,) where contact is looked for and how far the last forces have
+    moved them there (h,), and the time at the end [s]."""
+
+    hubs: Hubs
+    ahead: Ahead
+    free: Array
+    at: Array
+    shift: Array
+    t: float
+
+
+class Pressing(NamedTuple):
+    """What the flanks do in a step: where pairs meet, forces (n,) [N], residual and older residual (n,) [m], and
+    whether the forces were found."""
+
+    met: Met
+    force: Array
+    residual: Array
+    older: Array
+    converged: bool
+
+
+def press_law(integrator: Integrator, state: State, step: Step) -> Pressing:
+    """Forces of the contact law."""
+    machine, at = integrator.machine, step.at
+    met = meet(machine, angles(machine, at, step.t), at[machine.rotations :])
+    met = met._replace(over=met.over + met.rows @ step.shift)
+    kappa = machine.beta / (2.0 * integrator.scheme.step)
+    gain = 1.0 / (1.0 + 3.0 * kappa)
+    past = history(state, met, kappa)
+    near = approach(integrator, step.hubs, step.ahead, step.free, met)
+    shared = share_load(
+        machine.law.curves, met.pairs, near.over - past.memory, gain * met.cross + near.flexibility, gain, past.force
+    )
+    fresh = past.memory + gain * residual_of(machine, met, shared.force)
+    return Pressing(met, shared.force, fresh, past.residual, bool(shared.converged))
+
+
+def press_surfaces(integrator: Integrator, state: State, step: Step) -> Pressing:
+    """Forces of the meshes' own surfaces, by penalty and multipliers."""
+    machine, at = integrator.machine, step.at
+    touching = near_surfaces(machine, angles(machine, at, step.t), at[machine.rotations :])
+    met = touching.met._replace(over=touching.met.over + touching.met.rows @ step.shift)
+    near = approach(integrator, step.hubs, step.ahead, step.free, met)
+    known = {key.tobytes(): force for key, force in zip(state.pairs, state.force, strict=True)}
+    guess = np.array([known.get(key.tobytes(), 0.0) for key in met.pairs])
+    found = closed_points(near.flexibility, near.over, softness(machine), guess, TOLERANCE * touching.share)
+    none = np.zeros(len(found.force))
+    return Pressing(met, found.force, none, none, found.found)
+
+
 def take_step(integrator: Integrator, state: State, torque: float) -> Stepped:
     """One step under the driver torque [N m] at its end."""
     machine, scheme = integrator.machine, integrator.scheme
-    h, late, r = scheme.step, 1.0 - scheme.alpha_f, machine.rotations
+    h, late = scheme.step, 1.0 - scheme.alpha_f
     t, square = state.t + h, scheme.beta * h * h
     outer = outer_load(machine, torque)
     rigid = hub_motions(machine, angles(machine, state.d.hub, state.t))
@@ -249,18 +303,9 @@ def take_step(integrator: Integrator, state: State, torque: float) -> Stepped:
 
     # Where the teeth meet is taken with the last forces still acting; the overlaps then without any.
     shift = square * held(integrator, hubs, state)
-    at = ahead.d.hub + square * free + shift
-    met = meet(machine, angles(machine, at, t), at[r:])
-    met = met._replace(over=met.over + met.rows @ shift)
-    kappa = machine.beta / (2.0 * h)
-    gain = 1.0 / (1.0 + 3.0 * kappa)
-    past = history(state, met, kappa)
-    step = approach(integrator, hubs, ahead, free, met)
-    shared = share_load(
-        machine.law.curves, met.pairs, step.over - past.memory, gain * met.cross + step.flexibility, gain, past.force
-    )
-    force = shared.force
-    fresh = past.memory + gain * residual_of(machine, met, force)
+    step = Step(hubs, ahead, free, ahead.d.hub + square * free + shift, shift, t)
+    pressing = (press_surfaces if machine.surfaces else press_law)(integrator, state, step)
+    met, force = pressing.met, pressing.force
 
     push = tuple(on.field(gear.teeth, force) for on, gear in zip(met.pressed, machine.gears, strict=True))
     for gear, field, on in zip(machine.gears, ahead.rest.gears, push, strict=True):
@@ -270,8 +315,9 @@ def take_step(integrator: Integrator, state: State, torque: float) -> Stepped:
     a = accelerations(integrator, hubs, rest)
     d = Motion(*(x + square * y for x, y in zip(ahead.d, a, strict=True)))
     v = Motion(*(x + h * scheme.gamma * y for x, y in zip(ahead.v, a, strict=True)))
-    new = State(t, d, v, a, outer, on_hub, (push[0], push[1]), met.pairs, force, fresh, past.residual)
-    return Stepped(new, driven_torque(machine, met, force, a, outer), bool(shared.converged))
+    pushes = push[0], push[1]
+    new = State(t, d, v, a, outer, on_hub, pushes, met.pairs, force, pressing.residual, pressing.older)
+    return Stepped(new, driven_torque(machine, met, force, a, outer), pressing.converged)
 
 
 def accelerations(integrator: Integrator, hubs: Hubs, rest: Motion) -> Motion:
@@ -288,6 +334,5 @@ def driven_torque(machine: Machine, met: Met, force: Array, a: Motion, outer: Ar
     """Torque [N m] on the driven gear against its rotation: the load's, or what holds its speed."""
     if machine.rotations == 2:
         return float(-outer[1])
-    lever = (1.0 - 2.0 * met.pairs["side"]) * met.pairs["lever2"]
     spun = onto_hub(machine.gears[1].rigid, a.driven)[2]
-    return float(lever @ force + spun)
+    return float(met.lever @ force + spun)

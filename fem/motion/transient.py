@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import floor
 from typing import NamedTuple
 
 import numpy as np
@@ -32,6 +33,10 @@ class Samples(NamedTuple):
     torque_driven: Array  # [N m]
     loaded: Array  # number of pairs that carry
     divided: Array  # number of steps, of those that lead here, that had to be divided
+    leaving: Array  # force of the working flanks [N] of the pair that has passed the pitch point by a pitch or so
+    middle: Array  # of the pair nearest the pitch point
+    entering: Array  # of the pair that comes to it next
+    back: Array  # of all back flanks
 
 
 CHANNELS = len(Samples._fields)
@@ -134,8 +139,18 @@ def sample(machine: Machine, now: Stage, run: Run, tried: Tried, k: int, out: Sa
     if at.x1 >= 0:
         out.x_driver[k], out.x_driven[k] = now.d[at.x1], now.d[at.x2]
     out.torque_driver[k], out.torque_driven[k] = tried.torque_driver, tried.torque_driven
+    nearest = floor(theta2 / machine.law.driven.pitch + 0.5)
     for p in range(run.pairs):
-        out.loaded[k] += now.force[p] > 0.0
+        force = now.force[p]
+        out.loaded[k] += force > 0.0
+        if now.pairs[p].side == 1:
+            out.back[k] += force
+        elif now.pairs[p].tooth < nearest:
+            out.leaving[k] += force
+        elif now.pairs[p].tooth > nearest:
+            out.entering[k] += force
+        else:
+            out.middle[k] += force
     apart = centres(machine, now.d)
     return not off_flanks(machine.law, theta1, theta2, apart.x, apart.y)
 

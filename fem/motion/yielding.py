@@ -142,7 +142,9 @@ def linearise(machine: Machine, scheme: Scheme, new: Stage, n: int, room: Room) 
 
 @compiled(fastmath=ROUNDING, **INLINED)
 def settled(machine: Machine, new: Stage, n: int, room: Room) -> bool:
-    """Whether the forces were linearised where the step led; if not, they will be there."""
+    """Whether the forces were linearised where the step led; if not, they will be there. A sliding velocity that has
+    turned round is linearised at rest: between the saturated ends tangents would lead to and fro for ever, from the
+    middle, where friction is steepest, they lead outwards step by step."""
     rubbing, springs, close = machine.rubbing, machine.springs, True
     for p in range(n):
         speed, force = sliding_speed(machine, new.v, p, room), new.force[p]
@@ -150,7 +152,8 @@ def settled(machine: Machine, new: Stage, n: int, room: Room) -> bool:
         true = rubbing.coefficient * tanh(speed * rubbing.steepness)
         if abs(true * force - taken) > SETTLED * rubbing.coefficient * force:
             close = False
-        room.sliding[p], room.turned[p] = speed, true
+        room.turned[p] = true
+        room.sliding[p] = speed if speed * room.sliding[p] >= 0.0 else 0.0
     for m in range(len(springs.stiffness)):
         s = stretch(machine, new.d, m)
         force = pull(machine, m, s)

@@ -9,6 +9,7 @@ import pytest
 
 from gearbench.bench import BenchError, simulate
 from gearbench.bench.models import model_for
+from gearbench.bench.plan.schedule import schedule
 from gearbench.cases import case_path
 from gearbench.rig import Case, read_case
 
@@ -65,3 +66,18 @@ def test_what_it_lacks_is_refused_by_name(setting: str, key: str) -> None:
     case, model = model_for(case_with(*settings), "full")
     with pytest.raises(BenchError, match=f"full finite-element model does not represent {key}"):
         model.refuse(case)
+
+
+def test_contact_of_surfaces_is_the_full_model_s_alone() -> None:
+    """By name, before work begins; flanks with errors are refused beside it."""
+    penalty = 'simulation.contact="penalty"'
+    for name in ("reduced", "lumped"):
+        with pytest.raises(BenchError, match=f'simulation.contact = "penalty" is of the model "full" only.*{name}'):
+            model_for(case_with(penalty), name)
+    case, model = model_for(case_with(penalty, "rig.driver.runout_um=5.0"), "full")
+    with pytest.raises(BenchError, match=r'simulation.contact = "penalty" does not represent rig\.driver\.runout'):
+        model.refuse(case)
+    case, model = model_for(case_with(penalty), "full")
+    model.refuse(case)
+    prepared = model.prepare(case, schedule(case.experiment, case.rig), lambda note: None)
+    assert prepared.settings["contact"] == "penalty" and prepared.integrator.machine.surfaces

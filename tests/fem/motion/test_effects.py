@@ -268,18 +268,36 @@ def test_a_spinning_rotor_keeps_its_support_frequency(twins: Any) -> None:
     assert found == pytest.approx(np.sqrt(6e6 / mass) / (2 * np.pi), rel=2e-3)
 
 
+def test_friction_that_turns_round_at_once_is_coulombs(twins: Any) -> None:
+    """Sliding that changes sign within nanometres a second, from rest on and through the pitch point, in steps of any
+    length: forces of statics, T1 = F (rb1 + mu s rho1) and k y1 = -F (cos a + mu s sin a), s = -1 before, 1 behind."""
+    mu, frequency, step, alpha = 0.3, 20.0, 2e-5, twins.pair.working_pressure_angle
+    damped = {"one": {"damping": 2e4}, "two": {"damping": 2e4}}
+    machine = build(twins, {"friction": Friction(coefficient=mu, transition_speed=1e-8), **damped}, frequency, 1e-5)
+    start = initial_state(machine, TORQUE, -0.15 / frequency)
+    torque = np.full(round(0.3 / frequency / step), TORQUE)
+    _, samples, ran = advance(machine, make_scheme(step, 0.6), start, torque, 1)
+    out = columns(samples)
+    assert ran.failed == -1 and out.divided.sum() == 0 and out.loaded.max() == 1
+    phase = -0.15 + frequency * step * (1 + np.arange(len(torque)))
+    for at, sense in ((-0.1, -1.0), (0.1, 1.0)):
+        rho = machine.law.driver.rb * (np.tan(alpha) + at * machine.law.driver.pitch)
+        force = TORQUE / (machine.law.driver.rb + mu * sense * rho)
+        expected = -force * (np.cos(alpha) + mu * sense * np.sin(alpha)) / STIFF
+        assert out.y_driver[np.abs(phase - at).argmin()] == pytest.approx(expected, rel=2e-3)
+
+
 def test_steps_too_long_are_divided(twins: Any) -> None:
-    """Friction that turns round within a hundredth of the usual speed, in steps too long for that: some are divided,
-    the grid of samples stays, and the result is that of short steps."""
-    damped = {"one": {"damping": 2e4}, "two": {"damping": 2e4}}  # or the steps show their own error in the ringing
-    machine = build(twins, {"friction": Friction(coefficient=0.1, transition_speed=1e-4), **damped}, 100.0, 1e-5)
-    found = []
-    for step in (2e-5, 4e-6):
-        count = round(0.02 / step)
-        torque = np.full(count, TORQUE)
-        _, samples, ran = advance(machine, make_scheme(step, 0.6), initial_state(machine, TORQUE), torque, count // 100)
-        assert ran.failed == -1 and ran.t == pytest.approx(0.02)
-        found.append(columns(samples))
-    assert found[0].divided.sum() > 0 and len(found[0].divided) == len(found[1].divided) == 100
-    swing = np.ptp(found[1].y_driver)
-    assert np.std(found[0].y_driver - found[1].y_driver) < 0.05 * swing
+    """Supports that stiffen a hundredfold under steps of torque, in steps of time too long for that: some are divided,
+    the grid of samples stays, and at last the rig rests where k y |y/r|^3 = F cos a."""
+    reference = 1e-7
+    stiffening = {"exponent": 3.0, "reference_deflection": reference, "damping": 1e4}
+    machine = build(twins, {"one": stiffening, "two": stiffening}, 1.0, 1e-5)
+    torque = TORQUE * np.where(np.arange(200) < 100, 1 + 0.9 * (-1.0) ** (np.arange(200) // 3), 1.0)
+    start, step = initial_state(machine, TORQUE), 1e-4
+    _, samples, ran = advance(machine, make_scheme(step, 0.6), start, torque, 1)
+    out = columns(samples)
+    assert ran.failed == -1 and ran.t == pytest.approx(0.02) and len(out.divided) == 200
+    assert 0 < out.divided.sum() < 50
+    force = TORQUE / machine.law.driver.rb * np.cos(twins.pair.working_pressure_angle)
+    assert out.y_driven[-1] == pytest.approx(reference * (force / (STIFF * reference)) ** 0.25, rel=1e-3)
