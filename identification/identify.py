@@ -260,7 +260,7 @@ def _dataset(
     response = itf_from_htf(result.htf, settings.phases)
     variance = result.itf_variance(settings.phases)
     modes = itf_modes(frequency, response, variance, modes=settings.modes)
-    accuracy = expected_accuracy(result, _relative_noise(spectra, result), cost)
+    accuracy = expected_accuracy(result, cost)
     rule = record_rule(spectra, window.harmonics, window.order, *modes, accuracy.truncation)
     warnings = [*notes, *_warnings(accuracy, rule, spectra)]
     attributes: dict[str, Any] = {
@@ -312,16 +312,6 @@ def _about(spectra: Spectra) -> dict[str, Any]:
         "joint_period": spectra.duration,
         "periods_averaged": spectra.periods,
     }
-
-
-def _relative_noise(spectra: Spectra, result: LpmResult) -> float | None:
-    """Rms of the noise over the rms response in the output band, where repeated periods tell it."""
-    if spectra.noise is None:
-        return None
-    band = np.arange(result.lines[0], result.lines[-1] + 1)
-    if spectra.mesh_lines > 1:
-        band = band[band % spectra.mesh_lines != 0]
-    return float(np.sqrt(spectra.noise[band].mean() / np.mean(np.abs(spectra.dte[:, band]) ** 2)))
 
 
 def _warnings(accuracy: Accuracy, rule: RecordRule | None, spectra: Spectra) -> list[str]:
