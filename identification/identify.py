@@ -24,7 +24,7 @@ from gearbench.identification.response.modes import itf_modes
 from gearbench.identification.spectra.joint import Spectra
 from gearbench.identification.spectra.records import record_spectra
 from gearbench.identification.truth.periodic import itf_from_htf
-from gearbench.records import RecordError
+from gearbench.records import RecordError, validate_record
 from gearbench.records.checks import check_record, same_samples
 
 Progress = Callable[[float, str], None]
@@ -105,6 +105,8 @@ def identify(
     settings = settings or IdentificationSettings()
     report = progress or (lambda fraction, message: None)
     report(0.0, "spectra")
+    for record in records:
+        validate_record(record)
     sidebands = settings.harmonics if settings.harmonics is not None else LADDER[-1]
     spectra, excited, notes = record_spectra(
         records, top=settings.band[1] if settings.band else None, sidebands=sidebands
@@ -316,6 +318,11 @@ def _about(spectra: Spectra) -> dict[str, Any]:
 
 def _warnings(accuracy: Accuracy, rule: RecordRule | None, spectra: Spectra) -> list[str]:
     notes = []
+    if accuracy.expected >= 1.0:
+        notes.append(
+            f"the expected error of {accuracy.expected:.0%} exceeds the response: this result says nothing; is the"
+            f" mesh period of {1.0 / (spectra.mesh_lines * spectra.spacing):g} s right?"
+        )
     if accuracy.expected > DOUBTFUL:
         doubtful = f", doubtful channels {accuracy.record:.0%}" if accuracy.record else ""
         notes.append(

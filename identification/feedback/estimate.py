@@ -23,7 +23,7 @@ HARMONICS = 100
 # Intervals of the splines that assume nothing about D and N, at most, and equations for each; decrease of the cost at
 # which their rounds end, and pairs of common poles that are tried after them.
 INTERVALS = 80
-SUPPORT = 30
+SUPPORT = 18
 FEWEST_INTERVALS = 20
 ROUGH_SETTLED = 0.2
 # Splines are trusted to no better than this part of D and N.
@@ -32,7 +32,7 @@ PAIRS = 6
 FITTED_POINTS = 1200
 # Equations that the search for a model looks at; the last rounds take all.
 SEARCHED = 6000
-# A model with more parameters must improve the criterion (Akaike 1974) by so much.
+# A model with more parameters must improve the criterion by so much.
 GAIN = 4.0
 # Decrease of the cost at which rounds end while numbers of poles are compared.
 COMPARED = 0.02
@@ -90,11 +90,13 @@ def mesh_feedback(
 
 
 def criterion(fit: Refined, data: ClassData) -> float:
-    """Akaike's criterion: twice the equations times the log of their residual, plus twice the parameters of D and N.
+    """Schwarz's criterion (1978): twice the equations times the log of their residual, plus the parameters of D and N
+    times the log of twice the equations. Pairs that it does without are poles in noise, whose variance is large.
 
     The mesh's harmonics are the same for all that are compared, and held by their prior.
     """
-    return 2 * data.equations * float(np.log(fit.noise * fit.freedom)) + 2 * fit.model.free
+    count = 2 * data.equations
+    return count * float(np.log(fit.noise * fit.freedom)) + fit.model.free * float(np.log(count))
 
 
 def rational(fit: Refined, data: ClassData, pairs: int) -> Model:

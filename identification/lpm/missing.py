@@ -12,8 +12,8 @@ would be missing there if the whole residual elsewhere were missing response. No
 record without a quiet part, then counts as missing response: the error is overstated, not understated.
 
 A row's missing power comes from sources inside and outside of the output lines. A varying stiffness turns the response
-at the source into force in the row, so that branch j is taken to weigh the response at its source times 1/j^2, the power
-of the harmonics of a stiffness that jumps.
+at the source into force in the row, so that branch j is taken to weigh the response at its source times 1/j^2, the
+power of the harmonics of a stiffness that jumps.
 """
 
 from __future__ import annotations
