@@ -24,8 +24,9 @@ from gearbench.identification.response.modes import itf_modes
 from gearbench.identification.spectra.joint import Spectra
 from gearbench.identification.spectra.records import record_spectra
 from gearbench.identification.truth.periodic import itf_from_htf
-from gearbench.records import RecordError, validate_record
+from gearbench.records import RecordError
 from gearbench.records.checks import check_record, same_samples
+from gearbench.records.record import require_finite
 
 Progress = Callable[[float, str], None]
 
@@ -106,22 +107,39 @@ def identify(
     report = progress or (lambda fraction, message: None)
     report(0.0, "spectra")
     for record in records:
-        validate_record(record)
+        for name in record.data_vars:
+            require_finite(record[name])
     sidebands = settings.harmonics if settings.harmonics is not None else LADDER[-1]
     spectra, excited, notes = record_spectra(
         records, top=settings.band[1] if settings.band else None, sidebands=sidebands
     )
     report(0.05, "what the records say about themselves")
     doubts, cost = _doubts(records)
-    band = settings.band or excited
-    lines = output_lines(spectra, band, excited, settings.step)
-    given = [*doubts, *notes]
+    return identify_spectra(spectra, excited, settings, notes=[*doubts, *notes], record_error=cost, progress=report)
+
+
+def identify_spectra(
+    spectra: Spectra,
+    excited: tuple[float, float],
+    settings: IdentificationSettings,
+    *,
+    notes: Sequence[str] = (),
+    record_error: float = 0.0,
+    progress: Progress | None = None,
+) -> xr.Dataset:
+    """The response from spectra whose force covers the band `excited` [Hz]; as `identify`, which makes them of records.
+
+    `notes` become warnings; `record_error`: what doubtful channels may cost. Raises LpmError.
+    """
+    report = progress or (lambda fraction, message: None)
+    lines = output_lines(spectra, settings.band or excited, excited, settings.step)
+    given = list(notes)
     if settings.method == "mesh-feedback":
-        frf = _by_feedback(spectra, settings, lines, excited, given, cost, report)
+        frf = _by_feedback(spectra, settings, lines, excited, given, record_error, report)
         if frf.attrs["expected_error"] > SECOND_OPINION:
-            frf = _second_opinion(frf, spectra, replace(settings, harmonics=None), lines, given, cost, report)
+            frf = _second_opinion(frf, spectra, replace(settings, harmonics=None), lines, given, record_error, report)
     else:
-        frf = _by_polynomials(spectra, settings, lines, given, cost, report)
+        frf = _by_polynomials(spectra, settings, lines, given, record_error, report)
     report(1.0, "identified")
     return frf
 

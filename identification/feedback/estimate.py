@@ -22,7 +22,7 @@ Progress = Callable[[float, str], None]
 HARMONICS = 100
 # Intervals of the splines that assume nothing about D and N, at most, and equations for each; decrease of the cost at
 # which their rounds end, and pairs of common poles that are tried after them.
-INTERVALS = 80
+INTERVALS = 160
 SUPPORT = 18
 FEWEST_INTERVALS = 20
 ROUGH_SETTLED = 0.2

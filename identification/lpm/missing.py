@@ -12,8 +12,9 @@ would be missing there if the whole residual elsewhere were missing response. No
 record without a quiet part, then counts as missing response: the error is overstated, not understated.
 
 A row's missing power comes from sources inside and outside of the output lines. A varying stiffness turns the response
-at the source into force in the row, so that branch j is taken to weigh the response at its source times 1/j^2, the
-power of the harmonics of a stiffness that jumps.
+at the source into force in the row, so that branch j is taken to weigh the response at its source times
+VARIATION / j^2, the power of the harmonics of a stiffness that jumps, over the quasi-static response that branch 0
+weighs. Rows without a window lie further from the output lines than those with one, and less reaches them.
 """
 
 from __future__ import annotations
@@ -37,6 +38,10 @@ LEAST_OF_PARTS = 1.63
 # Rows in which sources are counted, at most, and part of all lines over which the response of sources is averaged.
 COUNTED = 300
 AVERAGED = 0.004
+# (dk / (pi k))^2 of a stiffness that jumps by half of its mean.
+VARIATION = 0.03
+# Groups of rows with windows that rows without are held against.
+NEAR = 8
 
 
 class MissingPower:
@@ -54,6 +59,8 @@ class MissingPower:
         self.power: Floats = np.concatenate([[0.0], data])
         self.response = np.concatenate([[0.0], uniform_filter1d(np.where(self.operating, 0.0, data), width)])
         self.response *= self.excited
+        rising = self.response[: int(np.argmax(self.response)) + 1]
+        self.static = float(np.median(rising[rising > 0]))
         # Rows without a window: all response is missing.
         self.level: Floats = np.concatenate([[0.0], data])
         self.covered = np.zeros(self.rows.size + 1, dtype=bool)
@@ -90,7 +97,14 @@ class MissingPower:
         above = self.level - noise
         above[0] = 0.0
         above[1:][self.operating & ~self.covered[1:]] = 0.0
-        total = sum(float(above[rows].sum()) * share for rows, share in self._shares)
+        found = [(rows, float(above[rows].mean()) * share) for rows, share in self._shares]
+        served = [(int(rows[0]), mean) for rows, mean in found if self.covered[rows[0]]]
+        total = 0.0
+        for rows, mean in found:
+            if served and not self.covered[rows[0]]:
+                near = sorted(served, key=lambda one: abs(one[0] - int(rows[0])))[:NEAR]
+                mean = min(mean, float(np.mean([one[1] for one in near])))
+            total += rows.size * mean
         density = self.lines.size / (self.lines[-1] - self.lines[0] + self.step)
         return max(total, 0.0) * density / self.regression.input_power()
 
@@ -112,7 +126,8 @@ class MissingPower:
         branch = np.arange(-reach, reach + 1)
         source = np.abs(row + branch * d)
         branch, source = branch[source < self.excited.size], source[source < self.excited.size]
-        response = self.response[source] / np.maximum(np.abs(branch), 1) ** 2
+        response = VARIATION * self.response[source] / np.maximum(np.abs(branch), 1) ** 2
+        response[branch == 0] = self.static * self.excited[row]
         inside = (source >= self.lines[0]) & (source <= self.lines[-1])
         # What is missing may be the branches from `fewest` on, or what the polynomials of the others do not follow.
         later = response * (np.abs(branch) >= fewest)
