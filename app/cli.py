@@ -19,6 +19,7 @@ from gearbench.commands.convert import convert
 from gearbench.commands.diagnose import diagnose
 from gearbench.commands.identify import identify
 from gearbench.commands.mesh import mesh
+from gearbench.commands.multisine import multisine
 from gearbench.commands.run import run
 from gearbench.commands.schema import schema
 from gearbench.commands.simulate import simulate
@@ -37,7 +38,22 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
-COMMANDS = (run, simulate, static, sweep, convert, identify, compare, diagnose, check, mesh, cases, schema, validate)
+COMMANDS = (
+    run,
+    simulate,
+    static,
+    sweep,
+    multisine,
+    convert,
+    identify,
+    compare,
+    diagnose,
+    check,
+    mesh,
+    cases,
+    schema,
+    validate,
+)
 for command in COMMANDS:
     app.command()(command)
 app.add_typer(challenge)

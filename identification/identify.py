@@ -26,6 +26,7 @@ from gearbench.identification.spectra.records import record_spectra
 from gearbench.identification.truth.periodic import itf_from_htf
 from gearbench.records import RecordError
 from gearbench.records.checks import check_record, same_samples
+from gearbench.records.record import require_finite
 
 Progress = Callable[[float, str], None]
 
@@ -105,21 +106,40 @@ def identify(
     settings = settings or IdentificationSettings()
     report = progress or (lambda fraction, message: None)
     report(0.0, "spectra")
+    for record in records:
+        for name in record.data_vars:
+            require_finite(record[name])
     sidebands = settings.harmonics if settings.harmonics is not None else LADDER[-1]
     spectra, excited, notes = record_spectra(
         records, top=settings.band[1] if settings.band else None, sidebands=sidebands
     )
     report(0.05, "what the records say about themselves")
     doubts, cost = _doubts(records)
-    band = settings.band or excited
-    lines = output_lines(spectra, band, excited, settings.step)
-    given = [*doubts, *notes]
+    return identify_spectra(spectra, excited, settings, notes=[*doubts, *notes], record_error=cost, progress=report)
+
+
+def identify_spectra(
+    spectra: Spectra,
+    excited: tuple[float, float],
+    settings: IdentificationSettings,
+    *,
+    notes: Sequence[str] = (),
+    record_error: float = 0.0,
+    progress: Progress | None = None,
+) -> xr.Dataset:
+    """The response from spectra whose force covers the band `excited` [Hz]; as `identify`, which makes them of records.
+
+    `notes` become warnings; `record_error`: what doubtful channels may cost. Raises LpmError.
+    """
+    report = progress or (lambda fraction, message: None)
+    lines = output_lines(spectra, settings.band or excited, excited, settings.step)
+    given = list(notes)
     if settings.method == "mesh-feedback":
-        frf = _by_feedback(spectra, settings, lines, excited, given, cost, report)
+        frf = _by_feedback(spectra, settings, lines, excited, given, record_error, report)
         if frf.attrs["expected_error"] > SECOND_OPINION:
-            frf = _second_opinion(frf, spectra, replace(settings, harmonics=None), lines, given, cost, report)
+            frf = _second_opinion(frf, spectra, replace(settings, harmonics=None), lines, given, record_error, report)
     else:
-        frf = _by_polynomials(spectra, settings, lines, given, cost, report)
+        frf = _by_polynomials(spectra, settings, lines, given, record_error, report)
     report(1.0, "identified")
     return frf
 
@@ -260,7 +280,7 @@ def _dataset(
     response = itf_from_htf(result.htf, settings.phases)
     variance = result.itf_variance(settings.phases)
     modes = itf_modes(frequency, response, variance, modes=settings.modes)
-    accuracy = expected_accuracy(result, _relative_noise(spectra, result), cost)
+    accuracy = expected_accuracy(result, cost)
     rule = record_rule(spectra, window.harmonics, window.order, *modes, accuracy.truncation)
     warnings = [*notes, *_warnings(accuracy, rule, spectra)]
     attributes: dict[str, Any] = {
@@ -314,18 +334,13 @@ def _about(spectra: Spectra) -> dict[str, Any]:
     }
 
 
-def _relative_noise(spectra: Spectra, result: LpmResult) -> float | None:
-    """Rms of the noise over the rms response in the output band, where repeated periods tell it."""
-    if spectra.noise is None:
-        return None
-    band = np.arange(result.lines[0], result.lines[-1] + 1)
-    if spectra.mesh_lines > 1:
-        band = band[band % spectra.mesh_lines != 0]
-    return float(np.sqrt(spectra.noise[band].mean() / np.mean(np.abs(spectra.dte[:, band]) ** 2)))
-
-
 def _warnings(accuracy: Accuracy, rule: RecordRule | None, spectra: Spectra) -> list[str]:
     notes = []
+    if accuracy.expected >= 1.0:
+        notes.append(
+            f"the expected error of {accuracy.expected:.0%} exceeds the response: this result says nothing; is the"
+            f" mesh period of {1.0 / (spectra.mesh_lines * spectra.spacing):g} s right?"
+        )
     if accuracy.expected > DOUBTFUL:
         doubtful = f", doubtful channels {accuracy.record:.0%}" if accuracy.record else ""
         notes.append(

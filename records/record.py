@@ -144,11 +144,16 @@ def _check_channel(record: xr.Dataset, name: str) -> None:
     unit = unit_of_channel(name)
     if channel.attrs.get("units") != unit:
         raise RecordError(f"channel {name} has units {channel.attrs.get('units')!r}, not {unit!r}")
+    require_finite(channel)
+
+
+def require_finite(channel: xr.DataArray) -> None:
+    """Raise RecordError if a channel (realisation, time) holds values that are not finite."""
     for row, values in enumerate(channel.values):
         if not np.isfinite(values).all():
             bad = np.flatnonzero(~np.isfinite(values))
             raise RecordError(
-                f"channel {name} holds {bad.size} value(s) that are not finite, first at realisation {row},"
+                f"channel {channel.name} holds {bad.size} value(s) that are not finite, first at realisation {row},"
                 f" sample {bad[0]}"
             )
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,8 +10,10 @@ from numpy.typing import NDArray
 from gearbench.identification.lpm.regression import prepare
 from gearbench.identification.spectra.joint import Complexes, Floats, Spectra
 
-# Lines beyond the excited ones that are kept, as part of the highest: their sidebands act back on the excited ones.
+# Lines beyond the excited ones that are kept, as part of the highest and in mesh harmonics: sidebands act back on the
+# excited lines, and tell the mesh's higher harmonics.
 MARGIN = 0.05
+SIDEBANDS = 8
 
 
 @dataclass(frozen=True)
@@ -53,13 +55,25 @@ class ClassData:
         return self.force_unit / self.dte_unit
 
 
+def fewer_classes(data: ClassData, equations: int) -> ClassData:
+    """Classes spread evenly over all of them, with about so many equations in them."""
+    count = data.lines.shape[0]
+    kept = int(np.ceil(count * min(1.0, equations / data.equations)))
+    if kept == count:
+        return data
+    chosen = np.unique(np.round((np.arange(kept) + 0.5) * count / kept - 0.5).astype(int))
+    parts = {name: getattr(data, name)[chosen] for name in ("lines", "valid", "force", "dte", "weight")}
+    return replace(data, **parts, equations=_equations(parts["valid"], parts["dte"], parts["weight"]))
+
+
 def class_data(spectra: Spectra, excited: int) -> ClassData:
     """Lines up to a little beyond the highest `excited` one, without the operating response (class 0 of its records).
 
     Records are shifted to mesh phase 0 as in the local polynomial method.
     """
     regression = prepare(spectra, transient=False, reach=0)
-    d, top = spectra.mesh_lines, min(spectra.highest, int((1.0 + MARGIN) * excited))
+    d = spectra.mesh_lines
+    top = min(spectra.highest, max(int((1.0 + MARGIN) * excited), excited + SIDEBANDS * d))
     classes = np.arange(d // 2 + 1)
     reach = top // d + 1
     position = np.arange(-reach, reach + 1)
@@ -70,9 +84,7 @@ def class_data(spectra: Spectra, excited: int) -> ClassData:
         np.where(valid[:, :, None], source[classes][:, :, at].transpose(0, 2, 1), 0.0)
         for source in (regression.force, regression.dte)
     )
-    own = (2 * classes) % d == 0
-    present = np.abs(dte).sum(axis=1) > 0  # (C, E): the operating response's record is gone from class 0
-    equations = float(np.sum(valid.sum(axis=1)[:, None] * present * np.where(own, 0.5, 1.0)[:, None]))
+    weight = np.where((2 * classes) % d == 0, np.sqrt(0.5), 1.0)
     force_unit, dte_unit = (
         float(np.sqrt(np.sum(np.abs(x) ** 2) / max(np.count_nonzero(x), 1))) or 1.0 for x in (force, dte)
     )
@@ -81,12 +93,18 @@ def class_data(spectra: Spectra, excited: int) -> ClassData:
         valid,
         np.asarray(force / force_unit, dtype=complex),
         np.asarray(dte / dte_unit, dtype=complex),
-        np.where(own, np.sqrt(0.5), 1.0),
+        weight,
         d,
         spectra.spacing,
         excited,
         top,
         force_unit,
         dte_unit,
-        equations,
+        _equations(valid, dte, weight),
     )
+
+
+def _equations(valid: NDArray[np.bool_], dte: Complexes, weight: Floats) -> float:
+    """Complex equations, each counted once."""
+    present = np.abs(dte).sum(axis=1) > 0  # (C, E): the operating response's record is gone from class 0
+    return float(np.sum(valid.sum(axis=1)[:, None] * present * weight[:, None] ** 2))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.identification.feedback.data import ClassData, class_data
+from gearbench.identification.feedback.data import ClassData, class_data, fewer_classes
 from gearbench.identification.feedback.functions import Fractions, Splines, common_poles
 from gearbench.identification.feedback.model import Model
 from gearbench.identification.feedback.refine import Refined, linearised, refined
@@ -20,15 +20,19 @@ Progress = Callable[[float, str], None]
 
 # Harmonics of the mesh unless given; their prior keeps those that the record does not show small.
 HARMONICS = 100
-# Intervals of the splines that assume nothing about D and N, decrease of the cost at which their rounds end, and pairs
-# of common poles that are tried after them.
-INTERVALS = 30
+# Intervals of the splines that assume nothing about D and N, at most, and equations for each; decrease of the cost at
+# which their rounds end, and pairs of common poles that are tried after them.
+INTERVALS = 160
+SUPPORT = 18
+FEWEST_INTERVALS = 20
 ROUGH_SETTLED = 0.2
 # Splines are trusted to no better than this part of D and N.
 ROUGH = 0.01
 PAIRS = 6
 FITTED_POINTS = 1200
-# A model with more parameters must improve the criterion (Akaike 1974) by so much.
+# Equations that the search for a model looks at; the last rounds take all.
+SEARCHED = 6000
+# A model with more parameters must improve the criterion by so much.
 GAIN = 4.0
 # Decrease of the cost at which rounds end while numbers of poles are compared.
 COMPARED = 0.02
@@ -62,21 +66,22 @@ def mesh_feedback(
     report = progress or (lambda part, message: None)
     data = class_data(spectra, excited)
     count = min(harmonics if harmonics is not None else HARMONICS, data.lines.shape[1] - 1)
-    basis = Splines(INTERVALS)
-    unknowns = 4 * (INTERVALS + 3) + 4 * count
+    intervals = int(np.clip(data.equations / SUPPORT, FEWEST_INTERVALS, INTERVALS))
+    unknowns = 4 * (intervals + 3) + 4 * count
     if data.equations < unknowns:
         raise LpmError(
             f"under-determined: {unknowns} unknowns of the mesh-feedback model against {data.equations:.0f} equations;"
             " record longer or more realisations"
         )
     report(0.0, "mesh feedback: first model")
-    best = refined(first_model(data, basis, count), data, ROUGH_SETTLED)
+    part = fewer_classes(data, SEARCHED)
+    best = refined(first_model(part, Splines(intervals), count), part, ROUGH_SETTLED)
     splines = best
     for pairs in range(1, PAIRS + 1):
         report(pairs / (PAIRS + 1), f"mesh feedback: {pairs} pair(s) of poles")
         found = isinstance(best.model.basis, Fractions)
-        trial = refined(extended(best.model, data) if found else rational(splines, data, pairs), data, COMPARED)
-        if criterion(trial, data) < criterion(best, data) - GAIN:
+        trial = refined(extended(best.model, part) if found else rational(splines, part, pairs), part, COMPARED)
+        if criterion(trial, part) < criterion(best, part) - GAIN:
             best = trial
         elif found:
             break
@@ -85,11 +90,13 @@ def mesh_feedback(
 
 
 def criterion(fit: Refined, data: ClassData) -> float:
-    """Akaike's criterion: twice the equations times the log of their residual, plus twice the parameters of D and N.
+    """Schwarz's criterion (1978): twice the equations times the log of their residual, plus the parameters of D and N
+    times the log of twice the equations. Pairs that it does without are poles in noise, whose variance is large.
 
     The mesh's harmonics are the same for all that are compared, and held by their prior.
     """
-    return 2 * data.equations * float(np.log(fit.noise * fit.freedom)) + 2 * fit.model.free
+    count = 2 * data.equations
+    return count * float(np.log(fit.noise * fit.freedom)) + fit.model.free * float(np.log(count))
 
 
 def rational(fit: Refined, data: ClassData, pairs: int) -> Model:

@@ -58,6 +58,11 @@ def feedback_frf(
     itf_variance = np.mean([np.abs(itf_from_htf(error, phases)) ** 2 for error in errors], axis=0)
     htf_variance = _between(lines, chosen, htf_variance.T).T
     itf_variance = _between(lines, chosen, itf_variance)
+    # Sidebands beyond the record's lines are extrapolated: nothing says that they are right.
+    order = np.arange(-branches, branches + 1)[:, None]
+    extrapolated = np.where(np.abs(lines + order * data.mesh_lines) > data.top, np.abs(response) ** 2, 0.0)
+    htf_variance += extrapolated
+    itf_variance += extrapolated.sum(axis=0)[:, None]
     power = float(np.sum(np.abs(response) ** 2))
     variance = float(np.sqrt(htf_variance.sum() / power))
     apart = unexplained(found, (int(lines[0]), int(lines[-1]))) * lines.size / (lines[-1] - lines[0] + 1)

@@ -11,13 +11,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import solve_banded
 
+from gearbench.identification.feedback.blocks import MeshMatrices
 from gearbench.identification.feedback.functions import Basis, Fractions
 from gearbench.identification.spectra.joint import Complexes, Floats
-
-# Classes of up to so many lines are solved as dense matrices.
-DENSE = 160
 
 
 @dataclass(frozen=True)
@@ -84,45 +81,16 @@ class Operator:
     """A of `A Y = N U` for the classes of `lines` / top (C, S), solvable for any right-hand sides."""
 
     def __init__(self, model: Model, omega: Floats, valid: np.ndarray) -> None:
-        self.size, self.harmonics = omega.shape[1], min(model.harmonics, omega.shape[1] - 1)
-        diagonal, self.n = model.functions(omega)
-        diagonal = np.where(valid, diagonal, 1.0)
-        self.n = np.where(valid, self.n, 0.0)
-        if self.size <= DENSE:
-            inverse = np.linalg.inv(self._dense(model, omega, valid, diagonal))
-            self.inverse: Complexes | None = np.asarray(inverse, dtype=complex)
-        else:
-            self.inverse = None
-            self.banded = self._banded(model, omega, valid, diagonal)
-
-    def _dense(self, model: Model, omega: Floats, valid: np.ndarray, diagonal: Complexes) -> Complexes:
-        index = np.subtract.outer(np.arange(self.size), np.arange(self.size)) + self.size - 1
-        k, c = np.zeros((2, 2 * self.size - 1), dtype=complex)
-        for target, source in ((k, model.k), (c, model.c)):
-            target[self.size : self.size + self.harmonics] = source[: self.harmonics]
-            target[self.size - 1 - self.harmonics : self.size - 1] = source[: self.harmonics][::-1].conj()
-        matrix = (k[index] + c[index] * (1j * omega)[:, None, :]) * (valid[:, :, None] & valid[:, None, :])
-        matrix[:, np.arange(self.size), np.arange(self.size)] = diagonal
-        return np.asarray(matrix)
-
-    def _banded(self, model: Model, omega: Floats, valid: np.ndarray, diagonal: Complexes) -> Complexes:
-        reach = self.harmonics
-        band = np.zeros((omega.shape[0], 2 * reach + 1, self.size), dtype=complex)
-        band[:, reach] = diagonal
-        for branch in range(1, reach + 1):
-            low = (model.k[branch - 1] + 1j * model.c[branch - 1] * omega) * valid
-            high = (model.k[branch - 1].conj() + 1j * model.c[branch - 1].conj() * omega) * valid
-            # Row q + l of column q: l = branch below the diagonal, -branch above it.
-            band[:, reach + branch, :-branch] = (low[:, :-branch]) * valid[:, branch:]
-            band[:, reach - branch, branch:] = (high[:, branch:]) * valid[:, :-branch]
-        return band
+        kept = min(model.harmonics, omega.shape[1] - 1)
+        diagonal, n = model.functions(omega)
+        self.n = np.where(valid, n, 0.0)
+        self._matrices = MeshMatrices(
+            np.where(valid, diagonal, 1.0), model.k[:kept], model.c[:kept], omega, valid
+        )
 
     def solve(self, index: int, right: Complexes) -> Complexes:
         """A^-1 `right` (S, m) of one class."""
-        if self.inverse is not None:
-            return np.asarray(self.inverse[index] @ right)
-        reach = self.harmonics
-        return np.asarray(solve_banded((reach, reach), self.banded[index], right, check_finite=False))
+        return self._matrices.solve(index, right)
 
 
 def coupled(values: Complexes, omega: Floats, harmonics: int) -> tuple[Complexes, Complexes]:

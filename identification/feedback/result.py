@@ -9,6 +9,7 @@ from gearbench.identification.feedback.data import ClassData
 from gearbench.identification.feedback.estimate import Feedback
 from gearbench.identification.feedback.functions import Fractions
 from gearbench.identification.feedback.model import Model, Operator
+from gearbench.identification.feedback.start import gauged
 from gearbench.identification.spectra.joint import Complexes, Floats
 
 # Draws of the parameters from their covariance, and output lines on which they are followed.
@@ -58,12 +59,13 @@ def followed(lines: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def drawn_models(found: Feedback) -> list[Model]:
-    """Models with parameters drawn from their covariance."""
+    """Models with parameters drawn from their covariance, each with the common factor of its own N."""
     model, rng = found.model, np.random.default_rng(0)
     covariance = found.refined.covariance
     values, vectors = np.linalg.eigh(0.5 * (covariance + covariance.T))
     root = vectors * np.sqrt(np.maximum(values, 0.0))
-    return [model.moved(model.vector() + root @ rng.standard_normal(values.size)) for _ in range(DRAWS)]
+    moved = (model.moved(model.vector() + root @ rng.standard_normal(values.size)) for _ in range(DRAWS))
+    return [gauged(one, found.data) for one in moved]
 
 
 def along_phase(model: Model, data: ClassData, phases: int) -> tuple[Floats, Floats]:

@@ -25,9 +25,9 @@ MISSING = 0.03
 class Accuracy:
     """Expected relative rms error of the ITF and what it is made of (all relative to the ITF's rms).
 
-    `variance`: from the residuals; `truncation`: branches beyond L, from what the residuals share with their
-    inputs; `record`: what doubtful channels of the
-    records may cost; `expected`: all three together; `bound`: with the whole residual taken as missing response.
+    `variance`: from the residuals; `truncation`: branches beyond L and what polynomials do not follow, from what the
+    residuals hold above the noise; `record`: what doubtful channels of the records may cost; `expected`: all three
+    together; `bound`: with the whole residual taken as missing response unless repeated periods tell the noise.
     """
 
     variance: float
@@ -53,19 +53,17 @@ class RecordRule:
         return self.needed / self.duration
 
 
-def expected_accuracy(result: LpmResult, noise: float | None, record: float = 0.0) -> Accuracy:
+def expected_accuracy(result: LpmResult, record: float = 0.0) -> Accuracy:
     """Expected error of an identified ITF.
 
-    `noise`: rms of the measurement noise over the rms response if it is known from repeated periods, else
-    None. `record`: what the findings about the records may cost; a wrong channel biases the response whatever is fitted
+    `record`: what the findings about the records may cost; a wrong channel biases the response whatever is fitted
     to it, independently of variance and truncation, so that squares add.
     """
     power = np.sum(np.abs(result.htf) ** 2, axis=0).sum()
     spread = float(result.itf_covariance[0].real.sum())
     signal = max(power - spread, 0.1 * power)
     variance = np.sqrt(spread / signal)
-    missing = np.sqrt(max(result.residual**2 - (noise or 0.0) ** 2, 0.0))
-    truncation = np.sqrt(max(result.missing, 0.0) / signal)
+    truncation, missing = (np.sqrt(value / signal) for value in (result.missing, result.missing_bound))
     return Accuracy(
         float(variance),
         float(truncation),

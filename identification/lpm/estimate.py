@@ -30,8 +30,6 @@ CONDITION_EVERY = 32
 # Work [floating-point operations] spent on variances before they are sampled, and before cross terms are left out.
 VARIANCE_WORK = 2e10
 CROSS_WORK = 1e11
-# Windows whose residuals are searched for missing branches.
-SEARCHED = 200
 
 
 @dataclass(frozen=True)
@@ -39,8 +37,9 @@ class LpmResult:
     """Identified branches on the output lines.
 
     `lines` (F,); `htf`, `htf_variance` (2L+1, F), l = -L..L [m/N]; `itf_covariance` (Q+1, F): sums over l
-    of E[dG_l conj(dG_{l+q})], q = 0 first, which give the ITF's variance at any phase; `missing`: estimated sum of
-    |G_l|^2 over the branches beyond L and the output lines (noise may make it negative); `residual`: rms of
+    of E[dG_l conj(dG_{l+q})], q = 0 first, which give the ITF's variance at any phase; `missing`: estimated sum over
+    output lines and branches of |error of G_l|^2 that the variance does not hold, `missing_bound` the same with all
+    of the residual taken for it unless repeated periods tell the noise; `residual`: rms of
     the residual over that of the response in the windows (degrees of freedom accounted for); `condition`:
     largest estimated condition number; `unknowns`, `equations`, `freedom`: of an inner window, transients
     included; `windows`: how many; `variance_sampled`: windows per computed variance; `cross_terms`:
@@ -52,6 +51,7 @@ class LpmResult:
     htf_variance: Floats
     itf_covariance: Complexes
     missing: float
+    missing_bound: float
     residual: float
     condition: float
     unknowns: int
@@ -90,7 +90,7 @@ def local_polynomial(
     rows = needed_rows(lines, window.harmonics, spectra.mesh_lines)
     centres = plan_centres(rows, window, regression.last_row(window.harmonics))
     require_equations(regression, [centre for centre, _ in centres], window)
-    return _Sweep(regression, window, lines, centres).run(progress)
+    return _Sweep(regression, window, lines, centres, spectra.noise).run(progress)
 
 
 def require_lines(spectra: Spectra, lines: Lines, window: Window) -> None:
@@ -151,8 +151,16 @@ def plan_centres(rows: Lines, window: Window, highest: int) -> list[tuple[int, L
 class _Sweep:
     """One pass over all windows; collects branches and variances on the output lines."""
 
-    def __init__(self, regression: Regression, window: Window, lines: Lines, centres: list[tuple[int, Lines]]) -> None:
+    def __init__(
+        self,
+        regression: Regression,
+        window: Window,
+        lines: Lines,
+        centres: list[tuple[int, Lines]],
+        noise: Floats | None,
+    ) -> None:
         self.regression, self.window, self.lines, self.centres = regression, window, lines, centres
+        self.noise = noise
         self.place = np.full(int(lines[-1]) + 1, -1)
         self.place[lines] = np.arange(lines.size)
         self.htf = np.zeros((window.branches, lines.size), dtype=complex)
@@ -169,8 +177,7 @@ class _Sweep:
             self.cross_terms = "exact"
             self.cross = CrossCovariance(regression, window, self.place, shifts)
         self.residual = self.power = 0.0
-        self.missing = MissingPower(lines, regression.mesh_lines, regression.highest)
-        self.search_every = -(-len(centres) // SEARCHED)
+        self.missing = MissingPower(regression, lines, window.harmonics)
         self.condition = 0.0
 
     def run(self, progress: Callable[[float, str], None] | None) -> LpmResult:
@@ -190,8 +197,7 @@ class _Sweep:
             assert last is not None
             noise = self._account(fit, source)
             self._read(fit, centre, rows, noise * last)
-            if done % self.search_every == 0:
-                self.missing.add(fit, source, rows)
+            self.missing.add(fit, rows, self.window.width)
             if self.cross is not None:
                 self.cross.add(fit, source, rows, noise)
             if progress is not None and done % 16 == 0:
@@ -234,7 +240,8 @@ class _Sweep:
             self.htf,
             self.variance,
             np.concatenate([diagonal, cross]),
-            self.missing.total,
+            self.missing.total(self.missing.quietest() if self.noise is None else self.noise),
+            self.missing.total(0.0 if self.noise is None else self.noise),
             float(np.sqrt(self.residual / self.power)) if self.power else 0.0,
             self.condition,
             middle.unknowns + transient,

@@ -1,64 +1,134 @@
-"""Power of the branches that a local model leaves out, from what its residuals share with their inputs.
+"""Power of what a local model leaves out: residual above the noise, shared among the branches that can have caused it.
 
-A branch j that is left out sends Gs_j(m) U(m + j d) into the residual r of a window. The other inputs are independent
-of U(m + j d), so that with phi = degrees of freedom over equations
+Per degree of freedom the residual of a window holds s^2 = noise + sum_j |dGs_j U_j|^2 over everything that the model
+does not have: branches beyond L, and what polynomials of order R do not follow. With inputs of power P_u on each line
 
-    c_j = sum conj(U(m + j d)) r(m) / (phi S_j),  S_j = sum |U(m + j d)|^2,   E|c_j|^2 = |Gs_j|^2 + s^2 / (phi S_j):
+    sum_j |dGs_j(m)|^2 = (s^2(m) - noise) / P_u,
 
-the correlation, less what noise of the residual's variance s^2 adds to it (Bendat and Piersol 2010, chapter 9).
+whatever the branches are like. Rows that no window serves hold nothing but missing response.
 
-Over a window that is wide against the response's variation only the mean of Gs_j counts: the power is then low, by
-a tenth to a quarter in trials with three and six experiments, and by more in wider windows. One experiment with a
-transient, whose polynomial takes the slow part of every residual, showed a tenth to a third of it.
+Noise: from repeated periods where there are some; else the residual of the quietest part of the excited band, less what
+would be missing there if the whole residual elsewhere were missing response. Noise that is larger elsewhere, or a
+record without a quiet part, then counts as missing response: the error is overstated, not understated.
+
+A row's missing power comes from sources inside and outside of the output lines. A varying stiffness turns the response
+at the source into force in the row, so that branch j is taken to weigh the response at its source times
+VARIATION / j^2, the power of the harmonics of a stiffness that jumps, over the quasi-static response that branch 0
+weighs. Rows without a window lie further from the output lines than those with one, and less reaches them.
 """
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
 
 from gearbench.identification.lpm.local_solve import LocalFit
-from gearbench.identification.lpm.rows import WindowRows
+from gearbench.identification.lpm.regression import Regression
+from gearbench.identification.spectra.joint import Floats
 
 Lines = NDArray[np.int64]
 
+# Parts of the excited band whose quietest one tells the noise, and how far the least of so many normal numbers lies
+# below their mean [standard deviations].
+PARTS = 12
+LEAST_OF_PARTS = 1.63
+# Rows in which sources are counted, at most, and part of all lines over which the response of sources is averaged.
+COUNTED = 300
+AVERAGED = 0.004
+# (dk / (pi k))^2 of a stiffness that jumps by half of its mean.
+VARIATION = 0.03
+# Groups of rows with windows that rows without are held against.
+NEAR = 8
+
 
 class MissingPower:
-    """Mean over output lines k of |G_l(k)|^2 for branches |l| > L, window by window.
+    """Sum over output lines k and branches l of |error of G_l(k)|^2 that no variance tells, window by window."""
 
-    A row m reads branch l = -j of line m + j d, or l = j of line -(m + j d) where that is negative.
-    """
+    def __init__(self, regression: Regression, lines: Lines, harmonics: int) -> None:
+        self.regression, self.lines, self.harmonics = regression, lines, harmonics
+        d, origin = regression.mesh_lines, regression.origin
+        self.rows = np.arange(1, regression.highest + 1)
+        residue, position = self.rows % d, self.rows // d + origin
+        self.excited = np.concatenate([[False], regression.excited[residue, position]])
+        data = np.mean(np.abs(regression.dte[residue, :, position]) ** 2, axis=1)
+        self.operating = residue == 0 if d > 1 else np.zeros(self.rows.size, dtype=bool)
+        width = max(3, round(AVERAGED * self.rows.size))
+        self.power: Floats = np.concatenate([[0.0], data])
+        self.response = np.concatenate([[0.0], uniform_filter1d(np.where(self.operating, 0.0, data), width)])
+        self.response *= self.excited
+        rising = self.response[: int(np.argmax(self.response)) + 1]
+        self.static = float(np.median(rising[rising > 0]))
+        # Rows without a window: all response is missing.
+        self.level: Floats = np.concatenate([[0.0], data])
+        self.covered = np.zeros(self.rows.size + 1, dtype=bool)
+        self.freedom = np.zeros(self.rows.size + 1)
+        self.step = int(np.min(np.diff(lines))) if lines.size > 1 else 1
 
-    def __init__(self, lines: Lines, mesh_lines: int, highest: int) -> None:
-        self.lines = lines
-        self.wanted = np.zeros(int(lines[-1]) + 1, dtype=bool)
-        self.wanted[lines] = True
-        self.furthest = (int(lines[-1]) + highest) // mesh_lines + 1
-        self.power, self.count = np.zeros((2, 2 * self.furthest + 1))
+    def add(self, fit: LocalFit, rows: Lines, width: int) -> None:
+        """Take in the residual of a window of `width` lines for the `rows` that are read from it."""
+        served = slice(int(rows[0]), int(rows[-1]) + self.step)
+        self.level[served] = fit.residual / fit.freedom
+        self.covered[served] = True
+        self.freedom[served] = fit.freedom / width
 
-    @property
-    def total(self) -> float:
-        """Sum over the branches and all output lines; those that no row has met count like those that some have."""
-        met = self.count > 0
-        return float(np.sum(self.power[met] / self.count[met]) * self.lines.size)
+    def quietest(self) -> float:
+        """Noise [m^2] of a line and experiment from the quietest part of the excited band."""
+        driven = np.flatnonzero(self.covered & (np.arange(self.covered.size) <= np.flatnonzero(self.excited)[-1]))
+        driven = driven[driven > 0]
+        if driven.size < PARTS:
+            return 0.0
+        driven = driven[~self.operating[driven - 1]]
+        parts = np.array_split(driven, PARTS)
+        freedom = np.array([self.freedom[part].sum() for part in parts])
+        sums = np.array([np.sum(self.level[part] * self.freedom[part]) for part in parts])
+        response = np.array([self.power[part].mean() for part in parts])
+        if not freedom.min() > 0:
+            return 0.0
+        means = sums / freedom
+        least = int(np.argmin(means))
+        found = means[least] * (1.0 + LEAST_OF_PARTS / np.sqrt(freedom[least]))
+        return float(max(found - means.mean() / response.mean() * response[least], 0.0))
 
-    def add(self, fit: LocalFit, source: WindowRows, rows: Lines) -> None:
-        """Take in the residuals of a window for the `rows` that are read from it."""
-        branch = np.arange(-self.furthest, self.furthest + 1)
-        branch = branch[np.abs(branch) > source.window.harmonics]
-        line = rows[:, None] + branch * source.regression.mesh_lines
-        reached = (np.abs(line) < self.wanted.size) & self.wanted[np.minimum(np.abs(line), self.wanted.size - 1)]
-        ahead, mirrored = (np.count_nonzero(reached & side, axis=0) for side in (line > 0, line < 0))
-        some = ahead + mirrored > 0
-        branch, ahead, mirrored = branch[some], ahead[some], mirrored[some]
-        if not branch.size or fit.freedom <= 0:
-            return
-        inputs = source.inputs_of(branch)
-        size = np.sum(inputs.real**2 + inputs.imag**2, axis=(0, 1))
-        excited = size > 0
-        share = fit.freedom / source.equations * size[excited]
-        product = np.einsum("rej,er->j", inputs[:, :, excited].conj(), fit.left)
-        found = np.abs(product / share) ** 2 - fit.residual / fit.freedom / share
-        for place, count in ((-branch, ahead), (branch, mirrored)):
-            self.power[place[excited] + self.furthest] += count[excited] * found
-            self.count[place[excited] + self.furthest] += count[excited]
+    def total(self, noise: Floats | float) -> float:
+        """The sum with the noise [m^2] of every row (lines 0, 1, ..) or of all."""
+        above = self.level - noise
+        above[0] = 0.0
+        above[1:][self.operating & ~self.covered[1:]] = 0.0
+        found = [(rows, float(above[rows].mean()) * share) for rows, share in self._shares]
+        served = [(int(rows[0]), mean) for rows, mean in found if self.covered[rows[0]]]
+        total = 0.0
+        for rows, mean in found:
+            if served and not self.covered[rows[0]]:
+                near = sorted(served, key=lambda one: abs(one[0] - int(rows[0])))[:NEAR]
+                mean = min(mean, float(np.mean([one[1] for one in near])))
+            total += rows.size * mean
+        density = self.lines.size / (self.lines[-1] - self.lines[0] + self.step)
+        return max(total, 0.0) * density / self.regression.input_power()
+
+    @cached_property
+    def _shares(self) -> list[tuple[Lines, float]]:
+        """Groups of rows, those with a window apart from the others, and their share of output lines."""
+        found = []
+        for part in np.array_split(self.rows, min(COUNTED, self.rows.size)):
+            for own in (part[self.covered[part]], part[~self.covered[part]]):
+                if own.size:
+                    fewest = self.harmonics + 1 if self.covered[own[0]] else 0
+                    found.append((own, self._share(int(own[own.size // 2]), fewest)))
+        return found
+
+    def _share(self, row: int, fewest: int) -> float:
+        """Part of the missing response in a row whose sources lie between the output lines; branches from `fewest`."""
+        d = self.regression.mesh_lines
+        reach = (row + self.excited.size) // d + 1
+        branch = np.arange(-reach, reach + 1)
+        source = np.abs(row + branch * d)
+        branch, source = branch[source < self.excited.size], source[source < self.excited.size]
+        response = VARIATION * self.response[source] / np.maximum(np.abs(branch), 1) ** 2
+        response[branch == 0] = self.static * self.excited[row]
+        inside = (source >= self.lines[0]) & (source <= self.lines[-1])
+        # What is missing may be the branches from `fewest` on, or what the polynomials of the others do not follow.
+        later = response * (np.abs(branch) >= fewest)
+        return max(float(w[inside].sum() / max(w.sum(), np.finfo(float).tiny)) for w in (response, later))

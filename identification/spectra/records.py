@@ -24,6 +24,8 @@ from gearbench.identification.spectra.transmission_error import AngleOnlyWarning
 EXCITED = 1e-3
 # Largest departure of the mesh phase from a straight line [cycles] that is passed over.
 PHASE_WANDER = 2e-3
+# Largest drift of the mesh phase against the mesh period over a record [cycles].
+DRIFT = 0.3
 SAME = 1e-9
 
 
@@ -163,6 +165,7 @@ def _start_phases(record: xr.Dataset, period: float, notes: list[str]) -> Floats
         for row in range(count):
             departure = record["mesh_phase"].values[row] - steps
             start[row] = departure.mean()
+            _require_speed(departure, steps)
             wander = np.abs(departure - start[row]).max()
             if wander > PHASE_WANDER:
                 notes.append(
@@ -174,6 +177,17 @@ def _start_phases(record: xr.Dataset, period: float, notes: list[str]) -> Floats
         return np.full(count, 1.0) * np.asarray(record.attrs["mesh_phase"], dtype=float)
     notes.append("the record does not know the mesh phase: phase 0 is the start of the record")
     return np.zeros(count)
+
+
+def _require_speed(departure: Floats, steps: Floats) -> None:
+    """Raise SpectraError where the mesh phase drifts away from the mesh period by more than DRIFT."""
+    cycles = float(steps[-1] - steps[0])
+    drift = cycles * float(np.polyfit(steps, departure, 1)[0]) if cycles else 0.0
+    if abs(drift) > DRIFT:
+        raise SpectraError(
+            f"mesh_phase runs through {cycles + drift:.6g} cycles where mesh_period says {cycles:.6g} (limit {DRIFT:g}"
+            " apart): wrong number of teeth, mesh period or sampling rate"
+        )
 
 
 def _scatter(record: xr.Dataset) -> float | None:

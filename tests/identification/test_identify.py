@@ -15,6 +15,7 @@ from gearbench.identification.spectra.joint import joint_periods
 from gearbench.identification.spectra.records import record_spectra
 from gearbench.identification.truth.monodromy import exact_itf
 from gearbench.identification.truth.periodic import truncation_error
+from gearbench.records import RecordError
 from gearbench.records.record import make_record
 
 # A faster mesh needs fewer branches: 16 reach 512 Hz to each side.
@@ -244,6 +245,33 @@ def test_wandering_speed_is_warned_of() -> None:
     record["mesh_phase"] = record.dte * 0 + record.time / 32.0 + 0.01 * np.sin(record.time / 10.0)
     _, _, notes = record_spectra([record], sidebands=2)
     assert any("0.01 cycles" in note for note in notes)
+
+
+def test_mesh_phase_that_drifts_from_the_mesh_period_is_refused() -> None:
+    """A wrong number of teeth turns the phase at another speed; a wandering one comes back."""
+    record = filter_record(2)
+    record["mesh_phase"] = record.dte * 0 + record.time / 32.0 * (1 + 1 / 6)
+    with pytest.raises(SpectraError, match=r"runs through 6.96\d* cycles where mesh_period says 5.9\d*.*wrong number"):
+        record_spectra([record], sidebands=2)
+
+
+@pytest.mark.parametrize("channel", ["dte", "force"])
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_values_that_are_not_finite_are_named(channel: str, value: float) -> None:
+    record = filter_record(2).copy(deep=True)
+    record[channel].values[0, 17] = value
+    with pytest.raises(RecordError, match=f"channel {channel} holds 1 value.* not finite, .*sample 17"):
+        identify([record])
+
+
+def test_result_that_says_nothing_says_so() -> None:
+    """A mesh period that is 1/7 too long: the expected error exceeds the response."""
+    record = reference_record(RIG, realisations=1, duration=0.25, band=(4.0, 2600.0)).drop_vars("mesh_phase")
+    wrong = record.assign_attrs(mesh_period=0.25 / 7)
+    settings = IdentificationSettings(harmonics=2, order=1, window=10, band=(900.0, 1300.0), phases=16, modes=0)
+    frf = identify([wrong], settings)
+    assert frf.attrs["expected_error"] > 1.0
+    assert "exceeds the response: this result says nothing" in frf.attrs["warnings"]
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ from functools import lru_cache, partial
 from typing import Literal
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 from shared.reference_rig import ReferenceRig, reference_record
 
@@ -22,6 +23,14 @@ from gearbench.identification import (
 BAND = (700.0, 2500.0)
 FREQUENCIES = np.arange(BAND[0], BAND[1] + 1, 4.0)
 PHASES = 512
+# Mesh frequency, noise, realisations, and windows (L, R, n).
+EXPECTED: tuple[tuple[float, float, int, tuple[tuple[int, int, int], ...]], ...] = (
+    (500.0, 0.01, 1, ((3, 1, 14), (5, 2, 24), (7, 3, 42), (9, 2, 60), (9, 4, 60))),
+    (500.0, 0.1, 3, ((3, 1, 6), (5, 2, 12), (9, 3, 20), (9, 1, 10))),
+    (200.0, 0.0, 1, ((4, 1, 16), (8, 2, 40), (12, 1, 40), (18, 2, 80))),
+    (200.0, 0.03, 4, ((4, 1, 6), (12, 2, 16), (18, 3, 28))),
+    (50.0, 0.01, 4, ((8, 1, 8), (15, 2, 20), (30, 1, 24), (30, 2, 40))),
+)
 METHODS: tuple[tuple[Literal["lpm", "mesh-feedback"], float], ...] = (("lpm", 0.025), ("mesh-feedback", 0.01))
 
 
@@ -71,6 +80,43 @@ def at_speed(mesh_frequency: float, method: Literal["lpm", "mesh-feedback"]) -> 
     return relative(found, exact_itf(rig.system(512), frequency, np.arange(128) / 128))
 
 
+def expected_errors() -> float:
+    """Expected over actual error of the local polynomial method, or its inverse: the worst of 20 settings."""
+    ratios = []
+    for mesh, noise, realisations, windows in EXPECTED:
+        rig = ReferenceRig(mesh_frequency=mesh)
+        given = {"duration": 1.0, "sampling_rate": 16000.0, "band": (1.0, 5000.0), "noise": noise}
+        record = reference_record(rig, realisations=realisations, **given)
+        exact = exact_itf(rig.system(512), FREQUENCIES[::8], np.arange(128) / 128)
+        for harmonics, order, window in windows:
+            settings = IdentificationSettings(
+                harmonics=harmonics, order=order, window=window, band=BAND, step=4, phases=128, modes=0
+            )
+            frf = identify([record], settings)
+            error = relative(itf(frf).sel(frequency=FREQUENCIES[::8]).values, exact)
+            ratios.append(frf.attrs["expected_error"] / error)
+    return max(max(ratios), 1.0 / min(ratios))
+
+
+def deviations(quantity: str) -> float:
+    """Empirical over predicted standard deviation of mesh feedback's `quantity`, or its inverse: 12 draws of noise."""
+    frfs = repeated_feedback()
+    values = np.array([itf(frf).values if quantity == "itf" else frf[quantity].values for frf in frfs])
+    empirical = float(np.mean(np.var(values, axis=0, ddof=1)))
+    ratio = float(np.sqrt(np.mean([frf[f"{quantity}_var"].values.mean() for frf in frfs]) / empirical))
+    return max(ratio, 1.0 / ratio)
+
+
+@lru_cache(maxsize=1)
+def repeated_feedback() -> list[xr.Dataset]:
+    """Mesh feedback of one record of 1 s at 50 Hz mesh with twelve draws of noise, 40 dB."""
+    clean = reference_record(ReferenceRig(mesh_frequency=50.0), realisations=1, duration=1.0, sampling_rate=8000.0)
+    size = 0.01 * float((clean.dte - clean.dte.mean()).std())
+    settings = IdentificationSettings(method="mesh-feedback", band=BAND, step=20, phases=64, modes=0)
+    draws = (np.random.default_rng(seed).standard_normal(clean.dte.shape) for seed in range(12))
+    return [identify([clean.assign(dte=clean.dte + size * draw)], settings) for draw in draws]
+
+
 def formulations() -> float:
     """Monodromy against harmonic balance on the reference system with edges 20 % wide, at three frequencies."""
     system = ReferenceRig(edge=0.2).system(256)
@@ -99,6 +145,17 @@ CHECKS = [
         Check(f"{method}-{mesh}hz", f"{method}, {mesh} Hz mesh, 4 s, 40 dB", reach, "", partial(at_speed, mesh, method))
         for method, reach in METHODS
         for mesh in (50, 200, 500)
+    ),
+    Check("lpm-expected", "LPM: expected against actual error, worst of 20 settings", 2.0, "times", expected_errors),
+    *(
+        Check(
+            f"deviations-{quantity}",
+            f"mesh-feedback: predicted against empirical deviation, {quantity}",
+            1.6,
+            "times",
+            partial(deviations, quantity),
+        )
+        for quantity in ("itf", "mesh_stiffness")
     ),
     Check("exact-itf", "exact ITF: monodromy against harmonic balance", 1e-8, "", formulations),
     Check("frozen-itf", "frozen against exact ITF: distance from the stated 16 %", 0.01, "", frozen),

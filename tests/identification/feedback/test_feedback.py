@@ -6,7 +6,7 @@ import xarray as xr
 from shared.ptv import periodic_filter
 from shared.reference_rig import ReferenceRig, reference_record
 
-from gearbench.identification import IdentificationSettings, LpmError, identify, itf
+from gearbench.identification import IdentificationSettings, LpmError, htf, identify, itf
 from gearbench.identification.feedback.data import ClassData, class_data
 from gearbench.identification.feedback.functions import Basis, Fractions, Splines, common_poles
 from gearbench.identification.feedback.model import Model
@@ -152,6 +152,28 @@ def test_reference_rig_at_40_db(identified: xr.Dataset) -> None:
     assert actual < 2.5 * np.sqrt(identified.mesh_stiffness_var.values.mean())
 
 
+def test_predicted_standard_deviations_are_those_of_repeated_noise() -> None:
+    """Eight draws of noise on one record: predicted over empirical standard deviation of ITF, HTF and k(theta).
+
+    With draws that keep the factor of all parameters where the estimate has it, k comes out at half.
+    """
+    clean = reference_record(RIG, realisations=1, duration=0.25, band=(4.0, 2600.0), start_phase=0.3)
+    size = 0.03 * float((clean.dte - clean.dte.mean()).std())
+    settings = IdentificationSettings(method="mesh-feedback", harmonics=14, band=BAND, phases=32, step=8, modes=0)
+    found = []
+    for seed in range(8):
+        noise = size * np.random.default_rng(seed).standard_normal(clean.dte.shape)
+        found.append(identify([clean.assign(dte=clean.dte + noise)], settings))
+    for values, variance in (
+        ([itf(frf).values for frf in found], "itf_var"),
+        ([htf(frf).values for frf in found], "htf_var"),
+        ([frf.mesh_stiffness.values for frf in found], "mesh_stiffness_var"),
+    ):
+        empirical = np.mean(np.var(np.array(values), axis=0, ddof=1))
+        predicted = np.mean([frf[variance].values.mean() for frf in found])
+        assert 0.8 < np.sqrt(predicted / empirical) < 1.6, variance
+
+
 def test_record_that_no_mesh_force_explains_is_told() -> None:
     """A random time-varying filter: the residual follows the force, and the local polynomial method takes over."""
     system = periodic_filter(2, 32, taps=6)
@@ -160,7 +182,7 @@ def test_record_that_no_mesh_force_explains_is_told() -> None:
     record = make_record(
         {"dte": 1e-9 * system.response(force), "force": force}, {**given, "settling_residual": 0.0}
     )
-    frf = identify([record], IdentificationSettings(method="mesh-feedback", phases=32, band=(0.05, 0.4)))
+    frf = identify([record], IdentificationSettings(method="mesh-feedback", harmonics=10, phases=32, band=(0.05, 0.4)))
     assert frf.attrs["method"] == "lpm"
     assert "mesh-feedback expects to err by" in frf.attrs["warnings"]
     assert "local polynomial method instead" in frf.attrs["warnings"]

@@ -1,5 +1,8 @@
 """What a result expects of itself, and the choice of branches, order and window."""
 
+from dataclasses import replace
+from functools import cache
+
 import numpy as np
 import pytest
 from shared.ptv import periodic_filter, spectra_of
@@ -18,37 +21,64 @@ from gearbench.identification.truth.periodic import itf_from_htf
 LINES = np.arange(100, 500, 4)
 
 
-def result(htf: np.ndarray, *, variance: float, residual: float, missing: float = 0.0) -> LpmResult:
+def result(htf: np.ndarray, *, variance: float, missing: float, bound: float) -> LpmResult:
     spread = np.full(htf.shape, variance)
     total = spread.sum(axis=0)[None, :].astype(complex)
-    return LpmResult(np.arange(1, htf.shape[1] + 1), htf, spread, total, missing, residual, 1.0, 1, 2, 1, 1, "none")
+    lines = np.arange(1, htf.shape[1] + 1)
+    return LpmResult(lines, htf, spread, total, missing, bound, 0.25, 1.0, 1, 2, 1, 1, "none")
 
 
 def test_expected_error_adds_variance_and_missing_branches() -> None:
     htf = np.ones((3, 10), complex)  # power 3 per frequency
-    accuracy = expected_accuracy(result(htf, variance=0.01 * 3 / 3.03, residual=0.25, missing=30 * 0.2**2), noise=None)
+    found = result(htf, variance=0.01 * 3 / 3.03, missing=30 * 0.2**2, bound=30 * 0.25**2)
+    accuracy = expected_accuracy(found, record=0.15)
     assert accuracy.variance == pytest.approx(0.1, rel=0.01)
     assert accuracy.truncation == pytest.approx(0.2, rel=0.01)
-    assert accuracy.expected == pytest.approx(np.hypot(0.1, 0.2), rel=0.01)
-    assert accuracy.bound == pytest.approx(np.hypot(0.1, 0.25), rel=0.01)
-    # Noise that repeated periods have told apart is no missing response; an estimate below zero is none either.
-    known = expected_accuracy(result(htf, variance=0.0, residual=0.2, missing=-1.0), noise=0.16)
-    assert known.expected == 0.0
-    assert known.bound == pytest.approx(0.12)
+    assert accuracy.expected == pytest.approx(np.sqrt(0.1**2 + 0.2**2 + 0.15**2), rel=0.01)
+    assert accuracy.bound == pytest.approx(np.sqrt(0.1**2 + 0.25**2 + 0.15**2), rel=0.01)
 
 
 @pytest.mark.parametrize(("experiments", "noise"), [(3, 0.0), (6, 0.1)])
 def test_missing_power_is_that_of_the_branches_left_out(experiments: int, noise: float) -> None:
-    """Four branches are there, two are fitted: what the residuals show of the others, against the closed form.
+    """Four branches are there, two are fitted: what is missing against the closed form, with the noise known.
 
-    Without the share of degrees of freedom the estimate is low by the square of that share; without the noise term
-    it is high.
+    Unless the noise is taken off it is high by a quarter in the second case.
     """
-    spectra, truth = noisy(noise, experiments)
-    result = local_polynomial(spectra, LINES, Window(2, 1, 5, transient=False))
-    order = np.abs(np.arange(-8, 9))
-    wanted = np.sum(np.abs(truth[order > 2]) ** 2)
-    assert result.missing == pytest.approx(wanted, rel=0.25)
+    lines = np.arange(4, 900, 4)  # so that nothing that is missing comes from elsewhere
+    spectra, truth = noisy(noise, experiments, lines=lines)
+    size = float(np.mean(np.abs(spectra.dte) ** 2)) / (1 + noise**2)
+    known = replace(spectra, noise=np.full(spectra.highest + 1, noise**2 * size))
+    found = local_polynomial(known, lines, Window(2, 1, 5, transient=False))
+    wanted = np.sum(np.abs(truth[np.abs(np.arange(-8, 9)) > 2]) ** 2)
+    assert np.sqrt(found.missing) == pytest.approx(np.sqrt(wanted), rel=0.15)
+    assert found.missing_bound == found.missing
+    # Nothing of this response is quiet: without knowledge of the noise all of the residual counts.
+    unknown = local_polynomial(spectra, lines, Window(2, 1, 5, transient=False))
+    assert 0.9 * wanted < unknown.missing <= unknown.missing_bound
+
+
+@cache
+def at_500_hz() -> tuple[Spectra, np.ndarray, np.ndarray]:
+    """One second of the reference system, output lines, and the exact ITF on every fourth of them."""
+    rig = ReferenceRig(mesh_frequency=500.0)
+    record = reference_record(rig, realisations=1, duration=1.0, sampling_rate=16000.0, band=(1.0, 5000.0), noise=0.01)
+    spectra, _, _ = record_spectra([record], top=2500.0, sidebands=9)
+    lines = np.arange(704, 2500, 8)
+    return spectra, lines, exact_itf(rig.system(256), lines[::4].astype(float), np.arange(128) / 128)
+
+
+@pytest.mark.parametrize(
+    ("window", "transient"), [((3, 1, 14), False), ((6, 2, 50), False), ((6, 2, 50), True), ((9, 1, 40), False)]
+)
+def test_expected_error_is_the_error(window: tuple[int, int, int], transient: bool) -> None:
+    """One record at 500 Hz mesh, with too few branches, too wide windows or neither, against the exact ITF.
+
+    With the missing response of every row taken for that of output lines (share 1) the first one is high by a third.
+    """
+    spectra, lines, exact = at_500_hz()
+    found = local_polynomial(spectra, lines, Window(*window, transient))
+    error = np.linalg.norm(itf_from_htf(found.htf, 128)[::4] - exact) / np.linalg.norm(exact)
+    assert expected_accuracy(found).expected == pytest.approx(error, rel=0.25)
 
 
 def test_record_length_rule() -> None:
@@ -75,13 +105,15 @@ def test_record_length_rule() -> None:
     assert record_rule(spectra, 3, 1, np.empty((0, 5)), np.empty((0, 5)), 0.1) is None
 
 
-def noisy(noise: float, experiments: int = 3, harmonics: int = 4) -> tuple[Spectra, np.ndarray]:
+def noisy(
+    noise: float, experiments: int = 3, harmonics: int = 4, lines: np.ndarray = LINES
+) -> tuple[Spectra, np.ndarray]:
     system = periodic_filter(harmonics, 64, taps=30, seed=2)
     rng = np.random.default_rng(3)
     force = rng.standard_normal((experiments, 2048))
     clean = system.response(force)
     dte = clean + noise * clean.std() * rng.standard_normal(clean.shape)
-    return spectra_of(force, dte, 32), system.htf(LINES / 2048, 8)
+    return spectra_of(force, dte, 32), system.htf(lines / 2048, 8)
 
 
 def error(spectra: Spectra, truth: np.ndarray, window: Window) -> float:

@@ -1,0 +1,95 @@
+"""`multisine CASE`: what the excitation of a case will resolve, before anything is measured."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from gearbench.shell.options import CaseArgument, JsonOption, SetOption, load_case, print_json
+from gearbench.shell.progress import Progress
+
+if TYPE_CHECKING:
+    from gearbench.bench.design import Design
+
+
+def multisine(
+    case: CaseArgument,
+    snr_db: Annotated[
+        float, typer.Option("--snr-db", help="torque-induced DTE over noise, rms in the excited band")
+    ] = 40.0,
+    method: Annotated[Literal["lpm", "mesh-feedback"], typer.Option("--method", help="estimator")] = "lpm",
+    band_hz: Annotated[
+        tuple[float, float] | None, typer.Option("--band-hz", help="identified band; absent: the case's, else excited")
+    ] = None,
+    settings: SetOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Tell what the planned multisine of a case will resolve: branches, record length, expected error of the response.
+
+    The spectra of the planned record are written down from the exact response of the linearised lumped model, with
+    noise, and identified as the record would be.
+    """
+    loaded = load_case(case, settings)
+    import gearbench as gb
+    from gearbench.bench.design import design
+
+    wanted = band_hz or loaded.identification.band
+    with Progress(f"multisine {loaded.name}") as progress:
+        progress.step("plan")
+        found = design(
+            loaded,
+            gb.IdentificationSettings(method=method, band=wanted, modes=0),
+            snr_db=snr_db,
+            progress=progress,
+        )
+    if as_json:
+        print_json({**asdict(found), "realisations_needed": found.realisations_needed, "advice": advice(found)})
+        return
+    typer.echo("\n".join(sentences(found)))
+    for sentence in advice(found):
+        typer.echo(f"advice: {sentence}")
+
+
+def sentences(found: Design) -> list[str]:
+    """The plan, the mode that it is meant for, and what comes out."""
+    chosen = zip("LRn", found.window, strict=True)
+    window = ", ".join(f"{name} = {value}" for name, value in chosen if value is not None)
+    return [
+        f"excitation: {found.lines} lines {found.spacing:g} Hz apart in {found.band[0]:g}-{found.band[1]:g} Hz,"
+        f" {found.peak:.4g} N m peak, {found.rms:.4g} N m rms, crest {found.crest:.3g};"
+        f" {found.realisations} realisation(s), {found.distinct:g} s of distinct excitation",
+        f"mesh: {found.mesh_frequency:g} Hz; first mode {found.natural[0]:.4g}-{found.natural[1]:.4g} Hz with"
+        f" {found.bandwidth:.3g} Hz of bandwidth: {found.branches} branches a side, {found.needed:.3g} s of distinct"
+        " excitation",
+        f"at {found.snr_db:g} dB, {found.identified[0]:g}-{found.identified[1]:g} Hz: {found.method} ({window})"
+        f" will expect to err by {found.expected:.1%} and errs by {found.actual:.1%}",
+    ]
+
+
+def advice(found: Design) -> list[str]:
+    """What to change."""
+    notes: list[str] = []
+    if found.needed > found.distinct:
+        notes.append(
+            f"the record is short by a factor of {found.needed / found.distinct:.3g}: set"
+            f" experiment.realisations={found.realisations_needed}, or longer periods, or use --method mesh-feedback"
+        )
+    if found.headroom < 1.0:
+        notes.append(
+            f"the multisine would unload the mesh: at most {found.headroom:.2g} of it,"
+            f" {found.headroom * found.peak:.3g} N m peak, or more mean torque"
+        )
+    if found.natural[1] + found.bandwidth > found.band[1] or found.natural[0] - found.bandwidth < found.band[0]:
+        notes.append(
+            f"the band leaves out part of the first mode: excite {found.natural[0] - 2 * found.bandwidth:.0f}-"
+            f"{found.natural[1] + 2 * found.bandwidth:.0f} Hz at least"
+        )
+    if found.spacing > found.bandwidth / 4:
+        notes.append(
+            f"lines {found.spacing:g} Hz apart are too few for a bandwidth of {found.bandwidth:.3g} Hz:"
+            f" take periods of {4 / found.bandwidth:.2g} s or more"
+        )
+    return notes
+

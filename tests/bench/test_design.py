@@ -1,0 +1,76 @@
+"""What is told before a measurement against what records that were integrated in time then give."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from gearbench.bench.design import design
+from gearbench.bench.errors import BenchError
+from gearbench.bench.experiment import simulate
+from gearbench.bench.results.exact import lumped_periodic_system
+from gearbench.cases import case_path
+from gearbench.identification import IdentificationSettings, exact_itf, identify, itf
+from gearbench.rig import Case, read_case
+
+BAND = (800.0, 2000.0)
+NOISE = 10 ** (-30 / 20)
+
+
+@cache
+def planned() -> Case:
+    settings = ["experiment.realisations=2", "experiment.mesh_frequency_hz=400", "experiment.periods=1"]
+    return read_case(case_path("quick_lumped"), settings)
+
+
+@cache
+def measured() -> xr.Dataset:
+    """The record with white noise 30 dB below what the torque causes between 1 and 3500 Hz."""
+    record = simulate(planned())
+    count = record.sizes["time"]
+    lines = np.arange(1, 1750)
+    power = np.abs(np.fft.rfft(record["dte"].values, axis=1)[:, lines]) ** 2
+    power = power[:, lines % 200 != 0].mean() / count  # without the operating response
+    noise = NOISE * np.sqrt(power) * np.random.default_rng(7).standard_normal(record["dte"].shape)
+    return record.assign(dte=(record["dte"].dims, record["dte"].values + noise, record["dte"].attrs))
+
+
+@pytest.mark.parametrize("window", [(3, 1, 10), (6, 2, 20), (8, 3, 36)])
+def test_error_is_told_before_the_record_is_made(window: tuple[int, int, int]) -> None:
+    """Spectra whose sidebands keep the source's phase at negative lines (no conjugate) err twice as much."""
+    harmonics, order, half_width = window
+    settings = IdentificationSettings(
+        harmonics=harmonics, order=order, window=half_width, band=BAND, step=4, phases=50, modes=0
+    )
+    told = design(planned(), settings, snr_db=30.0)
+    frf = identify([measured()], settings)
+    frequency = frf["frequency"].values[::3]
+    exact = exact_itf(lumped_periodic_system(planned()), frequency, np.arange(50) / 50)
+    error = float(np.linalg.norm(itf(frf).values[::3] - exact) / np.linalg.norm(exact))
+    assert told.actual == pytest.approx(error, rel=0.2)
+    assert told.expected == pytest.approx(frf.attrs["expected_error"], rel=0.2)
+
+
+def test_plan_is_that_of_the_case() -> None:
+    told = design(planned(), IdentificationSettings(harmonics=3, order=1, window=10, band=BAND, modes=0))
+    assert (told.lines, told.spacing, told.realisations) == (1750, 2.0, 2)
+    assert told.peak == pytest.approx(50.0)
+    assert told.mesh_frequency == pytest.approx(400.0)
+    # Frozen eigenvalues: F = k x (and supports) on equal rotors, read from the matrices at 64 phases.
+    a, _, _ = lumped_periodic_system(planned()).at(np.arange(64) / 64)
+    lowest = [np.sort(np.abs(np.linalg.eigvals(one)[np.linalg.eigvals(one).imag > 1.0]))[0] for one in a]
+    assert told.natural == pytest.approx((min(lowest) / (2 * np.pi), max(lowest) / (2 * np.pi)), rel=1e-6)
+    assert told.needed == pytest.approx(3 * (2 * told.branches + 1) * 2 / told.bandwidth)
+    assert told.distinct == pytest.approx(1.0)
+
+
+def test_what_cannot_be_planned_is_refused() -> None:
+    settings = IdentificationSettings()
+    constant = planned().model_copy(
+        update={"experiment": planned().experiment.model_copy(update={"multisine": None})}
+    )
+    with pytest.raises(BenchError, match=r"no experiment.multisine: there is nothing to plan"):
+        design(constant, settings)
+    with pytest.raises(BenchError, match="signal-to-noise ratio of 300 dB must lie between -20 and 200"):
+        design(planned(), settings, snr_db=300.0)
