@@ -5,8 +5,8 @@ Along a given motion the mesh is a spring k(t) and a damper c(t), so that depart
 
     M q'' + C q' + K q = -m (k(t) m.q + c(t) m.q' + f(t)) + d g(t)
 
-with m what each coordinate contributes to the deflection, d the coordinate that the driver's torque acts on, f(t) the
-force that a change of the rig adds in the mesh at unchanged motion, and g(t) that on the shaft. Friction is left out:
+with m what each coordinate contributes to the deflection, f(t) the force that a change of the rig adds in the mesh at
+unchanged motion, and g(t) that on one coordinate d: a support, the driver, its shaft. Friction is left out:
 it turns a few per cent of a departure. Many departures are carried at once by the classical Runge-Kutta method.
 """
 
@@ -24,30 +24,29 @@ Array = NDArray[np.float64]
 
 class Tangent(NamedTuple):
     """A rig along a motion: springs K, dampers C (n, n), inverse masses (n,), what coordinates contribute to the
-    deflection (n,), what the driver's torque acts on (n,), and of the mesh on the half-step grid of one repetition
-    stiffness k and damping c (entries,); `step` [s] is two entries."""
+    deflection (n,), and of the mesh on the half-step grid of one repetition stiffness k and damping c (entries,);
+    `step` [s] is two entries."""
 
     springs: Array
     dampers: Array
     inverse: Array
     mesh: Array
-    drive: Array
     stiffness: Array
     damping: Array
     step: float
 
 
-def departures(tangent: Tangent, forces: Array, on_drive: bool, substeps: int, early: int) -> tuple[Array, Array]:
+def departures(tangent: Tangent, forces: Array, on: int | None, substeps: int, early: int) -> tuple[Array, Array]:
     """Departures (samples, n, columns) of the coordinates [m] and (samples, columns) of the mesh force [N] under forces
-    (entries, columns) [N] in the mesh, or on the driver's shaft; `early` steps before the first sample begin at rest.
+    (entries, columns) [N] in the mesh, or on the coordinate `on`; `early` steps before the first sample begin at rest.
     """
     entries, columns = forces.shape
     size = len(tangent.inverse)
     samples = entries // (2 * substeps)
     places, pushes = np.empty((samples, size, columns)), np.empty((samples, columns))
     inverse = tangent.inverse[:, None]
-    in_mesh = 0.0 if on_drive else 1.0
-    direction = tangent.inverse * (tangent.drive if on_drive else -tangent.mesh)
+    in_mesh = 1.0 if on is None else 0.0
+    direction = -tangent.inverse * tangent.mesh if on is None else tangent.inverse * (np.arange(size) == on)
     _run(
         -inverse * tangent.springs, -inverse * tangent.dampers, tangent.mesh, -tangent.inverse * tangent.mesh,
         direction, in_mesh, tangent.stiffness, tangent.damping, np.ascontiguousarray(forces), tangent.step, substeps,
