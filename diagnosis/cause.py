@@ -72,7 +72,7 @@ def find_cause(
     unsteady = unsteadiness(problem.model, measurements, problem.unknowns, fit.p, problem.conditions[0].band)
     simulate = replays(problem.model.law)
     found = simulated(problem, result, measurements, nominal, simulate, without, report)
-    common = {
+    common: dict[str, Any] = {
         "where": _places(problem, result.base),
         "indistinguishable": alike(fit, problem.unknowns, representatives(problem, without)),
         "evidence": {one.hypothesis.name: one.log_bayes_factor for one in result.tried},
@@ -99,7 +99,8 @@ def _by_forces_alone(
     problem: Problem, nominal: Case, result: Search, decision: Decision, common: dict[str, Any]
 ) -> Finding:
     """The finding where records cannot be simulated, as they do not tell the mesh phase."""
-    plain, effects, updated = recalibrated(nominal, fitted(problem, result.base)), (), None
+    plain, updated = recalibrated(nominal, fitted(problem, result.base)), None
+    effects: tuple[Effect, ...] = ()
     if decision.winner is not None and decision.winner.fit is not None:
         values, effect = fitted(problem, decision.winner.fit), decision.winner.hypothesis.effect
         assert effect is not None

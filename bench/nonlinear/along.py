@@ -108,7 +108,7 @@ def along(steady: Steady) -> Along:
     decay = max(model.slowest_decay(float(steady.drive.fine.mean())), 1e-9)
     early = min(ceil(log(1 / TRANSIENT) / decay / step), samples * substeps)
     first = setup.phase_at(0)
-    cycles = first + np.arange(entries) * (setup.cycles_per_sample / (2 * substeps))
+    cycles: Array = first + np.arange(entries, dtype=np.float64) * (setup.cycles_per_sample / (2 * substeps))
     tangent = Tangent(springs, dampers, inverse_masses(c, s), mesh, slope, damping, step)
 
     def moving(signal: Array) -> Moving:
