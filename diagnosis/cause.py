@@ -22,7 +22,7 @@ from gearbench.diagnosis.forces.steadiness import unsteadiness
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.intake.signals import measured_channels
 from gearbench.diagnosis.output.simulated import Simulated, simulated
-from gearbench.diagnosis.output.verdict_of import Decided, decide_simulated
+from gearbench.diagnosis.output.verdict_of import Decided, decide_simulated, lacking, remainder
 from gearbench.diagnosis.replay.replays import replays
 from gearbench.diagnosis.verdict import Candidate, Effect, Outcome, Parameter, Share
 from gearbench.rig import Case
@@ -81,6 +81,7 @@ def find_cause(
     if found is None:
         return _by_forces_alone(problem, nominal, result, decide(result, silent, unsteady), common)
     decided = decide_simulated(found, result, silent, unsteady)
+    common["audits"] |= {"remainder": tuple(remainder(found).values()), "lacking": tuple(lacking(found).values())}
     judged = held_out if held_out is not None and held_out.phase_known else None
     return Finding(
         verdict=decided.verdict,
@@ -143,7 +144,7 @@ def _parameters(effect: Library, estimates: Sequence[Estimate]) -> dict[str, Par
 def _effects(found: Simulated, decided: Decided) -> tuple[Effect, ...]:
     """The named effects with their parameters; one that is at work in two places counts once."""
     best = found.selection.best
-    values = found.layout.fitted(best.p, best.std)
+    values = found.layout.fitted(best.p, found.std)
     out: dict[str, Effect] = {}
     for one in decided.named:
         effect = one.hypothesis.effect
