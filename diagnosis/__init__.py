@@ -2,8 +2,8 @@
 
 `intake`: records become measurements, checked against the nominal rig. `forces`: the force missing from each equation
 of motion, and how it depends on the unknowns. `effects`: the library, an effect a file. `evidence`: hypotheses, their
-evidence, the decision between them. `replay`: rigs simulated under the records' own torque: recalibration, gap, gap
-budget.
+evidence, the search among them. `replay`: rigs simulated under the records' own torque: gap, gap budget. `output`: rigs
+fitted to the records as they are simulated, which decides.
 """
 
 from gearbench.diagnosis.diagnosis import Diagnosis, diagnose

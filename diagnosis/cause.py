@@ -1,25 +1,28 @@
-"""Which unmodelled effect causes the gap: search, audits, decision, and the rigs that follow from it."""
+"""Which unmodelled effects cause the gap: search by forces, decision by simulation, and the rigs that follow."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gearbench.diagnosis.effects.effect import Effect as Library
 from gearbench.diagnosis.effects.effect import Estimate, Fitted, added
 from gearbench.diagnosis.effects.recalibrated import recalibrated
 from gearbench.diagnosis.evidence.decision import Decision, decide, named
 from gearbench.diagnosis.evidence.fit import Fit
 from gearbench.diagnosis.evidence.problem import Problem, problem_of
-from gearbench.diagnosis.evidence.search import Search, Tried, missing_by_equation, search
+from gearbench.diagnosis.evidence.search import Search, missing_by_equation, search
 from gearbench.diagnosis.evidence.separable import alike, representatives
 from gearbench.diagnosis.forces.equations import PLACES
 from gearbench.diagnosis.forces.steadiness import unsteadiness
 from gearbench.diagnosis.intake.measurements import Measurement
-from gearbench.diagnosis.intake.signals import measured_channels, simulated_channels
-from gearbench.diagnosis.replay.refine import Addition
+from gearbench.diagnosis.intake.signals import measured_channels
+from gearbench.diagnosis.output.simulated import Simulated, simulated
+from gearbench.diagnosis.output.verdict_of import Decided, decide_simulated, lacking, remainder
 from gearbench.diagnosis.replay.replays import replays
 from gearbench.diagnosis.verdict import Candidate, Effect, Outcome, Parameter, Share
 from gearbench.rig import Case
@@ -31,8 +34,7 @@ Report = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Finding:
-    """What the search found: fields of the verdict, the nominal case recalibrated and with the effect added, and how
-    to add the effect to any case."""
+    """What was found: fields of the verdict, the nominal case recalibrated and with the effects added."""
 
     verdict: Outcome
     probability: dict[str, float]
@@ -43,7 +45,6 @@ class Finding:
     recalibrated: Case
     with_effect: Case | None
     because: str
-    addition: Addition | None = None
     indistinguishable: tuple[tuple[str, ...], ...] = ()
     advice: tuple[str, ...] = ()
     evidence: dict[str, float] = field(default_factory=dict)
@@ -68,25 +69,65 @@ def find_cause(
     fit = best.fit if best and best.fit else result.base
     silent = missing_by_equation(problem, fit)
     report("steadiness")
-    band = problem.conditions[0].band
-    unsteady = unsteadiness(problem.model, measurements, problem.unknowns, fit.p, band)
-    decision = decide(result, silent, unsteady)
-    plain = recalibrated(nominal, fitted(problem, result.base))
-    effects, updated = _effects(problem, nominal, decision)
+    unsteady = unsteadiness(problem.model, measurements, problem.unknowns, fit.p, problem.conditions[0].band)
+    simulate = replays(problem.model.law)
+    found = simulated(problem, result, measurements, nominal, simulate, without, report)
+    common: dict[str, Any] = {
+        "where": _places(problem, result.base),
+        "indistinguishable": alike(fit, problem.unknowns, representatives(problem, without)),
+        "evidence": {one.hypothesis.name: one.log_bayes_factor for one in result.tried},
+        "audits": {"silent": tuple(silent), "unsteady": tuple(unsteady)},
+    }
+    if found is None:
+        return _by_forces_alone(problem, nominal, result, decide(result, silent, unsteady), common)
+    decided = decide_simulated(found, result, silent, unsteady)
+    common["audits"] |= {"remainder": tuple(remainder(found).values()), "lacking": tuple(lacking(found).values())}
+    judged = held_out if held_out is not None and held_out.phase_known else None
+    return Finding(
+        verdict=decided.verdict,
+        probability=decided.probability,
+        effects=_effects(found, decided),
+        candidates=_candidates(found, judged),
+        place=decided.place,
+        recalibrated=found.recalibrated,
+        with_effect=found.with_effects if decided.named else None,
+        because=decided.because,
+        **common,
+    )
+
+
+def _by_forces_alone(
+    problem: Problem, nominal: Case, result: Search, decision: Decision, common: dict[str, Any]
+) -> Finding:
+    """The finding where records cannot be simulated, as they do not tell the mesh phase."""
+    plain, updated = recalibrated(nominal, fitted(problem, result.base)), None
+    effects: tuple[Effect, ...] = ()
+    if decision.winner is not None and decision.winner.fit is not None:
+        values, effect = fitted(problem, decision.winner.fit), decision.winner.hypothesis.effect
+        assert effect is not None
+        updated, estimates = added(recalibrated(nominal, values), decision.winner.hypothesis, values)
+        effects = (
+            Effect(
+                name=effect.name,
+                probability=decision.probability["effect"],
+                parameters=_parameters(effect, estimates),
+            ),
+        )
+    tried: dict[tuple[str, ...], float] = {(): 0.0}
+    for one in result.tried:
+        if one.hypothesis.effect:
+            tried.setdefault((one.hypothesis.effect.name,), one.log_bayes_factor)
+    listed = [Candidate(effects=names, log_evidence=value) for names, value in tried.items()]
     return Finding(
         verdict=decision.verdict,
         probability=decision.probability,
         effects=effects,
-        candidates=_candidates(result, _gaps_held_out(problem, nominal, plain, result, held_out)),
+        candidates=tuple(sorted(listed, key=lambda candidate: -candidate.log_evidence)),
         place=decision.place,
-        where=_places(problem, result.base),
         recalibrated=plain,
         with_effect=updated,
         because=decision.because,
-        addition=_addition(problem, decision.winner),
-        indistinguishable=alike(fit, problem.unknowns, representatives(problem, without)),
-        evidence={one.hypothesis.name: one.log_bayes_factor for one in result.tried},
-        audits={"silent": tuple(silent), "unsteady": tuple(unsteady)},
+        **common,
     )
 
 
@@ -96,66 +137,52 @@ def fitted(problem: Problem, fit: Fit) -> Fitted:
     return Fitted(problem.model, problem.unknowns, fit.p, fit.std, means)
 
 
-def with_hypothesis(problem: Problem, nominal: Case, tried: Tried) -> tuple[Case, tuple[Estimate, ...]]:
-    """The nominal case recalibrated under a hypothesis of the library with its effect added, and the parameters."""
-    assert tried.fit is not None
-    values = fitted(problem, tried.fit)
-    return added(recalibrated(nominal, values), tried.hypothesis, values)
+def _parameters(effect: Library, estimates: Sequence[Estimate]) -> dict[str, Parameter]:
+    return {e.name: Parameter(value=e.value, std=effect.stated(e), unit=e.unit) for e in estimates}
 
 
-def _addition(problem: Problem, winner: Tried | None) -> Addition | None:
-    if winner is None or winner.fit is None or winner.hypothesis.effect is None:
-        return None
-    values, hypothesis = fitted(problem, winner.fit), winner.hypothesis
-    return Addition(lambda case: added(case, hypothesis, values)[0], winner.hypothesis.effect.fields)
+def _effects(found: Simulated, decided: Decided) -> tuple[Effect, ...]:
+    """The named effects with their parameters; one that is at work in two places counts once."""
+    best = found.selection.best
+    values = found.layout.fitted(best.p, found.std)
+    out: dict[str, Effect] = {}
+    for one in decided.named:
+        effect = one.hypothesis.effect
+        assert effect is not None
+        estimates = effect.add(found.layout.nominal.rig, one.hypothesis, values)[1]
+        before = out[effect.name].parameters if effect.name in out else {}
+        parameters = {**before, **_parameters(effect, estimates)}
+        out[effect.name] = Effect(name=effect.name, probability=decided.probability["effect"], parameters=parameters)
+    return tuple(out.values())
 
 
-def _effects(problem: Problem, nominal: Case, decision: Decision) -> tuple[tuple[Effect, ...], Case | None]:
-    if decision.winner is None:
-        return (), None
-    updated, estimates = with_hypothesis(problem, nominal, decision.winner)
-    effect = decision.winner.hypothesis.effect
-    assert effect is not None
-    parameters = {e.name: Parameter(value=e.value, std=effect.stated(e), unit=e.unit) for e in estimates}
-    return (Effect(name=effect.name, probability=decision.probability["effect"], parameters=parameters),), updated
+def _candidates(found: Simulated, judged: Measurement | None) -> tuple[Candidate, ...]:
+    """The best hypothesis of each effect, the background alone, and what is named together, with the relative gap that
+    each leaves on the held-out record."""
+    selection = found.selection
+    measured = measured_channels(judged)["dte"].mean(axis=0) if judged is not None else None
 
-
-def _candidates(result: Search, gaps: dict[str, float]) -> tuple[Candidate, ...]:
-    """The best hypothesis of each effect, and the background alone; `gaps` by the names of hypotheses."""
-    best: dict[tuple[str, ...], Tried | None] = {(): None}
-    for one in result.tried:  # the best first
-        if one.hypothesis.effect:
-            best.setdefault((one.hypothesis.effect.name,), one)
-    listed = [
-        Candidate(
-            effects=names,
-            log_evidence=float(one.log_bayes_factor) if one else 0.0,
-            held_out=gaps.get(one.hypothesis.name if one else ""),
-        )
-        for names, one in best.items()
-    ]
-    return tuple(sorted(listed, key=lambda candidate: -candidate.log_evidence))
-
-
-def _gaps_held_out(
-    problem: Problem, nominal: Case, plain: Case, result: Search, held_out: Measurement | None
-) -> dict[str, float]:
-    """Rms of what is left of the transmission error on the held-out record over its own fluctuation, by hypothesis
-    ("": the background alone), for those that were refitted and add evidence."""
-    if held_out is None or not held_out.phase_known:
-        return {}
-    simulate = replays(problem.model.law)
-    measured = measured_channels(held_out)["dte"].mean(axis=0)
-
-    def left(case: Case) -> float:
-        rest = measured - simulated_channels(held_out, simulate(case, held_out.record))["dte"]
+    def left(p: Array | None) -> float | None:
+        if judged is None or measured is None or p is None:
+            return None
+        try:
+            rest = measured - found.simulator.channels(p, judged)["dte"]
+        except ValueError:
+            return None
         return float(np.std(rest) / np.std(measured))
 
-    out = {"": left(plain)}
-    for one in result.tried:
-        if one.hypothesis.effect and one.fit is not None and one.log_bayes_factor > 0.0:
-            out[one.hypothesis.name] = left(with_hypothesis(problem, nominal, one)[0])
-    return out
+    best: dict[tuple[str, ...], tuple[float, Array | None]] = {(): (0.0, selection.base.p)}
+    for one in selection.weighed:  # the best first
+        assert one.hypothesis.effect is not None
+        p = one.optimum.p if one.optimum and one.log_bayes_factor > 0.0 else None
+        best.setdefault((one.hypothesis.effect.name,), (one.log_bayes_factor, p))
+    names = tuple(dict.fromkeys(one.hypothesis.effect.name for one in selection.entered if one.hypothesis.effect))
+    if len(names) > 1:
+        best[names] = (selection.best.evidence - selection.base.evidence, selection.best.p)
+    listed = [
+        Candidate(effects=effects, log_evidence=float(value), held_out=left(p)) for effects, (value, p) in best.items()
+    ]
+    return tuple(sorted(listed, key=lambda candidate: -candidate.log_evidence))
 
 
 def _places(problem: Problem, base: Fit) -> tuple[Share, ...]:

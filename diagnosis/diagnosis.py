@@ -18,7 +18,6 @@ from gearbench.diagnosis.intake.signals import simulated_channels
 from gearbench.diagnosis.replay.adjustable import Simulate, uncertain, variants
 from gearbench.diagnosis.replay.budget import budget
 from gearbench.diagnosis.replay.gap import gaps
-from gearbench.diagnosis.replay.refine import refined
 from gearbench.diagnosis.replay.replays import replays_of
 from gearbench.diagnosis.verdict import Gap, Probabilities, Share, Verdict
 from gearbench.rig import Case
@@ -83,7 +82,7 @@ def diagnose(
     `records`: one of each condition, files or datasets. `held_out` names the record that the result is judged by and
     not found from (absent: the one named "held-out", or of four or more the last); `without` leaves effects out of the
     library; `progress` is told the name of every step as it begins. `quick` leaves out the division of the gap by
-    channel, band and so on, and takes the rigs as the search found them: each saves as long as the search takes.
+    channel, band and so on.
 
     Raises DiagnosisError or RecordError, one sentence each, for records that cannot be diagnosed.
 
@@ -121,8 +120,6 @@ def diagnosed(inputs: Inputs, progress: Progress | None = None, *, quick: bool =
     finding = find_cause(inputs.measurements, inputs.nominal, held_out=inputs.held_out, without=inputs.without)
     said("how far the gap shrinks")
     plain, improved = finding.recalibrated, finding.with_effect
-    if not quick and inputs.judged.phase_known:
-        plain, improved = refined(inputs.nominal, finding.addition, inputs.measurements, simulate)
     shrunk = gaps(inputs.nominal, plain, improved, inputs.judged, simulate=simulate)
     where = finding.where
     if not quick:

@@ -39,7 +39,7 @@ ROOMS: dict[str, tuple[str, ...]] = {
     "lumped": ("stiffness", "linear", "nonlinear"),
     "identification": ("excitation", "spectra", "lpm", "truth", "response", "feedback"),
     "bench": ("plan", "record", "refusals", "linear", "elastic", "full", "nonlinear", "stress", "export", "results"),
-    "diagnosis": ("intake", "forces", "effects", "evidence", "replay"),
+    "diagnosis": ("intake", "forces", "effects", "evidence", "replay", "output"),
     "challenge": ("truth", "making", "scoring"),
     "app": ("shell", "words", "figures", "report", "commands"),
 }

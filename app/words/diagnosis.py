@@ -46,6 +46,8 @@ STAGE_WORDS = {
     "with_effect": "with the effect",
     "floor": "noise floor",
 }
+# A gap counts as explained when this part of it, or this multiple of the noise floor, is left.
+LEFT_OF_GAP, LEFT_OF_FLOOR = 0.1, 2.0
 # How a unit is shown: (factor, unit).
 SHOWN_UNITS = {"m": (1e6, "um"), "rad": (1e6, "urad"), "1": (1.0, "")}
 
@@ -77,7 +79,11 @@ def headline(verdict: Verdict) -> str:
     place = PLACES[verdict.place]
     if verdict.verdict == "effect":
         words = effects_in_words([effect.name for effect in verdict.effects])
-        return f"{words[:1].upper()}{words[1:]} {'explains' if len(verdict.effects) == 1 else 'explain'} the gap."
+        one = len(verdict.effects) == 1
+        said = f"{'explains' if one else 'explain'} the gap"
+        if not explained(verdict):
+            said = f"{'is' if one else 'are'} at work, and a part of the gap remains"
+        return f"{words[:1].upper()}{words[1:]} {said}."
     if verdict.verdict == "none":
         return "No effect is needed: within its uncertainties the nominal rig explains the records."
     where = f" It arises {place}." if verdict.place != "none" else ""
@@ -100,16 +106,31 @@ def shrinkage(verdict: Verdict) -> str:
     gap = next(iter(whole_band(verdict.gap)), None)
     if gap is None:
         return ""
-    best = gap.with_effect or gap.recalibrated
     scale, unit = SHOWN_UNITS.get(gap.unit, (1.0, gap.unit))
     named = "" if gap.record == "held-out" else f" {gap.record}"
     record = f"the held-out record{named}" if verdict.held_out else f"record {gap.record} (not held out)"
-    by = "recalibrated" if gap.with_effect is None else "with the effect"
+    steps = f"to {length(scale * gap.recalibrated.value)} {unit} recalibrated"
+    if gap.with_effect is not None:
+        several = "effects" if len(verdict.effects) > 1 else "effect"
+        steps += f" and {length(scale * gap.with_effect.value)} {unit} with the {several}"
     floor = f" (noise floor {length(scale * gap.floor.value)} {unit})" if gap.floor else ""
+    rest = ""
+    if gap.with_effect is not None and gap.floor is not None and not explained(verdict):
+        times = number(gap.with_effect.value / max(gap.floor.value, 1e-300), 2)
+        rest = f" What remains is {times} times the floor: the rig's own structure, or another cause."
     return (
         f"On {record} the rms gap of the {CHANNELS.get(gap.channel, gap.channel)} goes from"
-        f" {length(scale * gap.nominal.value)} to {length(scale * best.value)} {unit} {by}{floor}."
+        f" {length(scale * gap.nominal.value)} {unit} {steps}{floor}.{rest}"
     )
+
+
+def explained(verdict: Verdict) -> bool:
+    """Whether little of the gap of the first channel is left with the effects: a tenth of it, or what noise makes."""
+    gap = next(iter(whole_band(verdict.gap)), None)
+    if gap is None or gap.with_effect is None:
+        return True
+    floor = gap.floor.value if gap.floor else 0.0
+    return gap.with_effect.value <= max(LEFT_OF_GAP * gap.nominal.value, LEFT_OF_FLOOR * floor)
 
 
 def whole_band(gaps: Sequence[Gap]) -> list[Gap]:

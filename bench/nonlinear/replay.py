@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import ceil, log
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from gearbench.bench.errors import BenchError
 from gearbench.bench.nonlinear.law_table import mesh_law
 from gearbench.bench.nonlinear.run import HEADROOM, Setup, make_setup
-from gearbench.bench.plan.schedule import schedule
+from gearbench.bench.plan.schedule import Schedule, schedule
 from gearbench.bench.plan.settling import change
 from gearbench.bench.protocol import Drive
 from gearbench.bench.record.attributes import (
@@ -37,16 +38,24 @@ TOLERANCE = 1e-4  # change of the DTE over its standard deviation from period to
 PERIODS_MAX = 6
 
 
-def replay(case: Case, record: xr.Dataset, law: MeshLaw | None = None, realisation: int = 0) -> xr.Dataset:
-    """One steady period of the case's rig under the record's torque, speed, sampling and starting mesh phase.
+class Steady(NamedTuple):
+    """A rig in the steady motion of a record: its setup, what drives it, one repetition of outputs (samples, n), and
+    how steady that is; the record's mean torque on the rig over one excitation period, mesh frequency [Hz] and mesh
+    phase [cycles] of the first sample."""
 
-    The torque is the mean over the record's periods of one realisation, as a trigonometric sum; gain, delay and filter
-    of the rig's torque sensor are taken back for the torque on the rig. What the rig's sensors do is applied, but for
-    noise and quantisation. Where teeth differ and the excitation period does not hold all pairings, the result is as
-    long as they take; where the mesh stiffness drifts, as long as the record.
-    Attribute `settling_residual` is the change of the DTE over the last two periods; a motion that does not settle is
-    returned with a warning. Raises BenchError for a record that says too little.
-    """
+    setup: Setup
+    drive: Drive
+    outputs: Array
+    residual: float
+    plan: Schedule
+    torque: Array
+    frequency: float
+    phase: float
+
+
+def steady_motion(case: Case, record: xr.Dataset, law: MeshLaw | None = None, realisation: int = 0) -> Steady:
+    """The steady motion of the case's rig under the record's torque, as its sensors would not show it; arguments and
+    refusals as those of `replay`."""
     if case.rig.drive.boundary != "torque":
         raise BenchError(
             f'a replay imposes the recorded driver torque, which rig.drive.boundary = "{case.rig.drive.boundary}" does'
@@ -64,9 +73,25 @@ def replay(case: Case, record: xr.Dataset, law: MeshLaw | None = None, realisati
     plan = schedule(experiment, case.rig)
     check_delays(case.rig, plan.wraps, plan.repeat_time)
     setup = make_setup(case, plan, law, phase)
-    force = resampled(torque, 2 * setup.substeps * samples) / meshing.driver.base_radius
-    outputs, residual = _settled(setup, Drive(torque, force))
-    applied = repeated(torque, len(outputs))
+    drive = Drive(torque, resampled(torque, 2 * setup.substeps * samples) / meshing.driver.base_radius)
+    outputs, residual = _settled(setup, drive)
+    return Steady(setup, drive, outputs, residual, plan, torque, frequency, phase)
+
+
+def replay(case: Case, record: xr.Dataset, law: MeshLaw | None = None, realisation: int = 0) -> xr.Dataset:
+    """One steady period of the case's rig under the record's torque, speed, sampling and starting mesh phase.
+
+    The torque is the mean over the record's periods of one realisation, as a trigonometric sum; gain, delay and filter
+    of the rig's torque sensor are taken back for the torque on the rig. What the rig's sensors do is applied, but for
+    noise and quantisation. Where teeth differ and the excitation period does not hold all pairings, the result is as
+    long as they take; where the mesh stiffness drifts, as long as the record.
+    Attribute `settling_residual` is the change of the DTE over the last two periods; a motion that does not settle is
+    returned with a warning. Raises BenchError for a record that says too little.
+    """
+    steady = steady_motion(case, record, law, realisation)
+    setup, outputs, residual, plan, phase = steady.setup, steady.outputs, steady.residual, steady.plan, steady.phase
+    meshing, samples = setup.meshing, plan.samples_per_period
+    applied = repeated(steady.torque, len(outputs))
     swings = {**setup.channels(outputs, applied)._asdict(), "torque_driver": applied}
     rows = {name: values[None] for name, values in swings.items() if values is not None}
     quiet = case.rig.model_copy(update={"sensors": _quiet(case.rig.sensors)})
@@ -78,10 +103,10 @@ def replay(case: Case, record: xr.Dataset, law: MeshLaw | None = None, realisati
     inertias = turning_inertias(case.rig, meshing)
     attributes = {
         **rig_attributes(case.rig, meshing),
-        **experiment_attributes(plan, len(outputs) // samples, shown_mean(case.rig, float(torque.mean()))),
+        **experiment_attributes(plan, len(outputs) // samples, shown_mean(case.rig, float(steady.torque.mean()))),
         "inertia_driver": inertias[0],
         "inertia_driven": inertias[1],
-        "mesh_period": 1.0 / frequency,
+        "mesh_period": 1.0 / steady.frequency,
         "settling_residual": residual,
         "contact_lost_samples": lost,
         "warnings": joined(lost_contact(lost, len(outputs)), unsettled),

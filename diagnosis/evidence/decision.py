@@ -35,19 +35,19 @@ def decide(search: Search, silent: Array, unsteady: Array, limits: Limits = LIMI
     """The decision. `silent` (equations + 1,) is what the best effect's fit (else the background's) leaves unexplained
     by equation, `unsteady` (equations + 1,) the excess scatter between repetitions."""
     best, free = named(search, limits), search.best_free
-    place, over = _worst(unsteady, limits.unsteady)
+    place, over = worst(unsteady, limits.unsteady)
     if over > 1.0:
-        return _unknown(place, f"the force missing {_at(place)} changes from one repetition to the next")
+        return _unknown(place, f"the force missing {at_place(place)} changes from one repetition to the next")
     needed = limits.free
     if best:
         needed = limits.competitor_factor * best.log_bayes_factor + limits.competitor_offset
     if free and free.log_bayes_factor > needed:
         found = free.hypothesis.place
-        return _unknown(found, f"a force {_at(found)} without any given form explains the records clearly better")
-    place, over = _worst(silent, limits.silent)
+        return _unknown(found, f"a force {at_place(found)} without any given form explains the records clearly better")
+    place, over = worst(silent, limits.silent)
     left = float(silent[PLACES.index(place)])
     if over > 1.0 and not (best and best.log_bayes_factor > left):
-        return _unknown(place, f"a force {_at(place)} remains that no effect of the library explains")
+        return _unknown(place, f"a force {at_place(place)} remains that no effect of the library explains")
     if best:
         assert best.hypothesis.effect is not None
         margin = best.log_bayes_factor - limits.of(best.hypothesis.effect)
@@ -82,14 +82,15 @@ def named(search: Search, limits: Limits = LIMITS) -> Tried | None:
     return best
 
 
-def _worst(values: Array, limits: Mapping[str, float]) -> tuple[Place, float]:
+def worst(values: Array, limits: Mapping[str, float]) -> tuple[Place, float]:
     """The place whose value (equations + 1,) is largest over its limit, and that ratio."""
     over = values / np.array([limits[place] for place in PLACES])
     worst = int(np.argmax(over))
     return PLACES[worst], float(over[worst])
 
 
-def _at(place: str) -> str:
+def at_place(place: str) -> str:
+    """`in the mesh`, `at the drive`."""
     return f"{'in' if place == 'mesh' else 'at'} the {place.replace('-', ' ')}"
 
 

@@ -81,10 +81,14 @@ def search(problem: Problem, without: Sequence[str] = (), report: Report = lambd
             continue
         report(hypothesis.name)
         sd = hypothesis.prior(unknowns)
-        if number in begun:
-            fit = refit(problem, sd, *begun[number][0], most=STEPS)
-        else:
-            fit = refit(problem, sd, begin, most=STEPS, coarse=COARSE)
+        try:
+            if number in begun:
+                fit = refit(problem, sd, *begun[number][0], most=STEPS)
+            else:
+                fit = refit(problem, sd, begin, most=STEPS, coarse=COARSE)
+        except ValueError:  # a fit that leads nowhere costs its hypothesis, not the verdict
+            tried.append(Tried(hypothesis, 0.0, None))
+            continue
         evidence = fit.log_evidence - float(np.log(hypothesis.choices))
         tried.append(Tried(hypothesis, evidence, fit, relative_size(unknowns, hypothesis, fit)))
     base, tried = _level(problem, base, tried)

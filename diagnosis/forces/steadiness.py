@@ -26,6 +26,10 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 ROUNDS = 60
+# Lines that scatter beyond white noise by this factor do not scatter by chance: one in 160 000.
+COLOURED = 12.0
+# Part of a channel's fluctuation that a sound rig's slow changes leave between repetitions.
+SLOW = 3e-3
 
 
 def unsteadiness(
@@ -33,9 +37,11 @@ def unsteadiness(
 ) -> Array:
     """Excess scatter (equations + 1,) between repetitions: sum over blocks of bins of count log lambda, the mesh last.
 
-    Zero where there is one repetition only.
+    Zero where there is one repetition only, and where no channel changes by more than a sound rig's slow changes make.
     """
     total = np.zeros(len(PLACES))
+    if changing_part(measurements) < SLOW:
+        return total
     for measured in measurements:
         if measured.repetitions < 2:
             continue
@@ -50,6 +56,26 @@ def unsteadiness(
         variance = noise_of_equations(model, whole) * measured.repetitions + (ALIASED * whole.force_level) ** 2
         total += excess_of(scatter / np.sqrt(1 - 1 / measured.repetitions), last.mesh_factor, variance)
     return total
+
+
+def changing_part(measurements: Sequence[Measurement]) -> float:
+    """Largest rms, of any channel and record, of what scatters between repetitions beyond white noise, over that of the
+    channel's fluctuation; 0 where there is one repetition only."""
+    largest = 0.0
+    for measured in measurements:
+        if measured.repetitions < 2:
+            continue
+        for name, repetitions in measured.periods.items():
+            if name.startswith("temperature"):
+                continue
+            lines = np.fft.rfft(repetitions, axis=-1)[:, 1:]
+            apart = (np.abs(lines - lines.mean(axis=0)) ** 2).sum(axis=0) / (len(lines) - 1)
+            white = float(np.median(apart)) / np.log(2.0)
+            coloured = float(apart[apart > COLOURED * white].sum())
+            level = float((np.abs(lines.mean(axis=0)) ** 2).sum())
+            if level > 0.0:
+                largest = max(largest, float(np.sqrt(coloured / level)))
+    return largest
 
 
 def excess_of(scatter: Complex, mesh_factor: Complex, variance: Array) -> Array:

@@ -1,1 +1,1 @@
-"""Rigs simulated under the records' own torque: recalibration, gap, gap budget."""
+"""Rigs simulated under the records' own torque: gap, gap budget."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 from math import acos, atan2, sqrt
 
 import numpy as np
@@ -35,6 +36,7 @@ def tip_path(gear: Profile, mate: Profile, distance: float, working_pressure_ang
     return distance * radial(own) - radius * radial(own + swept)
 
 
+@lru_cache(maxsize=64)  # a diagnosis makes many rigs of the same gears
 def fillet_clearance(gear: Profile, mate: Profile, distance: float, working_pressure_angle: float) -> float:
     """Smallest gap [m] between the mate's tip-edge arc and the fillet of `gear`; negative: it cuts in.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from math import pi
 
 import numpy as np
@@ -64,6 +65,7 @@ def boundary_quadrature(tooth: Profile) -> tuple[Array, Array, Array]:
     return np.concatenate(points), np.concatenate(normals), np.concatenate(weights)
 
 
+@lru_cache(maxsize=64)  # a diagnosis makes many rigs of the same gears
 def gear_area(tooth: Profile) -> tuple[float, float]:
     """Area [m^2] and polar second moment of area [m^4] of the whole gear (no bore), by Gauss' theorem:
     A = 1/2 integral of X.n ds, I = 1/4 integral of |X|^2 X.n ds (both sides of z teeth)."""

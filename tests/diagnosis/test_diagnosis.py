@@ -12,18 +12,12 @@ from shared.measured import channels, nominal, record, written
 from gearbench.diagnosis import Diagnosis, DiagnosisError, diagnose
 from gearbench.diagnosis import diagnosis as module
 from gearbench.diagnosis.diagnosis import take_in
-from gearbench.rig import Case
 
 
 @pytest.fixture(autouse=True)
 def stand_in(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Stand in for the search, the refinement and the replay."""
-
-    def refined(case: Case, *rest: object) -> tuple[Case, Case | None]:
-        return friction_found(case).recalibrated, friction_found(case).with_effect
-
+    """Stand in for the search and the replay."""
     monkeypatch.setattr(module, "find_cause", lambda measurements, case, **asked: friction_found(case))
-    monkeypatch.setattr(module, "refined", refined)
     monkeypatch.setattr(module, "replays_of", lambda case, measurements: at_rest)
 
 

@@ -29,7 +29,6 @@ class Finding:
     indistinguishable: tuple[tuple[str, ...], ...] = ()
     advice: tuple[str, ...] = ()
     calls: list = field(default_factory=list)
-    addition: None = None
 
 
 def recalibrated(nominal: Case) -> Case:

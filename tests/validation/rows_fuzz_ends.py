@@ -197,7 +197,6 @@ def _stand_ins() -> Iterator[None]:
     """A search and a replay whose answers are known, and checkpoints that come often."""
     found: dict[str, Any] = {
         "find_cause": lambda measurements, case, **options: friction_found(case),
-        "refined": lambda case, *others: (friction_found(case).recalibrated, friction_found(case).with_effect),
         "replays_of": lambda nominal, measurements: at_rest,
     }
     with patch.multiple(job, **found), patch.object(Shelf.__init__, "__defaults__", (OFTEN,)):

@@ -80,12 +80,7 @@ def stand_in(monkeypatch: pytest.MonkeyPatch) -> dict:
         said["calls"] += 1
         return said["find"](case)
 
-    def as_found(nominal: Case, addition: object, measurements: tuple, simulate: object) -> tuple:
-        found = said["find"](nominal)
-        return found.recalibrated, found.with_effect
-
     monkeypatch.setattr(job, "find_cause", search)
-    monkeypatch.setattr(job, "refined", as_found)
     monkeypatch.setattr(job, "replays_of", lambda nominal, measurements: at_rest)
     return said
 

@@ -97,6 +97,9 @@ def gap(channel: str, band: tuple[float, float], nominal: float, with_effect: fl
     )
 
 
+FLOOR = Range(value=5e-8, low=4e-8, high=6e-8)
+
+
 def test_the_sentences_of_a_verdict() -> None:
     whole = gap("dte", (0.0, 3000.0), 4e-6, 2.5e-7)
     gaps = (gap("dte", (0.0, 200.0), 9e-6, 1e-6), whole, gap("dte", (0.0, 0.0), 1e-5, 0.0))
@@ -108,7 +111,14 @@ def test_the_sentences_of_a_verdict() -> None:
     assert headline(found) == "An elastic coupling and ripple of the driving torque explain the gap."
     assert confidence(found) == (
         "Probability of one of the known effects: 90 %. It acts at the drive. On record r (not held out) the rms gap of"
-        " the transmission error goes from 4.00 to 0.250 um with the effect."
+        " the transmission error goes from 4.00 um to 2.00 um recalibrated and 0.250 um with the effects."
+    )
+    noisy = gaps[1].model_copy(update={"with_effect": Range(value=1e-6, low=1e-6, high=1e-6), "floor": FLOOR})
+    partly = found.model_copy(update={"effects": found.effects[:1], "gap": (noisy,)})
+    assert headline(partly) == "An elastic coupling is at work, and a part of the gap remains."
+    assert confidence(partly).endswith(
+        "1.00 um with the effect (noise floor 0.0500 um). What remains is 20 times the floor: the rig's own structure,"
+        " or another cause."
     )
     refused = Verdict(
         verdict="unknown", probability=Probabilities(effect=0.1, none=0.0, unknown=0.9), place="none", held_out="r",
@@ -117,7 +127,7 @@ def test_the_sentences_of_a_verdict() -> None:
     assert headline(refused) == "None of the known effects explains the gap."
     assert confidence(refused) == (
         "Probability of a cause that is not known: 90 %. On the held-out record r the rms gap of the transmission error"
-        " goes from 4.00 to 2.00 um recalibrated."
+        " goes from 4.00 um to 2.00 um recalibrated."
     )
 
 

@@ -1,0 +1,125 @@
+"""Small departures from a motion of the non-linear lumped model, compiled: what a little more force in the mesh, or on
+the driver's shaft, does to every coordinate.
+
+Along a given motion the mesh is a spring k(t) and a damper c(t), so that departures q obey
+
+    M q'' + C q' + K q = -m (k(t) m.q + c(t) m.q' + f(t)) + d g(t)
+
+with m what each coordinate contributes to the deflection, f(t) the force that a change of the rig adds in the mesh at
+unchanged motion, and g(t) that on one coordinate d: a support, the driver, its shaft. Friction is left out:
+it turns a few per cent of a departure. Many departures are carried at once by the classical Runge-Kutta method.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.kernels.compiled import ROUNDING, compiled
+
+Array = NDArray[np.float64]
+
+
+class Tangent(NamedTuple):
+    """A rig along a motion: springs K, dampers C (n, n), inverse masses (n,), what coordinates contribute to the
+    deflection (n,), and of the mesh on the half-step grid of one repetition stiffness k and damping c (entries,);
+    `step` [s] is two entries."""
+
+    springs: Array
+    dampers: Array
+    inverse: Array
+    mesh: Array
+    stiffness: Array
+    damping: Array
+    step: float
+
+
+def departures(tangent: Tangent, forces: Array, on: int | None, substeps: int, early: int) -> tuple[Array, Array]:
+    """Departures (samples, n, columns) of the coordinates [m] and (samples, columns) of the mesh force [N] under forces
+    (entries, columns) [N] in the mesh, or on the coordinate `on`; `early` steps before the first sample begin at rest.
+    """
+    entries, columns = forces.shape
+    size = len(tangent.inverse)
+    samples = entries // (2 * substeps)
+    places, pushes = np.empty((samples, size, columns)), np.empty((samples, columns))
+    inverse = tangent.inverse[:, None]
+    in_mesh = 1.0 if on is None else 0.0
+    direction = -tangent.inverse * tangent.mesh if on is None else tangent.inverse * (np.arange(size) == on)
+    _run(
+        -inverse * tangent.springs, -inverse * tangent.dampers, tangent.mesh, -tangent.inverse * tangent.mesh,
+        direction, in_mesh, tangent.stiffness, tangent.damping, np.ascontiguousarray(forces), tangent.step, substeps,
+        early, places, pushes,
+    )  # fmt: skip
+    return places, pushes
+
+
+@compiled(fastmath=ROUNDING)
+def _rates(
+    q: Array, v: Array, springs: Array, dampers: Array, mesh: Array, pushed: Array, direction: Array, k: float,
+    c: float, force: Array, out: Array, push: Array,
+) -> None:  # fmt: skip
+    """Accelerations `out` (n, columns) and the mesh's elastic and damping force `push` (columns,)."""
+    size, columns = q.shape
+    for p in range(columns):
+        push[p] = 0.0
+    for i in range(size):
+        if mesh[i] != 0.0:
+            for p in range(columns):
+                push[p] += mesh[i] * (k * q[i, p] + c * v[i, p])
+    for i in range(size):
+        for p in range(columns):
+            out[i, p] = pushed[i] * push[p] + direction[i] * force[p]
+        for j in range(size):
+            if springs[i, j] != 0.0 or dampers[i, j] != 0.0:
+                for p in range(columns):
+                    out[i, p] += springs[i, j] * q[j, p] + dampers[i, j] * v[j, p]
+
+
+@compiled(fastmath=ROUNDING)
+def _run(
+    springs: Array, dampers: Array, mesh: Array, pushed: Array, direction: Array, in_mesh: float, stiffness: Array,
+    damping: Array, forces: Array, h: float, substeps: int, early: int, places: Array, pushes: Array,
+) -> None:  # fmt: skip
+    """Fill places and pushes."""
+    entries, columns = forces.shape
+    size = len(mesh)
+    q, v = np.zeros((size, columns)), np.zeros((size, columns))
+    q2, v2, v3, v4 = np.empty_like(q), np.empty_like(q), np.empty_like(q), np.empty_like(q)
+    a1, a2, a3, a4 = np.empty_like(q), np.empty_like(q), np.empty_like(q), np.empty_like(q)
+    push = np.empty(columns)
+    steps = entries // 2
+    for number in range(-early, steps):
+        i = (2 * number) % entries
+        middle, after = i + 1, (i + 2) % entries
+        _rates(q, v, springs, dampers, mesh, pushed, direction, stiffness[i], damping[i], forces[i], a1, push)
+        if number >= 0 and number % substeps == 0:
+            sample = number // substeps
+            for c in range(size):
+                for p in range(columns):
+                    places[sample, c, p] = q[c, p]
+            for p in range(columns):
+                pushes[sample, p] = push[p] + in_mesh * forces[i, p]
+        for c in range(size):
+            for p in range(columns):
+                q2[c, p] = q[c, p] + 0.5 * h * v[c, p]
+                v2[c, p] = v[c, p] + 0.5 * h * a1[c, p]
+        _rates(q2, v2, springs, dampers, mesh, pushed, direction, stiffness[middle], damping[middle], forces[middle],
+               a2, push)  # fmt: skip
+        for c in range(size):
+            for p in range(columns):
+                q2[c, p] = q[c, p] + 0.5 * h * v2[c, p]
+                v3[c, p] = v[c, p] + 0.5 * h * a2[c, p]
+        _rates(q2, v3, springs, dampers, mesh, pushed, direction, stiffness[middle], damping[middle], forces[middle],
+               a3, push)  # fmt: skip
+        for c in range(size):
+            for p in range(columns):
+                q2[c, p] = q[c, p] + h * v3[c, p]
+                v4[c, p] = v[c, p] + h * a3[c, p]
+        _rates(q2, v4, springs, dampers, mesh, pushed, direction, stiffness[after], damping[after], forces[after],
+               a4, push)  # fmt: skip
+        for c in range(size):
+            for p in range(columns):
+                q[c, p] += h / 6.0 * (v[c, p] + 2.0 * (v2[c, p] + v3[c, p]) + v4[c, p])
+                v[c, p] += h / 6.0 * (a1[c, p] + 2.0 * (a2[c, p] + a3[c, p]) + a4[c, p])

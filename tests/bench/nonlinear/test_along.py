@@ -1,0 +1,72 @@
+"""The tangent of a steady motion: against two simulations that differ by little."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gearbench.bench import simulate
+from gearbench.bench.nonlinear.along import along
+from gearbench.bench.nonlinear.law_table import mesh_law
+from gearbench.bench.nonlinear.replay import steady_motion
+from gearbench.cases import case_files
+from gearbench.lumped.nonlinear.step import columns
+from gearbench.rig import read_case
+
+SMALL = 1e-7  # [m]
+
+
+def test_an_error_of_one_tooth_does_what_two_simulations_differ_by() -> None:
+    case = read_case(case_files()["gap_demo"])
+    record = simulate(case.under(case.conditions[0]))
+    law = mesh_law(case.rig, case.simulation, 200.0)
+    plain = steady_motion(case, record, law)
+    errors = np.zeros(case.rig.driver.teeth)
+    errors[3] = SMALL
+    gear = case.rig.driver.model_copy(update={"pitch_error": tuple(errors)})
+    moved = case.model_copy(update={"rig": case.rig.model_copy(update={"driver": gear})})
+    other = steady_motion(moved, record, law)
+
+    tangent = along(plain)
+    numbers, share = law.pairs(tangent.phase)
+    excess = SMALL * (share * (numbers % 20 == 3)).sum(axis=1, keepdims=True)
+    found = tangent.answers(tangent.of_excess(excess))
+    before, after = columns(plain.outputs), columns(other.outputs)
+    wanted = {
+        "dte": other.setup.dte(other.outputs) - plain.setup.dte(plain.outputs),
+        "angle_driver": after.u1 - before.u1,
+        "y_driver": after.y1 - before.y1,
+        "y_driven": after.y2 - before.y2,
+    }
+    for channel, change in wanted.items():
+        assert np.linalg.norm(found[channel][0] - change) < 0.05 * np.linalg.norm(change), channel
+
+
+def test_torque_on_the_shaft_does_what_ripple_does() -> None:
+    case = read_case(case_files()["gap_demo"])
+    record = simulate(case.under(case.conditions[0]))
+    law = mesh_law(case.rig, case.simulation, 200.0)
+    rippled = read_case(
+        case_files()["gap_demo"],
+        [f"rig.drive.ripple.{key}" for key in ("orders=[6]", "amplitude_nm=[0.2]", "phase_deg=[0]")],
+    )
+    plain, other = steady_motion(case, record, law), steady_motion(rippled, record, law)
+    tangent = along(plain)
+    force = 0.2 * np.cos(6 * 2 * np.pi * tangent.phase / 20)[:, None] / plain.setup.meshing.driver.base_radius
+    found = tangent.answers(force, tangent.drive)["dte"][0]
+    change = other.setup.dte(other.outputs) - plain.setup.dte(plain.outputs)
+    assert np.linalg.norm(found - change) < 0.05 * np.linalg.norm(change)
+
+
+def test_a_rig_with_stiff_supports_across_keeps_its_tangent_stable() -> None:
+    keys = [f"rig.support.{side}.across.stiffness_n_per_m=8e9" for side in ("driver", "driven")]
+    case = read_case(case_files()["gap_demo"], keys)
+    record = simulate(case.under(case.conditions[0]))
+    law = mesh_law(case.rig, case.simulation, 200.0)
+    softer = case.rig.mesh.model_copy(update={"error_mean": SMALL})
+    moved = case.model_copy(update={"rig": case.rig.model_copy(update={"mesh": softer})})
+    plain, other = steady_motion(case, record, law), steady_motion(moved, record, law)
+    tangent = along(plain)
+    found = tangent.answers(tangent.of_excess(np.full((len(tangent.phase), 1), SMALL)))["dte"][0]
+    change = other.setup.dte(other.outputs) - plain.setup.dte(plain.outputs)
+    assert found == pytest.approx(change, abs=0.05 * SMALL)

@@ -1,0 +1,43 @@
+"""Small departures from a motion: against the closed form of a damped oscillator."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gearbench.lumped.nonlinear.tangent import Tangent, departures
+
+MASS, STIFFNESS, DAMPING = 2.0, 3e6, 400.0  # of the oscillator; the mesh has a third of the stiffness
+SUBSTEPS, SAMPLES = 4, 512
+
+
+def oscillator(on_mesh: float) -> tuple[Tangent, float]:
+    """One mass between the ground and the mesh, which has `on_mesh` of stiffness and damping, and its rate [rad/s]."""
+    duration = 4 * 2 * np.pi / 900.0
+    entries = 2 * SUBSTEPS * SAMPLES
+    tangent = Tangent(
+        springs=np.array([[STIFFNESS * (1 - on_mesh)]]),
+        dampers=np.array([[DAMPING * (1 - on_mesh)]]),
+        inverse=np.array([1 / MASS]),
+        mesh=np.array([1.0]),
+        stiffness=np.full(entries, STIFFNESS * on_mesh),
+        damping=np.full(entries, DAMPING * on_mesh),
+        step=duration / (SUBSTEPS * SAMPLES),
+    )
+    return tangent, 900.0
+
+
+@pytest.mark.parametrize("on_drive", [False, True])
+def test_an_oscillator_answers_as_its_receptance_says(on_drive: bool) -> None:
+    tangent, rate = oscillator(1 / 3)
+    time = np.arange(2 * SUBSTEPS * SAMPLES) * tangent.step / 2
+    forces = np.stack([np.cos(rate * time), 5.0 * np.sin(rate * time)], axis=1)
+    places, pushes = departures(tangent, forces, 0 if on_drive else None, SUBSTEPS, 5 * SUBSTEPS * SAMPLES)
+    receptance = 1 / (STIFFNESS - rate**2 * MASS + 1j * rate * DAMPING)
+    sign = 1.0 if on_drive else -1.0
+    at = time[:: 2 * SUBSTEPS]
+    for column, amplitude in enumerate((1.0, -5.0j)):
+        motion = sign * receptance * amplitude * np.exp(1j * rate * at)
+        assert places[:, 0, column] == pytest.approx(motion.real, abs=2e-5 * abs(receptance * amplitude))
+        mesh = (STIFFNESS + 1j * rate * DAMPING) / 3 * motion + (0.0 if on_drive else amplitude * np.exp(1j * rate * at))
+        assert pushes[:, column] == pytest.approx(mesh.real, abs=1e-4 * np.abs(mesh).max())

@@ -1,0 +1,75 @@
+"""A stand-in for simulations: lines that depend on a few unknowns by a formula, in blocks made by hand."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from types import SimpleNamespace
+
+import numpy as np
+
+from gearbench.diagnosis.forces.unknowns import Unknowns, group, unknowns_of
+from gearbench.diagnosis.output.target import Block, Target
+
+LINES, BLOCKS = 60, 6
+
+
+def unknowns() -> Unknowns:
+    """Three of the background, two effects, and two teeth that no background cracks."""
+    return unknowns_of(
+        [
+            group("stiffness", "1", ("driver", "driven", "more"), 0.1, slot="stiffness"),
+            group("friction", "1", ("coefficient",), 0.01, 0.5, slot="friction"),
+            group("ripple", "1", ("cos", "sin"), 0.01, 0.5, slot="torque"),
+            group("crack", "1", 2, 0.02, 0.35, slot="loss", low=0.0),
+        ],
+        2,
+    )
+
+
+def target(lines: np.ndarray, floor: float = 1e-6) -> Target:
+    """Six blocks of ten lines each."""
+    of_line = np.arange(LINES) % BLOCKS
+    blocks = tuple(Block("base", "dte", "excited", (float(i), float(i + 1))) for i in range(BLOCKS))
+    return Target(
+        measurements=(),
+        plan=(),
+        lines=lines,
+        of_line=of_line,
+        blocks=blocks,
+        floors=np.full(BLOCKS, floor),
+        counts=np.full(BLOCKS, 8.0),
+        sizes=np.bincount(of_line).astype(float),
+    )
+
+
+def sensitivities(seed: int = 0) -> np.ndarray:
+    """A matrix (size, LINES): what each unknown does."""
+    rng = np.random.default_rng(seed)
+    size = unknowns().size
+    return rng.standard_normal((size, LINES)) + 1j * rng.standard_normal((size, LINES))
+
+
+@dataclass
+class FakeSimulator:
+    """Lines `of(p)`; derivatives by central differences. None wherever an unknown exceeds `largest`."""
+
+    of: Callable[[np.ndarray], np.ndarray]
+    target: Target
+    largest: float = np.inf
+    layout: SimpleNamespace = field(default_factory=lambda: SimpleNamespace(unknowns=unknowns()))
+    jacobians: int = 0
+
+    def lines(self, p: np.ndarray) -> np.ndarray | None:
+        return None if np.abs(p).max() > self.largest else self.of(p)
+
+    def jacobian(self, p: np.ndarray, sd: np.ndarray, chosen: np.ndarray) -> np.ndarray | None:
+        self.jacobians += 1
+        if self.lines(p) is None:
+            return None
+        out = np.zeros((p.size, self.target.lines.size), dtype=complex)
+        for number in np.flatnonzero(chosen):
+            step = np.zeros(p.size)
+            step[number] = 1e-4
+            out[number] = (self.of(p + step) - self.of(p - step)) / 2e-4
+        return out
