@@ -1,0 +1,139 @@
+"""Output-error fit: all unknowns moved together to where the simulation comes closest, under one set of priors.
+
+Gauss-Newton on `quadratic`, whose steps are simulated: a step that does not lower the cost is halved, then the Jacobian
+is renewed where the unknowns are by now; it is done when no step promises half a nat.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.diagnosis.output.quadratic import Quadratic, quadratic_of
+from gearbench.diagnosis.output.simulator import Simulator
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Flags = NDArray[np.bool_]
+
+GAIN = 0.5  # nats that are worth a step
+POOR = 0.25  # part of what a step promised, below which the Jacobian is renewed
+HALVINGS = 3
+STEPS = 10
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """A Jacobian (size, K) and the quadratic that it makes."""
+
+    jacobian: Complex
+    quadratic: Quadratic
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """Unknowns `p` (size,) under priors `sd` (size,), their simulated lines, cost with and without the prior, log
+    evidence, posterior covariance of the active unknowns, nats that another step promises, and the sensitivities last
+    used, about this residual."""
+
+    p: Array
+    sd: Array
+    lines: Complex
+    cost: float
+    misfit: float
+    evidence: float
+    left: float
+    sensitivity: Sensitivity
+
+    @property
+    def std(self) -> Array:
+        """Posterior standard deviations (size,)."""
+        quadratic = self.sensitivity.quadratic
+        width = self.sd[quadratic.active]
+        free = width > 0.0
+        scale = width[free]
+        information = quadratic.information(np.zeros(len(quadratic.active)))
+        matrix = information[np.ix_(free, free)] * scale[:, None] * scale[None, :] + np.eye(len(scale))
+        out = np.zeros(self.p.size)
+        out[quadratic.active[free]] = scale * np.sqrt(np.diag(np.linalg.inv(matrix)))
+        return out
+
+
+def sensitivity_of(simulator: Simulator, p: Array, sd: Array, chosen: Flags) -> Sensitivity | None:
+    """Sensitivities of the chosen unknowns (size,) at `p`, moved by parts of `sd`; None where no rig is there."""
+    lines = simulator.lines(p)
+    jacobian = simulator.jacobian(p, sd, chosen) if lines is not None else None
+    if lines is None or jacobian is None:
+        return None
+    active = np.flatnonzero(np.abs(jacobian).max(axis=1) > 0.0)
+    return Sensitivity(jacobian, quadratic_of(simulator.target, simulator.target.lines - lines, jacobian, active))
+
+
+def cost_of(simulator: Simulator, p: Array, sd: Array) -> float:
+    """Cost of unknowns under priors; infinite where no rig has them."""
+    lines = simulator.lines(p)
+    if lines is None:
+        return np.inf
+    return simulator.target.cost(simulator.target.lines - lines) + prior_cost(p, sd)
+
+
+def prior_cost(p: Array, sd: Array) -> float:
+    """Nats of the prior; unknowns of sd 0 count nothing."""
+    held = sd > 0.0
+    return 0.5 * float(((p[held] / sd[held]) ** 2).sum())
+
+
+def fit(
+    simulator: Simulator, p: Array, sd: Array, sensitivity: Sensitivity, *, renewals: int, chosen: Flags
+) -> Optimum | None:
+    """The optimum under the prior `sd` (size,) near `p` (size,), with at most so many renewals of the Jacobian of the
+    chosen unknowns; None where `p` is no rig."""
+    target, bounds = simulator.target, simulator.layout.unknowns.bounds()
+    p = np.clip(p, *bounds)
+    # What these records do not show is left at nothing.
+    p[np.isin(np.arange(p.size), sensitivity.quadratic.active, invert=True)] = 0.0
+    cost = cost_of(simulator, p, sd)
+    if not np.isfinite(cost):
+        return None
+    fresh = False
+    for _ in range(STEPS):
+        lines = simulator.lines(p)
+        assert lines is not None
+        near = sensitivity.quadratic.moved(target.lines - lines, sensitivity.jacobian)
+        step, promised, _ = near.best(p, sd, bounds)
+        gain = 0.0
+        if cost - promised > GAIN:
+            for halving in range(HALVINGS + 1):
+                trial = p.copy()
+                trial[near.active] += 0.5**halving * step
+                value = cost_of(simulator, trial, sd)
+                if value < cost:
+                    gain, p, cost = cost - value, trial, value
+                    break
+        wanted = max(GAIN, POOR * (cost + gain - promised))
+        if gain < wanted:
+            if fresh or renewals == 0:
+                break
+            renewed = sensitivity_of(simulator, p, np.where(sd > 0, sd, 1.0), chosen)
+            if renewed is None:
+                break
+            sensitivity, renewals, fresh = renewed, renewals - 1, True
+            continue
+        fresh = False
+    lines = simulator.lines(p)
+    assert lines is not None
+    near = sensitivity.quadratic.moved(target.lines - lines, sensitivity.jacobian)
+    _, promised, _ = near.best(p, sd, bounds)
+    here = near.information(np.zeros(len(near.active)))
+    return Optimum(
+        p=p,
+        sd=sd,
+        lines=lines,
+        cost=cost,
+        misfit=cost - prior_cost(p, sd),
+        evidence=near.evidence(cost, here, sd),
+        left=cost - promised,
+        sensitivity=Sensitivity(sensitivity.jacobian, near),
+    )

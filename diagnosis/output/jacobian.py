@@ -1,0 +1,163 @@
+"""Derivatives of all simulated lines by all unknowns, at one rig.
+
+What a tooth, the mesh's series, run-out and ripple do is a small force at an unchanged motion, carried through the
+rig's tangent (`bench.nonlinear.along`), many at once. Delays, gains and encoders act on the channels alone. The rest
+(supports, masses, friction, coupling) is moved a little and simulated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.diagnosis.effects.bearing_nonlinearity import KEYS as BEARINGS
+from gearbench.diagnosis.effects.coupling import KEY as COMPLIANCE
+from gearbench.diagnosis.effects.eccentricity import KEYS as RUNOUTS
+from gearbench.diagnosis.effects.friction import KEY as FRICTION
+from gearbench.diagnosis.effects.pitch_error import KEYS as PITCHES
+from gearbench.diagnosis.effects.sensor_delay import KEYS as DELAYS
+from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
+from gearbench.diagnosis.effects.torque_ripple import KEY as RIPPLE
+from gearbench.diagnosis.effects.torque_ripple import ORDERS
+from gearbench.diagnosis.forces.basis import waves
+from gearbench.diagnosis.intake.measurements import Measurement
+from gearbench.diagnosis.intake.signals import measured_channels
+from gearbench.diagnosis.output.layout import ACROSS, ENCODER, GAIN, Layout
+from gearbench.diagnosis.output.target import Target
+
+if TYPE_CHECKING:
+    from gearbench.bench.nonlinear.along import Along
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Flags = NDArray[np.bool_]
+Integers = NDArray[np.int64]
+
+# Moved and simulated, by this part of their standard deviation as background.
+MOVED = (FRICTION, COMPLIANCE, ACROSS)
+SMALLEST = 1e-4  # of a support's reference deflection, below which its logarithm is cut
+STEP = 0.05
+
+
+def mesh_forces(layout: Layout, along: Along, chosen: Flags) -> tuple[Array, Integers]:
+    """Force (entries, columns) [N] per unit of the chosen unknowns (size,) that act in the mesh, and their indices."""
+    unknowns, law, phase = layout.unknowns, along.law, along.phase
+    z1, z2 = layout.model.teeth
+    parts: list[Array] = []
+    at: list[int] = []
+
+    def put(key: str, columns: Array) -> None:
+        indices = np.arange(*unknowns[key].indices(unknowns.size))
+        keep = chosen[indices]
+        parts.append(columns[:, keep])
+        at.extend(indices[keep])
+
+    numbers, share = law.pairs(phase)
+    wave = waves(phase).T
+    damped = (along.tangent.damping * along.rate)[:, None]
+    put("scale", along.elastic[:, None] + 0.5 * damped)
+    put("mesh-ratio", damped)
+    put("shape", (along.elastic[:, None] + 0.5 * damped) * wave)
+    put("offset", along.of_excess(np.ones((len(phase), 1))))
+    put("profile", along.of_excess(wave))
+    for side, key in enumerate(RUNOUTS.values()):
+        turn = 2 * np.pi * phase / (z1, z2)[side]
+        put(key, along.of_excess(np.stack([np.cos(turn), np.sin(turn)], axis=1)))
+    bending = law.bending_of(phase)
+    for side, key in enumerate(PITCHES.values()):
+        tooth = numbers % (z1, z2)[side]
+        indices = np.arange(*unknowns[key].indices(unknowns.size))
+        if chosen[indices].any():
+            put(key, along.of_excess(_by_tooth(tooth, share, (z1, z2)[side])))
+    soft = []
+    for one in layout.teeth:
+        side, number = (0, one) if one < z1 else (1, one - z1)
+        meant = numbers % (z1, z2)[side] == number
+        soft.append(-along.elastic * (meant * share * bending[..., side]).sum(axis=1))
+    if soft:
+        indices = unknowns[CRACK].start + np.array(layout.teeth)
+        keep = chosen[indices]
+        parts.append(np.stack(soft, axis=1)[:, keep])
+        at.extend(indices[keep])
+    return np.concatenate(parts, axis=1), np.array(at)
+
+
+def _by_tooth(tooth: NDArray[np.int64], share: Array, count: int) -> Array:
+    """Part (entries, count) of the load that each tooth of a gear carries."""
+    out = np.zeros((len(tooth), count))
+    rows = np.arange(len(tooth))
+    for column in range(tooth.shape[1]):
+        np.add.at(out, (rows, tooth[:, column]), share[:, column])
+    return out
+
+
+def inertial_forces(layout: Layout, along: Along, p: Array) -> list[tuple[Array, Integers, int]]:
+    """Forces (entries, columns) [N] per unit of the unknowns of supports, masses and inertias, these unknowns'
+    indices, and the coordinate that they act on."""
+    unknowns, model = layout.unknowns, layout.model
+    out = []
+    for side, (key, number) in enumerate(zip(BEARINGS.values(), (1, 2), strict=True)):
+        y, held = along.coordinates[number], model.reference[side]
+        size = np.maximum(np.abs(y.place) / held, SMALLEST)
+        exponent = model.exponent[side] + float(p[unknowns[key]][0])
+        stiffness = model.stiffness[side] * float(np.exp(p[unknowns["stiffness"]][side]))
+        spring = stiffness * y.place * size**exponent
+        damping = model.damping[side] * float(np.exp(p[unknowns["damping"]][side]))
+        columns = [-spring, -damping * y.rate, -model.mass[side] * y.acceleration, -spring * np.log(size)]
+        at = [*(unknowns[name].start + side for name in ("stiffness", "damping", "mass")), unknowns[key].start]
+        out.append((np.stack(columns, axis=1), np.array(at), number))
+    turning, start = along.coordinates[0].acceleration, unknowns["inertia"].start
+    masses = np.array((model.inertia[0], model.rotor)) / model.base_radius[0] ** 2
+    # The rotor's column is that of a rotor which turns with the gear: else it is moved and simulated.
+    rows = (0, 2) if along.drive == 0 else (0,)
+    columns = [-masses[0 if row == 0 else 1] * turning for row in rows]
+    out.append((np.stack(columns, axis=1), start + np.array(rows), 0))
+    return out
+
+
+def drive_forces(layout: Layout, along: Along, condition: str) -> tuple[Array, Integers]:
+    """Force (entries, columns) [N] on the driver's shaft per unit of ripple, and the unknowns' indices; none for a
+    record that is no condition."""
+    names = list(layout.torque_mean)
+    if condition not in names:
+        return np.zeros((len(along.phase), 0)), np.zeros(0, dtype=int)
+    turn = 2 * np.pi * along.phase / layout.model.teeth[0]
+    columns = [part(order * turn) for order in ORDERS for part in (np.cos, np.sin)]
+    first = layout.unknowns[RIPPLE].start + names.index(condition) * 2 * len(ORDERS)
+    return np.stack(columns, axis=1) / layout.model.base_radius[0], first + np.arange(2 * len(ORDERS))
+
+
+def sensor_columns(
+    layout: Layout, target: Target, number: int, channels: Mapping[str, Array]
+) -> dict[int, dict[str, Array]]:
+    """Changes of the channels (N,) of a record per unit of the unknowns of its sensors, by their index."""
+    unknowns, one = layout.unknowns, target.measurements[number]
+    samples = one.phase.size
+    omega = 2 * np.pi * np.fft.rfftfreq(samples, 1 / one.sampling_rate)
+    g = layout.model.support_factor
+    into = {"angle_driver": 1.0, "angle_driven": -1.0, "y_driver": g, "y_driven": -g}
+    zero = np.zeros(samples)
+    found: dict[int, dict[str, Array]] = {}
+    for channel, key in DELAYS.items():
+        if channel not in channels:
+            continue
+        late = np.fft.irfft(-1j * omega * np.fft.rfft(moving(one, channels, channel)), samples)
+        found[unknowns[key].start] = {channel: late, "dte": into[channel] * late}
+    if "torque_driven" in channels:
+        found[unknowns[GAIN].start] = {"torque_driven": channels["torque_driven"]}
+    for side, gear in enumerate(("driver", "driven")):
+        turn = 2 * np.pi * one.phase / layout.model.teeth[side]
+        for part, wave in enumerate((np.cos, np.sin)):
+            column = (1.0, -1.0)[side] * wave(turn)
+            found[unknowns[ENCODER].start + 2 * side + part] = {f"angle_{gear}": wave(turn), "dte": column}
+    return {index: {name: parts.get(name, zero) for name in channels} for index, parts in found.items()}
+
+
+def moving(measured: Measurement, channels: Mapping[str, Array], channel: str) -> Array:
+    """The simulated channel (N,), or the measured one where the rig holds what it shows."""
+    if np.ptp(channels[channel]) > 0.0:
+        return channels[channel]
+    return measured_channels(measured)[channel].mean(axis=0)

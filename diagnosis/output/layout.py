@@ -1,0 +1,177 @@
+"""The unknowns of the output error: those of the force residuals that a rig can have, and the structure of real rigs.
+
+A vector of unknowns makes a rig: the nominal one, recalibrated, with every effect in it at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import exp
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.diagnosis.effects.background import background
+from gearbench.diagnosis.effects.bearing_nonlinearity import KEYS as BEARINGS
+from gearbench.diagnosis.effects.coupling import COUPLING
+from gearbench.diagnosis.effects.coupling import KEY as COMPLIANCE
+from gearbench.diagnosis.effects.effect import SIDES, Fitted, Hypothesis, changed, with_rig
+from gearbench.diagnosis.effects.library import LIBRARY
+from gearbench.diagnosis.effects.recalibrated import recalibrated
+from gearbench.diagnosis.effects.sensor_delay import KEYS as DELAYS
+from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
+from gearbench.diagnosis.effects.tooth_crack import LARGEST
+from gearbench.diagnosis.effects.torque_ripple import KEY as RIPPLE
+from gearbench.diagnosis.forces.condition import Condition
+from gearbench.diagnosis.forces.nominal import NominalModel
+from gearbench.diagnosis.forces.unknowns import Group, Unknowns, group, unknowns_of
+from gearbench.geometry import pair
+from gearbench.lumped.nonlinear.law import MeshLaw
+from gearbench.rig import Across, Case, Rig
+from gearbench.rig.gear import Crack
+
+Array = NDArray[np.float64]
+
+# Of the background those that no field of a rig holds.
+FORCES_ONLY = ("curvature", "compliance", "radial")
+# Compliance of a support across over that along: rolling bearings are several times stiffer across than pedestals along.
+ACROSS, ACROSS_SD, ACROSS_LARGEST = "across", 0.15, 1.0
+# Gain of the reaction's sensor: torque sensors are good to a few tenths of a per cent, their mounting to one.
+GAIN, GAIN_SD = "gain", 0.01
+# Encoder run-out along the base circle [m]: what grating and centring of a good encoder leave.
+ENCODER, ENCODER_SD = "encoder", 0.2e-6
+NEARLY_RIGID = 1e-3  # compliance of a coupling below this part of its prior is left out of the rig
+# Across: softer than the former part of the support a rig has it, and then at least the latter: steps stay long.
+FELT, STIFFEST = 0.01, 0.03
+LEAST_LOSS = 1e-6
+MOST_MESH_RATIO = 0.49
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The unknowns of a nominal case, and how a rig is made of them. `teeth` are the teeth that may be cracked, by
+    number; `torque_mean` [N m] of every condition."""
+
+    nominal: Case
+    model: NominalModel
+    unknowns: Unknowns
+    teeth: tuple[int, ...]
+    torque_mean: Mapping[str, float]
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return self.unknowns.size
+
+    def fitted(self, p: Array, std: Array | None = None) -> Fitted:
+        """Values of the unknowns as effects take them."""
+        return Fitted(self.model, self.unknowns, p, np.zeros(p.size) if std is None else std, self.torque_mean)
+
+    def law_of(self, case: Case) -> MeshLaw:
+        """The force law of the mesh of a rig of these unknowns."""
+        return replace(self.model.law, backlash=max(pair(case.rig).backlash_normal, 0.0))
+
+    def case(self, p: Array, condition: str | None = None) -> Case:
+        """The rig of these unknowns (size,), with the ripple of one condition, or the mean of all. Raises ValueError
+        for values that no rig may have."""
+        fitted = self.fitted(p)
+        case = recalibrated(self.nominal, fitted)
+        rig = case.rig
+        for effect in LIBRARY:
+            if effect.name in ("friction", "eccentricity", "pitch-error", "backlash"):
+                rig = effect.add(rig, _all_of(effect.name), fitted)[0]
+        rig = _cracked(rig, self, p)
+        rig = _supports(rig, self, p)
+        rig = _sensors(rig, self, p)
+        rig = _drive(rig, self, fitted, condition)
+        return with_rig(case, rig)
+
+
+def _all_of(name: str) -> Hypothesis:
+    """A hypothesis of which only the values count, not the estimates."""
+    return Hypothesis(name, "none", ())
+
+
+def layout_of(
+    nominal: Case, model: NominalModel, conditions: Sequence[Condition], teeth: Sequence[int]
+) -> Layout:
+    """The unknowns for these conditions."""
+    groups: list[Group] = [one for one in background(model) if one.key not in FORCES_ONLY]
+    for effect in LIBRARY:
+        groups += effect.unknowns(model, conditions)
+    groups += [
+        group(ACROSS, "1", SIDES, ACROSS_SD, slot="structure", low=0.0, high=ACROSS_LARGEST),
+        group(GAIN, "1", ("torque_driven",), GAIN_SD, slot="structure", first=2),
+        group(ENCODER, "m", [f"{s}.{part}" for s in SIDES for part in ("cos", "sin")], ENCODER_SD,
+              slot="structure", first=3),
+    ]  # fmt: skip
+    # Bases belong to force residuals: here unknowns are moved one by one.
+    plain = [replace(one, basis=None) for one in groups]
+    means = {condition.name: condition.torque_mean for condition in conditions}
+    return Layout(nominal, model, unknowns_of(plain, sum(model.teeth)), tuple(teeth), means)
+
+
+def _cracked(rig: Rig, layout: Layout, p: Array) -> Rig:
+    """The largest loss of either gear as its crack."""
+    losses = p[layout.unknowns[CRACK]]
+    z1 = layout.model.teeth[0]
+    for side, part, first in (("driver", losses[:z1], 0), ("driven", losses[z1:], z1)):
+        tooth = int(np.argmax(part))
+        if part[tooth] > LEAST_LOSS and first + tooth in layout.teeth:
+            crack = Crack(tooth=tooth, stiffness_loss=min(float(part[tooth]), LARGEST))
+            rig = changed(rig, side, crack=crack)
+    return rig
+
+
+def _supports(rig: Rig, layout: Layout, p: Array) -> Rig:
+    unknowns, model = layout.unknowns, layout.model
+    update = {}
+    soft = p[unknowns[ACROSS]]
+    for number, side in enumerate(SIDES):
+        support = getattr(rig.support, side)
+        exponent = model.exponent[number] + float(p[unknowns[BEARINGS[side]]][0])
+        more: dict[str, object] = {}
+        if exponent:
+            more |= {"exponent": exponent, "reference_deflection": model.reference[number]}
+        if support.across is None and soft.max() > FELT and support.stiffness is not None:
+            stiffness = support.stiffness / max(float(soft[number]), STIFFEST)
+            damping = support.damping * (stiffness / support.stiffness) ** 0.5
+            more["across"] = Across(stiffness=stiffness, damping=damping)
+        update[side] = support.model_copy(update=more)
+    return changed(rig, "support", **update)
+
+
+def _sensors(rig: Rig, layout: Layout, p: Array) -> Rig:
+    unknowns, sensors = layout.unknowns, rig.sensors
+    update = {}
+    for channel, key in DELAYS.items():
+        field = f"delay_{channel}"
+        update[field] = getattr(sensors, field) + float(p[unknowns[key]][0])
+    update["gain_torque_driven"] = sensors.gain_torque_driven * exp(float(p[unknowns[GAIN]][0]))
+    parts = p[unknowns[ENCODER]]
+    for number, side in enumerate(SIDES):
+        field, radius = f"encoder_runout_{side}", layout.model.base_radius[number]
+        phase = getattr(sensors, f"{field}_phase")
+        turning = getattr(sensors, field) * np.exp(1j * phase)
+        turning += (parts[2 * number] + 1j * parts[2 * number + 1]) / radius
+        update[field], update[f"{field}_phase"] = float(abs(turning)), float(np.angle(turning))
+    return changed(rig, "sensors", **update)
+
+
+def _drive(rig: Rig, layout: Layout, fitted: Fitted, condition: str | None) -> Rig:
+    least = NEARLY_RIGID * layout.unknowns.group(COMPLIANCE).wide[0]
+    if layout.model.rotor > 0.0 and layout.model.compliance + float(fitted.of(COMPLIANCE)[0]) > least:
+        rig = COUPLING.add(rig, _all_of("coupling"), fitted)[0]
+    if not np.any(fitted.of(RIPPLE)):
+        return rig
+    ripple = next(one for one in LIBRARY if one.name == "torque-ripple")
+    if condition in layout.torque_mean:
+        values = fitted.of(RIPPLE).reshape(len(layout.torque_mean), -1)
+        chosen = list(layout.torque_mean).index(str(condition))
+        own = np.zeros(layout.size)
+        own[layout.unknowns[RIPPLE]] = np.tile(values[chosen], len(layout.torque_mean))
+        fitted = layout.fitted(own, np.ones(layout.size))
+    else:
+        fitted = layout.fitted(fitted.p, np.ones(layout.size))
+    return ripple.add(rig, _all_of("torque-ripple"), fitted)[0]

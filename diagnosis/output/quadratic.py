@@ -1,0 +1,135 @@
+"""The cost near a rig, from its residual and Jacobian alone: block by block a quadratic, so that any prior can be tried
+without simulating.
+
+With residual r and Jacobian J of a block, C(step) = (r.r - 2 g.step + step.A step) / size, A = Re J* J, g = Re J* r. The
+logarithm is concave: least squares with weights n / (s^2 + C) bound the cost from above, and their solutions walk
+downhill to its minimum under a prior.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve
+
+from gearbench.diagnosis.output.target import Target
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Flags = NDArray[np.bool_]
+
+ROUNDS = 12
+ENOUGH = 0.1  # nats
+
+
+@dataclass(frozen=True)
+class Quadratic:
+    """`squares` (blocks, q, q), `slopes` (blocks, q), `energy` (blocks,) over the active unknowns `active` (q,)."""
+
+    target: Target
+    active: NDArray[np.int64]
+    squares: Array
+    slopes: Array
+    energy: Array
+
+    def moved(self, residual: Complex, jacobian: Complex) -> Quadratic:
+        """The same curvature about another residual (K,); jacobian (size, K)."""
+        slopes, energy = _slopes(self.target, residual, jacobian[self.active])
+        return Quadratic(self.target, self.active, self.squares, slopes, energy)
+
+    def cost(self, step: Array) -> float:
+        """Nats of the data after a step (q,)."""
+        return float(np.sum(self.target.counts * np.log1p(self._energies(step) / self.target.floors)))
+
+    def _energies(self, step: Array) -> Array:
+        whole = self.energy - 2 * self.slopes @ step + np.einsum("bij,i,j->b", self.squares, step, step, optimize=True)
+        return np.asarray(np.maximum(whole, 0.0) / self.target.sizes)
+
+    def weights(self, step: Array) -> Array:
+        """2 n / ((s^2 + C) size) (blocks,) after a step."""
+        target = self.target
+        return 2 * target.counts / ((target.floors + self._energies(step)) * target.sizes)
+
+    def information(self, step: Array) -> Array:
+        """Curvature (q, q) of the data's cost there."""
+        return np.asarray(np.tensordot(self.weights(step), self.squares, axes=1))
+
+    def best(
+        self, p: Array, sd: Array, bounds: tuple[Array, Array], start: Array | None = None
+    ) -> tuple[Array, float, Array]:
+        """The step (q,) to the least cost under the prior `sd` (size,) from unknowns `p` (size,) within bounds (size,),
+        what it costs with the prior, and the information there. Unknowns of sd 0 stay."""
+        here, width = p[self.active], sd[self.active]
+        low, high = (bound[self.active] - here for bound in bounds)
+        step = np.zeros(len(here)) if start is None else start.copy()
+        free = width > 0.0
+        cost, information = self._whole(step, here, width), self.information(step)
+        for _ in range(ROUNDS):
+            weights = self.weights(step)
+            information = np.tensordot(weights, self.squares, axes=1)
+            trial = self._solved(information, weights @ self.slopes, here, width, free, (low, high))
+            value = self._whole(trial, here, width)
+            if value < cost:
+                step, gained, cost = trial, cost - value, value
+                if gained > ENOUGH:
+                    continue
+            break
+        return step, cost, information
+
+    def _solved(
+        self, information: Array, slope: Array, here: Array, width: Array, free: Flags, bounds: tuple[Array, Array]
+    ) -> Array:
+        """Least squares under the prior; what would leave its bounds stays on them."""
+        low, high = bounds
+        step = np.zeros(len(here))
+        free = free.copy()
+        for _ in range(len(here)):
+            scale = width[free]
+            inside = information[free]
+            matrix = inside[:, free] * scale[:, None] * scale[None, :] + np.eye(len(scale))
+            pull = (slope[free] - inside[:, ~free] @ step[~free]) * scale - here[free] / scale
+            step[free] = scale * cho_solve(cho_factor(matrix, lower=True), pull)
+            outside = free & ((step < low) | (step > high))
+            if not outside.any():
+                return step
+            step[outside] = np.clip(step[outside], low[outside], high[outside])
+            free &= ~outside
+        return step
+
+    def _whole(self, step: Array, here: Array, width: Array) -> float:
+        held = width > 0.0
+        return self.cost(step) + 0.5 * float((((here + step)[held] / width[held]) ** 2).sum())
+
+    def evidence(self, cost: float, information: Array, sd: Array) -> float:
+        """Laplace's log evidence of a cost with its prior, and the information there."""
+        width = sd[self.active]
+        free = width > 0.0
+        scale = width[free]
+        matrix = information[np.ix_(free, free)] * scale[:, None] * scale[None, :] + np.eye(int(free.sum()))
+        return -cost - 0.5 * float(np.linalg.slogdet(matrix)[1])
+
+
+def quadratic_of(target: Target, residual: Complex, jacobian: Complex, active: NDArray[np.int64]) -> Quadratic:
+    """The quadratic about a residual (K,) with Jacobian (size, K) for the active unknowns."""
+    chosen = jacobian[active]
+    squares = np.empty((len(target.floors), len(active), len(active)))
+    real = _real(chosen[:, target.order])
+    for block, inside in enumerate(target.runs):
+        part = real[:, inside].reshape(len(active), -1)
+        squares[block] = part @ part.T
+    slopes, energy = _slopes(target, residual, chosen)
+    return Quadratic(target, active, squares, slopes, energy)
+
+
+def _real(values: Complex) -> Array:
+    """Real and imaginary parts (..., K, 2)."""
+    return np.stack([values.real, values.imag], axis=-1)
+
+
+def _slopes(target: Target, residual: Complex, chosen: Complex) -> tuple[Array, Array]:
+    product = (chosen * residual.conj()).real
+    sums = [np.bincount(target.of_line, row, len(target.floors)) for row in product]
+    energy = np.asarray(np.bincount(target.of_line, np.abs(residual) ** 2, len(target.floors)), dtype=np.float64)
+    return np.stack(sums, axis=1), energy

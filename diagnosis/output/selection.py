@@ -1,0 +1,231 @@
+"""Which effects the records call for: forward one by one, backward what the others make needless.
+
+The background, its nuisances and structure are fitted alone. At its optimum the quadratic weighs every hypothesis; the
+few of most evidence, by it or by the force residuals, are simulated to convergence. The best one enters when its
+evidence clears the limit, and the others are weighed again beside it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.diagnosis.effects.effect import Hypothesis
+from gearbench.diagnosis.forces.unknowns import Unknowns
+from gearbench.diagnosis.output.fit import Optimum, Sensitivity, cost_of, fit, sensitivity_of
+from gearbench.diagnosis.output.simulator import Simulator
+
+Array = NDArray[np.float64]
+Report = Callable[[str], None]
+
+LIMIT = 8.0  # nats from which an effect enters
+TRIED = 4  # hypotheses that are simulated, at each step
+BY_FORCES = 2  # of them at least, by the force residuals' ranking
+MOST = 3  # effects
+LOOKED_AT = 8  # hypotheses whose quadratic is followed to its minimum
+WORTH = 2.0  # nats promised from which a hypothesis is simulated
+RENEWALS_BASE, RENEWALS = 2, 0
+
+
+@dataclass(frozen=True)
+class Weighed:
+    """A hypothesis, its log Bayes factor over what was there before it, and its optimum (None: by the quadratic)."""
+
+    hypothesis: Hypothesis
+    log_bayes_factor: float
+    optimum: Optimum | None
+
+
+@dataclass(frozen=True)
+class Selection:
+    """The background's optimum, that with all effects that entered, these in the order of entering with the evidence
+    that each would take away, and all that was weighed over the background, the best first."""
+
+    base: Optimum
+    best: Optimum
+    entered: tuple[Weighed, ...]
+    weighed: tuple[Weighed, ...]
+
+
+@dataclass(frozen=True)
+class Start:
+    """Where the force residuals would have the unknowns of a hypothesis, and their log Bayes factor for it."""
+
+    hypothesis: Hypothesis
+    p: Array
+    log_bayes_factor: float
+
+
+def select(
+    simulator: Simulator,
+    hypotheses: Sequence[Hypothesis],
+    background: Sequence[Array],
+    starts: Mapping[str, Start],
+    report: Report = lambda step: None,
+) -> Selection | None:
+    """The effects of the hypotheses that the records call for; `background`: where to begin without any (size,),
+    `starts`: by a hypothesis' name. None where no start is a rig."""
+    unknowns = simulator.layout.unknowns
+    sd = prior_of(simulator, unknowns.prior())
+    chosen = np.ones(unknowns.size, dtype=bool)
+    report("simulating: background")
+    begin = min(background, key=lambda p: cost_of(simulator, p, sd))
+    first = sensitivity_of(simulator, begin, unknowns.prior(), chosen)
+    base = fit(simulator, begin, sd, first, renewals=RENEWALS_BASE, chosen=chosen) if first else None
+    if base is None:
+        return None
+    best, weighed = base, None
+    entered: list[Weighed] = []
+    while len(entered) < MOST:
+        taken = [one.hypothesis for one in entered]
+        rest = [one for one in hypotheses if not any(_same(one, other) for other in taken)]
+        found = weigh(simulator, best, rest, starts, report)
+        weighed = found if weighed is None else weighed
+        winner = found[0] if found else None
+        if winner is None or winner.optimum is None or winner.log_bayes_factor < LIMIT:
+            break
+        entered.append(winner)
+        best = winner.optimum
+        renewed = sensitivity_of(simulator, best.p, unknowns.prior(), chosen)
+        if renewed is not None:
+            best = fit(simulator, best.p, best.sd, renewed, renewals=0, chosen=chosen) or best
+    best, kept = _needed(simulator, best, entered)
+    return Selection(base, best, kept, tuple(weighed or ()))
+
+
+def prior_of(simulator: Simulator, sd: Array) -> Array:
+    """The prior `sd` (size,) with what no rig of the background has held at zero: cracked teeth."""
+    out = sd.copy()
+    out[simulator.layout.unknowns["crack"]] = 0.0
+    return out
+
+
+def weigh(
+    simulator: Simulator,
+    base: Optimum,
+    hypotheses: Sequence[Hypothesis],
+    starts: Mapping[str, Start],
+    report: Report = lambda step: None,
+) -> list[Weighed]:
+    """All hypotheses beside what `base` holds, the best first: the most promising simulated."""
+    unknowns, quadratic = simulator.layout.unknowns, base.sensitivity.quadratic
+    # What moves nothing in these records cannot be weighed by them.
+    hypotheses = [one for one in hypotheses if np.isin(one.entries(unknowns), quadratic.active).any()]
+    promised = []
+    first = first_look(base, hypotheses, unknowns)
+    likely = set(np.argsort(-first)[:LOOKED_AT])
+    for number, one in enumerate(hypotheses):
+        if number not in likely and one.name not in starts:
+            promised.append((min(float(first[number]), 0.0), one, np.zeros(len(quadratic.active))))
+            continue
+        sd = widened_prior(unknowns, base.sd, one)
+        step, cost, information = quadratic.best(base.p, sd, unknowns.bounds())
+        evidence = quadratic.evidence(cost, information, sd) - base.evidence - np.log(one.choices)
+        promised.append((float(evidence), one, step))
+    promised.sort(key=lambda item: -item[0])
+    ranked = [one.name for _, one, _ in promised]
+    by_force = sorted((s for s in starts.values() if s.hypothesis.name in ranked), key=lambda s: -s.log_bayes_factor)
+    names = [s.hypothesis.name for s in by_force[:BY_FORCES] if s.log_bayes_factor > WORTH]
+    names = list(dict.fromkeys([*names, *(one.name for value, one, _ in promised[:TRIED] if value > WORTH)]))[:TRIED]
+    out = []
+    for value, one, step in promised:
+        if one.name not in names:
+            out.append(Weighed(one, min(value, 0.0), None))
+            continue
+        report(f"simulating: {one.name}")
+        optimum = _refit(simulator, base, one, step, starts.get(one.name))
+        if optimum is None:
+            out.append(Weighed(one, min(value, 0.0), None))
+            continue
+        factor = optimum.evidence - base.evidence - float(np.log(one.choices))
+        out.append(Weighed(one, min(factor, relief(unknowns, base.sd, one, optimum)), optimum))
+    return sorted(out, key=lambda one: -one.log_bayes_factor)
+
+
+def first_look(base: Optimum, hypotheses: Sequence[Hypothesis], unknowns: Unknowns) -> Array:
+    """Log Bayes factors (hypotheses,) under the weights that the blocks have at `base`: what one step would gain."""
+    quadratic = base.sensitivity.quadratic
+    nothing = np.zeros(len(quadratic.active))
+    information, weights = quadratic.information(nothing), quadratic.weights(nothing)
+    here = base.p[quadratic.active]
+    slope = weights @ quadratic.slopes + information @ here
+
+    def evidence(sd: Array) -> float:
+        width = sd[quadratic.active]
+        scale = width[width > 0.0]
+        inside = np.ix_(width > 0.0, width > 0.0)
+        root = np.linalg.cholesky(information[inside] * scale[:, None] * scale[None, :] + np.eye(len(scale)))
+        half = np.linalg.solve(root, scale * slope[width > 0.0])
+        return 0.5 * float(half @ half) - float(np.log(np.diag(root)).sum())
+
+    plain = evidence(base.sd)
+    found = [evidence(widened_prior(unknowns, base.sd, one)) - plain - np.log(one.choices) for one in hypotheses]
+    return np.array(found)
+
+
+def _refit(
+    simulator: Simulator, base: Optimum, one: Hypothesis, step: Array, start: Start | None
+) -> Optimum | None:
+    unknowns, active = simulator.layout.unknowns, base.sensitivity.quadratic.active
+    sd = widened_prior(unknowns, base.sd, one)
+    linear = base.p.copy()
+    linear[active] += step
+    trials = [linear, base.p]
+    if start is not None:
+        own = base.p.copy()
+        entries = one.entries(unknowns)
+        own[entries] = start.p[entries]
+        trials += [own, np.where(sd > 0.0, start.p, 0.0)]
+    seen = np.isin(np.arange(unknowns.size), active)
+    costs = [cost_of(simulator, np.where(seen, np.clip(p, *unknowns.bounds()), 0.0), sd) for p in trials]
+    begin = trials[int(np.argmin(costs))]
+    chosen = np.ones(unknowns.size, dtype=bool)
+    near: Sensitivity = base.sensitivity
+    return fit(simulator, begin, sd, near, renewals=RENEWALS, chosen=chosen)
+
+
+def widened_prior(unknowns: Unknowns, sd: Array, hypothesis: Hypothesis) -> Array:
+    """The prior `sd` (size,) with that of the hypothesis made wide."""
+    out = sd.copy()
+    for wide in hypothesis.wide:
+        wide.into(unknowns, out)
+    return out
+
+
+def relief(unknowns: Unknowns, narrow: Array, hypothesis: Hypothesis, optimum: Optimum) -> float:
+    """What widening its own prior can add to the evidence at most (`evidence.search`); no limit for what the background
+    holds at zero."""
+    at = hypothesis.entries(unknowns)
+    if not narrow[at].all():
+        return np.inf
+    return 0.5 * float((optimum.p[at] ** 2 * (narrow[at] ** -2.0 - optimum.sd[at] ** -2.0)).sum())
+
+
+def _needed(simulator: Simulator, best: Optimum, entered: Sequence[Weighed]) -> tuple[Optimum, tuple[Weighed, ...]]:
+    """The optimum without what the other effects make needless, and each effect that stays with what it is worth."""
+    unknowns, kept = simulator.layout.unknowns, []
+    for one in entered:
+        sd = best.sd.copy()
+        at = one.hypothesis.entries(unknowns)
+        sd[at] = prior_of(simulator, unknowns.prior())[at]
+        p = np.where((sd > 0.0) | (best.sd == 0.0), best.p, 0.0)
+        quadratic = best.sensitivity.quadratic
+        step, cost, information = quadratic.best(best.p, sd, _bounds_at(unknowns, p, best.p, sd))
+        worth = best.evidence - quadratic.evidence(cost, information, sd)
+        kept.append(replace(one, log_bayes_factor=float(worth) if len(entered) > 1 else one.log_bayes_factor))
+    return best, tuple(one for one in kept if one.log_bayes_factor > LIMIT)
+
+
+def _bounds_at(unknowns: Unknowns, wanted: Array, here: Array, sd: Array) -> tuple[Array, Array]:
+    """Bounds that hold at `wanted` what has no prior."""
+    low, high = unknowns.bounds()
+    fixed = (sd == 0.0) & (wanted != here)
+    return np.where(fixed, wanted, low), np.where(fixed, wanted, high)
+
+
+def _same(one: Hypothesis, other: Hypothesis) -> bool:
+    """Whether two hypotheses move the same unknowns."""
+    return any(a.key == b.key and (a.at is None or b.at is None or a.at == b.at) for a in one.wide for b in other.wide)

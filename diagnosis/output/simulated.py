@@ -1,0 +1,180 @@
+"""From the search by forces to what simulation makes of it: which records, where to begin, what is weighed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.diagnosis.effects.backlash import KEY as BACKLASH
+from gearbench.diagnosis.effects.effect import Hypothesis
+from gearbench.diagnosis.effects.library import hypotheses as library
+from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
+from gearbench.diagnosis.evidence.prediction import predicted_factors
+from gearbench.diagnosis.evidence.problem import Problem
+from gearbench.diagnosis.evidence.search import Search
+from gearbench.diagnosis.forces.unknowns import Unknowns
+from gearbench.diagnosis.intake.measurements import Measurement
+from gearbench.diagnosis.output.layout import ACROSS, Layout, layout_of
+from gearbench.diagnosis.output.selection import LIMIT, WORTH, Selection, Start, Weighed, select
+from gearbench.diagnosis.output.simulator import Simulate, Simulator
+from gearbench.diagnosis.output.target import target_of
+from gearbench.rig import Case
+
+Array = NDArray[np.float64]
+Report = Callable[[str], None]
+
+# Part of the time without contact from which a record is too rough to follow downhill: small changes make jumps.
+LOSING = 0.01
+ACROSS_BEGIN = 0.15  # compliance across over along: below some per cent a rig does not show it
+SPACING = 0.15  # of the backlash, between the values that are tried
+CRACKED = 4  # teeth that may be cracked: those that the force residuals rank first
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """What simulation found: the effects that entered, the unknowns' layout and the simulator."""
+
+    layout: Layout
+    simulator: Simulator
+    selection: Selection
+    std: Array  # (size,) of the unknowns at the optimum
+
+    @property
+    def recalibrated(self) -> Case:
+        """The nominal case at the optimum of the background alone."""
+        return self.layout.case(self.selection.base.p)
+
+    @property
+    def with_effects(self) -> Case | None:
+        """The case at the optimum with all effects that entered; None without any."""
+        return self.layout.case(self.selection.best.p) if self.selection.entered else None
+
+
+def simulated(
+    problem: Problem,
+    found: Search,
+    measurements: Sequence[Measurement],
+    nominal: Case,
+    simulate: Simulate,
+    without: Sequence[str] = (),
+    report: Report = lambda step: None,
+) -> Simulated | None:
+    """Which effects the records call for, by simulation; None where the nominal rig cannot be simulated at all, or
+    records do not tell the mesh phase."""
+    smooth = smooth_records(nominal, measurements, simulate)
+    if not smooth:
+        return None
+    listed = library(problem.model, without)
+    cracks = [one for one in listed if one.wide[0].key == CRACK]
+    ranked = np.argsort(-predicted_factors(found.base, problem.unknowns, cracks))[:CRACKED]
+    likely = [cracks[number] for number in ranked]
+    teeth = tuple(int(one.wide[0].at) for one in likely if one.wide[0].at is not None)
+    layout = layout_of(nominal, problem.model, problem.conditions, teeth)
+    chosen = [measurements[number] for number in smooth]
+    target = target_of(chosen, [problem.conditions[number] for number in smooth])
+    simulator = Simulator(layout, target, simulate)
+    weighed = [one for one in listed if one.wide[0].key != CRACK or one in likely]
+    starts = _starts(layout, problem.unknowns, found, weighed)
+    selection = select(
+        simulator,
+        weighed,
+        _beginnings(layout, carried_over(layout, problem.unknowns, found.base.p)),
+        starts,
+        report,
+    )
+    if selection is None:
+        return None
+    std = selection.best.std
+    rough = [number for number in range(len(measurements)) if number not in smooth]
+    start = starts.get("backlash")
+    if rough and start is not None and start.log_bayes_factor > WORTH:
+        report("simulating: backlash")
+        target = target_of(
+            [measurements[number] for number in rough], [problem.conditions[number] for number in rough]
+        )
+        opened = _opened(Simulator(layout, target, simulate), selection, start)
+        if opened is not None:
+            selection = opened
+            std[layout.unknowns[BACKLASH]] = SPACING * selection.best.p[layout.unknowns[BACKLASH]]
+    return Simulated(layout, simulator, selection, std)
+
+
+def _opened(simulator: Simulator, selection: Selection, start: Start) -> Selection | None:
+    """The selection with backlash, if the records whose flanks part call for it: followed downhill they would lead
+    astray, so that backlash alone is tried there, around where the force residuals have it."""
+    unknowns = simulator.layout.unknowns
+    at, wide = unknowns[BACKLASH].start, unknowns.group(BACKLASH).wide[0]
+    costs: dict[float, float] = {}
+    for factor in (0.0, *(1.0 + SPACING * step for step in range(-2, 3))):
+        p = selection.best.p.copy()
+        p[at] = factor * start.p[at]
+        lines = simulator.lines(p)
+        if lines is not None:
+            costs[factor] = simulator.target.cost(simulator.target.lines - lines) + 0.5 * (p[at] / wide) ** 2
+    if 0.0 not in costs or len(costs) < 2:
+        return None
+    best = min(costs, key=lambda factor: costs[factor])
+    value = best * start.p[at]
+    occam = float(np.log(wide / max(SPACING * abs(value), 1e-300)))
+    worth = costs[0.0] - costs[best] - max(occam, 0.0)
+    p = selection.best.p.copy()
+    p[at] = value
+    optimum = replace(selection.best, p=p)
+    found = Weighed(start.hypothesis, worth, optimum)
+    weighed = tuple(sorted((*selection.weighed, found), key=lambda one: -one.log_bayes_factor))
+    if worth < LIMIT:
+        return replace(selection, weighed=weighed)
+    entered = tuple(sorted((*selection.entered, found), key=lambda one: -one.log_bayes_factor))
+    return replace(selection, best=optimum, entered=entered, weighed=weighed)
+
+
+def smooth_records(nominal: Case, measurements: Sequence[Measurement], simulate: Simulate) -> list[int]:
+    """Numbers of the records whose flanks stay together on the nominal rig; if all part, of the one that does least."""
+    if not all(one.phase_known for one in measurements):
+        return []
+    lost = []
+    for one in measurements:
+        try:
+            steady = simulate(nominal, one.record)
+        except ValueError:
+            return []
+        samples = max(int(np.prod(steady["time"].shape)), 1)
+        lost.append(float(steady.attrs.get("contact_lost_samples", 0)) / samples)
+    smooth = [number for number, part in enumerate(lost) if part < LOSING]
+    return smooth or [int(np.argmin(lost))]
+
+
+def carried_over(layout: Layout, unknowns: Unknowns, p: Array) -> Array:
+    """Unknowns of the force residuals (size,) as those of a layout; no tooth is cracked."""
+    out = np.zeros(layout.size)
+    for one in layout.unknowns.groups:
+        if one.key in unknowns.slices and one.key != CRACK:
+            out[layout.unknowns[one.key]] = p[unknowns[one.key]]
+    return out
+
+
+def _beginnings(layout: Layout, by_forces: Array) -> list[Array]:
+    """Where to begin without an effect: the nominal rig, and the force residuals' one with centres that do not and do
+    move across their supports."""
+    moving = by_forces.copy()
+    moving[layout.unknowns[ACROSS]] = ACROSS_BEGIN
+    return [np.zeros(layout.size), by_forces, moving]
+
+
+def _starts(
+    layout: Layout, unknowns: Unknowns, found: Search, weighed: Sequence[Hypothesis]
+) -> Mapping[str, Start]:
+    names = {one.name: one for one in weighed}
+    out = {}
+    for one in found.tried:
+        if one.fit is None or one.hypothesis.name not in names:
+            continue
+        p = carried_over(layout, unknowns, one.fit.p)
+        at = one.hypothesis.wide[0].at
+        if one.hypothesis.wide[0].key == CRACK and at is not None:
+            p[layout.unknowns[CRACK].start + at] = max(float(one.fit.p[unknowns[CRACK].start + at]), 0.0)
+        out[one.hypothesis.name] = Start(names[one.hypothesis.name], p, one.log_bayes_factor)
+    return out

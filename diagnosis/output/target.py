@@ -1,0 +1,140 @@
+"""What a simulation is held against: the lines of all channels, in blocks whose misfit has a size of its own.
+
+A block is one record, channel, kind of line (operating, excited, sideband of either shaft, other) and band. With s^2
+the noise of the repetitions' mean and the square of a hundredth of the level, below which no model is right, and C the
+mean square of measured minus simulated, the block costs n log((s^2 + C) / s^2) nats: what the discrepancy between rig
+and model is there is not known and has been maximised out. Neighbouring lines err alike: n is at most 8.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.diagnosis.forces.condition import Condition
+from gearbench.diagnosis.forces.covariance import KINDS, kinds_of
+from gearbench.diagnosis.intake.measurements import Measurement
+from gearbench.diagnosis.intake.signals import bands, frequencies, measured_channels, noise_of_mean
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Integers = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+
+FITTED = ("dte", "y_driver", "y_driven", "torque_driven")
+INDEPENDENT = 8  # lines that a block counts as, at most
+LEVEL = 1e-2  # part of the measured level below which no model is right
+REACH = 1e-4  # part of the channel's whole fluctuation that leaks into any line
+TINY = 1e-60
+
+
+@dataclass(frozen=True)
+class Block:
+    """Where a block lies: record, channel, kind of line, band [Hz]."""
+
+    record: str
+    channel: str
+    kind: str
+    band: tuple[float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Target:
+    """Measured lines (K,) of all blocks in a row; `plan` says which: record, channel, line numbers. `of_line` (K,)
+    their blocks; floors s^2, independent counts n and sizes (blocks,)."""
+
+    measurements: tuple[Measurement, ...]
+    plan: tuple[tuple[int, str, Integers], ...]
+    lines: Complex
+    of_line: Integers
+    blocks: tuple[Block, ...]
+    floors: Array
+    counts: Array
+    sizes: Array
+
+    @cached_property
+    def order(self) -> Integers:
+        """Numbers (K,) of the lines, block after block."""
+        return np.argsort(self.of_line, kind="stable")
+
+    @cached_property
+    def runs(self) -> tuple[slice, ...]:
+        """Where the lines of each block lie in that order."""
+        ends = np.cumsum(self.sizes).astype(int)
+        return tuple(slice(end - int(size), end) for end, size in zip(ends, self.sizes, strict=True))
+
+    def gathered(self, channels: Sequence[Mapping[str, Array]]) -> Complex:
+        """The same lines (K,) or (..., K) of simulated signals (..., N): by record, channel -> signal."""
+        spectra = [_spectrum(channels[number][channel])[..., bins] for number, channel, bins in self.plan]
+        return np.concatenate(spectra, axis=-1)
+
+    def energies(self, residual: Complex) -> Array:
+        """C (blocks,) of a residual (K,)."""
+        found = np.bincount(self.of_line, np.abs(residual) ** 2, len(self.floors))
+        return np.asarray(found / self.sizes)
+
+    def cost(self, residual: Complex) -> float:
+        """Nats that a residual costs."""
+        return float(np.sum(self.counts * np.log1p(self.energies(residual) / self.floors)))
+
+
+def target_of(measurements: Sequence[Measurement], conditions: Sequence[Condition]) -> Target:
+    """The lines of measurements, which have those conditions, up to the end of the excitation."""
+    plan: list[tuple[int, str, Integers]] = []
+    lines: list[Complex] = []
+    labels: list[Integers] = []
+    blocks: list[Block] = []
+    floors: list[float] = []
+    counts: list[int] = []
+    for number, (one, condition) in enumerate(zip(measurements, conditions, strict=True)):
+        kinds, frequency = kinds_of(condition), frequencies(one)[: condition.bins]
+        for channel, repetitions in measured_channels(one).items():
+            if channel not in FITTED:
+                continue
+            spectrum = _spectrum(repetitions.mean(axis=0))[: condition.bins]
+            noise = np.zeros(spectrum.size)
+            if len(repetitions) > 1:
+                noise = (np.abs(_spectrum(noise_of_mean(repetitions))) ** 2).sum(axis=0)[: condition.bins]
+            leak = REACH**2 * float(np.abs(spectrum[1:]).max() ** 2)
+            label = np.full(spectrum.size, -1)
+            for kind, band, inside in _parts(kinds, frequency, one):
+                level = float(np.mean(np.abs(spectrum[inside]) ** 2))
+                label[inside] = len(blocks)
+                blocks.append(Block(one.name, channel, kind, band))
+                floors.append(float(noise[inside].mean()) + LEVEL**2 * level + leak + TINY)
+                counts.append(min(INDEPENDENT, int(inside.sum())))
+            kept = np.flatnonzero(label >= 0)
+            plan.append((number, channel, kept))
+            lines.append(spectrum[kept])
+            labels.append(label[kept])
+    of_line = np.concatenate(labels)
+    return Target(
+        tuple(measurements),
+        tuple(plan),
+        np.concatenate(lines),
+        of_line,
+        tuple(blocks),
+        np.array(floors),
+        np.array(counts, dtype=float),
+        np.bincount(of_line, minlength=len(blocks)).astype(float),
+    )
+
+
+def _parts(
+    kinds: Integers, frequency: Array, one: Measurement
+) -> Iterator[tuple[str, tuple[float, float], Flags]]:
+    """Kind, band and flags of every block of a record; the mean is in none."""
+    for number, kind in enumerate(KINDS):
+        for low, high in bands(one):
+            inside = (kinds == number) & (frequency > low * (1 + 1e-12)) & (frequency <= high * (1 + 1e-12))
+            if inside.any():
+                yield kind, (low, high), inside
+
+
+def _spectrum(values: Array) -> Complex:
+    spectrum: Complex = np.fft.rfft(values, axis=-1) / values.shape[-1]
+    return spectrum
