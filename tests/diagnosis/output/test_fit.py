@@ -1,0 +1,64 @@
+"""Output-error fit on lines that depend on unknowns by a formula: it comes back to where they were made."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from shared.fake_simulator import LINES, FakeSimulator, sensitivities, target, unknowns
+
+from gearbench.diagnosis.output.fit import fit, prior_cost, sensitivity_of
+
+MATRIX = sensitivities()
+TRUE = np.array([0.12, -0.08, 0.05, 0.3, 0.0, 0.0, 0.0, 0.0])
+SD = np.array([0.1, 0.1, 0.1, 0.5, 0.01, 0.01, 0.0, 0.0])
+ALL = np.ones(8, dtype=bool)
+
+
+def curved(p: np.ndarray) -> np.ndarray:
+    """Lines that are no linear function of the unknowns."""
+    return p @ MATRIX + 0.8 * p[3] ** 2 * MATRIX[0] + 0.5 * np.sin(4 * p[1]) * MATRIX[1]
+
+
+def noise(size: float) -> np.ndarray:
+    rng = np.random.default_rng(7)
+    return size * (rng.standard_normal(LINES) + 1j * rng.standard_normal(LINES))
+
+
+def test_it_converges_to_the_rig_that_made_the_records() -> None:
+    simulator = FakeSimulator(curved, target(curved(TRUE) + noise(1e-3)))
+    first = sensitivity_of(simulator, np.zeros(8), SD, ALL)
+    assert first is not None
+    best = fit(simulator, np.zeros(8), SD, first, renewals=4, chosen=ALL)
+    assert best is not None and best.left < 0.5
+    assert best.p == pytest.approx(TRUE, abs=2e-3)
+    assert best.cost == pytest.approx(best.misfit + prior_cost(best.p, SD))
+    # The covariance is that of least squares under the weights of the blocks.
+    weights = best.sensitivity.quadratic.weights(np.zeros(8))[simulator.target.of_line]
+    derivative = simulator.jacobian(best.p, SD, ALL)
+    assert derivative is not None
+    curvature = ((derivative.conj() * weights) @ derivative.T).real[:6, :6] + np.diag(SD[:6] ** -2)
+    assert best.std[:6] == pytest.approx(np.sqrt(np.diag(np.linalg.inv(curvature))), rel=0.02)
+    assert not best.std[6:].any()
+
+
+def test_a_step_to_where_no_rig_is_is_shortened() -> None:
+    simulator = FakeSimulator(curved, target(curved(TRUE) + noise(1e-3)), largest=0.31)
+    first = sensitivity_of(simulator, np.zeros(8), SD, ALL)
+    assert first is not None
+    best = fit(simulator, np.zeros(8), SD, first, renewals=4, chosen=ALL)
+    assert best is not None and np.abs(best.p).max() <= 0.31
+    assert best.cost < 0.6 * simulator.target.cost(simulator.target.lines)
+    assert fit(simulator, np.full(8, 1.0), SD, first, renewals=1, chosen=ALL) is None
+
+
+def test_unknowns_without_a_prior_stay_and_bounds_hold() -> None:
+    true = TRUE.copy()
+    true[6] = -0.2  # a tooth cannot gain stiffness
+    simulator = FakeSimulator(lambda p: p @ MATRIX, target(true @ MATRIX))
+    first = sensitivity_of(simulator, np.zeros(8), np.ones(8), ALL)
+    assert first is not None
+    sd = SD.copy()
+    assert fit(simulator, np.zeros(8), sd, first, renewals=0, chosen=ALL).p[6] == 0.0  # type: ignore[union-attr]
+    sd[6] = 0.35
+    assert fit(simulator, np.zeros(8), sd, first, renewals=0, chosen=ALL).p[6] >= 0.0  # type: ignore[union-attr]
+    assert unknowns().group("crack").low == 0.0

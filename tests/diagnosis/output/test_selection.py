@@ -1,0 +1,75 @@
+"""Forward and backward selection on lines made by hand: what was put in enters, nothing else does."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from shared.fake_simulator import LINES, FakeSimulator, sensitivities, target
+
+from gearbench.diagnosis.effects.effect import Hypothesis, Wide
+from gearbench.diagnosis.output.selection import LIMIT, Selection, Start, select
+
+MATRIX = sensitivities(3)
+FRICTION = Hypothesis("friction", "mesh", (Wide("friction"),))
+RIPPLE = Hypothesis("torque-ripple", "drive", (Wide("ripple"),))
+CRACKS = tuple(Hypothesis(f"tooth-crack {i}", "mesh", (Wide("crack", i),), choices=2) for i in range(2))
+LISTED = (FRICTION, RIPPLE, *CRACKS)
+
+
+def selected(true: dict[int, float], starts: dict[str, Start] | None = None) -> Selection:
+    p = np.array([0.08, -0.1, 0.02, 0.004, -0.005, 0.006, 0.0, 0.0])
+    for number, value in true.items():
+        p[number] = value
+    rng = np.random.default_rng(11)
+    lines = p @ MATRIX + 0.02 * (rng.standard_normal(LINES) + 1j * rng.standard_normal(LINES))
+    simulator = FakeSimulator(lambda q: q @ MATRIX, target(lines))
+    found = select(simulator, LISTED, [np.zeros(8)], starts or {})
+    assert found is not None
+    return found
+
+
+def names(found: Selection) -> list[str]:
+    return [one.hypothesis.name for one in found.entered]
+
+
+def test_a_rig_with_a_good_rigs_share_of_everything_needs_nothing() -> None:
+    found = selected({})
+    assert names(found) == [] and found.best is found.base
+    assert all(one.log_bayes_factor < LIMIT for one in found.weighed)
+
+
+@pytest.mark.parametrize(("number", "value", "name"), [(3, 0.4, "friction"), (7, 0.3, "tooth-crack 1")])
+def test_one_effect_enters_with_its_size(number: int, value: float, name: str) -> None:
+    found = selected({number: value})
+    assert names(found) == [name]
+    assert found.best.p[number] == pytest.approx(value, abs=4 * found.best.std[number])
+    assert found.weighed[0].hypothesis.name == name
+    assert found.best.misfit < found.base.misfit - LIMIT
+
+
+def test_two_effects_enter_the_larger_first_and_each_is_needed() -> None:
+    found = selected({3: 0.5, 4: 0.2, 5: -0.15})
+    assert names(found) == ["friction", "torque-ripple"]
+    assert found.best.p[[3, 4, 5]] == pytest.approx([0.5, 0.2, -0.15], abs=0.03)
+    assert all(one.log_bayes_factor > LIMIT for one in found.entered)
+
+
+def test_a_start_of_the_force_residuals_is_tried_even_if_the_quadratic_does_not_see_it() -> None:
+    # From zero this effect does nothing to first order.
+    def lines_of(p: np.ndarray) -> np.ndarray:
+        return p[:3] @ MATRIX[:3] + 20 * p[3] ** 2 * MATRIX[3]
+
+    true = np.array([0.05, 0, 0, 0.4, 0, 0, 0, 0])
+    simulator = FakeSimulator(lines_of, target(lines_of(true)))
+    simulator.jacobian = lambda p, sd, chosen: np.where(  # type: ignore[method-assign, assignment]
+        np.arange(8)[:, None] == 3, 40 * (p[3] + 1e-3) * MATRIX, np.where(np.arange(8)[:, None] < 3, MATRIX, 0)
+    )
+    start = Start(FRICTION, np.array([0, 0, 0, 0.35, 0, 0, 0, 0.0]), 30.0)
+    found = select(simulator, (FRICTION,), [np.zeros(8)], {"friction": start})
+    assert found is not None and names(found) == ["friction"]
+    assert found.best.p[3] == pytest.approx(0.4, abs=0.02)
+
+
+def test_no_rig_at_the_start_is_no_selection() -> None:
+    simulator = FakeSimulator(lambda q: q @ MATRIX, target(MATRIX[0]), largest=0.1)
+    assert select(simulator, LISTED, [np.ones(8)], {}) is None

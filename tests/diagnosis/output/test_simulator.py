@@ -1,0 +1,110 @@
+"""Derivatives of simulated lines: against two simulations, unknown by unknown; rigs that unknowns make."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from gearbench.bench import simulate
+from gearbench.cases import case_files
+from gearbench.diagnosis.evidence.problem import problem_of
+from gearbench.diagnosis.intake.measurements import measurement
+from gearbench.diagnosis.output.layout import ACROSS, ENCODER, GAIN, Layout, layout_of
+from gearbench.diagnosis.output.simulator import Simulator
+from gearbench.diagnosis.output.target import target_of
+from gearbench.diagnosis.replay.replays import replays
+from gearbench.rig import read_case
+
+
+@dataclass(frozen=True)
+class Bench:
+    layout: Layout
+    simulator: Simulator
+    jacobian: np.ndarray
+
+
+@pytest.fixture(scope="module")
+def bench() -> Bench:
+    nominal = read_case(case_files()["gap_demo"])
+    record = simulate(nominal.under(nominal.conditions[0]))
+    measured = measurement(record, "base", nominal)
+    problem = problem_of([measured], nominal)
+    layout = layout_of(nominal, problem.model, problem.conditions, (3,))
+    target = target_of([measured], problem.conditions)
+    simulator = Simulator(layout, target, replays(problem.model.law))
+    chosen = np.ones(layout.size, dtype=bool)
+    jacobian = simulator.jacobian(np.zeros(layout.size), layout.unknowns.prior(), chosen)
+    assert jacobian is not None
+    return Bench(layout, simulator, jacobian)
+
+
+@pytest.mark.parametrize(
+    ("key", "entry", "part", "close"),
+    [
+        ("stiffness", 0, 0.02, 0.05),
+        ("damping", 1, 0.02, 0.05),
+        ("mass", 0, 0.05, 0.03),
+        ("inertia", 2, 0.02, 0.05),
+        ("scale", 0, 0.005, 0.05),
+        ("mesh-ratio", 0, 0.05, 0.05),
+        ("shape", 2, 0.02, 0.05),
+        ("eccentricity-driven", 1, 0.5, 0.03),
+        ("pitch-driven", 7, 0.5, 0.05),
+        ("bearing-driver", 0, 0.1, 0.05),
+        ("delay-y_driver", 0, 0.5, 0.02),
+        ("ripple", 3, 0.5, 0.05),
+        (GAIN, 0, 0.1, 0.01),
+        (ENCODER, 2, 0.5, 0.01),
+    ],
+)
+def test_a_derivative_is_what_two_simulations_differ_by(
+    bench: Bench, key: str, entry: int, part: float, close: float
+) -> None:
+    """`part` of the unknown's standard deviation, within the part `close` of the change."""
+    at = bench.layout.unknowns[key].start + entry
+    step = part * bench.layout.unknowns.prior()[at]
+    p = np.zeros(bench.layout.size)
+    before = bench.simulator.lines(p)
+    p[at] = step
+    after = bench.simulator.lines(p)
+    assert before is not None and after is not None
+    weight = bench.simulator.target.floors[bench.simulator.target.of_line] ** -0.5
+    change = weight * (after - before) / step
+    assert np.linalg.norm(weight * bench.jacobian[at] - change) < close * np.linalg.norm(change)
+
+
+def test_unknowns_make_the_rig_that_they_name(bench: Bench) -> None:
+    layout, unknowns = bench.layout, bench.layout.unknowns
+    p = np.zeros(layout.size)
+    assert layout.case(p).rig.support.driver.across is None and layout.case(p).rig.drive.ripple is None
+    p[unknowns["stiffness"]] = 0.1, -0.1
+    p[unknowns["friction"]] = 0.05
+    p[unknowns["eccentricity-driver"]] = 3e-6, 4e-6
+    p[unknowns["crack"].start + 3] = 0.3
+    p[unknowns["crack"].start + 5] = 0.4  # no tooth that may be cracked
+    p[unknowns[ACROSS]] = 0.2, 0.1
+    p[unknowns[ENCODER].start + 3] = 1e-6
+    p[unknowns["delay-y_driven"]] = 2e-5
+    p[unknowns["ripple"].start : unknowns["ripple"].start + 2] = 0.0, 1.5
+    rig = layout.case(p, "base").rig
+    assert rig.support.driver.stiffness == pytest.approx(1e8 * np.exp(0.1))
+    assert rig.support.driver.across is not None and rig.support.driven.across is not None
+    assert rig.support.driver.across.stiffness == pytest.approx(5 * 1e8 * np.exp(0.1))
+    assert rig.friction.coefficient == pytest.approx(0.05)
+    assert rig.driver.runout == pytest.approx(1e-5) and rig.driver.runout_phase == pytest.approx(np.arctan2(4, 3))
+    assert rig.driver.crack is None  # a gear has one crack, and the largest loss is none of a tooth that may be
+    assert rig.sensors.delay_y_driven == 2e-5
+    assert rig.sensors.encoder_runout_driven == pytest.approx(1e-6 / layout.model.base_radius[1])
+    assert rig.sensors.encoder_runout_driven_phase == pytest.approx(np.pi / 2)
+    assert rig.drive.ripple is not None and rig.drive.ripple.amplitude[0] == pytest.approx(1.5)
+    # 1.5 sin is 1.5 cos(.. - pi/2)
+    assert rig.drive.ripple.phase[0] == pytest.approx(-np.pi / 2)
+
+
+def test_what_no_rig_may_have_is_no_answer(bench: Bench) -> None:
+    p = np.zeros(bench.layout.size)
+    p[bench.layout.unknowns["inertia"]] = -0.9
+    assert bench.simulator.lines(p) is None
+    assert bench.simulator.jacobian(p, bench.layout.unknowns.prior(), np.ones(p.size, dtype=bool)) is None
