@@ -8,9 +8,9 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gearbench.bench.elastic.course import begun_with, check_course, check_reach, drive_of, torque_of
 from gearbench.bench.elastic.rig import ElasticRig, choose_substeps, elastic_rig, machine_for, slowest_decay
 from gearbench.bench.elastic.together import under_excitation, under_ripple
-from gearbench.bench.errors import BenchError
 from gearbench.bench.plan.excitation import Torque
 from gearbench.bench.plan.schedule import Schedule
 from gearbench.bench.plan.settling import Keep
@@ -25,7 +25,6 @@ from gearbench.bench.record.channels import (
     support_factor,
     turned_by,
 )
-from gearbench.fem.contact.curve import EDGE_SEPARATION
 from gearbench.fem.motion.machine import Machine
 from gearbench.fem.motion.scheme import Scheme, make_scheme
 from gearbench.fem.motion.start import State as Step
@@ -91,9 +90,7 @@ class Elastic:
         return {"limits": "; ".join(LIMITS), "inertia_driver": one, "inertia_driven": two}
 
     def drive(self, torque: Torque) -> Drive:
-        period = torque.sample(self.samples_per_period * self.substeps)
-        # Entry k of the shifted signal is the torque at the end of step k.
-        return Drive(period[:: self.substeps].copy(), np.roll(period, -1))
+        return drive_of(torque, self.samples_per_period, self.substeps)
 
     def start(self, sample: int) -> State:
         step = initial_state(self.machine, self.mean_torque, sample / self.sampling_rate)
@@ -117,25 +114,19 @@ class Elastic:
 
     def advance(self, drive: Drive, state: State, samples: int) -> tuple[State, Array]:
         first, steps = state.sample * self.substeps, samples * self.substeps
-        torque = np.take(drive.fine, np.arange(first, first + steps), mode="wrap")
+        torque = torque_of(drive, first, steps)
         begin = state.step
         if state.begins:
             begin = under_excitation(self.machine, begin, drive.fine, self.scheme.step, first)
         step, outputs, run = advance(self.machine, self.scheme, begin, torque, self.substeps)
-        if run.off:
-            raise BenchError(
-                f"at t = {step.t:.6g} s the teeth overlap where contact leaves the modelled flanks: lower"
-                " experiment.torque_mean_nm or the multisine"
-            )
+        lost = ""
         if run.failed >= 0:
-            raise BenchError(
+            lost = (
                 f"contact was not found at t = {step.t:.6g} s, in steps of {self.scheme.step / PARTS:.2g} s either:"
                 " the motion diverges, or forces are far beyond what the flanks can carry"
             )
-        if not np.isfinite(outputs).all():
-            raise BenchError(f"the integration diverged before t = {step.t:.6g} s")
-        here = np.vstack([state.here[None], outputs[:-1]])
-        return State(state.sample + samples, step, outputs[-1]), here
+        check_course(step.t, run.off, lost, outputs)
+        return State(state.sample + samples, step, outputs[-1]), begun_with(state.here, outputs)
 
     def dte(self, outputs: Array) -> Array:
         out = columns(outputs)
@@ -149,12 +140,7 @@ class Elastic:
         dte, out, rig = self.dte(outputs), columns(outputs), self.elastic.rig
         across, held = moves_across(rig), rig.drive.boundary == "speed"
         applied = out.torque_driver if held else torque
-        most = EDGE_SEPARATION * self.elastic.pair.driver.module
-        if dte.max() > most:
-            raise BenchError(
-                f"the DTE reaches {1e6 * dte.max():.4g} um, beyond the {1e6 * most:.4g} um to which contact off the"
-                " line of action is modelled for this module: lower experiment.torque_mean_nm or the multisine"
-            )
+        check_reach(dte, self.elastic.pair)
         return Channels(
             torque_driven=out.torque_driven,
             angle_driver=out.angle_driver,

@@ -8,14 +8,13 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gearbench.bench.elastic.course import begun_with, check_course, check_reach, drive_of, torque_of
 from gearbench.bench.elastic.rig import ElasticRig, choose_substeps, elastic_rig, machine_for
-from gearbench.bench.errors import BenchError
 from gearbench.bench.plan.excitation import Torque
 from gearbench.bench.plan.schedule import Schedule
 from gearbench.bench.plan.settling import Keep
 from gearbench.bench.protocol import Channels, Drive, Note
 from gearbench.bench.record.channels import PAIRS, dte_of, force_of, support_factor, turned_by
-from gearbench.fem.contact.curve import EDGE_SEPARATION
 from gearbench.fem.full.gear import FullGear, make_gear
 from gearbench.fem.full.machine import Machine, make_machine
 from gearbench.fem.full.record import CHANNELS, advance, columns
@@ -71,9 +70,7 @@ class Full:
         return {}
 
     def drive(self, torque: Torque) -> Drive:
-        period = torque.sample(self.samples_per_period * self.substeps)
-        # Entry k of the shifted signal is the torque at the end of step k.
-        return Drive(period[:: self.substeps].copy(), np.roll(period, -1))
+        return drive_of(torque, self.samples_per_period, self.substeps)
 
     def start(self, sample: int) -> State:
         step = initial_state(self.integrator.machine, self.mean_torque, sample / self.sampling_rate)
@@ -81,19 +78,11 @@ class Full:
 
     def advance(self, drive: Drive, state: State, samples: int) -> tuple[State, Array]:
         first, steps = state.sample * self.substeps, samples * self.substeps
-        torque = np.take(drive.fine, np.arange(first, first + steps), mode="wrap")
+        torque = torque_of(drive, first, steps)
         run = advance(self.integrator, state.step, torque, self.substeps)
-        if run.off:
-            raise BenchError(
-                f"at t = {run.state.t:.6g} s the teeth overlap where contact leaves the modelled flanks: lower"
-                " experiment.torque_mean_nm or the multisine"
-            )
-        if run.lost:
-            raise BenchError(f"the full model found no contact forces at t = {run.state.t:.6g} s")
-        if not np.isfinite(run.samples).all():
-            raise BenchError(f"the integration diverged before t = {run.state.t:.6g} s")
-        here = np.vstack([state.here[None], run.samples[:-1]])
-        return State(state.sample + samples, run.state, run.samples[-1]), here
+        lost = f"the full model found no contact forces at t = {run.state.t:.6g} s" if run.lost else ""
+        check_course(run.state.t, run.off, lost, run.samples)
+        return State(state.sample + samples, run.state, run.samples[-1]), begun_with(state.here, run.samples)
 
     def dte(self, outputs: Array) -> Array:
         out = columns(outputs)
@@ -103,12 +92,7 @@ class Full:
     def channels(self, outputs: Array, torque: Array) -> Channels:
         """Raises BenchError where the flanks overlapped further than tip edges are followed."""
         dte, out = self.dte(outputs), columns(outputs)
-        most = EDGE_SEPARATION * self.elastic.pair.driver.module
-        if dte.max() > most:
-            raise BenchError(
-                f"the DTE reaches {1e6 * dte.max():.4g} um, beyond the {1e6 * most:.4g} um to which contact off the"
-                " line of action is modelled for this module: lower experiment.torque_mean_nm or the multisine"
-            )
+        check_reach(dte, self.elastic.pair)
         return Channels(
             torque_driven=out.torque_driven,
             angle_driver=out.angle_driver,

@@ -1,0 +1,54 @@
+"""What the reduced and the full model share on their way through time: excitation, samples, what ends a course."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.bench.errors import BenchError
+from gearbench.bench.plan.excitation import Torque
+from gearbench.bench.protocol import Drive
+from gearbench.fem.contact.curve import EDGE_SEPARATION
+from gearbench.geometry import Pair
+
+Array = NDArray[np.float64]
+
+
+def drive_of(torque: Torque, samples_per_period: int, substeps: int) -> Drive:
+    """One period of the driver torque, of which entry k of `fine` is that at the end of step k."""
+    period = torque.sample(samples_per_period * substeps)
+    return Drive(period[::substeps].copy(), np.roll(period, -1))
+
+
+def torque_of(drive: Drive, first: int, steps: int) -> Array:
+    """Driver torque [N m] (steps,) at the ends of the steps from `first` on."""
+    return np.take(drive.fine, np.arange(first, first + steps), mode="wrap")
+
+
+def check_course(t: float, off: bool, lost: str, outputs: Array) -> None:
+    """Raises BenchError where an integration has ended early at `t` [s]: off the modelled flanks, without contact
+    forces (`lost` is then the sentence for it, else empty), or without end."""
+    if off:
+        raise BenchError(
+            f"at t = {t:.6g} s the teeth overlap where contact leaves the modelled flanks: lower"
+            " experiment.torque_mean_nm or the multisine"
+        )
+    if lost:
+        raise BenchError(lost)
+    if not np.isfinite(outputs).all():
+        raise BenchError(f"the integration diverged before t = {t:.6g} s")
+
+
+def begun_with(here: Array, outputs: Array) -> Array:
+    """Outputs (samples, n) at the starts of steps, from `here` (n,) and those at their ends."""
+    return np.vstack([here[None], outputs[:-1]])
+
+
+def check_reach(dte: Array, meshing: Pair) -> None:
+    """Raises BenchError where the flanks overlap further than tip edges are followed; dte [m]."""
+    most = EDGE_SEPARATION * meshing.driver.module
+    if dte.max() > most:
+        raise BenchError(
+            f"the DTE reaches {1e6 * dte.max():.4g} um, beyond the {1e6 * most:.4g} um to which contact off the"
+            " line of action is modelled for this module: lower experiment.torque_mean_nm or the multisine"
+        )
