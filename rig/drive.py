@@ -75,6 +75,11 @@ class Drive(Value):
     coupling: Coupling | None = quantity(None, doc="absent: the torque acts on the gear itself")
     ripple: Ripple | None = quantity(None, doc="absent: no torque but the commanded one")
 
+    @property
+    def twists(self) -> bool:
+        """Whether an elastic shaft lies between the boundary and the gear."""
+        return self.coupling is not None and self.coupling.stiffness is not None
+
 
 class Load(Value):
     """Boundary of the driven gear, at the outer end of its shaft, and what lies between.
@@ -86,10 +91,15 @@ class Load(Value):
     boundary: Boundary = quantity("speed", doc="what is imposed on the driven gear's shaft")
     coupling: OutputShaft | None = quantity(None, doc="absent: the load acts on the gear itself")
 
+    @property
+    def twists(self) -> bool:
+        """Whether an elastic shaft lies between the gear and the boundary."""
+        return self.coupling is not None and self.coupling.stiffness is not None
+
     @model_validator(mode="after")
     def _end_has_inertia(self) -> Load:
         shaft = self.coupling
-        if self.boundary != "speed" and shaft is not None and shaft.stiffness is not None and not shaft.inertia:
+        if self.boundary != "speed" and shaft is not None and self.twists and not shaft.inertia:
             raise ValueError(
                 f'coupling.inertia_kg_m2 = 0 must be greater than 0 while boundary = "{self.boundary}" lets the end of'
                 " the elastic shaft turn freely"

@@ -112,7 +112,7 @@ def _load_effects(load: Load) -> list[str]:
     found = ["boundary"] if load.boundary == "inertia" else []
     shaft = load.coupling
     turning = shaft is not None and shaft.inertia > 0 and load.boundary != "speed"
-    if shaft is not None and (shaft.stiffness is not None or turning):
+    if shaft is not None and (load.twists or turning):
         found.append("coupling")
     return found
 

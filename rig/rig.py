@@ -63,6 +63,11 @@ class Rig(Value):
     mesh: MeshCorrection = quantity(MeshCorrection(), doc="corrections of the mesh force and of the pairs' errors")
     sensors: Sensors = quantity(Sensors(), doc="what the measuring chain does to the channels")
 
+    @property
+    def turns_freely(self) -> bool:
+        """Whether no prescribed speed holds the common rotation of both gears."""
+        return "speed" not in (self.drive.boundary, self.load.boundary)
+
     @model_validator(mode="after")
     def _driven_and_loaded(self) -> Rig:
         drive, load = self.drive, self.load

@@ -86,6 +86,11 @@ class Supports(Value):
     driven: Support = quantity(Support(), doc="support of the driven gear")
     direction: Literal["tangential", "line-of-action"] = quantity("tangential", doc="axis of support motion")
 
+    @property
+    def move_across(self) -> bool:
+        """Whether a centre moves across its support as well."""
+        return self.driver.across is not None or self.driven.across is not None
+
 
 class Housing(Value):
     """One rigid body between both supports and the ground, which moves along the supports' direction."""

@@ -21,7 +21,6 @@ from gearbench.bench.record.channels import (
     across_factor,
     dte_of,
     generalised_force,
-    moves_across,
     support_factor,
     turned_by,
 )
@@ -132,13 +131,13 @@ class Elastic:
         out = columns(outputs)
         turned = turned_by(self.elastic.pair, out.angle_driver, out.angle_driven)
         rig, meshing = self.elastic.rig, self.elastic.pair
-        across = (out.x_driver, out.x_driven, across_factor(rig, meshing)) if moves_across(rig) else ()
+        across = (out.x_driver, out.x_driven, across_factor(rig, meshing)) if rig.support.move_across else ()
         return dte_of(turned, out.y_driver, out.y_driven, support_factor(rig, meshing), *across)
 
     def channels(self, outputs: Array, torque: Array) -> Channels:
         """Raises BenchError where the flanks overlapped further than tip edges are followed."""
         dte, out, rig = self.dte(outputs), columns(outputs), self.elastic.rig
-        across, held = moves_across(rig), rig.drive.boundary == "speed"
+        across, held = rig.support.move_across, rig.drive.boundary == "speed"
         applied = out.torque_driver if held else torque
         check_reach(dte, self.elastic.pair)
         return Channels(

@@ -21,7 +21,7 @@ from gearbench.bench.plan.settling import Keep
 from gearbench.bench.plan.substeps import runge_kutta_substeps
 from gearbench.bench.protocol import Channels, Drive
 from gearbench.bench.record.attributes import turning_inertias
-from gearbench.bench.record.channels import dte_of, generalised_force, moves_across, turned_by
+from gearbench.bench.record.channels import dte_of, generalised_force, turned_by
 from gearbench.bench.refusals.effects import refuse_unknown
 from gearbench.geometry import Pair, pair
 from gearbench.lumped.nonlinear.law import MeshLaw
@@ -174,14 +174,14 @@ class Setup:
         return self._dte(out.u1 - out.u2, out)
 
     def _dte(self, turned: Array, out: Outputs) -> Array:
-        across = (out.x1, out.x2, self.model.slide) if moves_across(self.model.rig) else ()
+        across = (out.x1, out.x2, self.model.slide) if self.model.rig.support.move_across else ()
         return dte_of(turned, out.y1, out.y2, self.model.factor, *across)
 
     def channels(self, outputs: Array, torque: Array) -> Channels:
         out = columns(outputs)
         r1, r2 = self.model.base_radii
         one, two = out.u1 / r1, out.u2 / r2
-        across, held = moves_across(self.model.rig), self.model.rig.drive.boundary == "speed"
+        across, held = self.model.rig.support.move_across, self.model.rig.drive.boundary == "speed"
         load, applied = out.load_force * r2, out.drive_force * r1 if held else torque
         return Channels(
             torque_driven=load,

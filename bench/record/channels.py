@@ -30,11 +30,6 @@ def across_factor(rig: Rig, meshing: Pair) -> float:
     return 0.0 if rig.support.direction == "line-of-action" else sin(meshing.working_pressure_angle)
 
 
-def moves_across(rig: Rig) -> bool:
-    """Whether a gear's centre moves across its support, so that a record has channels x."""
-    return rig.support.driver.across is not None or rig.support.driven.across is not None
-
-
 def dte_of(
     turned: Array,
     y_driver: Array,

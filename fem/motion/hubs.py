@@ -61,26 +61,18 @@ class Hubs(NamedTuple):
     load_shaft: tuple[float, float]
 
 
-def both_free(rig: Rig) -> bool:
-    """Whether nothing holds the rotation of both gears together."""
-    return "speed" not in (rig.drive.boundary, rig.load.boundary)
-
-
 def unknowns_of(rig: Rig) -> tuple[Unknowns, int]:
     """Numbers of the hubs' unknowns of a rig, and how many there are."""
-    drive, load = rig.drive.coupling, rig.load.coupling
-    twists_drive = drive is not None and drive.stiffness is not None
-    twists_load = load is not None and load.stiffness is not None
-    across = rig.support.driver.across is not None or rig.support.driven.across is not None
+    across = rig.support.move_across
     wanted = {
         "driver": True,
-        "driven": rig.load.boundary != "speed" or twists_load,
+        "driven": rig.load.boundary != "speed" or rig.load.twists,
         "y1": True,
         "y2": True,
         "x1": across,
         "x2": across,
-        "drive_end": twists_drive and rig.drive.boundary != "speed",
-        "load_end": twists_load and rig.load.boundary != "speed",
+        "drive_end": rig.drive.twists and rig.drive.boundary != "speed",
+        "load_end": rig.load.twists and rig.load.boundary != "speed",
         "housing": rig.housing is not None,
     }
     present = [name for name, there in wanted.items() if there]

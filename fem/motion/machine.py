@@ -18,7 +18,7 @@ from gearbench.fem.contact.coupling import PLACE, Places, find_places
 from gearbench.fem.contact.kernel import Kernel
 from gearbench.fem.contact.law import Law, Meetings
 from gearbench.fem.gear.body import CondensedGear
-from gearbench.fem.motion.hubs import ABSENT, Springs, Unknowns, both_free, hubs_of
+from gearbench.fem.motion.hubs import ABSENT, Springs, Unknowns, hubs_of
 from gearbench.geometry.pair.kinematics import Pair
 from gearbench.geometry.tooth.body import Body
 from gearbench.kernels.compiled import compiled
@@ -123,7 +123,7 @@ def make_machine(
     hubs = hubs_of(rig, bodies)
     squares = np.concatenate([driver.omega, driven.omega]) ** 2
     alpha = pair.working_pressure_angle if rig.support.direction == "line-of-action" else 0.0
-    friction, mesh, free = rig.friction, rig.mesh, both_free(rig)
+    friction, mesh, free = rig.friction, rig.mesh, rig.turns_freely
     series = (mesh.stiffness_cos, mesh.stiffness_sin, mesh.error_cos, mesh.error_sin)
     one, two, three, four = (np.array(values, dtype=float) for values in series)
     return Machine(

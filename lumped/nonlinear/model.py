@@ -60,9 +60,7 @@ from gearbench.lumped.nonlinear.rest import (
 )
 from gearbench.lumped.nonlinear.structure import (
     Structure,
-    both_free,
     driven_turns,
-    elastic_load,
     has_structure,
     structure_of,
 )
@@ -103,7 +101,7 @@ class NonLinear:
     @property
     def free(self) -> bool:
         """Whether nothing holds the rotation of both gears together."""
-        return both_free(self.rig)
+        return self.rig.turns_freely
 
     @property
     def slide(self) -> float:
@@ -217,7 +215,7 @@ class NonLinear:
         if structure is None:
             return np.array([*Coordinates(apart, y1, y2, 0.0, apart + twist), *(0.0 for _ in Coordinates._fields)])
         apart -= self.slide * (x1 - x2)
-        out = force / structure.load_stiffness if elastic_load(self.rig) else 0.0
+        out = force / structure.load_stiffness if self.rig.load.twists else 0.0
         # The end whose speed is prescribed is where it would be in steady rotation.
         u2 = -twist - apart if self.rig.drive.boundary == "speed" else structure.held * out
         place = Coordinates(u2 + apart, y1, y2, u2, u2 + apart + twist), Further(u2 - out, 0.0, x1, x2)
@@ -279,13 +277,13 @@ def nonlinear_model(rig: Rig, meshing: Pair, law: MeshLaw) -> NonLinear:
     r1, r2 = meshing.driver.base_radius, meshing.driven.base_radius
     coupling = rig.drive.coupling
     rotor = coupling.inertia if coupling is not None else 0.0
-    elastic = coupling is not None and coupling.stiffness is not None
+    elastic = rig.drive.twists
     for name, support in (("driver", rig.support.driver), ("driven", rig.support.driven)):
         if not support.exponent > -1.0:
             raise LumpedError(f"rig.support.{name}.exponent = {support.exponent:g} must be more than -1")
     shaft = rig.load.coupling
     output = shaft.inertia if shaft is not None else 0.0
-    twists = elastic_load(rig)
+    twists = rig.load.twists
     turning = one.inertia + (0.0 if elastic else rotor), two.inertia + (0.0 if twists else output)
     return NonLinear(
         rig=rig,

@@ -42,26 +42,15 @@ class Structure(NamedTuple):
     coupling2: float
 
 
-def elastic_load(rig: Rig) -> bool:
-    """Whether the load's shaft twists."""
-    return rig.load.coupling is not None and rig.load.coupling.stiffness is not None
-
-
 def driven_turns(rig: Rig) -> bool:
     """Whether the driven gear is free to depart from its steady rotation."""
-    return rig.load.boundary != "speed" or elastic_load(rig)
-
-
-def both_free(rig: Rig) -> bool:
-    """Whether nothing holds the rotation of both gears together."""
-    return "speed" not in (rig.drive.boundary, rig.load.boundary)
+    return rig.load.boundary != "speed" or rig.load.twists
 
 
 def has_structure(rig: Rig) -> bool:
     """Whether a rig needs the further coordinates or boundaries."""
-    across = rig.support.driver.across or rig.support.driven.across
     other = rig.load.boundary == "inertia" or rig.drive.boundary == "speed"
-    return bool(across) or rig.housing is not None or elastic_load(rig) or other
+    return rig.support.move_across or rig.housing is not None or rig.load.twists or other
 
 
 def structure_of(
@@ -72,7 +61,7 @@ def structure_of(
     if not has_structure(rig):
         return None
     shaft, housing, square = rig.load.coupling, rig.housing, base_radius**2
-    elastic = shaft is not None and shaft.stiffness is not None
+    elastic = rig.load.twists
     one, two = rig.support.driver.across, rig.support.driven.across
     return Structure(
         load_stiffness=shaft.stiffness / square if shaft is not None and shaft.stiffness is not None else 0.0,
@@ -80,9 +69,9 @@ def structure_of(
         inverse_load=1.0 / outer if elastic and rig.load.boundary != "speed" else 0.0,
         rigid_load=0.0 if elastic else 1.0,
         held=1.0 if rig.load.boundary == "speed" else 0.0,
-        follow=1.0 if rig.load.boundary == "torque" and both_free(rig) else 0.0,
+        follow=1.0 if rig.load.boundary == "torque" and rig.turns_freely else 0.0,
         constant=1.0 if rig.load.boundary == "inertia" or rig.drive.boundary == "speed" else 0.0,
-        balance=1.0 if both_free(rig) else 0.0,
+        balance=1.0 if rig.turns_freely else 0.0,
         housing_stiffness=housing.stiffness if housing is not None else 0.0,
         housing_damping=housing.damping if housing is not None else 0.0,
         inverse_housing=1.0 / housing.mass if housing is not None else 0.0,
