@@ -129,6 +129,8 @@ class MissingPower:
         response = VARIATION * self.response[source] / np.maximum(np.abs(branch), 1) ** 2
         response[branch == 0] = self.static * self.excited[row]
         inside = (source >= self.lines[0]) & (source <= self.lines[-1])
-        # What is missing may be the branches from `fewest` on, or what the polynomials of the others do not follow.
+        # What is missing may be the branches from `fewest` on, or what the polynomials of the others do not follow:
+        # without knowledge of which, half of each.
         later = response * (np.abs(branch) >= fewest)
-        return max(float(w[inside].sum() / max(w.sum(), np.finfo(float).tiny)) for w in (response, later))
+        shares = [float(w[inside].sum() / w.sum()) for w in (response, later) if w.any()]
+        return float(np.mean(shares)) if shares else 0.0
