@@ -41,10 +41,12 @@ class Weighed:
 
 @dataclass(frozen=True)
 class Selection:
-    """The background's optimum, that with all effects that entered, these in the order of entering with the evidence
-    that each would take away, and all that was weighed over the background, the best first."""
+    """The background's optimum, the same without any part of what entered, that with all effects that entered, these in
+    the order of entering with the evidence that each would take away, and all that was weighed over the background, the
+    best first."""
 
     base: Optimum
+    bare: Optimum
     best: Optimum
     entered: tuple[Weighed, ...]
     weighed: tuple[Weighed, ...]
@@ -93,7 +95,8 @@ def select(
         if renewed is not None:
             best = fit(simulator, best.p, best.sd, renewed, renewals=0, chosen=chosen) or best
     best, kept = _needed(simulator, best, entered)
-    return Selection(base, best, kept, tuple(weighed or ()))
+    bare = _without(simulator, base, [one.hypothesis for one in kept], chosen)
+    return Selection(base, bare, best, kept, tuple(weighed or ()))
 
 
 def prior_of(simulator: Simulator, sd: Array) -> Array:
@@ -202,6 +205,17 @@ def relief(unknowns: Unknowns, narrow: Array, hypothesis: Hypothesis, optimum: O
     if not narrow[at].all():
         return np.inf
     return 0.5 * float((optimum.p[at] ** 2 * (narrow[at] ** -2.0 - optimum.sd[at] ** -2.0)).sum())
+
+
+def _without(simulator: Simulator, base: Optimum, effects: Sequence[Hypothesis], chosen: NDArray[np.bool_]) -> Optimum:
+    """The background's optimum with the unknowns of these effects held at zero, but for numbers of the nominal rig,
+    which recalibration moves; itself where that is no rig."""
+    sd, p, unknowns = base.sd.copy(), base.p.copy(), simulator.layout.unknowns
+    for wide in (wide for one in effects for wide in one.wide):
+        group, at = unknowns.group(wide.key), wide.entries(unknowns)
+        if (group.wide > group.sd).any():  # the effect's own, and no number of the nominal rig
+            sd[at] = p[at] = 0.0
+    return (fit(simulator, p, sd, base.sensitivity, renewals=0, chosen=chosen) or base) if effects else base
 
 
 def _needed(simulator: Simulator, best: Optimum, entered: Sequence[Weighed]) -> tuple[Optimum, tuple[Weighed, ...]]:

@@ -44,8 +44,9 @@ class Simulated:
 
     @property
     def recalibrated(self) -> Case:
-        """The nominal case at the optimum of the background alone."""
-        return self.layout.case(self.selection.base.p)
+        """The nominal case at the optimum of the background alone, without any part of the effects that entered: what a
+        good rig has of them would else take their place in the gap."""
+        return self.layout.case(self.selection.bare.p)
 
     @property
     def with_effects(self) -> Case | None:

@@ -43,7 +43,7 @@ def test_torque_ripple_from_records_to_the_rig_that_has_it() -> None:
     ripple = found.with_effect.rig.drive.ripple
     assert ripple is not None and ripple.phase[:2] == pytest.approx((radians(30), radians(-60)), abs=0.1)
     plain = found.recalibrated.rig.drive.ripple  # a good rig's share of it
-    assert plain is not None and max(plain.amplitude) < 0.2 * 1.5
+    assert plain is None
     # A record that the search has not seen, in the bins of the ripple: 6 and 12 times 2.5 Hz, angle of the driver.
     errors = []
     for case in (found.recalibrated, found.with_effect):

@@ -45,6 +45,9 @@ def test_one_effect_enters_with_its_size(number: int, value: float, name: str) -
     assert found.best.p[number] == pytest.approx(value, abs=4 * found.best.std[number])
     assert found.weighed[0].hypothesis.name == name
     assert found.best.misfit < found.base.misfit - LIMIT
+    # Recalibrated without it: nothing of it is left, though a good rig might have a little.
+    assert found.bare.p[number] == 0.0 and found.base.p[3] != 0.0
+    assert found.bare.misfit > found.best.misfit + LIMIT
 
 
 def test_two_effects_enter_the_larger_first_and_each_is_needed() -> None:
