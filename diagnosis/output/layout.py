@@ -35,7 +35,7 @@ Array = NDArray[np.float64]
 
 # Of the background those that no field of a rig holds.
 FORCES_ONLY = ("curvature", "compliance", "radial")
-# Compliance of a support across over that along: rolling bearings are several times stiffer across than pedestals along.
+# Compliance of a support across over that along: bearings are several times stiffer across than pedestals along.
 ACROSS, ACROSS_SD, ACROSS_LARGEST = "across", 0.15, 1.0
 # Gain of the reaction's sensor: torque sensors are good to a few tenths of a per cent, their mounting to one.
 GAIN, GAIN_SD = "gain", 0.01

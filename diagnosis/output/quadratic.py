@@ -1,8 +1,8 @@
 """The cost near a rig, from its residual and Jacobian alone: block by block a quadratic, so that any prior can be tried
 without simulating.
 
-With residual r and Jacobian J of a block, C(step) = (r.r - 2 g.step + step.A step) / size, A = Re J* J, g = Re J* r. The
-logarithm is concave: least squares with weights n / (s^2 + C) bound the cost from above, and their solutions walk
+With residual r and Jacobian J of a block, C(step) = (r.r - 2 g.step + step.A step) / size, A = Re J* J, g = Re J* r.
+The logarithm is concave: least squares with weights n / (s^2 + C) bound the cost from above, and their solutions walk
 downhill to its minimum under a prior.
 """
 

@@ -213,7 +213,7 @@ def _needed(simulator: Simulator, best: Optimum, entered: Sequence[Weighed]) -> 
         sd[at] = prior_of(simulator, unknowns.prior())[at]
         p = np.where((sd > 0.0) | (best.sd == 0.0), best.p, 0.0)
         quadratic = best.sensitivity.quadratic
-        step, cost, information = quadratic.best(best.p, sd, _bounds_at(unknowns, p, best.p, sd))
+        _, cost, information = quadratic.best(best.p, sd, _bounds_at(unknowns, p, best.p, sd))
         worth = best.evidence - quadratic.evidence(cost, information, sd)
         kept.append(replace(one, log_bayes_factor=float(worth) if len(entered) > 1 else one.log_bayes_factor))
     return best, tuple(one for one in kept if one.log_bayes_factor > LIMIT)

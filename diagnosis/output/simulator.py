@@ -12,9 +12,9 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from gearbench.bench.plan.workers import processors
+from gearbench.diagnosis.effects.sensor_delay import KEYS as DELAYS
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.intake.signals import simulated_channels
-from gearbench.diagnosis.effects.sensor_delay import KEYS as DELAYS
 from gearbench.diagnosis.output.jacobian import (
     MOVED,
     STEP,

@@ -64,7 +64,7 @@ def test_bounds_hold_and_the_rest_is_the_best_beside_them() -> None:
 def test_evidence_of_a_linear_problem_is_that_of_its_gaussian() -> None:
     _, quadratic = made()
     sd = np.full(unknowns().size, 0.3)
-    step, cost, information = quadratic.best(np.zeros(8), sd, FREE)
+    _, cost, information = quadratic.best(np.zeros(8), sd, FREE)
     posterior = np.linalg.inv(information + np.diag(sd**-2.0))
     wanted = -cost + 0.5 * np.linalg.slogdet(posterior)[1] - np.log(sd).sum()
     assert quadratic.evidence(cost, information, sd) == pytest.approx(wanted, rel=1e-9)

@@ -77,7 +77,7 @@ def test_a_form_without_a_name_outbids_only_an_effect_that_leaves_the_gap() -> N
     assert decided(40.0, without=0.5, left=0.4, free=70.0).verdict == "effect"
     assert decided(40.0, without=0.5, left=0.05, free=900.0).verdict == "effect"
     assert decided(None, without=0.5, free=11.0).place == "drive"
-    assert decided(None, without=0.05, free=900.0).verdict == "none"  # a rig's structure leaves as much
+    assert decided(None, without=0.17, free=900.0).verdict == "none"  # a rig's structure leaves as much
 
 
 def test_audits_refuse_what_changes_and_what_remains() -> None:

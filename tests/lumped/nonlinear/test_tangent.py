@@ -39,5 +39,6 @@ def test_an_oscillator_answers_as_its_receptance_says(on_drive: bool) -> None:
     for column, amplitude in enumerate((1.0, -5.0j)):
         motion = sign * receptance * amplitude * np.exp(1j * rate * at)
         assert places[:, 0, column] == pytest.approx(motion.real, abs=2e-5 * abs(receptance * amplitude))
-        mesh = (STIFFNESS + 1j * rate * DAMPING) / 3 * motion + (0.0 if on_drive else amplitude * np.exp(1j * rate * at))
+        own = 0.0 if on_drive else amplitude * np.exp(1j * rate * at)
+        mesh = (STIFFNESS + 1j * rate * DAMPING) / 3 * motion + own
         assert pushes[:, column] == pytest.approx(mesh.real, abs=1e-4 * np.abs(mesh).max())
