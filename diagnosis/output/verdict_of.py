@@ -19,8 +19,8 @@ from gearbench.rig.contract import Place
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-# Part of a channel's fluctuation that a rig's structure leaves unexplained: a housing of 6 % of the supports' compliance,
-# supports with cross-coupling and a drift of 0.4 % leave 0.17.
+# Part of a channel's fluctuation that a rig's structure leaves unexplained: a housing of 6 % of the supports'
+# compliance, supports with cross-coupling and a drift of 0.4 % leave 0.17.
 STRUCTURE = 0.25
 # Part of what a channel lacks that an effect takes away for itself, from which no form without a name outbids it.
 CLOSES = 0.5
