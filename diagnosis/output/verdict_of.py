@@ -19,9 +19,10 @@ from gearbench.rig.contract import Place
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-# Part of a channel's fluctuation that a rig's structure leaves unexplained: a housing of 6 % of the supports'
-# compliance, supports with cross-coupling and a drift of 0.4 % leave 0.17.
-STRUCTURE = 0.25
+# Parts of a channel's fluctuation that must remain for a row, or a form without a name, to mean something unknown. A
+# housing of 6 % of the supports' compliance, supports with cross-coupling and a drift of 0.4 % leave 0.17, which free
+# forms describe though no row stands out; a slipping coupling leaves 0.155 in one row.
+STRUCTURE, FORMED = 0.1, 0.25
 # Part of what a channel lacks that an effect takes away for itself, from which no form without a name outbids it.
 CLOSES = 0.5
 
@@ -54,7 +55,7 @@ def decide_simulated(
     needed = limits.competitor_factor * max(worth, _by_force(forces, named)) + limits.competitor_offset
     left = remainder(found)
     closed = bool(named) and max(1.0 - left[c] / max(without, 1e-300) for c, without in lacking(found).items()) > CLOSES
-    open_still = not named and max(left.values()) > STRUCTURE
+    open_still = not named and max(left.values()) > FORMED
     if free and free.log_bayes_factor > (needed if named else limits.free) and (open_still or (named and not closed)):
         place = free.hypothesis.place
         because = f"a force {at_place(place)} without any given form explains the records clearly better"
