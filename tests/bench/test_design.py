@@ -36,7 +36,10 @@ def measured() -> xr.Dataset:
     return record.assign(dte=(record["dte"].dims, record["dte"].values + noise, record["dte"].attrs))
 
 
-@pytest.mark.parametrize("window", [(3, 1, 10), (6, 2, 20), (8, 3, 36)])
+@pytest.mark.parametrize(
+    "window",
+    [(3, 1, 10), *(pytest.param(one, marks=pytest.mark.validation) for one in ((6, 2, 20), (8, 3, 36)))],
+)
 def test_error_is_told_before_the_record_is_made(window: tuple[int, int, int]) -> None:
     """Spectra whose sidebands keep the source's phase at negative lines (no conjugate) err twice as much."""
     harmonics, order, half_width = window

@@ -36,7 +36,11 @@ def repeated(
 
 @pytest.mark.parametrize(
     ("experiments", "period", "transient"),
-    [(4, 16, False), (4, 128, False), (1, 64, True)],  # d = 64 > 2n+1; d = 8, overlapping windows; one record
+    [
+        pytest.param(4, 16, False, marks=pytest.mark.validation),  # d = 64 > 2n+1
+        (4, 128, False),  # d = 8, overlapping windows
+        pytest.param(1, 64, True, marks=pytest.mark.validation),  # one record
+    ],
 )
 def test_variances_are_those_of_the_errors(experiments: int, period: int, transient: bool) -> None:
     window = Window(2, 1, 5 if experiments > 1 else 12, transient)

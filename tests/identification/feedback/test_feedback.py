@@ -152,6 +152,7 @@ def test_reference_rig_at_40_db(identified: xr.Dataset) -> None:
     assert actual < 2.5 * np.sqrt(identified.mesh_stiffness_var.values.mean())
 
 
+@pytest.mark.validation
 def test_predicted_standard_deviations_are_those_of_repeated_noise() -> None:
     """Eight draws of noise on one record: predicted over empirical standard deviation of ITF, HTF and k(theta).
 

@@ -130,6 +130,7 @@ def test_choice_without_noise_takes_all_branches() -> None:
     assert error(spectra, truth, window) < 0.01
 
 
+@pytest.mark.validation
 def test_choice_under_noise_is_near_the_best_candidate() -> None:
     """Heavy noise: all branches would cost more than they bring; the choice is within 25 % of the best."""
     spectra, truth = noisy(1.5)
