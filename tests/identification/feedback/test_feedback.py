@@ -156,7 +156,7 @@ def test_reference_rig_at_40_db(identified: xr.Dataset) -> None:
 def test_predicted_standard_deviations_are_those_of_repeated_noise() -> None:
     """Eight draws of noise on one record: predicted over empirical standard deviation of ITF, HTF and k(theta).
 
-    With draws that keep the factor of all parameters where the estimate has it, k comes out at half.
+    Half of the covariance of the parameters is seen.
     """
     clean = reference_record(RIG, realisations=1, duration=0.25, band=(4.0, 2600.0), start_phase=0.3)
     size = 0.03 * float((clean.dte - clean.dte.mean()).std())
