@@ -49,14 +49,14 @@ class Optimum:
 
     @property
     def std(self) -> Array:
-        """Posterior standard deviations (size,)."""
+        """Posterior standard deviations (size,); of what these records do not show, those of the prior."""
         quadratic = self.sensitivity.quadratic
         width = self.sd[quadratic.active]
         free = width > 0.0
         scale = width[free]
         information = quadratic.information(np.zeros(len(quadratic.active)))
         matrix = information[np.ix_(free, free)] * scale[:, None] * scale[None, :] + np.eye(len(scale))
-        out = np.zeros(self.p.size)
+        out = self.sd.copy()
         out[quadratic.active[free]] = scale * np.sqrt(np.diag(np.linalg.inv(matrix)))
         return out
 

@@ -62,3 +62,14 @@ def test_unknowns_without_a_prior_stay_and_bounds_hold() -> None:
     sd[6] = 0.35
     assert fit(simulator, np.zeros(8), sd, first, renewals=0, chosen=ALL).p[6] >= 0.0  # type: ignore[union-attr]
     assert unknowns().group("crack").low == 0.0
+
+
+def test_what_the_records_do_not_show_is_known_as_before() -> None:
+    blind = MATRIX.copy()
+    blind[4] = 0.0
+    simulator = FakeSimulator(lambda p: p @ blind, target(TRUE @ blind + noise(1e-3)))
+    first = sensitivity_of(simulator, np.zeros(8), SD, ALL)
+    assert first is not None
+    best = fit(simulator, np.zeros(8), SD, first, renewals=1, chosen=ALL)
+    assert best is not None and best.p[4] == 0.0
+    assert best.std[4] == SD[4] and 0.0 < best.std[0] < SD[0]
