@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,7 @@ from gearbench.diagnosis.forces.equations import PLACES
 from gearbench.diagnosis.forces.steadiness import unsteadiness
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.intake.signals import measured_channels
+from gearbench.diagnosis.output.selection import with_entered
 from gearbench.diagnosis.output.simulated import Simulated, simulated
 from gearbench.diagnosis.output.verdict_of import Decided, decide_simulated, lacking, remainder
 from gearbench.diagnosis.replay.replays import replays
@@ -81,6 +82,8 @@ def find_cause(
     if found is None:
         return _by_forces_alone(problem, nominal, result, decide(result, silent, unsteady), common)
     decided = decide_simulated(found, result, silent, unsteady)
+    if decided.verdict == "none":
+        found, decided = seconded(found, decided, decide(result, silent, unsteady))
     common["audits"] |= {"remainder": tuple(remainder(found).values()), "lacking": tuple(lacking(found).values())}
     judged = held_out if held_out is not None and held_out.phase_known else None
     return Finding(
@@ -94,6 +97,18 @@ def find_cause(
         because=decided.because,
         **common,
     )
+
+
+def seconded(found: Simulated, decided: Decided, forces: Decision) -> tuple[Simulated, Decided]:
+    """What the force residuals name where simulation alone names nothing but speaks for the same effect."""
+    name = forces.winner.hypothesis.name if forces.winner is not None else None
+    for one in found.selection.weighed:
+        if one.hypothesis.name == name and one.optimum is not None and one.log_bayes_factor > 0.0:
+            selection = with_entered(found.simulator, found.selection, one)
+            because = "the forces missing in the measured motion call for it, and simulation comes closer with it"
+            named = Decided("effect", one.hypothesis.place, (one,), forces.probability, because)
+            return replace(found, selection=selection, std=selection.best.std), named
+    return found, decided
 
 
 def _by_forces_alone(

@@ -207,6 +207,14 @@ def relief(unknowns: Unknowns, narrow: Array, hypothesis: Hypothesis, optimum: O
     return 0.5 * float((optimum.p[at] ** 2 * (narrow[at] ** -2.0 - optimum.sd[at] ** -2.0)).sum())
 
 
+def with_entered(simulator: Simulator, selection: Selection, one: Weighed) -> Selection:
+    """The selection with an effect entered that was weighed and simulated but did not clear the limit."""
+    assert one.optimum is not None
+    chosen = np.ones(simulator.layout.unknowns.size, dtype=bool)
+    bare = _without(simulator, selection.base, [one.hypothesis], chosen)
+    return replace(selection, bare=bare, best=one.optimum, entered=(one,))
+
+
 def _without(simulator: Simulator, base: Optimum, effects: Sequence[Hypothesis], chosen: NDArray[np.bool_]) -> Optimum:
     """The background's optimum with the unknowns of these effects held at zero, but for numbers of the nominal rig,
     which recalibration moves; itself where that is no rig."""
