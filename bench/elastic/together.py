@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from gearbench.bench.plan.together import under_signal, under_waves
 from gearbench.fem.motion.hubs import ABSENT
 from gearbench.fem.motion.machine import Machine
 from gearbench.fem.motion.start import State
@@ -49,9 +50,7 @@ def under_ripple(machine: Machine, state: State) -> State:
         return state
     rate = waves.order * machine.speed1
     turn = waves.order * (machine.speed1 * state.t + state.d[machine.at.driver]) + waves.phase
-    push = waves.torque / _inertia(machine)
-    angle, speed = -(push / rate**2) @ np.cos(turn), (push / rate) @ np.sin(turn)
-    return _moved(machine, state, float(angle), float(speed))
+    return _moved(machine, state, *under_waves(waves.torque / _inertia(machine), rate, turn))
 
 
 def under_excitation(machine: Machine, state: State, torque: Array, step: float, at: int) -> State:
@@ -59,10 +58,4 @@ def under_excitation(machine: Machine, state: State, torque: Array, step: float,
     step after the state."""
     if not _free(machine) or machine.balance.follow:
         return state
-    lines = np.fft.rfft(torque)[1:] / torque.size
-    lines[: (torque.size - 1) // 2] *= 2.0  # the highest of an even number has no mirror image
-    number = np.arange(1, len(lines) + 1)
-    rate = 2 * np.pi * number / (torque.size * step)
-    turned = lines * np.exp(2j * np.pi * number * (at - 1) / torque.size) / _inertia(machine)
-    angle, speed = -(turned / rate**2).real.sum(), (turned / (1j * rate)).real.sum()
-    return _moved(machine, state, float(angle), float(speed))
+    return _moved(machine, state, *under_signal(torque / _inertia(machine), step, at - 1))

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from gearbench.bench.plan.together import under_signal, under_waves
 from gearbench.lumped.nonlinear.coordinates import NAMES
 from gearbench.lumped.nonlinear.model import NonLinear
 
@@ -19,29 +20,18 @@ _TURNING = np.array([name in ("u1", "u2", "w", "load") for name in NAMES], dtype
 
 def under_ripple(model: NonLinear, mesh_frequency: float, phase: float) -> Array:
     """State (2 size,) of the motion under the drive's ripple at a mesh phase [cycles]; frequency in Hz."""
-    ripple, moved, moving = model.rig.drive.ripple, 0.0, 0.0
+    ripple = model.rig.drive.ripple
     if ripple is None or not model.free:
         return np.zeros(2 * model.size)
-    total = _mass(model)
-    radius, z1 = model.base_radii[0], model.rig.driver.teeth
-    speed = 2 * np.pi * mesh_frequency / z1
-    for order, size, angle in zip(ripple.orders, ripple.amplitude, ripple.phase, strict=True):
-        turn = 2 * np.pi * order * phase / z1 + angle
-        rate = order * speed
-        push = size / radius / total
-        moved -= push * np.cos(turn) / rate**2
-        moving += push * np.sin(turn) / rate
-    return _all(model, moved, moving)
+    z1, orders = model.rig.driver.teeth, np.array(ripple.orders, dtype=float)
+    turn = 2 * np.pi * orders * phase / z1 + np.array(ripple.phase)
+    push = np.array(ripple.amplitude) / model.base_radii[0] / _mass(model)
+    return _all(model, *under_waves(push, 2 * np.pi * orders * mesh_frequency / z1, turn))
 
 
 def under_excitation(model: NonLinear, force: Array, step: float, at: int) -> Array:
     """State (2 size,) at entry `at` of the motion under T1/rb1 = force (n,) [N], which repeats, `step` [s] apart."""
-    lines = np.fft.rfft(force)[1:] / force.size
-    lines[: (force.size - 1) // 2] *= 2.0  # the highest of an even number has no mirror image
-    number = np.arange(1, len(lines) + 1)
-    rate = 2 * np.pi * number / (force.size * step)
-    turned = lines * np.exp(2j * np.pi * number * at / force.size) / _mass(model)
-    return _all(model, float((-turned / rate**2).real.sum()), float((turned / (1j * rate)).real.sum()))
+    return _all(model, *under_signal(force / _mass(model), step, at))
 
 
 def _mass(model: NonLinear) -> float:

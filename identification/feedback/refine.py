@@ -75,11 +75,6 @@ def linearised(model: Model, data: ClassData) -> tuple[Floats, Floats]:
     return _normal(model, data, operator, response(model, data, operator))
 
 
-def output_error(model: Model, data: ClassData) -> float:
-    """Sum over the equations of |Y - A^-1 N U|^2, each counted once; infinite where the model has no response."""
-    return _cost(data, response(model, data))
-
-
 def _shortened(
     model: Model, step: Floats, data: ClassData, cost: float
 ) -> tuple[Model, Operator, Complexes, float]:

@@ -34,14 +34,6 @@ class WindowRows:
         force, _ = self.regression.sliding(self.window.harmonics)
         return force[residue, :, position - self.window.harmonics]
 
-    def inputs_of(self, branch: NDArray[np.int64]) -> Complexes:
-        """Inputs (2n+1, E, J) of any branches j (J,): U(m + j d), 0 beyond the spectra."""
-        residue, position = self._place
-        force = self.regression.force
-        at = position[:, None] + branch
-        known = (at >= 0) & (at < force.shape[2])
-        return np.asarray(force[residue[:, None], :, np.where(known, at, 0)] * known[:, :, None]).transpose(0, 2, 1)
-
     @cached_property
     def excited(self) -> NDArray[np.bool_]:
         """Which regressors (2n+1, 2L+1) are excited."""
