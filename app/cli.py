@@ -11,21 +11,21 @@ from typing import Annotated
 import typer
 
 from gearbench import __version__
-from gearbench.commands.cases import cases
-from gearbench.commands.challenge import challenge
-from gearbench.commands.check import check
-from gearbench.commands.compare import compare
-from gearbench.commands.convert import convert
-from gearbench.commands.diagnose import diagnose
-from gearbench.commands.identify import identify
-from gearbench.commands.mesh import mesh
-from gearbench.commands.multisine import multisine
-from gearbench.commands.run import run
-from gearbench.commands.schema import schema
-from gearbench.commands.simulate import simulate
-from gearbench.commands.static import static
-from gearbench.commands.sweep import sweep
-from gearbench.commands.validate import validate
+from gearbench.commands.experiments.multisine import multisine
+from gearbench.commands.experiments.run import run
+from gearbench.commands.experiments.simulate import simulate
+from gearbench.commands.experiments.sweep import sweep
+from gearbench.commands.gears.check import check
+from gearbench.commands.gears.mesh import mesh
+from gearbench.commands.gears.static import static
+from gearbench.commands.house.cases import cases
+from gearbench.commands.house.schema import schema
+from gearbench.commands.house.validate import validate
+from gearbench.commands.measured.challenge import challenge
+from gearbench.commands.measured.compare import compare
+from gearbench.commands.measured.convert import convert
+from gearbench.commands.measured.diagnose import diagnose
+from gearbench.commands.measured.identify import identify
 from gearbench.shell.failure import INTERRUPTED, guarded, show_warning
 from gearbench.shell.options import expand_lists
 

@@ -13,7 +13,7 @@ from multiprocessing.connection import Connection
 import numpy as np
 
 from gearbench.cli import run_command_line
-from gearbench.commands.checks import Got
+from gearbench.commands.house.checks import Got
 from gearbench.shell.failure import BAD_INPUT, DONE
 
 SEED = 20260713

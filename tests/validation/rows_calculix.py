@@ -7,7 +7,7 @@ from shared.contact_models import RUNS, difference
 from shared.root_stresses import FINEST, roots
 from shared.torque_steps import REFERENCE, apart
 
-from gearbench.commands.checks import Check, Got
+from gearbench.commands.house.checks import Check, Got
 
 
 def contact_models(on_line: bool) -> float:

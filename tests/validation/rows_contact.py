@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from gearbench.commands.checks import Check, NotRun
+from gearbench.commands.house.checks import Check, NotRun
 from gearbench.fem.contact.law import Law, elastic_pair, make_law
 from gearbench.fem.contact.static import static_cycle
 from gearbench.fem.gear.body import condense

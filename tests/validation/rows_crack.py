@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gearbench.commands.checks import Check
+from gearbench.commands.house.checks import Check
 from gearbench.fem.gear.body import condense
 from gearbench.fem.gear.elasticity import plane_moduli
 from gearbench.fem.gear.patch import patch_compliance

@@ -18,8 +18,8 @@ from gearbench.challenge.making.cases import make_challenge
 from gearbench.challenge.making.plan import parse_mix
 from gearbench.challenge.scoring.judge import score_folder
 from gearbench.challenge.scoring.score import score
-from gearbench.commands.challenge import diagnose_case, read
-from gearbench.commands.checks import Check, Got
+from gearbench.commands.house.checks import Check, Got
+from gearbench.commands.measured.challenge import diagnose_case, read
 from gearbench.diagnosis import Diagnosis, diagnose
 from gearbench.records import write_record
 from gearbench.rig import Friction, read_case

@@ -11,7 +11,7 @@ from shared.surface_cycles import cycle
 
 from gearbench.bench.plan.excitation import torque_realisation
 from gearbench.cases import case_path
-from gearbench.commands.checks import Check, Got
+from gearbench.commands.house.checks import Check, Got
 from gearbench.rig import Damping, Gear, Rig, Simulation, Support, Supports, read_case
 
 HIGHEST = 3000.0  # [Hz]

@@ -11,7 +11,7 @@ from shared.mutations import damaged_record, leaves, settings
 from shared.small_run import SMALL_RUN
 
 from gearbench.cases import read_case
-from gearbench.commands.checks import Check, Got
+from gearbench.commands.house.checks import Check, Got
 from gearbench.records import read_record
 
 BASES = ("quick_lumped", "quick_fe", "gap_demo", "paper_lumped", "reference")

@@ -28,8 +28,8 @@ from shared.small_run import SMALL_RUN
 from gearbench.bench.tape import Shelf
 from gearbench.challenge.answers import Answer, read_answers, write_answers
 from gearbench.challenge.scoring.judge import score_folder
-from gearbench.commands.challenge import read
-from gearbench.commands.checks import Check, Got
+from gearbench.commands.house.checks import Check, Got
+from gearbench.commands.measured.challenge import read
 from gearbench.diagnosis import diagnosis as job
 from gearbench.diagnosis.verdict import Verdict, read_verdict, write_verdict
 from gearbench.files import FileError

@@ -10,7 +10,7 @@ from shared.hunting import generator, hunt, scale, told
 
 from gearbench.bench.statics import static
 from gearbench.cases import read_case
-from gearbench.commands.checks import Check, Got
+from gearbench.commands.house.checks import Check, Got
 from gearbench.fem.contact.law import elastic_pair, make_law
 from gearbench.fem.contact.static import ContactError, StaticCycle, static_cycle
 from gearbench.fem.gear.body import condense

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.optimize import brentq
 from shared.rack import GEARS, build, rack_half_angle
 
-from gearbench.commands.checks import Check
+from gearbench.commands.house.checks import Check
 from gearbench.geometry import pair
 from gearbench.rig import Gear, Rig, Support, Supports
 

@@ -10,7 +10,7 @@ import xarray as xr
 from numpy.typing import NDArray
 from shared.reference_rig import ReferenceRig, reference_record
 
-from gearbench.commands.checks import Check, NotRun
+from gearbench.commands.house.checks import Check, NotRun
 from gearbench.identification import (
     IdentificationSettings,
     exact_itf,

@@ -9,7 +9,7 @@ import tempfile
 import xml.etree.ElementTree as Xml
 from pathlib import Path
 
-from gearbench.commands.checks import Check, Got, NotRun
+from gearbench.commands.house.checks import Check, Got, NotRun
 
 TESTS = Path(__file__).resolve().parents[1]
 

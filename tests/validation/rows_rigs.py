@@ -12,7 +12,7 @@ import numpy as np
 from shared.hunting import scale
 from shared.random_rigs import Outcome, outcome, random_rig
 
-from gearbench.commands.checks import Check, Got
+from gearbench.commands.house.checks import Check, Got
 
 COUNT = 24
 SEED = 7

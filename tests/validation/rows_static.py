@@ -6,7 +6,7 @@ from functools import cache
 
 import numpy as np
 
-from gearbench.commands.checks import Check
+from gearbench.commands.house.checks import Check
 from gearbench.fem.contact.law import Law, elastic_pair, make_law
 from gearbench.fem.contact.static import static_cycle
 from gearbench.fem.gear.body import condense

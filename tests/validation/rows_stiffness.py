@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.commands.checks import Check, NotRun
+from gearbench.commands.house.checks import Check, NotRun
 from gearbench.geometry import Pair, pair
 from gearbench.lumped.stiffness.iso6336 import (
     basic_rack_factor,

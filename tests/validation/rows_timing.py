@@ -15,7 +15,7 @@ from gearbench.bench.linear.run import tables_for
 from gearbench.bench.plan.excitation import torque_realisation
 from gearbench.bench.plan.schedule import schedule
 from gearbench.cases import case_path
-from gearbench.commands.checks import Check
+from gearbench.commands.house.checks import Check
 from gearbench.fem.contact.static import static_cycle
 from gearbench.fem.gear.store import stored_gear
 from gearbench.geometry import pair

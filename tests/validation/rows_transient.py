@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.bench.elastic.rig import ElasticRig, elastic_rig, machine_for
-from gearbench.commands.checks import Check
+from gearbench.commands.house.checks import Check
 from gearbench.fem.contact.static import static_cycle
 from gearbench.fem.motion.scheme import make_scheme
 from gearbench.fem.motion.start import initial_state

@@ -2,7 +2,7 @@
 
 import pytest
 
-from gearbench.commands.checks import Check, checks, run
+from gearbench.commands.house.checks import Check, checks, run
 
 
 @pytest.mark.validation

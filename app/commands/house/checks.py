@@ -51,7 +51,7 @@ class Result:
 
 def folder() -> Path:
     """tests/validation of the checkout that this package runs from."""
-    return Path(__file__).resolve().parents[2] / "tests" / "validation"
+    return Path(__file__).resolve().parents[3] / "tests" / "validation"
 
 
 def checks() -> list[Check]:

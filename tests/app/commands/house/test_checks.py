@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from gearbench.commands.checks import Check, Got, NotRun, run
+from gearbench.commands.house.checks import Check, Got, NotRun, run
 
 
 @pytest.mark.parametrize(("got", "least", "outcome"), [(2.0, False, "pass"), (2.1, False, "fail"), (1.9, True, "fail")])

@@ -10,7 +10,7 @@ from shared.truth_plants import STIFFNESS, short_case
 
 from gearbench.challenge.making import cases as making
 from gearbench.cli import run_command_line
-from gearbench.commands.challenge import read
+from gearbench.commands.measured.challenge import read
 from gearbench.diagnosis.errors import DiagnosisError
 from gearbench.diagnosis.verdict import Effect, Parameter, Probabilities, Verdict, write_verdict
 from gearbench.rig import dump_case

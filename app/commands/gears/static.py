@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from gearbench.commands.stress_output import field_files, field_phases, write_all
+from gearbench.commands.gears.stress_output import field_files, field_phases, write_all
 from gearbench.shell.options import (
     CaseArgument,
     JsonOption,
@@ -95,7 +95,7 @@ def static(
 
             plot_static(result, figure)
         written = _stress_files(loaded, result, files, root_figure, progress)
-    from gearbench.commands.static_methods import draw_largest, methods_data, methods_lines, stiffness_tables
+    from gearbench.commands.gears.static_methods import draw_largest, methods_data, methods_lines, stiffness_tables
 
     tables = stiffness_tables(loaded, result)
     if stiffness_figure is not None:

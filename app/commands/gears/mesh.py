@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from gearbench.commands.mesh_options import check_crack, check_mesh_options
+from gearbench.commands.gears.mesh_options import check_crack, check_mesh_options
 from gearbench.shell.options import CaseArgument, JsonOption, SetOption, load_case, print_json
 from gearbench.shell.progress import Progress
 from gearbench.words.mesh import mesh_report, report_line

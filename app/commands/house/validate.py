@@ -18,7 +18,7 @@ def validate(
     as_json: JsonOption = False,
 ) -> int | None:
     """Measure every number that has a reach: reach, got, pass, fail or not-run. A fail exits 1."""
-    from gearbench.commands.checks import checks, folder, run
+    from gearbench.commands.house.checks import checks, folder, run
 
     available = checks()
     if not available:

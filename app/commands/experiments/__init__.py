@@ -1,0 +1,1 @@
+"""Commands that run a rig, once or many times."""

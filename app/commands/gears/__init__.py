@@ -1,0 +1,1 @@
+"""Commands about a pair at rest: its data sheet, its mesh, its static transmission error."""

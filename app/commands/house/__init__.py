@@ -1,0 +1,1 @@
+"""Commands about gearbench itself: its cases, its case format, its validation."""

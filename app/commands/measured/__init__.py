@@ -1,0 +1,1 @@
+"""Commands about records: identify, compare, convert, diagnose, challenge."""
