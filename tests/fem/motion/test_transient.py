@@ -295,7 +295,7 @@ def test_small_oscillations_have_the_linear_systems_frequencies(twins: Any) -> N
     expected = natural_frequencies(machine, TORQUE, 0.0)
     expected = expected[expected < 2e4]
     assert len(expected) >= 2
-    step, steps = 2.5e-6, 16384
+    step, steps = 2.5e-6, 8192
     scheme = make_scheme(step, 1.0)
     start = initial_state(machine, TORQUE)
     angle = np.zeros(steps)
