@@ -19,6 +19,7 @@ from gearbench.commands.gears.check import check
 from gearbench.commands.gears.mesh import mesh
 from gearbench.commands.gears.static import static
 from gearbench.commands.house.cases import cases
+from gearbench.commands.house.doctor import doctor
 from gearbench.commands.house.schema import schema
 from gearbench.commands.house.validate import validate
 from gearbench.commands.measured.challenge import challenge
@@ -53,6 +54,7 @@ COMMANDS = (
     cases,
     schema,
     validate,
+    doctor,
 )
 for command in COMMANDS:
     app.command()(command)
