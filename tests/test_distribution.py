@@ -70,9 +70,8 @@ def wheel(tree: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_wheel_holds_the_package_the_cases_and_nothing_else(wheel: Path) -> None:
     names = zipfile.ZipFile(wheel).namelist()
-    tracked = subprocess.run(
-        ["git", "ls-files", "*.py", "cases/*.toml", "app/py.typed"], cwd=ROOT, capture_output=True, text=True, check=True
-    ).stdout.split()
+    command = ["git", "ls-files", "*.py", "cases/*.toml", "app/py.typed"]
+    tracked = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout.split()
     outside = ("tests/", "benchmarks/", "tools/", "docs/", "examples/", ".")
     expected = {"gearbench/" + name.removeprefix("app/") for name in tracked if not name.startswith(outside)}
     assert {name for name in names if ".dist-info/" not in name} == expected
