@@ -19,6 +19,8 @@ from gearbench.commands.gears.check import check
 from gearbench.commands.gears.mesh import mesh
 from gearbench.commands.gears.static import static
 from gearbench.commands.house.cases import cases
+from gearbench.commands.house.completion import COMPLETE, completion, prepare
+from gearbench.commands.house.doctor import doctor
 from gearbench.commands.house.schema import schema
 from gearbench.commands.house.validate import validate
 from gearbench.commands.measured.challenge import challenge
@@ -53,6 +55,8 @@ COMMANDS = (
     cases,
     schema,
     validate,
+    doctor,
+    completion,
 )
 for command in COMMANDS:
     app.command()(command)
@@ -99,4 +103,6 @@ def main() -> None:
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
         os.environ.setdefault(name, "1")
     warnings.showwarning = show_warning
+    if COMPLETE in os.environ:
+        prepare()
     sys.exit(run_command_line(sys.argv[1:]))

@@ -22,7 +22,7 @@ from gearbench.bench.plan.excitation import torque_realisation
 from gearbench.bench.plan.schedule import ProgressReport, schedule
 from gearbench.bench.results.exact import lumped_periodic_system
 from gearbench.geometry import pair
-from gearbench.identification.identify import IdentificationSettings, identify_spectra
+from gearbench.identification.estimation import IdentificationSettings, identify_spectra
 from gearbench.identification.lpm.accuracy import BANDWIDTHS, RULE
 from gearbench.identification.response.frf import itf
 from gearbench.identification.spectra.joint import Spectra, joint_periods

@@ -7,10 +7,9 @@ Everything else of an experiment is written once: periods, settling, realisation
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from gearbench.bench.plan.excitation import Torque
@@ -18,6 +17,9 @@ from gearbench.bench.plan.schedule import ProgressReport, Schedule
 from gearbench.bench.plan.settling import Keep
 from gearbench.bench.record.static import Loads
 from gearbench.rig import Case
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Array = NDArray[np.float64]
 State = TypeVar("State")

@@ -3,12 +3,19 @@
 `gear`: plane elasticity of a tooth sector, the ring of sectors, condensation. `contact`: kinematics of real flanks,
 flank kernels, contact lines, the contact law of a pair, statics with hub centres held. `motion`: equations of motion of
 the reduced rig and their time integration. `full`: the same with every unknown of both gears. `stress`:
-fields inside loaded gears, root stress. Loads Numba.
+fields inside loaded gears, root stress. `limits`: what may be asked of them. All but that loads Numba.
 """
 
-from gearbench.fem.contact.law import Law, elastic_pair, make_law
-from gearbench.fem.contact.static import ContactError, StaticCycle, static_cycle
-from gearbench.fem.gear.body import CondensedGear, condense
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from gearbench.fem.contact.law import Law, make_law
+    from gearbench.fem.contact.static import ContactError, StaticCycle, static_cycle
+    from gearbench.fem.gear.body import CondensedGear, condense
+    from gearbench.fem.limits import elastic_pair
 
 __all__ = [
     "CondensedGear",
@@ -20,3 +27,23 @@ __all__ = [
     "make_law",
     "static_cycle",
 ]
+
+_HOMES = {
+    "CondensedGear": "gearbench.fem.gear.body",
+    "ContactError": "gearbench.fem.contact.static",
+    "Law": "gearbench.fem.contact.law",
+    "StaticCycle": "gearbench.fem.contact.static",
+    "condense": "gearbench.fem.gear.body",
+    "elastic_pair": "gearbench.fem.limits",
+    "make_law": "gearbench.fem.contact.law",
+    "static_cycle": "gearbench.fem.contact.static",
+}
+
+
+def __getattr__(name: str) -> Any:
+    # Imported on use: `check` asks for limits only, and elements and Numba take seconds to load.
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(_HOMES[name]), name)
+    globals()[name] = value
+    return value

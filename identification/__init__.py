@@ -5,24 +5,30 @@ polynomial method. `truth`: periodic systems whose exact response is known. `res
 frequency response, natural frequencies against mesh phase. `feedback`: the mesh-feedback estimator.
 """
 
-from gearbench.identification.excitation.multisine import MultisineError, MultisineSignal, random_phase_multisine
-from gearbench.identification.identify import IdentificationSettings, identify
-from gearbench.identification.lpm.local_solve import LpmError
-from gearbench.identification.response.exact import exact_frf, frozen_frf
-from gearbench.identification.response.frf import FrfError, htf, itf, make_frf, read_frf, validate_frf, write_frf
-from gearbench.identification.response.modes import frozen_modes, itf_modes
-from gearbench.identification.spectra.joint import SpectraError
-from gearbench.identification.spectra.transmission_error import AngleOnlyWarning, TransmissionError, dte, force
-from gearbench.identification.truth.harmonic_balance import harmonic_balance_itf
-from gearbench.identification.truth.monodromy import exact_itf, floquet_multipliers
-from gearbench.identification.truth.periodic import (
-    PeriodicSystem,
-    PeriodicSystemError,
-    frozen_itf,
-    htf_from_itf,
-    itf_from_htf,
-    truncation_error,
-)
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from gearbench.identification.estimation import IdentificationSettings, identify
+    from gearbench.identification.excitation.multisine import MultisineError, MultisineSignal, random_phase_multisine
+    from gearbench.identification.lpm.local_solve import LpmError
+    from gearbench.identification.response.exact import exact_frf, frozen_frf
+    from gearbench.identification.response.frf import FrfError, htf, itf, make_frf, read_frf, validate_frf, write_frf
+    from gearbench.identification.response.modes import frozen_modes, itf_modes
+    from gearbench.identification.spectra.joint import SpectraError
+    from gearbench.identification.spectra.transmission_error import AngleOnlyWarning, TransmissionError, dte, force
+    from gearbench.identification.truth.harmonic_balance import harmonic_balance_itf
+    from gearbench.identification.truth.monodromy import exact_itf, floquet_multipliers
+    from gearbench.identification.truth.periodic import (
+        PeriodicSystem,
+        PeriodicSystemError,
+        frozen_itf,
+        htf_from_itf,
+        itf_from_htf,
+        truncation_error,
+    )
 
 __all__ = [
     "AngleOnlyWarning",
@@ -57,3 +63,46 @@ __all__ = [
     "validate_frf",
     "write_frf",
 ]
+
+_HOMES = {
+    "AngleOnlyWarning": "gearbench.identification.spectra.transmission_error",
+    "FrfError": "gearbench.identification.response.frf",
+    "IdentificationSettings": "gearbench.identification.estimation",
+    "LpmError": "gearbench.identification.lpm.local_solve",
+    "MultisineError": "gearbench.identification.excitation.multisine",
+    "MultisineSignal": "gearbench.identification.excitation.multisine",
+    "PeriodicSystem": "gearbench.identification.truth.periodic",
+    "PeriodicSystemError": "gearbench.identification.truth.periodic",
+    "SpectraError": "gearbench.identification.spectra.joint",
+    "TransmissionError": "gearbench.identification.spectra.transmission_error",
+    "dte": "gearbench.identification.spectra.transmission_error",
+    "exact_frf": "gearbench.identification.response.exact",
+    "exact_itf": "gearbench.identification.truth.monodromy",
+    "floquet_multipliers": "gearbench.identification.truth.monodromy",
+    "force": "gearbench.identification.spectra.transmission_error",
+    "frozen_frf": "gearbench.identification.response.exact",
+    "frozen_itf": "gearbench.identification.truth.periodic",
+    "frozen_modes": "gearbench.identification.response.modes",
+    "harmonic_balance_itf": "gearbench.identification.truth.harmonic_balance",
+    "htf": "gearbench.identification.response.frf",
+    "htf_from_itf": "gearbench.identification.truth.periodic",
+    "identify": "gearbench.identification.estimation",
+    "itf": "gearbench.identification.response.frf",
+    "itf_from_htf": "gearbench.identification.truth.periodic",
+    "itf_modes": "gearbench.identification.response.modes",
+    "make_frf": "gearbench.identification.response.frf",
+    "random_phase_multisine": "gearbench.identification.excitation.multisine",
+    "read_frf": "gearbench.identification.response.frf",
+    "truncation_error": "gearbench.identification.truth.periodic",
+    "validate_frf": "gearbench.identification.response.frf",
+    "write_frf": "gearbench.identification.response.frf",
+}
+
+
+def __getattr__(name: str) -> Any:
+    # Imported on use: a multisine alone needs neither datasets nor estimators, which take a second to load.
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(_HOMES[name]), name)
+    globals()[name] = value
+    return value

@@ -31,7 +31,8 @@ case "$*" in
     *find_spec*) exit "${{FAKE_FOREIGN:-0}}" ;;
     -c*) exec '{sys.executable}' "$@" ;;
     '-m venv --clear '*) mkdir -p "$4/bin"; cp "$0" "$4/bin/python"; echo venv >>"$LOG" ;;
-    '-m pip install '*) echo "pip in $(pwd):" "$@" >>"$LOG"; echo noise; sleep "${{FAKE_PIP_SECONDS:-0}}"
+    '-m pip install '*) echo "pip in $(pwd):" "$@" >>"$LOG"; echo noise
+        echo "WARNING: Location is ignored" >&2; sleep "${{FAKE_PIP_SECONDS:-0}}"
         exit "${{FAKE_PIP_STATUS:-0}}" ;;
     *) echo "ran in $(pwd):" "$@" ;;
 esac
@@ -131,10 +132,15 @@ def test_launcher_is_executable_posix_shell() -> None:
 def test_first_use_installs_and_later_use_does_not(checkout: Checkout, tmp_path: Path) -> None:
     code, out, err = checkout.run("run", "a case.toml", "--out", "o")
     assert (code, out) == (0, f"ran in {tmp_path}: -P -m gearbench run a case.toml --out o\n")
-    assert "setting up" in err and "noise" in err
+    assert err.splitlines() == [
+        f"gearbench: setting up {checkout.home}/.venv with Python 3.11; this takes some minutes and 1.5 GB",
+        "gearbench: set-up done",
+    ]
+    log = checkout.home / ".venv" / "set-up.log"
+    assert log.read_text(encoding="utf-8") == "noise\nWARNING: Location is ignored\n"
     assert checkout.asked() == [
         "venv",
-        f"pip in {checkout.home}: -m pip install --quiet --no-input --disable-pip-version-check"
+        f"pip in {checkout.home}: -m pip install --no-input --disable-pip-version-check --progress-bar off"
         " -c constraints.txt -e .[dev]",
     ]
     assert checkout.run("cases") == (0, f"ran in {tmp_path}: -P -m gearbench cases\n", "")
@@ -216,7 +222,9 @@ def test_changed_python_is_seen(checkout: Checkout) -> None:
 
 def test_failed_installation_is_tried_again(checkout: Checkout) -> None:
     code, out, err = checkout.run("cases", FAKE_PIP_STATUS="1")
-    assert (code, out) == (1, "") and "pip could not install" in err
+    assert (code, out) == (1, "")
+    assert err.splitlines()[1:3] == ["noise", "WARNING: Location is ignored"]
+    assert f"pip could not install the packages (above the end of {checkout.home}/.venv/set-up.log)" in err
     assert not checkout.stamp.exists()
     assert checkout.run("cases")[0] == 0
 
@@ -299,7 +307,7 @@ def test_user_without_libraries_may_go_on_with_the_rest(checkout: Checkout) -> N
 
 def test_set_up_does_not_wait_for_answers(checkout: Checkout) -> None:
     """Nothing of the set-up reads stdin, which belongs to the command."""
-    greedy = PYTHON.replace("echo noise;", "cat;").replace('echo "ran in $(pwd):" "$@"', "cat")
+    greedy = PYTHON.replace("echo noise\n", "cat\n").replace('echo "ran in $(pwd):" "$@"', "cat")
     checkout.fake("python3", greedy)
     assert checkout.run("identify", stdin="for the command")[:2] == (0, "for the command")
 

@@ -16,8 +16,20 @@ if TYPE_CHECKING:
 
 PICTURES = (".png", ".svg", ".pdf")
 
+
+
+def _shipped(incomplete: str) -> list[str]:
+    """Names of shipped cases that begin so; where there are none the shell completes files."""
+    from gearbench.cases import case_files
+
+    return [name for name in case_files() if name.startswith(incomplete)]
+
+
 CaseArgument = Annotated[
-    str, typer.Argument(metavar="CASE", help="case file, or the name of a shipped case (see `cases`)")
+    str,
+    typer.Argument(
+        metavar="CASE", help="case file, or the name of a shipped case (see `cases`)", autocompletion=_shipped
+    ),
 ]
 SetOption = Annotated[
     list[str] | None,

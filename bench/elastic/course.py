@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from gearbench.bench.errors import BenchError
 from gearbench.bench.plan.excitation import Torque
 from gearbench.bench.protocol import Drive
-from gearbench.fem.contact.curve import EDGE_SEPARATION
+from gearbench.fem.limits import EDGE_SEPARATION
 from gearbench.geometry import Pair
 
 Array = NDArray[np.float64]

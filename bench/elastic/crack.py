@@ -4,11 +4,7 @@ from __future__ import annotations
 
 from math import degrees
 
-from gearbench.fem.gear.elasticity import plane_moduli
-from gearbench.fem.gear.patch import patch_compliance
-from gearbench.fem.gear.store import stored_gear
 from gearbench.geometry import Profile, pair
-from gearbench.lumped.stiffness.potential_energy import tooth_compliance
 from gearbench.rig import Gear, Material, Rig
 
 HALF_WIDTH = 0.05  # of the loaded stretch [modules]
@@ -22,6 +18,12 @@ def stiffness_loss(
     What finite elements find the crack to add to the compliance of the flank at the reference circle, over the
     compliance of the sound tooth there by the potential energy method, which is what the lumped model lets grow.
     """
+    # Imported on use: few gears have a crack, and elements take seconds to load.
+    from gearbench.fem.gear.elasticity import plane_moduli
+    from gearbench.fem.gear.patch import patch_compliance
+    from gearbench.fem.gear.store import stored_gear
+    from gearbench.lumped.stiffness.potential_energy import tooth_compliance
+
     condensed = stored_gear(gear, material, element_size, modes)
     s = (shape.reference_radius**2 - shape.base_radius**2) / (2 * shape.base_radius)
     room = min(s - shape.s_form, shape.s_end - s)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from gearbench.bench.plan.schedule import ProgressReport, Schedule
@@ -16,6 +15,8 @@ from gearbench.geometry.mesh.sector import refuse_crack
 from gearbench.rig import Case
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from gearbench.bench.elastic.run import Elastic
 
 Array = NDArray[np.float64]

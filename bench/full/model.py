@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from gearbench.bench.plan.schedule import ProgressReport, Schedule
@@ -15,6 +14,8 @@ from gearbench.bench.refusals.effects import FLANK_KEYS, refuse_effects
 from gearbench.rig import Case
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from gearbench.bench.full.run import Full
 
 Array = NDArray[np.float64]

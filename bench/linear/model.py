@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from gearbench.bench.plan.schedule import ProgressReport, Schedule
 from gearbench.bench.protocol import Model, Note, Prepared
 from gearbench.bench.record.static import Loads
 from gearbench.rig import Case
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Array = NDArray[np.float64]
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from gearbench.bench.plan.schedule import ProgressReport, Schedule
@@ -15,6 +14,8 @@ from gearbench.bench.refusals.effects import refuse_unknown
 from gearbench.rig import Case
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from gearbench.bench.nonlinear.run import Setup
 
 Array = NDArray[np.float64]

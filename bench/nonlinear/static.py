@@ -11,7 +11,7 @@ from gearbench.bench.record.attributes import turning_inertias
 from gearbench.bench.record.static import Loads, load_key, static_dataset
 from gearbench.bench.refusals.effects import refuse_unknown
 from gearbench.bench.refusals.load_range import check_dte
-from gearbench.fem.contact.curve import LOAD_RANGE
+from gearbench.fem.limits import LOAD_RANGE
 from gearbench.geometry import Pair, pair
 from gearbench.lumped.nonlinear.law import MeshLaw
 from gearbench.lumped.nonlinear.model import NonLinear, nonlinear_model

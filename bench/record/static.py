@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Array = NDArray[np.float64]
 
@@ -47,4 +51,6 @@ def static_dataset(
         variables["load_share"] = (("load", "phase", "pair"), share, {"units": "1"})
     if unloaded is not None:
         variables["transmission_error_unloaded"] = (("phase",), unloaded, {"units": "m"})
+    import xarray as xr  # on use: a model is known by less
+
     return xr.Dataset(variables, coords=coordinates, attrs={"schema": SCHEMA, **attributes})

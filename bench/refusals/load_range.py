@@ -5,8 +5,7 @@ from __future__ import annotations
 from math import inf
 
 from gearbench.bench.errors import BenchError
-from gearbench.fem.contact.curve import EDGE_SEPARATION, LOAD_RANGE
-from gearbench.fem.contact.law import elastic_pair
+from gearbench.fem.limits import EDGE_SEPARATION, LOAD_RANGE, elastic_pair
 from gearbench.geometry import Pair
 from gearbench.rig import Case
 

@@ -12,15 +12,14 @@ from scipy.interpolate import CubicSpline
 from gearbench.fem.contact.kernel import Kernel, lagrange
 from gearbench.fem.contact.kinematics import CORNER1, CORNER2, CORNER_SEPARATION, EDGE1, EDGE2, Contact, Tooth
 from gearbench.fem.contact.line import gap_to_master, line_contact, touching_point
+from gearbench.fem.limits import LOAD_RANGE
 from gearbench.kernels.compiled import compiled
 
 Array = NDArray[np.float64]
 
 LOADS = 15
-LOAD_RANGE = (1e1, 3e6)  # per unit of common face width [N/m]
 BLEND = 0.1  # of the path of contact, on either side of its middle: where the slave changes
 SMALLEST = 1e-30  # force [N] that counts as none
-EDGE_SEPARATION = 0.05  # of the module: how far a tip edge is followed beyond the line of action
 
 
 class Curve(NamedTuple):

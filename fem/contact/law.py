@@ -8,17 +8,18 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.fem.contact.curve import EDGE_SEPARATION, LOAD_RANGE, Curve, Curves, edge_reach, tabulate
+from gearbench.fem.contact.curve import Curve, Curves, edge_reach, tabulate
 from gearbench.fem.contact.deviation import Flanks, deviate, flanks_of, ideal_flanks
 from gearbench.fem.contact.kernel import Kernel, make_kernel
 from gearbench.fem.contact.kinematics import EDGE1, EDGE2, Contact, Facing, Tooth, facing, seen_contact, teeth_of
-from gearbench.fem.gear.body import CondensedGear, rounded
+from gearbench.fem.gear.body import CondensedGear
 from gearbench.fem.gear.elasticity import plane_moduli
-from gearbench.geometry.pair.kinematics import Pair, pair
+from gearbench.fem.limits import EDGE_SEPARATION, LOAD_RANGE, elastic_pair
+from gearbench.geometry.pair.kinematics import Pair
 from gearbench.geometry.tooth.iso1328 import drawn_gear
 from gearbench.geometry.tooth.micro import check_micro
 from gearbench.kernels.compiled import compiled
-from gearbench.rig import Gear, Material, Rig, sound_gear
+from gearbench.rig import Gear, Material, sound_gear
 
 __all__ = ["EDGE_SEPARATION", "LOAD_RANGE", "PAIRS", "Curve", "Law", "elastic_pair", "make_law"]
 
@@ -52,11 +53,6 @@ class Law(NamedTuple):
     flanks1: Flanks
     flanks2: Flanks
     play: float
-
-
-def elastic_pair(rig: Rig) -> Pair:
-    """The pair as the elastic gears see it: a tip edge sharper than elasticity can resolve is rounded."""
-    return pair(rig.model_copy(update={"driver": rounded(rig.driver), "driven": rounded(rig.driven)}))
 
 
 def make_law(

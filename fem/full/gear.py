@@ -17,10 +17,10 @@ from scipy.sparse import csc_matrix, csr_matrix
 from gearbench.fem.full.columns import symmetric_sweeps
 from gearbench.fem.full.outline import Outline, make_outline
 from gearbench.fem.full.sector_solver import SectorSolver, flexibility, make_solver
-from gearbench.fem.gear.body import rounded
 from gearbench.fem.gear.elasticity import assemble, plane_moduli
 from gearbench.fem.gear.flexibility import REACH
 from gearbench.fem.gear.ring import Solver, unknowns
+from gearbench.fem.limits import rounded
 from gearbench.geometry.mesh.element_size import flank_size
 from gearbench.geometry.mesh.grading import Grading, half_boundary
 from gearbench.geometry.mesh.sector_mesh import sector_within

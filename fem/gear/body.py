@@ -13,14 +13,13 @@ from gearbench.fem.gear.elasticity import assemble, plane_moduli
 from gearbench.fem.gear.flank import flank_trace
 from gearbench.fem.gear.flexibility import flank_kernels, kernel_samples
 from gearbench.fem.gear.ring import make_ring, ring_modes
+from gearbench.fem.limits import rounded
 from gearbench.geometry.mesh.sector import Element, meshed_sector, refuse_crack
 from gearbench.geometry.tooth.fillet import rotation
 from gearbench.geometry.tooth.profile import profile
 from gearbench.rig import Gear, Material
 
 Array = NDArray[np.float64]
-
-EDGE_RADIUS_LEAST = 5e-6  # [m]
 
 
 @dataclass(frozen=True)
@@ -53,11 +52,6 @@ class CondensedGear:
     def reach(self) -> int:
         """Number of neighbouring teeth kept on either side."""
         return (len(self.front) - 1) // 2
-
-
-def rounded(gear: Gear) -> Gear:
-    """The gear with a tip edge that elasticity can turn around: a sharper one is rounded to EDGE_RADIUS_LEAST."""
-    return gear.model_copy(update={"tip_edge_radius": max(gear.tip_edge_radius, EDGE_RADIUS_LEAST)})
 
 
 def condense(

@@ -17,8 +17,9 @@ from typing import Any
 
 import numpy as np
 
-from gearbench.fem.gear.body import CondensedGear, condense, rounded
+from gearbench.fem.gear.body import CondensedGear, condense
 from gearbench.fem.gear.crack import CrackedTooth
+from gearbench.fem.limits import rounded
 from gearbench.files import write_whole
 from gearbench.geometry.mesh.sector import Element
 from gearbench.kernels.folders import cache_folder

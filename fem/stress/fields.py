@@ -14,10 +14,10 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.fem.gear.body import rounded
 from gearbench.fem.gear.elasticity import PlaneModuli, assemble, plane_moduli
 from gearbench.fem.gear.flank import BoundaryQuadrature, boundary_quadrature
 from gearbench.fem.gear.ring import Ring, make_ring, ring_response
+from gearbench.fem.limits import rounded
 from gearbench.fem.stress.pressure import Strips
 from gearbench.fem.stress.recovery import Recovery, make_recovery, ring_stress
 from gearbench.geometry.mesh.sector_mesh import sector_mesh

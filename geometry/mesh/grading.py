@@ -9,7 +9,6 @@ from math import ceil, pi, sin
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.distance import cdist
 
 from gearbench.geometry.mesh.element_size import default_size
 from gearbench.geometry.tooth.outline import Segment, half_outline, joined
@@ -79,6 +78,9 @@ class Cloud:
 
     def at(self, points: Array) -> Array:
         """The largest size allowed at each of `points` (n, 2)."""
+        # Imported on use: what is not meshed need not wait for it.
+        from scipy.spatial.distance import cdist
+
         return np.min(self.sizes + self.growth * cdist(points, self.points), axis=1)
 
     def and_at(self, points: Array, sizes: Array) -> Cloud:

@@ -7,7 +7,6 @@ from functools import lru_cache
 from math import acos, atan2, sqrt
 
 import numpy as np
-from scipy.spatial.distance import cdist
 
 from gearbench.geometry.tooth.profile import Array, Profile, involute, radial
 
@@ -48,7 +47,7 @@ def fillet_clearance(gear: Profile, mate: Profile, distance: float, working_pres
         return float("inf")
     beta = np.linspace(0.0, gear.beta_form, SAMPLES)
     points, normals = gear.fillet(beta), gear.fillet_normals(beta)
-    nearest = np.argmin(cdist(path, points), axis=1)
+    nearest = np.argmin(np.sum((path[:, None] - points) ** 2, axis=2), axis=1)
     # Beyond the ends the arc faces the involute or the root circle, which have their own checks.
     inside = (nearest > 0) & (nearest < SAMPLES - 1)
     if not inside.any():

@@ -7,12 +7,11 @@ from math import degrees, pi, radians
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
-from scipy.spatial import cKDTree
 
 from gearbench.geometry.error import GeometryError
 from gearbench.geometry.tooth.outline import half_outline
 from gearbench.geometry.tooth.profile import Profile
+from gearbench.geometry.tooth.roots import bracketed_root
 from gearbench.rig import Crack, Gear
 
 Array = NDArray[np.float64]
@@ -63,7 +62,7 @@ def start_on_fillet(tooth: Profile, angle: float, name: str = "gear") -> float:
             f"{name}.crack.start_deg = {degrees(angle):g} must lie between {degrees(top + angle):.4g} and"
             f" {degrees(bottom + angle):.4g}, the angles that this tooth's fillet has to its centre line"
         )
-    return float(brentq(over, 0.0, tooth.beta_form, xtol=1e-14))
+    return bracketed_root(over, 0.0, tooth.beta_form, xtol=1e-14, rtol=4 * float(np.finfo(float).eps))
 
 
 def slit(tooth: Profile, gear: Gear, crack: Crack, name: str = "gear") -> Slit:
@@ -104,6 +103,8 @@ def _longest(tooth: Profile, hub_radius: float, start: Array, direction: Array) 
     radius, angle = np.hypot(*points.T), np.arctan2(points[:, 1], points[:, 0])
     near = np.minimum(clear, NEAR_START * t)
     half = np.concatenate([piece.points(piece.samples) for piece in half_outline(tooth)])
+    from scipy.spatial import cKDTree  # on use: few gears have a crack
+
     distance, which = cKDTree(np.concatenate([half, half * [1.0, -1.0]])).query(points)
     own = which < len(half)
     found = {

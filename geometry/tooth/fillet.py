@@ -12,7 +12,8 @@ from math import cos, hypot, pi, sin, sqrt
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import brentq
+
+from gearbench.geometry.tooth.roots import bracketed_root
 
 Array = NDArray[np.float64]
 
@@ -125,7 +126,7 @@ def form_point(fillet: Trochoid, psi_b: float) -> tuple[float, float]:
         """Parameter at a radius."""
         if np.hypot(*fillet.points(0.0)) >= radius:
             return 0.0
-        return float(brentq(lambda beta: np.hypot(*fillet.points(beta)) - radius, 0.0, last, xtol=1e-15, rtol=1e-15))
+        return bracketed_root(lambda beta: np.hypot(*fillet.points(beta)) - radius, 0.0, last, xtol=1e-15, rtol=1e-15)
 
     def beyond(beta: ArrayLike) -> Array:
         """Angle by which the trochoid stands out of the involute."""
@@ -141,7 +142,7 @@ def form_point(fillet: Trochoid, psi_b: float) -> tuple[float, float]:
         grid = np.linspace(over(base), last, SAMPLES)
         within = beyond(grid) < 0.0
         outermost = np.flatnonzero(within[:-1] & ~within[1:])[-1]
-        beta = float(brentq(beyond, grid[outermost], grid[outermost + 1], xtol=1e-15, rtol=1e-15))
+        beta = bracketed_root(beyond, grid[outermost], grid[outermost + 1], xtol=1e-15, rtol=1e-15)
     if beta >= last:  # an undercut below rounding
         return last, 0.0
     return beta, sqrt(max(float(np.sum(fillet.points(beta) ** 2)) - base**2, 0.0))

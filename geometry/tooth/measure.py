@@ -10,10 +10,10 @@ from math import atan2, cos, hypot, nan, pi, sin, sqrt, tan
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import brentq
 
 from gearbench.geometry.error import GeometryError
 from gearbench.geometry.tooth.profile import Profile
+from gearbench.geometry.tooth.roots import bracketed_root
 
 # Pins are rounded to this part of the module.
 PIN_STEP = 0.01
@@ -50,7 +50,9 @@ def half_angle_at(tooth: Profile, radius: float) -> float:
         return float(tooth.half_angle(radius))
     beta = 0.0
     if radius > np.hypot(*tooth.fillet(0.0)):
-        beta = brentq(lambda b: np.hypot(*tooth.fillet(b)) - radius, 0.0, tooth.beta_form, xtol=1e-15, rtol=1e-14)
+        beta = bracketed_root(
+            lambda b: np.hypot(*tooth.fillet(b)) - radius, 0.0, tooth.beta_form, xtol=1e-15, rtol=1e-14
+        )
     x, y = tooth.fillet(beta)
     return atan2(y, x)
 
@@ -108,7 +110,7 @@ def over_pins(tooth: Profile, pin: float | None = None) -> OverPins:
     rolled = pin / (2 * rb) - space
     if pin <= 0.0 or rolled <= 0.0:
         return OverPins(nan, nan)
-    slope = brentq(lambda t: t - np.arctan(t) - rolled, 0.0, rolled + 2.0, xtol=1e-16, rtol=1e-15)
+    slope = bracketed_root(lambda t: t - np.arctan(t) - rolled, 0.0, rolled + 2.0, xtol=1e-16, rtol=1e-15)
     centre = rb * sqrt(1 + slope * slope)
     touching = tooth.rho_form <= rb * slope - pin / 2 <= tooth.rho_end
     if not touching or centre - pin / 2 < tooth.root_radius:

@@ -13,7 +13,6 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import irfft, next_fast_len, rfft
 
 Grid = Literal["full", "odd", "comb"]
 
@@ -81,6 +80,8 @@ class MultisineSignal:
         highest = int(self.lines[-1])
         if n <= 2 * highest:
             raise MultisineError(f"{n} points a period cannot carry line {highest}; more than {2 * highest} can")
+        from scipy.fft import irfft
+
         bins = np.zeros(n // 2 + 1, dtype=complex)
         bins[self.lines] = 0.5 * n * self.spectrum * np.exp(2j * np.pi * self.lines * shift)
         return irfft(bins, n)
@@ -174,6 +175,8 @@ def excited_lines(
 
 
 def _points(highest: int, per_period: int) -> int:
+    from scipy.fft import next_fast_len
+
     return int(next_fast_len(per_period * highest, real=True))
 
 
@@ -189,6 +192,8 @@ def _clip_on_grid(
     lines: NDArray[np.int64], spectrum: NDArray[np.complex128], crest: float, points: int
 ) -> NDArray[np.complex128]:
     """One run of alternating projections with the signal seen at `points` points a period."""
+    from scipy.fft import irfft, rfft
+
     bins = np.zeros(points // 2 + 1, dtype=complex)
     rms = np.sqrt(0.5 * lines.size)
     best, lowest = spectrum, np.inf
