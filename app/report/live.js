@@ -36,18 +36,16 @@
     const [map, alongY, alongX] = figure.querySelectorAll(".plot");
     const [sliderX, sliderY] = figure.querySelectorAll("input");
     const [saidX, saidY] = figure.querySelectorAll("output");
-    const x = unpack(data.x), y = unpack(data.y);
+    const x = unpack(data.x);
     const sheets = data.sheets.map((packed) => {
-      const flat = unpack(packed);
-      return Array.from(y, (_, row) => flat.subarray(row * x.length, (row + 1) * x.length));
+      const y = unpack(packed.y), flat = unpack(packed.values);
+      return { y, rows: Array.from(y, (_, row) => flat.subarray(row * x.length, (row + 1) * x.length)) };
     });
+    const y = sheets[0].y; // the cursor's steps; the others show what they have nearest to it
     const at = { x: 0, y: 0 };
-    const values = (sheet, along) => {
-      const raw = along === "y" ? sheet.map((row) => row[at.x]) : Array.from(sheet[at.y]);
-      return data.logarithmic ? raw.map((value) => 10 ** value) : raw;
-    };
-    const curves = (along, over) =>
-      sheets.map((sheet, n) => ({ ...data.curves[n], x: over, y: values(sheet, along) }));
+    const plain = (raw) => (data.logarithmic ? raw.map((value) => 10 ** value) : raw);
+    const alongYof = (sheet) => plain(sheet.rows.map((row) => row[at.x]));
+    const alongXof = (sheet) => plain(Array.from(sheet.rows[nearest(sheet.y, y[at.y])]));
 
     function cross() {
       const line = { color: "#fff", width: 1.5, dash: "dot" };
@@ -72,8 +70,8 @@
       requestAnimationFrame(() => {
         waiting = false;
         Plotly.relayout(map, { shapes: cross() });
-        Plotly.restyle(alongY, { y: sheets.map((sheet) => values(sheet, "y")) });
-        Plotly.restyle(alongX, { y: sheets.map((sheet) => values(sheet, "x")) });
+        Plotly.restyle(alongY, { y: sheets.map(alongYof) });
+        Plotly.restyle(alongX, { y: sheets.map(alongXof) });
       });
     }
 
@@ -84,16 +82,17 @@
     say();
     sliderX.addEventListener("input", () => { at.x = Number(sliderX.value); moved(); });
     sliderY.addEventListener("input", () => { at.y = Number(sliderY.value); moved(); });
-    const traces = data.maps.map((one, n) => ({ ...one, x, y, z: sheets[n] }));
+    const traces = data.maps.map((one, n) => ({ ...one, x, y: sheets[n].y, z: sheets[n].rows }));
+    const curvesY = sheets.map((sheet, n) => ({ ...data.curves[n], x: sheet.y, y: alongYof(sheet) }));
+    const curvesX = sheets.map((sheet, n) => ({ ...data.curves[n], x, y: alongXof(sheet) }));
     return Promise.all([
       Plotly.newPlot(map, traces, { ...data.layout, shapes: cross() }, config),
-      Plotly.newPlot(alongY, curves("y", y), data.layout_y, config),
-      Plotly.newPlot(alongX, curves("x", x), data.layout_x, config),
+      Plotly.newPlot(alongY, curvesY, data.layout_y, config),
+      Plotly.newPlot(alongX, curvesX, data.layout_x, config),
     ]).then(() => {
       const follow = (event) => {
-        const index = event.points[0].pointIndex;
-        at.y = index[0];
-        at.x = index[1];
+        at.x = nearest(x, event.points[0].x);
+        at.y = nearest(y, event.points[0].y);
         moved();
       };
       map.on("plotly_hover", follow);

@@ -44,55 +44,57 @@ def live(
 
 
 @dataclass(frozen=True)
+class Quantity:
+    """What an axis or a bar of colours shows, and its unit."""
+
+    words: str
+    unit: str
+
+    @property
+    def title(self) -> str:
+        """As it stands on an axis."""
+        return f"{self.words} [{self.unit}]"
+
+
+@dataclass(frozen=True)
 class Sheet:
-    """One of the quantities of a map: its name, values (y, x) and the colour of its curves."""
+    """One of the results of a map: its name, its rows' y (n,), values (n, m), and the colour of its curves."""
 
     name: str
+    y: Array
     values: Array
     colour: str
 
 
-@dataclass(frozen=True)
-class Axis:
-    """An axis of a map: what it is, its unit, its values (n,)."""
-
-    words: str
-    unit: str
-    values: Array
-
-    @property
-    def title(self) -> str:
-        """As it stands on the axis."""
-        return f"{self.words} [{self.unit}]"
-
-
 def live_map(
-    name: str, x: Axis, y: Axis, sheets: Sequence[Sheet], quantity: tuple[str, str], still: str, caption: str,
-    *, start: tuple[float, float], limits: tuple[float, float] | None = None, logarithmic: bool = True,
+    name: str, quantities: tuple[Quantity, Quantity, Quantity], x: Array, sheets: Sequence[Sheet], still: str,
+    caption: str, *, start: tuple[float, float], limits: tuple[float, float] | None = None, logarithmic: bool = True,
 ) -> str:  # fmt: skip
-    """A map over x and y with a cursor that shows the curves through its place along both axes, of every sheet.
+    """A map over x (m,) and y with a cursor that shows the curves of every sheet through its place along both axes.
 
-    `quantity`: what the values are, and their unit; `start`: where the cursor stands at first; `limits`: of the colours
+    `quantities`: those of x, y and the values; `start`: where the cursor stands at first; `limits`: of the colours
     (absent: of all values); `logarithmic`: colours and curves on a logarithmic scale, values must then not be negative.
     """
-    title = f"{quantity[0]} [{quantity[1]}]"
+    along, across, quantity = quantities
     shown = [np.log10(np.maximum(one.values, 1e-300)) if logarithmic else one.values for one in sheets]
     low, high = limits or (min(float(np.nanmin(one.values)) for one in sheets), _largest(sheets))
     if logarithmic:
         low, high = float(np.log10(max(low, 1e-300))), float(np.log10(high))
     span = {"zmin": low, "zmax": high, "zauto": False, "colorscale": "Viridis", "type": "heatmap"}
-    bar = {"title": {"text": quantity[1]}, "thickness": 14, **(_decades(low, high) if logarithmic else {})}
-    hover = f"{x.words} %{{x:.4g}} {x.unit}<br>{y.words} %{{y:.5g}} {y.unit}<extra></extra>"
+    bar = {"title": {"text": quantity.unit}, "thickness": 14, **(_decades(low, high) if logarithmic else {})}
+    hover = f"{along.words} %{{x:.4g}} {along.unit}<br>{across.words} %{{y:.5g}} {across.unit}<extra></extra>"
     scale = log_axis(10**low, 10**high) if logarithmic else {}
     data = {
         "kind": "map",
         "logarithmic": logarithmic,
-        "x": _packed(x.values),
-        "y": _packed(y.values),
-        "unit_x": x.unit,
-        "unit_y": y.unit,
+        "x": _packed(x),
+        "unit_x": along.unit,
+        "unit_y": across.unit,
         "start": [float(start[0]), float(start[1])],
-        "sheets": [_packed(values) for values in shown],
+        "sheets": [
+            {"y": _packed(one.y), "values": _packed(values)}
+            for one, values in zip(sheets, shown, strict=True)
+        ],
         "maps": [
             span | {"name": one.name, "visible": n == 0, "colorbar": bar, "hovertemplate": hover}
             for n, one in enumerate(sheets)
@@ -101,13 +103,13 @@ def live_map(
             {"type": "scatter", "mode": "lines", "name": one.name, "line": {"color": one.colour, "width": 1.5}}
             for one in sheets
         ],
-        "layout": axes(x.title, y.title) | _choice(sheets),
-        "layout_y": axes(y.title, title, y=scale),
-        "layout_x": axes(x.title, title, y=scale),
+        "layout": axes(along.title, across.title) | _choice(sheets),
+        "layout_y": axes(across.title, quantity.title, y=scale),
+        "layout_x": axes(along.title, quantity.title, y=scale),
     }
     plots = [
         '<div class="plot" style="height:440px"></div>',
-        f'<div class="sliders">{_slider(x)}{_slider(y)}</div>',
+        f'<div class="sliders">{_slider(along)}{_slider(across)}</div>',
         '<div class="pair"><div class="plot" style="height:300px"></div>'
         '<div class="plot" style="height:300px"></div></div>',
     ]
@@ -174,7 +176,7 @@ def _figure(name: str, data: Mapping[str, Any], plots: Sequence[str], still: str
     )
 
 
-def _slider(axis: Axis) -> str:
+def _slider(axis: Quantity) -> str:
     return (
         f'<label>{escape(axis.words)} <input type="range" min="0" step="1" value="0">'
         f" <output></output></label>"

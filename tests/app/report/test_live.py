@@ -14,16 +14,16 @@ import numpy as np
 import pytest
 
 from gearbench.report.html import text
-from gearbench.report.live import Axis, Sheet, axes, curve, live, live_map, live_page, log_axis, thinned
+from gearbench.report.live import Quantity, Sheet, axes, curve, live, live_map, live_page, log_axis, thinned
 
 PHASE, FREQUENCY = np.arange(8) / 8, np.linspace(100.0, 900.0, 20)
 VALUES = 1e-9 * (1.0 + PHASE) * FREQUENCY[:, None]
 
 
 def a_map(name: str = "map") -> str:
-    sheets = [Sheet("identified", VALUES, "#0b5c9e"), Sheet("exact", 2 * VALUES, "#d1600a")]
-    x, y = Axis("mesh phase", "cycles", PHASE), Axis("frequency", "Hz", FREQUENCY)
-    return live_map(name, x, y, sheets, ("|ITF|", "m/N"), "<svg></svg>", "A map.", start=(0.5, 500.0))
+    sheets = [Sheet("one", FREQUENCY, VALUES, "#0b5c9e"), Sheet("two", FREQUENCY[::2], VALUES[::2], "#d1600a")]
+    axes_of = (Quantity("mesh phase", "cycles"), Quantity("frequency", "Hz"), Quantity("|ITF|", "m/N"))
+    return live_map(name, axes_of, PHASE, sheets, "<svg></svg>", "A map.", start=(0.5, 500.0))
 
 
 def a_curve(name: str = "curve") -> str:
@@ -89,7 +89,7 @@ def test_plotly_accepts_every_trace_and_layout() -> None:
 
 def test_numbers_come_back_from_what_is_packed() -> None:
     mapped = data_in(a_map())
-    rows = np.frombuffer(b64decode(mapped["sheets"][0]), "<f4").reshape(len(FREQUENCY), len(PHASE))
+    rows = np.frombuffer(b64decode(mapped["sheets"][0]["values"]), "<f4").reshape(len(FREQUENCY), len(PHASE))
     assert 10.0**rows == pytest.approx(VALUES, rel=1e-5)
     values = np.frombuffer(b64decode(data_in(a_curve())["traces"][0]["y"]["bdata"]), "<f4")
     assert np.isnan(values[1]) and list(values[2:]) == [0, 1, 2, 3, 4, 5]
