@@ -60,6 +60,26 @@ def draw_record(path: Path, record: xr.Dataset, realisation: int = 0) -> None:
         save(drawing, path)
 
 
+def draw_spectrum(path: Path, record: xr.Dataset, realisation: int = 0) -> None:
+    """Amplitudes of the DTE of one realisation, line by line; the first mesh orders are marked."""
+    rate = float(record.attrs["sampling_rate"])
+    dte = 1e6 * record["dte"].values[realisation]
+    amplitude = 2 * np.abs(np.fft.rfft(dte - dte.mean()))[1:] / dte.size
+    frequency = np.arange(1, amplitude.size + 1) * rate / dte.size
+    with figure(size=(8.0, 4.2)) as (drawing, axes):
+        axes.plot(frequency, amplitude, color=BLUE, lw=0.6, rasterized=True)
+        period = float(record.attrs.get("mesh_period", 0.0))
+        for order in range(1, 4) if period else ():
+            axes.axvline(order / period, color=GREY, ls=":", lw=1.0, label="mesh orders 1-3" if order == 1 else None)
+        axes.set_yscale("log")
+        axes.set_ylim(bottom=max(1e-1 * float(np.median(amplitude)), 1e-6 * float(amplitude.max()), 1e-12))
+        axes.set(xlabel="frequency [Hz]", ylabel="amplitude of the DTE [um]", xlim=(0.0, rate / 2))
+        axes.set_title(f"Spectrum of the DTE, realisation {realisation + 1}")
+        if period:
+            axes.legend(loc="upper right")
+        save(drawing, path)
+
+
 def _signals(record: xr.Dataset, realisation: int) -> tuple[Array, Array, Array]:
     row = record.isel(realisation=realisation)
     return record["time"].values, row["torque_driver"].values, row["dte"].values

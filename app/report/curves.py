@@ -47,8 +47,11 @@ def over_time(name: str, record: xr.Dataset, still: str, realisation: int = 0) -
     return live(name, traces, layout, still, f"{words} Drag to zoom, double-click to go back.")
 
 
-def spectrum(name: str, records: Mapping[str, xr.Dataset], still: str) -> str:
-    """Amplitude spectra of the DTE of the first realisation of records, over frequency; mesh orders are marked."""
+def spectrum(name: str, records: Mapping[str, xr.Dataset], still: str, band: float = 0.0) -> str:
+    """Amplitude spectra of the DTE of the first realisation of records, over frequency; mesh orders are marked.
+
+    band: frequency [Hz] that is shown at first, where it holds more than a dozen mesh orders.
+    """
     traces, period, top, least = [], 0.0, 0.0, np.inf
     for number, (title, record) in enumerate(records.items()):
         dte = 1e6 * record["dte"].values[0]
@@ -65,7 +68,7 @@ def spectrum(name: str, records: Mapping[str, xr.Dataset], still: str) -> str:
         {"type": "line", "x0": f, "x1": f, "yref": "paper", "y0": 0, "y1": 1, "line": {"color": GREY, "dash": "dot"}}
         for f in marks
     ]
-    upper = min(last, ORDERS / period) if period else last
+    upper = min(last, max(ORDERS / period, 1.1 * band)) if period else last
     y = log_axis(least, top) | {"range": [float(np.log10(max(0.1 * least, 1e-6 * top))), float(np.log10(2 * top))]}
     layout = axes(
         "frequency [Hz]", "amplitude of the DTE [um]", {"range": [0, upper]}, y, shapes=lines,
@@ -93,6 +96,15 @@ def over_phase(
     return live(name, traces, layout, still, words)
 
 
+def stiffness_curves(static: xr.Dataset, load: int = 0) -> list[tuple[str, Array, Array]]:
+    """Tangent mesh stiffness [N/um] of a static result over the phase, and the secant one where it differs."""
+    phase = static["phase"].values
+    tangent, secant = (1e-6 * static[f"stiffness_{key}"].values[load] for key in ("tangent", "secant"))
+    curves = [("tangent dF/d dte", phase, tangent)]
+    apart = np.abs(secant - tangent).max() > 1e-6 * tangent.max()
+    return [*curves, ("secant F/dte", phase, secant)] if apart else curves
+
+
 def natural_frequencies(
     name: str, results: Mapping[str, xr.Dataset], still: str, zones: Sequence[Span] = (), zone_words: str = ""
 ) -> str:
@@ -103,8 +115,9 @@ def natural_frequencies(
         for mode, values in enumerate(frf["natural_frequency"].values):
             x, y = closed(frf["phase"].values, values)
             colour = COLOURS.get(kind, PALETTE[number % len(PALETTE)])
-            marks = {"mode": "lines+markers", "marker": {"size": 4}} if kind == "identified" else {}
-            title = f"{NAMES.get(kind, kind)}, mode {mode + 1}"
+            marks: dict[str, Any] = {"mode": "lines+markers", "marker": {"size": 4}} if kind == "identified" else {}
+            marks |= {"hovertemplate": f"mode {mode + 1}: %{{y:.1f}} Hz at %{{x:.3f}}"}
+            title = NAMES.get(kind, kind)
             traces.append(curve(x, y, title, colour, legendgroup=kind, showlegend=mode == 0, **marks))
             gaps |= kind == "identified" and mode == 0 and bool(np.isnan(values).any())
             if kind != "linearised":

@@ -65,6 +65,11 @@ def text(words: str, kind: str = "p", style: str = "") -> str:
     return f"<{kind}{mark}>{escape(words)}</{kind}>"
 
 
+def preformatted(words: str) -> str:
+    """Plain text line by line, in letters of one width."""
+    return f"<pre>{escape(words)}</pre>"
+
+
 def items(lines: Sequence[str]) -> str:
     """A list of plain sentences; nothing if there are none."""
     return "<ul>\n" + "\n".join(f"<li>{escape(line)}</li>" for line in lines) + "\n</ul>" if lines else ""

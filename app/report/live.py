@@ -131,9 +131,10 @@ def axes(
         "gridcolor": "#e3e6ea", "linecolor": "#6b6b6b", "showline": True, "zeroline": False, "ticks": "outside",
         "automargin": True, "exponentformat": "power",
     }  # fmt: skip
+    top = 56 if more.get("showlegend", True) else 32
     return {
         "font": {"family": FONT, "size": 12, "color": "#1d2126"},
-        "margin": {"l": 56, "r": 12, "t": 56, "b": 48},
+        "margin": {"l": 56, "r": 12, "t": top, "b": 48},
         "paper_bgcolor": "#fff",
         "plot_bgcolor": "#fff",
         "hovermode": "closest",
