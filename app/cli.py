@@ -19,6 +19,7 @@ from gearbench.commands.gears.check import check
 from gearbench.commands.gears.mesh import mesh
 from gearbench.commands.gears.static import static
 from gearbench.commands.house.cases import cases
+from gearbench.commands.house.open import open_report
 from gearbench.commands.house.schema import schema
 from gearbench.commands.house.validate import validate
 from gearbench.commands.measured.challenge import challenge
@@ -56,6 +57,7 @@ COMMANDS = (
 )
 for command in COMMANDS:
     app.command()(command)
+app.command("open")(open_report)
 app.add_typer(challenge)
 
 # Options that take several numbers in a row.

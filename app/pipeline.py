@@ -168,6 +168,7 @@ def _part(job: Job, numbers: dict[str, Any], drawn: RunResults) -> RunPart:
     from gearbench.report.run import run_part
 
     digests = job.output.files()
+    digests.pop(REPORT, None)  # no page holds its own
     files = {name: (words, digests[name]) for name, words in numbers["files"].items() if name in digests}
     return run_part(
         job.suffix.removeprefix("-"), numbers, drawn, lambda base: job.output.path(job.name(base)), files

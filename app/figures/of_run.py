@@ -9,7 +9,7 @@ from typing import NamedTuple
 import xarray as xr
 
 from gearbench.figures.frf import draw_itf, draw_natural_frequencies
-from gearbench.figures.record import draw_record, draw_spectrum, draw_stiffness
+from gearbench.figures.record import draw_record, draw_spectra, draw_stiffness
 from gearbench.figures.static import plot_static
 from gearbench.geometry.pair.zones import Span
 
@@ -48,7 +48,7 @@ def _transmission_error(run: RunResults, path: Path) -> None:
 
 
 def _spectrum(run: RunResults, path: Path) -> None:
-    draw_spectrum(path, run.record)
+    draw_spectra(path, {"DTE": run.record})
 
 
 def _record(run: RunResults, path: Path) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import pi
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,6 +10,8 @@ from numpy.typing import NDArray
 
 from gearbench.figures.frf import NO_MODE, magnitude
 from gearbench.figures.plotting import BLUE, GREEN, GREY, ORANGE, SINGLE_ZONE, closed
+from gearbench.figures.record import dte_spectrum
+from gearbench.identification import dte
 from gearbench.report.live import MOST, Quantity, Sheet, axes, curve, live, live_map, log_axis, thinned
 
 if TYPE_CHECKING:
@@ -36,13 +37,14 @@ ORDERS = 12.0  # mesh orders that a spectrum shows at first
 def over_time(name: str, record: xr.Dataset, still: str, realisation: int = 0) -> str:
     """DTE of one realisation of a record over time, to zoom."""
     rate = float(record.attrs["sampling_rate"])
-    dte = 1e6 * record["dte"].values[realisation]
-    index, values = thinned(dte)
+    values = 1e6 * dte(record).values[realisation]
+    index, shown = thinned(values)
     count = record.sizes["realisation"]
-    words = f"DTE of realisation {realisation + 1} of {count}, {dte.size / rate:g} s."
-    if values.size < dte.size:
-        words += f" {dte.size} samples are drawn as the least and the largest of every {-(-2 * dte.size // MOST)}."
-    traces = [curve(index / rate, values, "DTE", BLUE, line={"width": 1})]
+    words = f"DTE of realisation {realisation + 1} of {count}, {values.size / rate:g} s."
+    if shown.size < values.size:
+        stretch = -(-2 * values.size // MOST)
+        words += f" {values.size} samples are drawn as the least and the largest of every {stretch}."
+    traces = [curve(index / rate, shown, "DTE", BLUE, line={"width": 1})]
     layout = axes("time [s]", "DTE [um]", showlegend=False)
     return live(name, traces, layout, still, f"{words} Drag to zoom, double-click to go back.")
 
@@ -54,12 +56,10 @@ def spectrum(name: str, records: Mapping[str, xr.Dataset], still: str, band: flo
     """
     traces, period, top, least = [], 0.0, 0.0, np.inf
     for number, (title, record) in enumerate(records.items()):
-        dte = 1e6 * record["dte"].values[0]
-        rate = float(record.attrs["sampling_rate"])
-        amplitude = 2 * np.abs(np.fft.rfft(dte - dte.mean()))[1:] / dte.size
+        frequency, amplitude = dte_spectrum(record)
         index, values = thinned(amplitude)
         shown = np.maximum(values, 1e-7 * amplitude.max())  # a logarithmic axis has no zero
-        traces.append(curve((1 + index) * rate / dte.size, shown, title, PALETTE[number], line={"width": 1}))
+        traces.append(curve(frequency[index], shown, title, PALETTE[number], line={"width": 1}))
         period = float(record.attrs.get("mesh_period", 0.0)) or period
         top, least = max(top, float(amplitude.max())), min(least, float(np.median(amplitude)))
     last = max(float(record.attrs["sampling_rate"]) / 2 for record in records.values())
@@ -82,14 +82,21 @@ def spectrum(name: str, records: Mapping[str, xr.Dataset], still: str, band: flo
 def over_phase(
     name: str, curves: Sequence[tuple[str, Array, Array]], y_title: str, still: str, caption: str,
     *, zones: Sequence[Span] = (), zone_words: str = "", from_zero: bool = False,
+    colours: Mapping[str, str] | None = None,
 ) -> str:  # fmt: skip
-    """Periodic curves (name, phases, values) over the mesh phase; `zones` are shaded, gaps stay gaps."""
+    """Periodic curves (name, phases, values) over the mesh phase; `zones` are shaded, gaps stay gaps.
+
+    `colours` by name; of two of one colour the second is dashed."""
+    given = COLOURS | dict(colours or {})
+    seen: set[str] = set()
     traces, period = [], 1.0
     for number, (title, phase, values) in enumerate(curves):
         period = float(round(phase[-1] + phase[1])) if len(phase) > 1 else 1.0
         x, y = closed(phase, values, period)
-        colour = COLOURS.get(title, PALETTE[number % len(PALETTE)])
-        traces.append(curve(x, y, NAMES.get(title, title), colour))
+        colour = given.get(title, PALETTE[number % len(PALETTE)])
+        line = {"dash": "dash" if colour in seen else "solid"}
+        traces.append(curve(x, y, NAMES.get(title, title), colour, line=line))
+        seen.add(colour)
     words = caption + (f" Shaded: {zone_words}." if zones and zone_words else "")
     y_axis = {"rangemode": "tozero"} if from_zero else {}
     layout = axes(PHASE, y_title, {"range": [0, period]}, y_axis, shapes=_shaded(zones), showlegend=len(traces) > 1)
@@ -179,16 +186,3 @@ def _peak(sheet: Sheet, phase: Array) -> tuple[float, float]:
     """Where the largest value of a map stands."""
     row, column = np.unravel_index(int(np.nanargmax(sheet.values)), sheet.values.shape)
     return float(phase[column]), float(sheet.y[row])
-
-
-def over_speed(name: str, result: xr.Dataset, key: str, scale: float, y_title: str, still: str, caption: str) -> str:
-    """A quantity of a sweep upwards and downwards over the driver's speed; K_v of ISO 6336 beside a dynamic factor."""
-    rpm = result["speed"].values * 30 / pi
-    traces = []
-    for direction, colour, dash in (("up", BLUE, "solid"), ("down", ORANGE, "dash")):
-        values = scale * result[key].sel(direction=direction).values
-        more = {"line": {"dash": dash}, "mode": "lines+markers", "marker": {"size": 4}}
-        traces.append(curve(rpm, values, f"speed {direction}", colour, **more))
-    if key == "dynamic_factor":
-        traces.append(curve(rpm, result["iso_dynamic_factor"].values, "K_v, ISO 6336-1 Method B", GREY))
-    return live(name, traces, axes("driver speed [1/min]", y_title, y={"rangemode": "tozero"}), still, caption, 340)

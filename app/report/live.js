@@ -58,8 +58,8 @@
     function say() {
       sliderX.value = at.x;
       sliderY.value = at.y;
-      saidX.textContent = rounded(x[at.x]) + " " + data.unit_x;
-      saidY.textContent = rounded(y[at.y]) + " " + data.unit_y;
+      saidX.textContent = (rounded(x[at.x]) + " " + data.unit_x).trim();
+      saidY.textContent = (rounded(y[at.y]) + " " + data.unit_y).trim();
     }
 
     let waiting = false;

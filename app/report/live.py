@@ -45,7 +45,7 @@ def live(
 
 @dataclass(frozen=True)
 class Quantity:
-    """What an axis or a bar of colours shows, and its unit."""
+    """What an axis or a bar of colours shows, and its unit (empty: a plain number)."""
 
     words: str
     unit: str
@@ -53,7 +53,7 @@ class Quantity:
     @property
     def title(self) -> str:
         """As it stands on an axis."""
-        return f"{self.words} [{self.unit}]"
+        return f"{self.words} [{self.unit}]" if self.unit else self.words
 
 
 @dataclass(frozen=True)

@@ -7,11 +7,11 @@ import re
 import subprocess
 import sys
 from base64 import b64decode
-from html.parser import HTMLParser
 from typing import Any
 
 import numpy as np
 import pytest
+from shared.pages import elements, fetched
 
 from gearbench.report.html import text
 from gearbench.report.live import Quantity, Sheet, axes, curve, live, live_map, live_page, log_axis, thinned
@@ -37,34 +37,12 @@ def data_in(piece: str) -> dict[str, Any]:
     return json.loads(held)
 
 
-class Addresses(HTMLParser):
-    """Every address that a page names in an attribute, and every element."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.found: list[str] = []
-        self.elements: list[str] = []
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        """Collect what a browser would fetch."""
-        self.elements.append(tag)
-        self.found += [value or "" for name, value in attrs if name in ("src", "href", "xlink:href", "srcset", "data")]
-
-
-def fetched(page: str) -> list[str]:
-    parser = Addresses()
-    parser.feed(page)
-    return [address for address in parser.found if not address.startswith(("data:", "#"))]
-
-
 def test_a_page_fetches_nothing_and_holds_the_script_once() -> None:
     page = live_page("A page", [text("Answer", "h1"), a_curve(), a_map()])
     assert fetched(page) == []
     assert "connect-src" not in page and "default-src 'none'" in page
-    parser = Addresses()
-    parser.feed(page)
-    assert parser.elements.count("script") == 4  # data of two figures, plotly, ours
-    assert parser.elements.count("link") == parser.elements.count("iframe") == 0
+    assert elements(page).count("script") == 4  # data of two figures, plotly, ours
+    assert elements(page).count("link") == elements(page).count("iframe") == 0
     assert len(re.findall(r"\* plotly\.js v\d", page)) == 1
     assert fetched('<img src="https://example.org/a.png">') and fetched('<link href="a.css">')
 
