@@ -21,6 +21,7 @@ from gearbench.commands.gears.static import static
 from gearbench.commands.house.cases import cases
 from gearbench.commands.house.completion import COMPLETE, completion, prepare
 from gearbench.commands.house.doctor import doctor
+from gearbench.commands.house.open import open_report
 from gearbench.commands.house.schema import schema
 from gearbench.commands.house.validate import validate
 from gearbench.commands.measured.challenge import challenge
@@ -60,6 +61,7 @@ COMMANDS = (
 )
 for command in COMMANDS:
     app.command()(command)
+app.command("open")(open_report)
 app.add_typer(challenge)
 
 # Options that take several numbers in a row.

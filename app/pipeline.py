@@ -20,10 +20,13 @@ from gearbench.words.summary import honest_warning, summary_text
 if TYPE_CHECKING:
     import xarray as xr
 
+    from gearbench.figures.of_run import RunResults
     from gearbench.geometry import Pair
+    from gearbench.report.run import RunPart
     from gearbench.rig import Case
 
 POSITIONS = 256  # mesh phases of the static response
+REPORT = "report.html"
 
 ABOUT = {
     "case.toml": "the case with every key, defaults included",
@@ -100,11 +103,15 @@ def run(case: Case, out: str | Path, *, force: bool = False, progress: Steps | N
             )
     with claimed(Path(out), "run", fingerprint(dump_case(case), source_digest()), force) as output:
         jobs = [Job(one, output, progress or Silent(), f"-{name}" if name else "") for name, one in case.experiments()]
-        return [run_experiment(job) for job in jobs]
+        done = [run_experiment(job) for job in jobs]
+        if not output.has(REPORT):
+            jobs[0].progress.step(REPORT)
+            _write_report(case, output, [part for _, part in done if part is not None])
+        return [numbers for numbers, _ in done]
 
 
-def run_experiment(job: Job) -> dict[str, Any]:
-    """All products of one experiment; the numbers of its summary."""
+def run_experiment(job: Job) -> tuple[dict[str, Any], RunPart | None]:
+    """All products of one experiment; the numbers of its summary, and its part of a report that is still to be made."""
     from gearbench.bench import simulate
     from gearbench.bench.models import model_for
     from gearbench.bench.results.responses import identify_case, linearised_modes, reference_results
@@ -151,8 +158,28 @@ def run_experiment(job: Job) -> dict[str, Any]:
     about = ABOUT | {figure.name: figure.about for figure in FIGURES} | {"summary.json": "the numbers of this summary"}
     held = {*job.output.files(), job.name("summary.json")}
     numbers["files"] = {job.name(base): words for base, words in about.items() if job.name(base) in held}
+    numbers["files"][REPORT] = "all of this on one page, to zoom and to ask"
     _write_summary(job, numbers)
-    return numbers
+    return numbers, None if job.output.has(REPORT) else _part(job, numbers, drawn)
+
+
+def _part(job: Job, numbers: dict[str, Any], drawn: RunResults) -> RunPart:
+    """The experiment's part of the report."""
+    from gearbench.report.run import run_part
+
+    digests = job.output.files()
+    digests.pop(REPORT, None)  # no page holds its own
+    files = {name: (words, digests[name]) for name, words in numbers["files"].items() if name in digests}
+    return run_part(
+        job.suffix.removeprefix("-"), numbers, drawn, lambda base: job.output.path(job.name(base)), files
+    )
+
+
+def _write_report(case: Case, output: Output, parts: list[RunPart]) -> None:
+    from gearbench.report.parts import versions
+    from gearbench.report.run import run_page
+
+    output.write_text(REPORT, run_page(case, parts, versions()))
 
 
 def _draw_gears(job: Job, meshing: Pair) -> None:

@@ -9,7 +9,8 @@ from typing import NamedTuple
 import xarray as xr
 
 from gearbench.figures.frf import draw_itf, draw_natural_frequencies
-from gearbench.figures.record import draw_record, draw_stiffness
+from gearbench.figures.record import draw_record, draw_spectra, draw_stiffness
+from gearbench.figures.static import plot_static
 from gearbench.geometry.pair.zones import Span
 
 
@@ -42,6 +43,14 @@ def _stiffness(run: RunResults, path: Path) -> None:
     draw_stiffness(path, run.static, run.zones, run.label)
 
 
+def _transmission_error(run: RunResults, path: Path) -> None:
+    plot_static(run.static, path)
+
+
+def _spectrum(run: RunResults, path: Path) -> None:
+    draw_spectra(path, {"DTE": run.record})
+
+
 def _record(run: RunResults, path: Path) -> None:
     draw_record(path, run.record)
 
@@ -55,8 +64,10 @@ def _natural_frequencies(run: RunResults, path: Path) -> None:
 
 
 FIGURES = (
+    RunFigure("transmission_error.png", "static transmission error over the mesh period", _transmission_error),
     RunFigure("stiffness.png", "mesh stiffness over the mesh period", _stiffness),
     RunFigure("record.png", "torque and DTE against time", _record),
+    RunFigure("spectrum.png", "spectrum of the DTE", _spectrum),
     RunFigure("itf.png", "magnitude of the ITF over frequency and mesh phase", _itf),
     RunFigure("natural_frequency.png", "natural frequency against mesh phase", _natural_frequencies),
 )

@@ -38,6 +38,23 @@ def plot_static(result: xr.Dataset, path: Path) -> None:
         save(drawing, path)
 
 
+def draw_harris_map(result: xr.Dataset, path: Path) -> None:
+    """Transmission error less its mean under each torque, over mesh phase and torque."""
+    loads, phase = result["load"].values, result["phase"].values
+    order = np.argsort(loads)
+    te = 1e6 * result["transmission_error"].values[order]
+    swing = te - te.mean(axis=1, keepdims=True)
+    period = float(round(phase[-1] + phase[1]))
+    with figure(size=(8.0, 4.8)) as (drawing, axes):
+        x, z = closed(phase, swing, period)
+        image = axes.pcolormesh(x, loads[order], z, cmap="viridis", shading="nearest", rasterized=True)
+        drawing.colorbar(image, ax=axes, label="TE less its mean [um]")
+        axes.set(title="Harris map", ylabel="driver torque [N m]")
+        axes.grid(visible=False)
+        phase_axis(axes, period)
+        save(drawing, path)
+
+
 def _curves(axes: Any, result: xr.Dataset, te: np.ndarray, loads: np.ndarray, unit: str) -> None:
     """One curve a load, light to dark."""
     phase = result["phase"].values

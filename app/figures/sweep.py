@@ -15,18 +15,19 @@ if TYPE_CHECKING:
 
 SHOWN = 4.0  # mesh orders in the waterfall
 FLOOR = 1e-3  # of the largest amplitude
+# What is drawn over speed: variable, factor to the unit of the axis, label of the axis.
+ROWS = (
+    ("dte_rms", 1e6, "DTE, rms [um]"),
+    ("dynamic_factor", 1.0, "largest mesh force / static"),
+    ("contact_loss", 100.0, "teeth apart [% of time]"),
+)
 
 
 def plot_sweep(result: xr.Dataset, path: Path) -> None:
     """Rms of the DTE, dynamic factor beside ISO's and contact loss, upwards and downwards, over the driver's speed."""
     rpm = result["speed"].values * 30 / pi
-    rows = (
-        ("dte_rms", 1e6, "DTE, rms [um]"),
-        ("dynamic_factor", 1.0, "largest mesh force / static"),
-        ("contact_loss", 100.0, "teeth apart [% of time]"),
-    )
     with figure(3, 1, size=(8.5, 9.0), sharex=True) as (drawing, axes):
-        for one, (name, scale, label) in zip(axes, rows, strict=True):
+        for one, (name, scale, label) in zip(axes, ROWS, strict=True):
             for direction, colour, style in (("up", BLUE, "-"), ("down", ORANGE, "--")):
                 values = scale * result[name].sel(direction=direction).values
                 one.plot(rpm, values, style, color=colour, lw=1.4, marker="o", ms=2.5, label=f"speed {direction}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from base64 import b64encode
 from collections.abc import Callable, Sequence
 from html import escape
 from pathlib import Path
@@ -27,8 +28,23 @@ tr.best td { font-weight: 600; } td.code { font-family: "DejaVu Sans Mono", Cons
 figure { margin: .8rem 0; } figure svg { width: 100%; height: auto; } figcaption { font-size: .85rem; color: #555c64; }
 summary { cursor: pointer; font-size: .85rem; color: #0b5c9e; } .wide { overflow-x: auto; }
 ul { margin: .3rem 0; padding-left: 1.2rem; }
-@media print { body { max-width: none; font-size: 11px; } h2, figure, table { break-inside: avoid; } }
+h1, h2, p, li, figcaption { overflow-wrap: anywhere; } figure img { max-width: 100%; height: auto; }
+.live .plots { display: none; } .live.drawn .plots { display: block; } .live.drawn .still { display: none; }
+.live .plot { width: 100%; } .pair { display: flex; flex-wrap: wrap; } .pair .plot { flex: 1 1 20rem; min-width: 0; }
+.sliders { display: flex; flex-wrap: wrap; gap: .2rem 1.5rem; font-size: .85rem; margin: .4rem 0; }
+.sliders label { flex: 1 1 20rem; }
+.sliders input { width: 45%; vertical-align: middle; }
+pre { overflow-x: auto; font: .8rem/1.4 "DejaVu Sans Mono", Consolas, monospace; background: #f5f6f8; padding: .6rem; }
+.warn { border-left: 4px solid #d1600a; padding: .1rem 0 .1rem .7rem; }
+@media print { body { max-width: none; font-size: 11px; } h2, figure, table { break-inside: avoid; }
+  h2 { break-after: avoid; } .live.drawn .plots { display: none; } .live.drawn .still { display: block; }
+  .wide { overflow-x: visible; } }
 """
+
+# Nothing is fetched: the browser itself is told so.
+_POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data: blob:"
+# By which a report is told from a page of somebody else.
+GENERATOR = '<meta name="generator" content="gearbench">'
 
 
 def page(title: str, body: Sequence[str]) -> str:
@@ -36,6 +52,7 @@ def page(title: str, body: Sequence[str]) -> str:
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">\n{GENERATOR}\n'
         f"<title>{escape(title)}</title>\n<style>{_STYLE}</style>\n</head>\n<body>\n"
         + "\n".join(piece for piece in body if piece)
         + "\n</body>\n</html>\n"
@@ -46,6 +63,11 @@ def text(words: str, kind: str = "p", style: str = "") -> str:
     """A paragraph or heading of plain text."""
     mark = f' class="{style}"' if style else ""
     return f"<{kind}{mark}>{escape(words)}</{kind}>"
+
+
+def preformatted(words: str) -> str:
+    """Plain text line by line, in letters of one width."""
+    return f"<pre>{escape(words)}</pre>"
 
 
 def items(lines: Sequence[str]) -> str:
@@ -94,14 +116,29 @@ def bar(parts: Sequence[tuple[str, float, str, str]]) -> str:
 
 def picture(draw: Callable[[Path], None], name: str, caption: str) -> str:
     """A picture as inline SVG: `draw(path)` writes an SVG file; `name` keeps its ids apart from other pictures'."""
+    return captioned(drawing(draw, name), caption)
+
+
+def captioned(element: str, caption: str) -> str:
+    """A drawing or an image as a figure with its caption."""
+    return (
+        f'<figure role="img" aria-label="{escape(caption, quote=True)}">{element}'
+        f"<figcaption>{escape(caption)}</figcaption></figure>"
+    )
+
+
+def drawing(draw: Callable[[Path], None], name: str) -> str:
+    """What `draw(path)` writes as an SVG file, as an element of a page; `name` as in `picture`."""
     with TemporaryDirectory() as folder:
         path = Path(folder) / "picture.svg"
         draw(path)
-        drawn = inline_svg(path.read_text(encoding="utf-8"), name)
-    return (
-        f'<figure role="img" aria-label="{escape(caption, quote=True)}">{drawn}'
-        f"<figcaption>{escape(caption)}</figcaption></figure>"
-    )
+        return inline_svg(path.read_text(encoding="utf-8"), name)
+
+
+def image(path: Path, words: str) -> str:
+    """A PNG file as an element of a page; `words` stand for it where it cannot be seen."""
+    data = b64encode(path.read_bytes()).decode("ascii")
+    return f'<img alt="{escape(words, quote=True)}" src="data:image/png;base64,{data}">'
 
 
 def inline_svg(document: str, name: str) -> str:

@@ -51,6 +51,9 @@ ModelOption = Annotated[
     ),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="print the summary as JSON")]
+ReportOption = Annotated[
+    bool, typer.Option("--report/--no-report", help="write the page NAME.html beside --out NAME.nc")
+]
 
 
 def check_out(out: Path, inputs: Sequence[Path | str] = ()) -> None:

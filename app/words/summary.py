@@ -32,7 +32,7 @@ def headline(numbers: dict[str, Any]) -> list[str]:
     return [
         f"Peak-to-peak TE: {numbers['te_peak_to_peak_um']:.4g} um (static, {numbers['torque_mean_nm']:g} N m)",
         f"TE mesh orders 1-3: {orders} um",
-        f"First mode: {_first_mode(numbers)}",
+        f"First mode: {first_mode(numbers)}",
     ]
 
 
@@ -42,7 +42,8 @@ def summary_text(numbers: dict[str, Any]) -> str:
     return "\n\n".join([*(part for part in parts if part), *_files(numbers)]) + "\n"
 
 
-def _first_mode(numbers: dict[str, Any]) -> str:
+def first_mode(numbers: dict[str, Any]) -> str:
+    """The first mode in words, to follow "First mode:"."""
     if not isfinite(numbers["first_mode_hz"][0]):
         return "none in the identified band"
     low, high = numbers["first_mode_hz"]
@@ -64,9 +65,13 @@ def _range(limits: tuple[float, float]) -> str:
 
 
 def _what(numbers: dict[str, Any]) -> list[str]:
+    return ["## What was done and found", *findings(numbers)]
+
+
+def findings(numbers: dict[str, Any]) -> list[str]:
+    """What was done and found, in plain paragraphs."""
     stiffness = numbers["stiffness_n_per_um"]
     lines = [
-        "## What was done and found",
         f"The {numbers['model_title']} ran {numbers['realisations']} realisation(s) of {numbers['duration_s']:g} s at"
         f" {numbers['sampling_rate_hz']:g} Hz, {numbers['torque_mean_nm']:g} N m mean torque and"
         f" {numbers['mesh_frequency_hz']:g} Hz mesh frequency.",
@@ -110,9 +115,15 @@ def _law(numbers: dict[str, Any]) -> list[str]:
 
 
 def _account(numbers: dict[str, Any]) -> list[str]:
+    bold = honest_warning(numbers)
+    notes = [f"- **{line}**" if line == bold else f"- {line}" for line in warnings_of(numbers)]
+    return ["## How far to trust the identified response", *trust(numbers), "\n".join(notes)]
+
+
+def trust(numbers: dict[str, Any]) -> list[str]:
+    """How far to trust the identified response, in plain paragraphs."""
     found = numbers["identification"]
     lines = [
-        "## How far to trust the identified response",
         f"Local polynomial method with {found['harmonics']} branches on each side, order {found['order']} and"
         f" {2 * found['window'] + 1} lines a window: {found['unknowns']} unknowns from {found['equations']} equations"
         f" in each of {found['windows']} windows; condition number {found['condition_number']:.3g}.",
@@ -127,11 +138,14 @@ def _account(numbers: dict[str, Any]) -> list[str]:
         )
     else:
         lines.append("This model has no exact response to measure against: the error is an estimate.")
-    warnings = [line for line in str(found.get("warnings", "")).splitlines() if line]
-    warnings += [line for line in str(numbers["record_warnings"] or "").split("; ") if line]
-    warnings = [f"**{honest_warning(numbers)}**" if honest_warning(numbers) else "", *warnings]
-    lines.append("\n".join(f"- {line}" for line in warnings if line))
     return lines
+
+
+def warnings_of(numbers: dict[str, Any]) -> list[str]:
+    """What identification and record warn of, the most important first."""
+    found = numbers["identification"]
+    said = [honest_warning(numbers), *str(found.get("warnings", "")).splitlines()]
+    return [line for line in (*said, *str(numbers["record_warnings"] or "").split("; ")) if line]
 
 
 def _files(numbers: dict[str, Any]) -> list[str]:

@@ -12,6 +12,7 @@ from gearbench.shell.options import (
     CaseArgument,
     JsonOption,
     ModelOption,
+    ReportOption,
     SetOption,
     check_out,
     check_picture,
@@ -29,6 +30,7 @@ def sweep(
     points: Annotated[int, typer.Option("--points", min=2, max=2000, help="number of speeds")] = 111,
     figure: Annotated[Path | None, typer.Option("--figure", help="picture over speed (.png, .svg, .pdf)")] = None,
     waterfall: Annotated[Path | None, typer.Option("--waterfall", help="picture of the orders over speed")] = None,
+    report: ReportOption = True,
     model: ModelOption = None,
     settings: SetOption = None,
     as_json: JsonOption = False,
@@ -45,7 +47,10 @@ def sweep(
         if picture is not None:
             check_picture(picture, others, option)
             others.append(picture)
+    from gearbench.report.where import report_beside
     from gearbench.shell.failure import InputError
+
+    page = report_beside(out, others) if report else None
 
     if not 0 < low < high:
         raise InputError(f"--from-rpm {low:g} must be greater than 0 and less than --to-rpm {high:g}")
@@ -66,7 +71,15 @@ def sweep(
             from gearbench.figures.sweep import plot_waterfall
 
             plot_waterfall(result, waterfall)
-    summary = sweep_summary(result, out)
+        summary = sweep_summary(result, out)
+        if page is not None:
+            progress.step(page.name)
+            from gearbench.files import write_text
+            from gearbench.report.parts import file_row
+            from gearbench.report.sweep import sweep_page
+
+            files = file_row(out, "DTE, dynamic factor, contact loss and orders over speed")
+            write_text(page, sweep_page(loaded, result, summary, files))
     if as_json:
         print_json(summary)
         return
@@ -77,6 +90,8 @@ def sweep(
     )
     for sentence in summary["warnings"]:
         typer.echo(f"warning: {sentence}")
+    if page is not None:
+        typer.echo(str(page))
 
 
 def sweep_summary(result: Any, out: Path) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from gearbench.shell.options import (
     CaseArgument,
     JsonOption,
     ModelOption,
+    ReportOption,
     SetOption,
     check_out,
     check_picture,
@@ -54,6 +55,7 @@ def static(
     root_figure: Annotated[
         Path | None, typer.Option("--root-figure", help="picture of the root stress over the mesh cycle as well")
     ] = None,
+    report: ReportOption = True,
     model: ModelOption = None,
     settings: SetOption = None,
     as_json: JsonOption = False,
@@ -68,6 +70,9 @@ def static(
             check_picture(picture, others, option)
             others.append(picture)
     from gearbench.bench.models import model_for
+    from gearbench.report.where import report_beside
+
+    page = report_beside(out, others) if report else None
 
     elastic = model_for(loaded, model)[1].elastic
     files = _check_stress(loaded, elastic, out, fields or [], root_figure, others)
@@ -103,6 +108,9 @@ def static(
     roots = root_tables(loaded, result)
     summary = static_summary(result, out) | methods_data(loaded, tables)
     summary |= {"root_stress": roots, "field_files": [str(path) for path in written]}
+    if page is not None:
+        _write_page(page, loaded, result, summary, tables, roots)
+        written.append(page)
     if as_json:
         print_json(summary)
         return
@@ -112,6 +120,20 @@ def static(
     lines += [f"warning: {warning}" for warning in summary["warnings"]]
     for line in [*lines, str(out), *map(str, written)]:
         typer.echo(line)
+
+
+def _write_page(
+    page: Path, case: Case, result: Any, summary: dict[str, Any], tables: list[Any], roots: list[dict[str, Any]]
+) -> None:
+    """The report beside the result."""
+    from gearbench.files import write_text
+    from gearbench.report.parts import file_row
+    from gearbench.report.static import static_page
+
+    files = file_row(Path(summary["file"]), "transmission error, stiffness, load sharing, root stress over phase")
+    for path in summary["field_files"]:
+        files |= file_row(Path(path), "stress and displacement at a mesh phase")
+    write_text(page, static_page(case, result, summary, tables, roots, files))
 
 
 def _check_stress(

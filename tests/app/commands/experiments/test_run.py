@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from shared.pages import fetched
 
 from gearbench.cli import run_command_line
 from gearbench.rig import read_case
@@ -27,7 +28,10 @@ SMALL = {
     "identification.order": "1",
     "identification.window": "6",
 }
-PICTURES = {"gears.png", "stiffness.png", "record.png", "itf.png", "natural_frequency.png"}
+PICTURES = {
+    "gears.png", "transmission_error.png", "stiffness.png", "record.png", "spectrum.png", "itf.png",
+    "natural_frequency.png",
+}  # fmt: skip
 DATA = {"record.nc", "static.nc", "frf.nc", "exact.nc", "frozen.nc"}
 
 
@@ -45,7 +49,7 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_all_products_are_there_and_whole(done: Path) -> None:
     names = {path.name for path in done.iterdir()}
-    assert names == PICTURES | DATA | {"case.toml", "summary.md", "summary.json", "run.json"}
+    assert names == PICTURES | DATA | {"case.toml", "summary.md", "summary.json", "run.json", "report.html"}
     assert all((done / name).read_bytes().startswith(b"\x89PNG") for name in PICTURES)
     assert read_case(done / "case.toml").experiment.realisations == 8
     record = xr.load_dataset(done / "record.nc", engine="h5netcdf", decode_cf=False)
@@ -91,6 +95,24 @@ def test_same_case_resumes_and_another_is_refused(done: Path, capsys: pytest.Cap
     assert {name: (done / name).stat().st_mtime_ns for name in DATA | PICTURES} == kept
 
 
+def test_the_report_holds_the_answers_and_is_made_again_from_the_products(done: Path) -> None:
+    page = (done / "report.html").read_text(encoding="utf-8")
+    numbers = json.loads((done / "summary.json").read_text(encoding="utf-8"))
+    assert fetched(page) == []
+    answer = page[page.index("<h1>") : page.index("<figure")]
+    low, high = numbers["first_mode_hz"]
+    for words in (f"{numbers['te_peak_to_peak_um']:.4g} um", f"{low:.0f}-{high:.0f} Hz", "expected to err by"):
+        assert words in answer
+    assert page.count('<figure class="live"') == 6 and page.count("<img ") == 7
+    for name, digest in json.loads((done / "run.json").read_text(encoding="utf-8"))["files"].items():
+        assert name.startswith(("report", "summary")) or digest[:16] in page, name
+    before = {name: (done / name).stat().st_mtime_ns for name in DATA | PICTURES}
+    (done / "report.html").write_text(page[:5000], encoding="utf-8")  # as a full disk would leave it
+    assert run_command_line(["run", "quick_lumped", "--out", str(done), *small()]) == 0
+    assert (done / "report.html").read_text(encoding="utf-8") == page
+    assert {name: (done / name).stat().st_mtime_ns for name in DATA | PICTURES} == before
+
+
 def test_identify_gives_what_the_run_gave(done: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "frf.nc"
     arguments = ["identify", str(done / "record.nc"), "--out", str(out), "--band-hz", "4", "1400", "--json"]
@@ -132,7 +154,7 @@ def test_compare_with_a_stiffer_rig(done: Path, tmp_path: Path, capsys: pytest.C
     assert any("mean torque differs: 200 and 300 N m" in note for note in summary["notes"])
     made = {path.name for path in out.iterdir()}
     pictures = {"dte.png", "itf.png", "natural_frequency.png", "static_te.png", "stiffness.png"}
-    assert made == pictures | {"compare.csv", "run.json"}
+    assert made == pictures | {"compare.csv", "report.html", "run.json"}
 
 
 def test_conditions_get_a_record_each(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

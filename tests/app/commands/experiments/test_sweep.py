@@ -6,6 +6,7 @@ from math import pi
 from pathlib import Path
 
 import pytest
+from shared.pages import fetched
 
 from gearbench.cli import run_command_line
 from gearbench.records import read_dataset
@@ -30,6 +31,10 @@ def test_the_command_writes_numbers_and_pictures(tmp_path: Path) -> None:
     assert found.sizes["speed"] == 3 and found.attrs["schema"] == "gearbench-sweep/1"
     assert found["speed"].values * 30 / pi == pytest.approx([300.0, 600.0, 900.0])
     assert picture.stat().st_size > 10_000 and orders.stat().st_size > 10_000
+    page = out.with_suffix(".html").read_text(encoding="utf-8")
+    assert fetched(page) == [] and page.count('<figure class="live"') == 2
+    at = int(found["dte_rms"].values.max(axis=0).argmax())
+    assert f"largest DTE {1e6 * found['dte_rms'].values.max():.3g} um rms at {(300, 600, 900)[at]} rpm" in page
 
 
 def test_speeds_that_do_not_rise_are_refused(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
