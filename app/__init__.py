@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from gearbench.pipeline import run
     from gearbench.records import make_record, read_record, validate_record, write_record
     from gearbench.rig import Case, dump_case
+    from gearbench.studies import campaign
 
 __version__ = "0.1.0"
 
@@ -42,6 +43,7 @@ _HOMES = {
     "Case": "gearbench.rig",
     "Comparison": "gearbench.bench",
     "IdentificationSettings": "gearbench.identification",
+    "campaign": "gearbench.studies",
     "compare": "gearbench.bench",
     "convert": "gearbench.bench",
     "diagnose": "gearbench.diagnosis",
@@ -79,6 +81,7 @@ __all__ = [
     "Case",
     "Comparison",
     "IdentificationSettings",
+    "campaign",
     "compare",
     "convert",
     "diagnose",

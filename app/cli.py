@@ -11,6 +11,7 @@ from typing import Annotated
 import typer
 
 from gearbench import __version__
+from gearbench.commands.experiments.campaign import campaign
 from gearbench.commands.experiments.multisine import multisine
 from gearbench.commands.experiments.run import run
 from gearbench.commands.experiments.simulate import simulate
@@ -43,6 +44,7 @@ COMMANDS = (
     simulate,
     static,
     sweep,
+    campaign,
     multisine,
     convert,
     identify,
