@@ -31,6 +31,7 @@ if TYPE_CHECKING:
         read_frf,
         write_frf,
     )
+    from gearbench.optimisation import optimise
     from gearbench.pipeline import run
     from gearbench.records import make_record, read_record, validate_record, write_record
     from gearbench.rig import Case, dump_case
@@ -54,6 +55,7 @@ _HOMES = {
     "identify": "gearbench.identification",
     "itf": "gearbench.identification",
     "make_record": "gearbench.records",
+    "optimise": "gearbench.optimisation",
     "read_case": "gearbench.cases",
     "read_frf": "gearbench.identification",
     "read_record": "gearbench.records",
@@ -92,6 +94,7 @@ __all__ = [
     "identify",
     "itf",
     "make_record",
+    "optimise",
     "read_case",
     "read_frf",
     "read_record",

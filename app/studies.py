@@ -104,7 +104,7 @@ def plan_of(source: str | Path | Case, settings: Sequence[str], given: dict[str,
     from gearbench.bench.study.quantities import QUANTITIES, Ask, check_quantities
     from gearbench.rig import CaseError
 
-    with _reader(source) as read:
+    with reader(source) as read:
         base = read(settings)
         study = _study(base, given)
         design = design_of(study)
@@ -221,8 +221,8 @@ def products(plan: Plan, table: xr.Dataset, output: Output) -> None:
     output.write("scatter.png", partial(draw_scatter, table))
     pictures: dict[str, Any] = {"scatter": partial(draw_scatter, table)}
     if _several(effects):
-        output.write("tornado.png", partial(draw_tornado, effects))
-        pictures["tornado"] = partial(draw_tornado, effects)
+        pictures["tornado"] = partial(draw_tornado, table, effects)
+        output.write("tornado.png", pictures["tornado"])
     output.write_text("report.html", study_page(plan.base.name, plan.design, table, effects, pictures))
 
 
@@ -231,7 +231,7 @@ def _several(effects: Sequence[Effects]) -> bool:
     return bool(effects) and len(effects[0].each) > 1
 
 
-class _reader:
+class reader:
     """Reads the case with settings on top, as often as wanted; a Case in memory goes through a file of its own."""
 
     def __init__(self, source: str | Path | Case) -> None:

@@ -34,6 +34,9 @@ FUNCTIONS: dict[str, tuple[str, ...]] = {
     "identify": ("records", "settings", "progress"),
     "itf": ("dataset",),
     "make_record": ("channels", "attributes", "channel_attributes", "start"),
+    "optimise": (
+        "case", "vary", "quantity", "torques", "over", "settings", "positions", "cycles", "out", "force", "progress",
+    ),
     "read_case": ("source", "overrides"),
     "read_frf": ("path",),
     "read_record": ("path",),

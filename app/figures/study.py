@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,19 +20,19 @@ MOST_RESULTS, MOST_FACTORS = 4, 6
 MOST_NAMES = 12  # texts on an axis
 
 
-def draw_tornado(effects: Sequence[Effects], path: Path) -> None:
+def draw_tornado(table: xr.Dataset, effects: Sequence[Effects], path: Path) -> None:
     """Of each result: the range of its mean over each factor, with the means at both ends; factors by their range."""
     shown = effects[:MOST_RESULTS]
     factors = min(len(shown[0].each), 12)
     with figure(len(shown), 1, size=(8.5, (0.9 + 0.42 * factors) * len(shown) + 0.5), squeeze=False) as (drawing, axes):
         for one, result in zip(axes[:, 0], shown, strict=True):
-            _tornado(one, result, factors)
+            _tornado(one, result, factors, _label(table, result.result))
         handles, labels = axes[0, 0].get_legend_handles_labels()
         drawing.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=9)
         save(drawing, path)
 
 
-def _tornado(axes: Any, effects: Effects, count: int) -> None:
+def _tornado(axes: Any, effects: Effects, count: int, label: str) -> None:
     ranked = sorted(effects.each, key=lambda one: -np.nan_to_num(one.most - one.least))[:count]
     for place, one in enumerate(ranked):
         axes.barh(
@@ -52,7 +53,12 @@ def _tornado(axes: Any, effects: Effects, count: int) -> None:
             )  # fmt: skip
     axes.set_yticks(range(len(ranked)), [_two_lines(one.factor) for one in ranked], fontsize=8)
     axes.set_ylim(len(ranked) - 0.5, -0.5)
-    axes.set_xlabel(_label(effects.result, effects.unit))
+    ends = np.array([end for one in ranked for end in (one.least, one.most)])
+    if np.isfinite(ends).any():
+        room = 0.04 * (np.nanmax(ends) - np.nanmin(ends)) or 1e-3 * abs(np.nanmax(ends)) or 1.0
+        axes.set_xlim(np.nanmin(ends) - room, np.nanmax(ends) + room)
+    axes.ticklabel_format(axis="x", useOffset=False)
+    axes.set_xlabel(label)
     axes.set_title(f"{effects.method}; S: first index, T: total index", fontsize=8, color=GREY, loc="left")
 
 
@@ -72,7 +78,8 @@ def draw_scatter(table: xr.Dataset, path: Path) -> None:
                 _points(one, table[factor].values, values, alone=len(factors) == 1)
                 one.set_xlabel(_factor_label(table, str(factor)) if row == rows - 1 else "")
                 _failed(one, table[factor].values, good, show=row == 0 and column == 0)
-            axes[row, 0].set_ylabel(_label(str(result), str(table[result].attrs["units"])))
+            axes[row, 0].set_ylabel(fill(_label(table, str(result)), 34), fontsize=9)
+            axes[row, 0].ticklabel_format(axis="y", useOffset=False)
             last = axes[row, -1]
             if good.any():
                 bins = min(24, max(5, int(good.sum() ** 0.5)))
@@ -118,9 +125,11 @@ def _failed(axes: Any, factor: Any, good: Any, show: bool) -> None:
         axes.legend(loc="best", fontsize=8)
 
 
-def _label(name: str, unit: str) -> str:
-    words = name
-    return f"{words} [{unit}]" if unit not in ("", "1") and not words.endswith(f"_{unit}") else words
+def _label(table: xr.Dataset, name: str) -> str:
+    """What a result is, with its unit."""
+    about = table[name].attrs
+    unit = about["units"]
+    return str(about["long_name"]) + (f" [{unit}]" if unit not in ("", "1") else "")
 
 
 def _factor_label(table: xr.Dataset, name: str) -> str:

@@ -7,8 +7,9 @@ Analysis: The Primer, 2008). By the sample:
   no interval;
 * sobol: Saltelli's estimator of S_i, Jansen's of T_i (Saltelli et al., Comput. Phys. Commun. 181 (2010) 259, table 2 b
   and f), 90 % intervals by the bootstrap over base points;
-* lhs, and a grid with single members that failed: S_i from the variance between bins of x_i, less what chance alone puts between
-  them (epsilon squared: Kelley, PNAS 21 (1935) 554), 90 % intervals by the bootstrap over members; T_i is not known.
+* lhs, and a grid in which single members failed: S_i from the variance between bins of x_i, less what chance alone puts
+  between them (epsilon squared: Kelley, PNAS 21 (1935) 554), 90 % intervals by the bootstrap over members; T_i is
+  not known.
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ A solution that several quantities need is made once. Every number is one column
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from math import pi
 from typing import Any, NamedTuple
 
@@ -180,6 +180,19 @@ def columns_of(names: Iterable[str]) -> tuple[Column, ...]:
     return tuple(column for name in names for column in QUANTITIES[name].columns)
 
 
+def single_column(name: str) -> tuple[str, Column]:
+    """A quantity and its only column, by its own name, or one column of several by the column's. Raises BenchError."""
+    for quantity in QUANTITIES.values():
+        for column in quantity.columns:
+            if column.name == name:
+                return quantity.name, column
+    (found,) = check_quantities([name])
+    columns = QUANTITIES[found].columns
+    if len(columns) > 1:
+        raise BenchError(f"{name} is several numbers: name one of {', '.join(column.name for column in columns)}")
+    return found, columns[0]
+
+
 def measure(case: Case, ask: Ask) -> tuple[dict[str, float], list[str]]:
     """The numbers of a case by their columns, and warnings. Raises what the solvers raise."""
     solved: dict[str, Any] = {}
@@ -195,7 +208,21 @@ def measure(case: Case, ask: Ask) -> tuple[dict[str, float], list[str]]:
     return numbers, list(dict.fromkeys(lines))
 
 
-def _loaded(case: Case, torque: float | None) -> Case:
+def at_loads(case: Case, torques: Sequence[float], name: str, column: str, ask: Ask) -> Array:
+    """One column of a quantity (loads,) at driver torques [N m]; static results are solved for all of them at once."""
+    quantity = QUANTITIES[name]
+    if quantity.stage != "static":
+        asks = [ask._replace(of=(name,), torque=torque) for torque in torques]
+        return np.array([measure(loaded(case, one.torque), one)[0][column] for one in asks])
+    from gearbench.bench.statics import static
+
+    result = static(case, torque=tuple(torques), positions=ask.positions, cycles=ask.cycles)
+    place = [one.name for one in quantity.columns].index(column)
+    parts = (result.isel(load=[load]).assign_attrs(mesh_cycles=ask.cycles) for load in range(len(torques)))
+    return np.array([quantity.find(part)[place] for part in parts])
+
+
+def loaded(case: Case, torque: float | None) -> Case:
     """The case with that mean torque, where one is given."""
     if torque is None:
         return case
@@ -220,19 +247,19 @@ def _iso(case: Case, ask: Ask) -> dict[str, float]:
     from gearbench.lumped.stiffness.iso6336 import iso_stiffness
 
     check_gears(case.rig)
-    loaded = _loaded(case, ask.torque)
+    under_load = loaded(case, ask.torque)
     meshing = pair(case.rig)
     found: dict[str, float] = {}
     if "iso-c-gamma" in ask.of:
         if ask.torque is None:
             check_stated(case, "iso-c-gamma")
-        force = loaded.experiment.torque_mean / meshing.driver.base_radius
+        force = under_load.experiment.torque_mean / meshing.driver.base_radius
         found["c_gamma"] = iso_stiffness(case.rig, meshing, force).mesh
     if "iso-kv" in ask.of:
         check_stated(case, "iso-kv")
         # The errors that a grade draws count as those that are given.
         drawn = {side: drawn_gear(getattr(case.rig, side), f"rig.{side}") for side in ("driver", "driven")}
-        real = loaded.model_copy(update={"rig": case.rig.model_copy(update=drawn)})
+        real = under_load.model_copy(update={"rig": case.rig.model_copy(update=drawn)})
         found["kv"] = float(iso_factors(real, np.array([_speed(case)]))[0][0])
     return found
 

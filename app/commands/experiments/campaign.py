@@ -37,7 +37,7 @@ def campaign(
         typer.Option("--sample", help="every combination, a Latin hypercube, or a Sobol design; absent: grid"),
     ] = None,
     size: Annotated[
-        int | None, typer.Option("--size", help="members of lhs; base points of sobol: (keys + 2) times as many members")
+        int | None, typer.Option("--size", help="members of lhs; base points of sobol: keys + 2 times as many members")
     ] = None,
     seed: Annotated[int | None, typer.Option("--seed", help="seed of lhs and sobol")] = None,
     torque_nm: Annotated[
