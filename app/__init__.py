@@ -31,9 +31,11 @@ if TYPE_CHECKING:
         read_frf,
         write_frf,
     )
+    from gearbench.optimisation import optimise
     from gearbench.pipeline import run
     from gearbench.records import make_record, read_record, validate_record, write_record
     from gearbench.rig import Case, dump_case
+    from gearbench.studies import campaign
 
 __version__ = "0.1.0"
 
@@ -42,6 +44,7 @@ _HOMES = {
     "Case": "gearbench.rig",
     "Comparison": "gearbench.bench",
     "IdentificationSettings": "gearbench.identification",
+    "campaign": "gearbench.studies",
     "compare": "gearbench.bench",
     "convert": "gearbench.bench",
     "diagnose": "gearbench.diagnosis",
@@ -52,6 +55,7 @@ _HOMES = {
     "identify": "gearbench.identification",
     "itf": "gearbench.identification",
     "make_record": "gearbench.records",
+    "optimise": "gearbench.optimisation",
     "read_case": "gearbench.cases",
     "read_frf": "gearbench.identification",
     "read_record": "gearbench.records",
@@ -79,6 +83,7 @@ __all__ = [
     "Case",
     "Comparison",
     "IdentificationSettings",
+    "campaign",
     "compare",
     "convert",
     "diagnose",
@@ -89,6 +94,7 @@ __all__ = [
     "identify",
     "itf",
     "make_record",
+    "optimise",
     "read_case",
     "read_frf",
     "read_record",

@@ -11,7 +11,9 @@ from typing import Annotated
 import typer
 
 from gearbench import __version__
+from gearbench.commands.experiments.campaign import campaign
 from gearbench.commands.experiments.multisine import multisine
+from gearbench.commands.experiments.optimise import optimise
 from gearbench.commands.experiments.run import run
 from gearbench.commands.experiments.simulate import simulate
 from gearbench.commands.experiments.sweep import sweep
@@ -46,6 +48,8 @@ COMMANDS = (
     simulate,
     static,
     sweep,
+    campaign,
+    optimise,
     multisine,
     convert,
     identify,

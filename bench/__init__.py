@@ -4,6 +4,7 @@
 schedule, torque, settling and workers. `record`: what a record says of its rig, sensors. `refusals`: what cannot be
 asked for, found before work begins. `linear`, `nonlinear`, `elastic`, `full`: the models. `stress`: fields and root
 stress. `results`: frequency responses of cases, single numbers, comparisons. `export`: models for other programs.
+`study`: many members of one case, on processes or a cluster, and which factor decides.
 `conversion`: measured files become records.
 """
 

@@ -11,6 +11,7 @@ from gearbench.rig.mesh import Friction, MeshCorrection
 from gearbench.rig.neutral import effects_in, sound_gear
 from gearbench.rig.rig import Damping, Material, Rig
 from gearbench.rig.sensors import Sensors
+from gearbench.rig.study import Study
 from gearbench.rig.support import Across, Housing, Support, Supports
 
 __all__ = [
@@ -36,6 +37,7 @@ __all__ = [
     "Ripple",
     "Sensors",
     "Simulation",
+    "Study",
     "Support",
     "Supports",
     "dump_case",

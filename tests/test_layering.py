@@ -39,7 +39,10 @@ ROOMS: dict[str, tuple[str, ...]] = {
     "fem": ("gear", "contact", "motion", "full", "stress"),
     "lumped": ("stiffness", "linear", "nonlinear"),
     "identification": ("excitation", "spectra", "lpm", "truth", "response", "feedback"),
-    "bench": ("plan", "record", "refusals", "linear", "elastic", "full", "nonlinear", "stress", "export", "results"),
+    "bench": (
+        *("plan", "record", "refusals", "linear", "elastic", "full", "nonlinear", "stress", "export", "results"),
+        "study",
+    ),
     "diagnosis": ("intake", "forces", "effects", "evidence", "replay", "output"),
     "challenge": ("truth", "making", "scoring"),
     "app": ("shell", "words", "figures", "report", "commands"),

@@ -20,6 +20,10 @@ ROOT = Path(__file__).resolve().parent.parent
 
 # What users may rely on: every public name; of functions the parameters. A change here is a change of the interface.
 FUNCTIONS: dict[str, tuple[str, ...]] = {
+    "campaign": (
+        "case", "out", "vary", "of", "sample", "size", "seed", "torque", "positions", "cycles", "settings", "workers",
+        "cluster", "force", "progress",
+    ),
     "compare": ("a", "b"),
     "convert": ("files", "channel_map", "case", "condition", "progress"),
     "diagnose": ("records", "nominal", "held_out", "without", "progress", "quick"),
@@ -30,6 +34,9 @@ FUNCTIONS: dict[str, tuple[str, ...]] = {
     "identify": ("records", "settings", "progress"),
     "itf": ("dataset",),
     "make_record": ("channels", "attributes", "channel_attributes", "start"),
+    "optimise": (
+        "case", "vary", "quantity", "torques", "over", "settings", "positions", "cycles", "out", "force", "progress",
+    ),
     "read_case": ("source", "overrides"),
     "read_frf": ("path",),
     "read_record": ("path",),

@@ -12,8 +12,10 @@ Result = TypeVar("Result")
 
 
 def processors() -> int:
-    """Processors that this process may run on."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    """Processors that this process may run on; GEARBENCH_PROCESSORS says so where others run beside it."""
+    here = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    told = os.environ.get("GEARBENCH_PROCESSORS", "")
+    return min(int(told), here) if told.isdecimal() and int(told) else here
 
 
 def realisations(run: Callable[[int], Result], total: int, stop: Event) -> list[Result]:

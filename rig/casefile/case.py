@@ -16,6 +16,7 @@ from gearbench.rig.casefile.writer import write_conditions, write_tables
 from gearbench.rig.errors import CaseError
 from gearbench.rig.experiment import Condition, Experiment, Identification, Simulation
 from gearbench.rig.rig import Rig
+from gearbench.rig.study import Study
 from gearbench.rig.value import Value, derived, fields_of, key_of, quantity
 
 __all__ = ["Case", "CaseError", "dump_case", "read_case"]
@@ -37,6 +38,7 @@ class Case(Value):
     experiment: Experiment = quantity(doc="what is done to the rig")
     simulation: Simulation = quantity(Simulation(), doc="how the experiment is simulated")
     identification: Identification = quantity(Identification(), doc="how the record is identified")
+    study: Study | None = quantity(None, doc="what `campaign` varies; absent: what its options say")
     conditions: tuple[Condition, ...] = derived((), doc="[[condition]]: named variations of the experiment")
     uncertainty: dict[str, float] = derived({}, doc="standard deviations in SI by dotted field path")
     stated: bool = derived(True, doc="whether an experiment is given")
@@ -97,7 +99,7 @@ def _case_of(document: Table, completed: Completed) -> Case:
     try:
         return Case.model_validate(fields)
     except ValidationError as error:
-        raise CaseError(_sentence(error)) from error
+        raise CaseError(one_sentence(error)) from error
 
 
 def _read_conditions(tables: Any, base: Mapping[str, Any], reader: Reader) -> list[dict[str, Any]]:
@@ -148,7 +150,7 @@ def _table_of(model: type[Value], key: str) -> type[Value] | None:
     return table_type(known[key][1]) if key in known else None
 
 
-def _sentence(error: ValidationError) -> str:
+def one_sentence(error: ValidationError) -> str:
     """One sentence from what pydantic found: the first error, with its dotted key."""
     first = error.errors()[0]
     where = ".".join(str(part) for part in first["loc"])

@@ -91,6 +91,10 @@ class Reader:
 
     def _list(self, info: FieldInfo, unit: str, raw: Any, where: str, path: str) -> tuple[Any, ...]:
         items = get_args(kind_of(info.annotation))
+        if items[0] is str:
+            if not isinstance(raw, list):
+                raise CaseError(f"{where} = {show(raw)} must be a list of texts")
+            return tuple(_text(item, f"{where}[{i}]") for i, item in enumerate(raw))
         if not isinstance(raw, list):
             raise CaseError(f"{where} = {show(raw)} must be a list of numbers")
         if Ellipsis not in items and len(raw) != len(items):

@@ -19,6 +19,7 @@ _HEAD = """\
 # [rig.support.driven] may stand in [rig.support] for both gears. Any number may also be written
 # { value = 6e6, sd = 1e6 } (sd: standard deviation). A gear may be a file: driver = "gears/z62.toml" in
 # [rig]. [[condition]] tables (name + the keys of [experiment] that differ) give one record each.
+# [study] is for `gearbench campaign`, whose options stand above it: docs/campaigns.md.
 #
 # Values without default: gears of ROSS's spur-gear example (62/62 teeth, m 2, b 20, bore radius 17.5);
 # experiment and supports of the published finite-element study (2 + 0.4 N m, 8192 Hz, 2 Hz, 6e6 N/m).
@@ -64,6 +65,7 @@ _EXAMPLES: dict[str, str] = {
     "simulation.stiffness_single_n_per_m": "2.5e8",
     "simulation.stiffness_double_n_per_m": "4.0e8",
     "simulation.element_size_um": "160.0",
+    "study.torque_nm": "100.0",
     "identification.order": "1",
     "identification.band_hz": "[1.0, 3000.0]",
 }

@@ -1,0 +1,121 @@
+"""`campaign CASE --vary KEY=.. --out DIR`: many members of a case, and what comes out of them."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from gearbench.shell.options import CaseArgument, JsonOption, SetOption, load_case, print_json
+from gearbench.shell.progress import Progress
+from gearbench.words.study import best, decider, effects_from, failures, span_line
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+MOST_SENTENCES = 5
+
+
+def campaign(
+    case: CaseArgument,
+    vary: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--vary",
+            metavar="KEY=VALUES",
+            help="what varies: KEY=V1,V2,.. | LOW:HIGH:COUNT | LOW:HIGH | normal(MEAN,SD); KEY1+KEY2 move together",
+        ),
+    ] = None,
+    of: Annotated[
+        list[str] | None, typer.Option("--of", metavar="RESULT", help="what is wanted: te-peak-to-peak, first-mode, ..")
+    ] = None,
+    out: Annotated[Path | None, typer.Option("--out", help="output folder; absent: study_NAME")] = None,
+    sample: Annotated[
+        Literal["grid", "lhs", "sobol"] | None,
+        typer.Option("--sample", help="every combination, a Latin hypercube, or a Sobol design; absent: grid"),
+    ] = None,
+    size: Annotated[
+        int | None, typer.Option("--size", help="members of lhs; base points of sobol: keys + 2 times as many members")
+    ] = None,
+    seed: Annotated[int | None, typer.Option("--seed", help="seed of lhs and sobol")] = None,
+    torque_nm: Annotated[
+        float | None, typer.Option("--torque-nm", help="load of static and ISO results; absent: the case's mean")
+    ] = None,
+    positions: Annotated[int | None, typer.Option("--positions", help="mesh phases of a mesh cycle")] = None,
+    cycles: Annotated[int | None, typer.Option("--cycles", help="mesh cycles, where teeth differ")] = None,
+    workers: Annotated[
+        int | None, typer.Option("--workers", min=1, help="processes (Slurm: jobs); absent: one a processor")
+    ] = None,
+    cluster: Annotated[
+        str | None, typer.Option("--cluster", metavar="ADDRESS", help="dask scheduler, tcp://HOST:PORT, or slurm")
+    ] = None,
+    force: Annotated[
+        bool, typer.Option("--force", help="replace what another study or other sources left in the folder")
+    ] = False,
+    settings: SetOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Compute many members of a case: grids, Latin hypercubes, Sobol designs; table, indices, pictures, report.
+
+    Resumes in its own folder. What is not given here is taken from the case's [study]. docs/campaigns.md lists the
+    results.
+    """
+    loaded = load_case(case, settings)
+    import gearbench as gb
+
+    folder = out or Path(f"study_{re.sub(r'[^A-Za-z0-9._-]+', '_', loaded.name)}")
+    with Progress(f"campaign {loaded.name}") as progress:
+        table = gb.campaign(
+            case, folder, vary or (), of=split(of), sample=sample, size=size, seed=seed, torque=torque_nm,
+            positions=positions, cycles=cycles, settings=settings or (), workers=workers, cluster=cluster, force=force,
+            progress=progress,
+        )  # fmt: skip
+    summary = study_summary(table, folder)
+    if as_json:
+        print_json(summary)
+    else:
+        typer.echo("\n".join(_lines(table, summary, folder)))
+    if summary["failed"] == summary["members"]:
+        from gearbench.shell.failure import InputError
+
+        raise InputError(f"no member has a result: {failures(table)[0][0]}")
+
+
+def split(of: list[str] | None) -> list[str]:
+    """Names given one by one or with commas."""
+    return [name.strip() for text in of or () for name in text.split(",") if name.strip()]
+
+
+def study_summary(table: xr.Dataset, folder: Path) -> dict[str, Any]:
+    """Members, failures, and each result's range and indices."""
+    from gearbench.bench.study.table import named
+
+    good = table["sentence"].values == ""
+    results = {}
+    for name in named(table, "result"):
+        values = table[name].values[good]
+        spread = {"least": values.min(), "mean": values.mean(), "most": values.max()} if values.size else {}
+        results[name] = {"unit": table[name].attrs["units"], **{key: float(one) for key, one in spread.items()}}
+    return {
+        "folder": str(folder),
+        "members": int(table.sizes["member"]),
+        "failed": int((~good).sum()),
+        "factors": named(table, "factor"),
+        "results": results,
+    }
+
+
+def _lines(table: xr.Dataset, summary: dict[str, Any], folder: Path) -> list[str]:
+    lines = [span_line(table, name) for name in summary["results"]]
+    effects = effects_from((folder / "effects.csv").read_text(encoding="utf-8"))
+    lines += [line for one in effects if (line := decider(one))]
+    first = next(iter(summary["results"]))
+    lines += [line for line in [best(table, first, summary["factors"])] if line]
+    said = failures(table)
+    if summary["failed"]:
+        lines.append(f"{summary['failed']} of {summary['members']} members failed:")
+        lines += [f"  {count} x {sentence}" for sentence, count in said[:MOST_SENTENCES]]
+        lines += [f"  and {len(said) - MOST_SENTENCES} other sentences"] if len(said) > MOST_SENTENCES else []
+    return [*lines, f"{folder}: report.html, study.csv, study.nc, effects.csv"]

@@ -1,0 +1,1 @@
+"""Many members of one case: what varies, what is wanted of each, where they are computed, what came out."""
