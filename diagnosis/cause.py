@@ -2,30 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gearbench.diagnosis.account import places_of, sentence_of_effect
 from gearbench.diagnosis.effects.effect import Effect as Library
-from gearbench.diagnosis.effects.effect import Estimate, Fitted, added
+from gearbench.diagnosis.effects.effect import Estimate, Fitted, Hypothesis, added
 from gearbench.diagnosis.effects.recalibrated import recalibrated
+from gearbench.diagnosis.evidence.calibration import LIMITS, Limits
 from gearbench.diagnosis.evidence.decision import Decision, decide, named
 from gearbench.diagnosis.evidence.fit import Fit
 from gearbench.diagnosis.evidence.problem import Problem, problem_of
 from gearbench.diagnosis.evidence.search import Search, missing_by_equation, search
 from gearbench.diagnosis.evidence.separable import alike, representatives
 from gearbench.diagnosis.forces.equations import PLACES
-from gearbench.diagnosis.forces.steadiness import unsteadiness
+from gearbench.diagnosis.forces.steadiness import changing_parts, unsteadiness
 from gearbench.diagnosis.intake.measurements import Measurement
-from gearbench.diagnosis.intake.signals import measured_channels
-from gearbench.diagnosis.output.selection import with_entered
+from gearbench.diagnosis.intake.signals import UNITS, measured_channels
+from gearbench.diagnosis.output.judged import Closing, Judged, itself, judged_on, rms_closed
+from gearbench.diagnosis.output.missing import Missing, missing_forces
+from gearbench.diagnosis.output.selection import only, with_entered
 from gearbench.diagnosis.output.simulated import Simulated, simulated
-from gearbench.diagnosis.output.verdict_of import Decided, decide_simulated, lacking, remainder
+from gearbench.diagnosis.output.structure import structure_found
+from gearbench.diagnosis.output.verdict_of import Decided, decide_simulated, relative_size, size_needed
 from gearbench.diagnosis.replay.replays import replays
-from gearbench.diagnosis.verdict import Candidate, Effect, Outcome, Parameter, Share
+from gearbench.diagnosis.verdict import NINE_OF_TEN, Candidate, Effect, Found, Outcome, Parameter, Range, Share
+from gearbench.diagnosis.words import SHOWN_UNITS
 from gearbench.rig import Case
 from gearbench.rig.contract import Place
 
@@ -45,7 +51,10 @@ class Finding:
     where: tuple[Share, ...]
     recalibrated: Case
     with_effect: Case | None
-    because: str
+    because: tuple[str, ...]
+    structure: tuple[Found, ...] = ()
+    missing: Missing | None = None
+    places: tuple[Place, ...] = ()
     indistinguishable: tuple[tuple[str, ...], ...] = ()
     advice: tuple[str, ...] = ()
     evidence: dict[str, float] = field(default_factory=dict)
@@ -68,47 +77,104 @@ def find_cause(
     result = search(problem, without, report)
     best = named(result)
     fit = best.fit if best and best.fit else result.base
-    silent = missing_by_equation(problem, fit)
     report("steadiness")
-    unsteady = unsteadiness(problem.model, measurements, problem.unknowns, fit.p, problem.conditions[0].band)
+    band = problem.conditions[0].band
+    unsteady = unsteadiness(problem.model, measurements, problem.unknowns, fit.p, band)
     simulate = replays(problem.model.law)
     found = simulated(problem, result, measurements, nominal, simulate, without, report)
     common: dict[str, Any] = {
-        "where": _places(problem, result.base),
         "indistinguishable": alike(fit, problem.unknowns, representatives(problem, without)),
         "evidence": {one.hypothesis.name: one.log_bayes_factor for one in result.tried},
-        "audits": {"silent": tuple(silent), "unsteady": tuple(unsteady)},
     }
     if found is None:
+        silent = missing_by_equation(problem, fit)
+        common["where"] = _places(problem, result.base)
+        common["audits"] = {"silent": tuple(silent), "unsteady": tuple(unsteady)}
         return _by_forces_alone(problem, nominal, result, decide(result, silent, unsteady), common)
-    decided = decide_simulated(found, result, silent, unsteady)
-    if decided.verdict == "none":
-        found, decided = seconded(found, decided, decide(result, silent, unsteady))
-    common["audits"] |= {"remainder": tuple(remainder(found).values()), "lacking": tuple(lacking(found).values())}
-    judged = held_out if held_out is not None and held_out.phase_known else None
+    report("judging")
+    found = seconded(sized(found), result)
+    judged = judgement(problem, found, held_out)
+    found = judged.found
+    best_p, smooth = found.selection.best.p, found.simulator.target.measurements
+    missing = missing_forces(
+        problem, nominal, smooth, lambda one: simulate(found.layout.case(best_p, one.name), one.record)
+    )
+    changing = changing_of(judged, changing_parts(measurements, band))
+    decided = decide_simulated(judged, result, missing, unsteady, changing)
+    kept = [one.hypothesis for one in decided.named]
     return Finding(
         verdict=decided.verdict,
         probability=decided.probability,
-        effects=_effects(found, decided),
-        candidates=_candidates(found, judged),
+        effects=_effects(judged, decided),
+        candidates=_candidates(found, held_out if held_out is not None and held_out.phase_known else None),
         place=decided.place,
-        recalibrated=found.recalibrated,
+        where=places_of(judged, kept, missing),
+        recalibrated=found.recalibrated if kept else found.layout.case(found.selection.base.p),
         with_effect=found.with_effects if decided.named else None,
-        because=decided.because,
+        because=(*decided.because, *_why(judged, kept)),
+        structure=structure_found(
+            found.layout.unknowns, found.selection.best.p, found.std
+        ),
+        missing=missing,
+        places=tuple(one.place for one in kept),
+        audits={
+            "unsteady": tuple(unsteady),
+            "missing": tuple(missing.excess),
+            "changing": (changing,),
+            "left": (judged.left, judged.remains),
+        },
         **common,
     )
 
 
-def seconded(found: Simulated, decided: Decided, forces: Decision) -> tuple[Simulated, Decided]:
-    """What the force residuals name where simulation alone names nothing but speaks for the same effect."""
-    name = forces.winner.hypothesis.name if forces.winner is not None else None
+def sized(found: Simulated, limits: Limits = LIMITS) -> Simulated:
+    """What simulation found without those effects of which a sound rig has as much."""
+    entered = found.selection.entered
+    kept = [one for one in entered if relative_size(found, one) > size_needed(one, limits)]
+    if len(kept) == len(entered):
+        return found
+    selection = only(found.simulator, found.selection, kept)
+    return replace(found, selection=selection, std=selection.best.std)
+
+
+def seconded(found: Simulated, forces: Search) -> Simulated:
+    """With what the force residuals name where simulation alone names nothing but speaks for the same effect."""
+    best = named(forces)
+    if found.selection.entered or best is None:
+        return found
     for one in found.selection.weighed:
-        if one.hypothesis.name == name and one.optimum is not None and one.log_bayes_factor > 0.0:
+        if one.hypothesis.name == best.hypothesis.name and one.optimum is not None and one.log_bayes_factor > 0.0:
             selection = with_entered(found.simulator, found.selection, one)
-            because = "the forces missing in the measured motion call for it, and simulation comes closer with it"
-            named = Decided("effect", one.hypothesis.place, (one,), forces.probability, because)
-            return replace(found, selection=selection, std=selection.best.std), named
-    return found, decided
+            return replace(found, selection=selection, std=selection.best.std)
+    return found
+
+
+def judgement(problem: Problem, found: Simulated, held_out: Measurement | None) -> Judged:
+    """What was found on the held-out record; without one that can be simulated, on the first record of the search."""
+    judged = None
+    if held_out is not None and held_out.phase_known:
+        judged = judged_on(problem, found, held_out)
+    return judged or itself(problem, found)
+
+
+def changing_of(judged: Judged, parts: Mapping[str, float]) -> float:
+    """The largest rms of what changes between repetitions over that of the nominal gap."""
+    sizes = judged.sizes
+    return max((parts[c] * one.fluctuation / one.nominal for c, one in sizes.items() if c in parts), default=0.0)
+
+
+def _why(judged: Judged, kept: Sequence[Hypothesis]) -> tuple[str, ...]:
+    """What each named effect closes, and what closes nothing."""
+    said = []
+    for one in kept:
+        assert one.effect is not None
+        closing = judged.closings[one.name]
+        said.append(sentence_of_effect(one.effect.noun, closing, judged.share(closing.without)))
+    for weighed in judged.dropped:
+        assert weighed.hypothesis.effect is not None
+        noun = weighed.hypothesis.effect.noun
+        said.append(f"The records of the search speak for {noun}, but the judged record's gap stays as it was with it")
+    return tuple(said)
 
 
 def _by_forces_alone(
@@ -141,7 +207,8 @@ def _by_forces_alone(
         place=decision.place,
         recalibrated=plain,
         with_effect=updated,
-        because=decision.because,
+        because=(decision.because,),
+        places=(decision.place,) if effects else (),
         **common,
     )
 
@@ -153,22 +220,45 @@ def fitted(problem: Problem, fit: Fit) -> Fitted:
 
 
 def _parameters(effect: Library, estimates: Sequence[Estimate]) -> dict[str, Parameter]:
-    return {e.name: Parameter(value=e.value, std=effect.stated(e), unit=e.unit) for e in estimates}
+    """Values with the interval that a normal distribution of the stated deviation has."""
+    out = {}
+    for e in estimates:
+        reach = NINE_OF_TEN * effect.stated(e)
+        out[e.name] = Parameter(value=e.value, low=e.value - reach, high=e.value + reach, unit=e.unit)
+    return out
 
 
-def _effects(found: Simulated, decided: Decided) -> tuple[Effect, ...]:
-    """The named effects with their parameters; one that is at work in two places counts once."""
-    best = found.selection.best
-    values = found.layout.fitted(best.p, found.std)
+def _effects(judged: Judged, decided: Decided) -> tuple[Effect, ...]:
+    """The named effects with their parameters and what they close; one at work in two places counts once."""
+    found = judged.found
+    values = found.layout.fitted(found.selection.best.p, found.std)
     out: dict[str, Effect] = {}
     for one in decided.named:
         effect = one.hypothesis.effect
         assert effect is not None
         estimates = effect.add(found.layout.nominal.rig, one.hypothesis, values)[1]
         before = out[effect.name].parameters if effect.name in out else {}
-        parameters = {**before, **_parameters(effect, estimates)}
-        out[effect.name] = Effect(name=effect.name, probability=decided.probability["effect"], parameters=parameters)
+        closing = judged.closings[one.hypothesis.name]
+        out[effect.name] = Effect(
+            name=effect.name,
+            probability=decided.probability["effect"],
+            due=closing.due,
+            parameters={**before, **_parameters(effect, estimates)},
+            share=judged.share(closing.without),
+            closes=_closes(judged, closing),
+        )
     return tuple(out.values())
+
+
+def _closes(judged: Judged, closing: Closing) -> dict[str, Range]:
+    """By channel, rms in um or N m that comes back without an effect."""
+    out = {}
+    for channel in judged.sizes:
+        sizes = rms_closed(judged.measured, channel, closing.without[channel], judged.signals[channel])
+        scale = SHOWN_UNITS.get(UNITS[channel], (1.0, ""))[0]
+        value, low, high = (scale * size for size in sizes)
+        out[channel] = Range(value=value, low=low, high=high)
+    return out
 
 
 def _candidates(found: Simulated, judged: Measurement | None) -> tuple[Candidate, ...]:

@@ -9,6 +9,7 @@ from pathlib import Path
 import xarray as xr
 
 from gearbench.bench.refusals.stated import check_springs, check_stated
+from gearbench.diagnosis.account import parts_of, sentences_of_gap
 from gearbench.diagnosis.advice import advice_of
 from gearbench.diagnosis.cause import Finding, find_cause
 from gearbench.diagnosis.effects.library import LIBRARY
@@ -137,12 +138,18 @@ def _budget(inputs: Inputs, simulate: Simulate) -> tuple[Share, ...]:
 
 def _verdict(inputs: Inputs, finding: Finding, where: tuple[Share, ...], shrunk: tuple[Gap, ...]) -> Verdict:
     advice = (*finding.advice, *advice_of(inputs.measurements, inputs.held_out))
+    explained, remaining = parts_of(shrunk, finding.missing, finding.places)
     return Verdict(
         verdict=finding.verdict,
         probability=Probabilities(**finding.probability),
         effects=finding.effects,
         candidates=finding.candidates,
         place=finding.place,
+        because=(*finding.because, *sentences_of_gap(shrunk, remaining)),
+        explained=explained,
+        remainder=remaining,
+        structure=finding.structure,
+        limits="population",
         where=where,
         gap=shrunk,
         held_out=inputs.held_out.name if inputs.held_out else None,

@@ -1,7 +1,8 @@
-"""The verdict of a diagnosis and its file, verdict.json (schema "gearbench-verdict/1").
+"""The verdict of a diagnosis and its file, verdict.json (schema "gearbench-verdict/2").
 
 Values are frozen and complete: what is not known is null, never a made-up number. Other programs write such files
-too, so reading checks everything and says what is wrong in one sentence.
+too, so reading checks everything and says what is wrong in one sentence. Files of version 1 are read as well: their
+verdict "effect" is "effects" now, and their standard deviations are intervals.
 """
 
 from __future__ import annotations
@@ -18,14 +19,17 @@ from gearbench.diagnosis.errors import DiagnosisError
 from gearbench.files import write_text
 from gearbench.rig.contract import Place
 
-SCHEMA: Literal["gearbench-verdict/1"] = "gearbench-verdict/1"
+SCHEMA: Literal["gearbench-verdict/2"] = "gearbench-verdict/2"
+FORMER = "gearbench-verdict/1"
 
-Outcome = Literal["effect", "none", "unknown"]
+Outcome = Literal["effects", "none", "unknown"]
 Kind = Literal["channel", "band", "class", "phase", "tooth", "place", "condition"]
 KINDS: tuple[str, ...] = get_args(Kind)
 
 # Departure of a sum of probabilities from 1 that rounding in a file explains.
 ROUNDING = 1e-6
+# Half of an interval that holds nine of ten, in standard deviations.
+NINE_OF_TEN = 1.6448536269514722
 # A verdict is a page of text; a file beyond this size [bytes] is something else.
 LARGEST_FILE = 2**24
 
@@ -58,19 +62,78 @@ class Probabilities(_Value):
 
 
 class Parameter(_Value):
-    """Estimate of one parameter of an effect: value and standard deviation in `unit`."""
+    """Estimate of one parameter of an effect, with the interval that holds it with a probability of 90 %, in `unit`."""
 
     value: float
-    std: NotNegative
+    low: float
+    high: float
     unit: str
+
+    @model_validator(mode="before")
+    @classmethod
+    def _from_std(cls, data: Any) -> Any:
+        """Version 1, and estimates, have a standard deviation in place of the interval."""
+        if not isinstance(data, Mapping) or "std" not in data or "low" in data or "high" in data:
+            return data
+        value, std = data.get("value"), data["std"]
+        if isinstance(std, bool) or not isinstance(std, (int, float)) or std < 0:
+            raise ValueError(f"std = {std} must be a number that is not negative")
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            return {key: entry for key, entry in data.items() if key != "std"} | {"low": 0.0, "high": 0.0}
+        reach = NINE_OF_TEN * std
+        return {"value": value, "low": value - reach, "high": value + reach} | {
+            key: entry for key, entry in data.items() if key not in ("value", "std")
+        }
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Parameter:
+        if not self.low <= self.value <= self.high:
+            raise ValueError(f"value {self.value:g} must lie between low {self.low:g} and high {self.high:g}")
+        return self
+
+    @property
+    def std(self) -> float:
+        """Standard deviation that the interval stands for."""
+        return (self.high - self.low) / (2 * NINE_OF_TEN)
+
+
+class Range(_Value):
+    """A value between its lowest and highest likely one; in the file the list [value, low, high]."""
+
+    value: NotNegative
+    low: NotNegative
+    high: NotNegative
+
+    @model_validator(mode="before")
+    @classmethod
+    def _from_list(cls, data: Any) -> Any:
+        if isinstance(data, (Range, dict)):
+            return data
+        if not isinstance(data, (list, tuple)) or len(data) != 3:
+            raise ValueError("must be a list of three numbers, [value, low, high]")
+        return dict(zip(("value", "low", "high"), data, strict=True))
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Range:
+        if not self.low <= self.value <= self.high:
+            raise ValueError(f"value {self.value:g} must lie between low {self.low:g} and high {self.high:g}")
+        return self
 
 
 class Effect(_Value):
-    """An effect found at work, how likely it is, and its parameters by name."""
+    """An effect found at work, how likely it is, and its parameters by name.
+
+    `share`: part of the nominal rig's gap that comes back when this effect alone is taken out and all else is fitted
+    again (null: not computed), and by channel how much that is, `closes`: rms in um or N m. `due`: whether the gap then
+    grows by a tenth or more in some channel.
+    """
 
     name: Name
     probability: Probability
+    due: bool | None = None
     parameters: dict[Name, Parameter] = {}
+    share: Annotated[float, Field(ge=0.0, le=1.0 + ROUNDING)] | None = None
+    closes: dict[Name, Range] = {}
 
 
 class Candidate(_Value):
@@ -96,29 +159,6 @@ class Share(_Value):
     floor: NotNegative | None
     floor_noise: NotNegative | None = None
     floor_nominal: NotNegative | None = None
-
-
-class Range(_Value):
-    """A value between its lowest and highest likely one; in the file the list [value, low, high]."""
-
-    value: NotNegative
-    low: NotNegative
-    high: NotNegative
-
-    @model_validator(mode="before")
-    @classmethod
-    def _from_list(cls, data: Any) -> Any:
-        if isinstance(data, (Range, dict)):
-            return data
-        if not isinstance(data, (list, tuple)) or len(data) != 3:
-            raise ValueError("must be a list of three numbers, [value, low, high]")
-        return dict(zip(("value", "low", "high"), data, strict=True))
-
-    @model_validator(mode="after")
-    def _ordered(self) -> Range:
-        if not self.low <= self.value <= self.high:
-            raise ValueError(f"value {self.value:g} must lie between low {self.low:g} and high {self.high:g}")
-        return self
 
 
 class Gap(_Value):
@@ -151,15 +191,53 @@ class Gap(_Value):
         return self
 
 
+class Part(_Value):
+    """A part of the gap, explained or left: rms `size` in one channel and band (the missing force of one equation:
+    channel "force") in `unit`, um, N m or N, with its 90 % interval; `place` where it arises; `share` of that channel's
+    whole nominal gap, by energy; `floors`: multiples of the measurement noise there (null: unknown)."""
+
+    channel: Name
+    band_hz: tuple[NotNegative, NotNegative]
+    place: Place
+    size: NotNegative
+    low: NotNegative
+    high: NotNegative
+    unit: str
+    share: NotNegative
+    floors: NotNegative | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _band_from_list(cls, data: Any) -> Any:
+        if isinstance(data, Mapping) and isinstance(data.get("band_hz"), list):
+            return {**data, "band_hz": tuple(data["band_hz"])}
+        return data
+
+
+class Found(_Value):
+    """A number of the rig's structure that no nominal case gives, as it was found: housing, shafts, gains."""
+
+    name: Name
+    value: float
+    low: float
+    high: float
+    unit: str
+
+
 class Verdict(_Value):
     """What a diagnosis hands back; the fields are those of verdict.json."""
 
-    schema_: Literal["gearbench-verdict/1"] = Field(SCHEMA, alias="schema")
+    schema_: Literal["gearbench-verdict/2"] = Field(SCHEMA, alias="schema")
     verdict: Outcome
     probability: Probabilities
     effects: tuple[Effect, ...] = ()
     candidates: tuple[Candidate, ...] = ()
     place: Place
+    because: tuple[str, ...] = ()
+    explained: tuple[Part, ...] = ()
+    remainder: tuple[Part, ...] = ()
+    structure: tuple[Found, ...] = ()
+    limits: Literal["this rig", "population"] | None = None
     where: tuple[Share, ...] = ()
     gap: tuple[Gap, ...] = ()
     held_out: Name | None = None
@@ -168,9 +246,9 @@ class Verdict(_Value):
 
     @model_validator(mode="after")
     def _agrees_with_itself(self) -> Verdict:
-        if self.verdict == "effect" and not self.effects:
-            raise ValueError('effects is empty, but verdict "effect" names at least one')
-        if self.verdict != "effect" and self.effects:
+        if self.verdict == "effects" and not self.effects:
+            raise ValueError('effects is empty, but verdict "effects" names at least one')
+        if self.verdict != "effects" and self.effects:
             raise ValueError(f'effects names {self.effects[0].name}, but verdict "{self.verdict}" names none')
         names = [effect.name for effect in self.effects]
         for name in names:
@@ -186,6 +264,8 @@ def verdict_json(verdict: Verdict) -> str:
         for name in ("nominal", "recalibrated", "with_effect", "floor"):
             if gap[name] is not None:
                 gap[name] = list(gap[name].values())
+    for effect in tree["effects"]:
+        effect["closes"] = {channel: list(size.values()) for channel, size in effect["closes"].items()}
     return json.dumps(tree, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
@@ -223,6 +303,9 @@ def parse_verdict(text: str) -> Verdict:
         raise DiagnosisError("JSON nested too deeply for a verdict") from None
     if not isinstance(tree, dict):
         raise DiagnosisError("a verdict is a JSON object with keys in braces")
+    if tree.get("schema") == FORMER:
+        told = tree.get("verdict")
+        tree = {**tree, "schema": SCHEMA, "verdict": "effects" if told == "effect" else told}
     if tree.get("schema") != SCHEMA:
         raise DiagnosisError(f'schema is {json.dumps(tree.get("schema"))}, but a verdict has "{SCHEMA}"')
     try:
@@ -270,6 +353,9 @@ _BELOW: dict[str, type[_Value]] = {
     "candidates": Candidate,
     "where": Share,
     "gap": Gap,
+    "explained": Part,
+    "remainder": Part,
+    "structure": Found,
 }
 
 

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 from gearbench.figures.plotting import BLUE, GREEN, ORANGE
 from gearbench.report.html import bar, folded, items, page, picture, table, text
 from gearbench.words.diagnosis import (
-    PLACES,
     SHORT_CHANNELS,
     SHOWN_UNITS,
     band_in_words,
@@ -22,6 +21,8 @@ from gearbench.words.diagnosis import (
     number,
     parameter_in_words,
     percent,
+    places_in_words,
+    sentences,
     whole_band,
     with_std,
 )
@@ -63,6 +64,7 @@ def report_page(report: Report) -> str:
         text(headline(verdict), "h1"),
         text(confidence(verdict), style="lead"),
         _probability(verdict),
+        *_because(verdict),
         *_parameters(verdict),
         *_how_far(report),
         *_candidates(verdict),
@@ -80,6 +82,10 @@ def _probability(verdict: Verdict) -> str:
         ("a cause that is not known", verdict.probability.unknown, ORANGE),
     )
     return bar([(name, value, percent(value), colour) for name, value, colour in parts])
+
+
+def _because(verdict: Verdict) -> list[str]:
+    return [text("Why, and what remains", "h2"), items(sentences(verdict))] if verdict.because else []
 
 
 def _parameters(verdict: Verdict) -> list[str]:
@@ -124,7 +130,7 @@ def _how_far(report: Report) -> list[str]:
     return [
         text("How far the gap shrinks", "h2"),
         text(f"{where}. In brackets: the range in which nine of ten repeated measurements would fall."),
-        *_pictures(report, ("gap", "traces")),
+        *_pictures(report, ("waterfall", "gap", "traces")),
         _gap_table(main),
         folded("All channels and bands", _gap_table(gaps)) if rest else "",
     ]
@@ -170,10 +176,7 @@ def _candidates(verdict: Verdict) -> list[str]:
 def _where(report: Report) -> list[str]:
     if not report.verdict.where:
         return []
-    place = report.verdict.place
-    words = "No place stands out. "
-    if place != "none":
-        words = f"The force that the simulation lacks acts {PLACES[place]}. "
+    words = places_in_words(report.verdict)
     return [
         text("Where the gap is", "h2"),
         text(

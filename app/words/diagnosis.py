@@ -7,29 +7,34 @@ from math import floor, isfinite, log10
 from typing import TYPE_CHECKING
 
 from gearbench.diagnosis.effects.library import LIBRARY
+from gearbench.diagnosis.words import CHANNELS, PLACES, SHOWN_UNITS, band_in_words, length, number, percent
 
 if TYPE_CHECKING:
     from gearbench.diagnosis.verdict import Gap, Range, Verdict
 
+__all__ = [
+    "CHANNELS",
+    "PLACES",
+    "SHOWN_UNITS",
+    "band_in_words",
+    "confidence",
+    "effects_in_words",
+    "explained",
+    "headline",
+    "interval",
+    "length",
+    "meaning",
+    "number",
+    "parameter_in_words",
+    "percent",
+    "places_in_words",
+    "sentences",
+    "shrinkage",
+    "whole_band",
+    "with_std",
+]
+
 EFFECTS = {effect.name: effect for effect in LIBRARY}
-PLACES = {
-    "mesh": "in the mesh",
-    "driver-support": "at the driver's support",
-    "driven-support": "at the driven gear's support",
-    "drive": "at the drive",
-    "load": "at the load",
-    "sensor": "in a sensor",
-    "none": "at no place",
-}
-CHANNELS = {
-    "dte": "transmission error",
-    "angle_driver": "angle of the driver",
-    "angle_driven": "angle of the driven gear",
-    "y_driver": "displacement of the driver",
-    "y_driven": "displacement of the driven gear",
-    "torque_driver": "torque on the driver",
-    "torque_driven": "torque on the driven gear",
-}
 SHORT_CHANNELS = {
     "dte": "TE",
     "angle_driver": "angle, driver",
@@ -38,6 +43,7 @@ SHORT_CHANNELS = {
     "y_driven": "y, driven",
     "torque_driver": "torque, driver",
     "torque_driven": "torque, driven",
+    "force": "missing force",
 }
 STAGES = ("nominal", "recalibrated", "with_effect", "floor")
 STAGE_WORDS = {
@@ -48,8 +54,6 @@ STAGE_WORDS = {
 }
 # A gap counts as explained when this part of it, or this multiple of the noise floor, is left.
 LEFT_OF_GAP, LEFT_OF_FLOOR = 0.1, 2.0
-# How a unit is shown: (factor, unit).
-SHOWN_UNITS = {"m": (1e6, "um"), "rad": (1e6, "urad"), "1": (1.0, "")}
 
 
 def effects_in_words(names: Sequence[str]) -> str:
@@ -77,7 +81,7 @@ def meaning(effect: str) -> str:
 def headline(verdict: Verdict) -> str:
     """The verdict in one sentence without numbers."""
     place = PLACES[verdict.place]
-    if verdict.verdict == "effect":
+    if verdict.verdict == "effects":
         words = effects_in_words([effect.name for effect in verdict.effects])
         one = len(verdict.effects) == 1
         said = f"{'explains' if one else 'explain'} the gap"
@@ -85,17 +89,21 @@ def headline(verdict: Verdict) -> str:
             said = f"{'is' if one else 'are'} at work, and a part of the gap remains"
         return f"{words[:1].upper()}{words[1:]} {said}."
     if verdict.verdict == "none":
-        return "No effect is needed: within its uncertainties the nominal rig explains the records."
+        if explained(verdict):
+            return "No effect is needed: within its uncertainties the nominal rig explains the records."
+        if mostly(verdict):
+            return "No effect is needed: recalibrated, the rig explains most of the gap, and a part of it remains."
+        return "No known effect is called for, and recalibration leaves the gap much as it was."
     where = f" It arises {place}." if verdict.place != "none" else ""
     return f"None of the known effects explains the gap.{where}"
 
 
 def confidence(verdict: Verdict) -> str:
     """How sure, where, and how far the gap shrinks, in a sentence or two."""
-    sure = getattr(verdict.probability, verdict.verdict)
-    words = {"effect": "one of the known effects", "none": "no effect", "unknown": "a cause that is not known"}
+    sure = getattr(verdict.probability, verdict.verdict.removesuffix("s"))
+    words = {"effects": "one of the known effects", "none": "no effect", "unknown": "a cause that is not known"}
     parts = [f"Probability of {words[verdict.verdict]}: {percent(sure)}."]
-    if verdict.verdict == "effect" and verdict.place != "none":
+    if verdict.verdict == "effects" and verdict.place != "none":
         parts.append(f"It acts {PLACES[verdict.place]}.")
     shrunk = shrinkage(verdict)
     return " ".join([*parts, shrunk] if shrunk else parts)
@@ -124,13 +132,39 @@ def shrinkage(verdict: Verdict) -> str:
     )
 
 
+def sentences(verdict: Verdict) -> tuple[str, ...]:
+    """Why the verdict is what it is, each as a whole sentence."""
+    return tuple(f"{one[:1].upper()}{one[1:].rstrip('.')}." for one in verdict.because)
+
+
+def places_in_words(verdict: Verdict) -> str:
+    """Which places the shares of the gap by place put first, as the picture beside it shows them."""
+    ranked = sorted((one for one in verdict.where if one.kind == "place"), key=lambda one: -one.share)
+    if not ranked:
+        return "" if verdict.place == "none" else f"The force that the simulation lacks acts {PLACES[verdict.place]}. "
+    first = ranked[0]
+    words = f"Most of what recalibration does not close arises {PLACES.get(first.name, first.name)}"
+    words += f" ({percent(first.share)})"
+    if verdict.place not in ("none", first.name):
+        share = next((one.share for one in ranked if one.name == verdict.place), 0.0)
+        words += f"; {percent(share)} {PLACES[verdict.place]}, where the verdict has its cause"
+    return f"{words}. "
+
+
 def explained(verdict: Verdict) -> bool:
-    """Whether little of the gap of the first channel is left with the effects: a tenth of it, or what noise makes."""
+    """Whether little of the gap of the first channel is left in the end: a tenth of it, or what noise makes."""
     gap = next(iter(whole_band(verdict.gap)), None)
-    if gap is None or gap.with_effect is None:
+    if gap is None:
         return True
     floor = gap.floor.value if gap.floor else 0.0
-    return gap.with_effect.value <= max(LEFT_OF_GAP * gap.nominal.value, LEFT_OF_FLOOR * floor)
+    last = gap.with_effect or gap.recalibrated
+    return last.value <= max(LEFT_OF_GAP * gap.nominal.value, LEFT_OF_FLOOR * floor)
+
+
+def mostly(verdict: Verdict) -> bool:
+    """Whether less than half of the gap of the first channel is left in the end."""
+    gap = next(iter(whole_band(verdict.gap)), None)
+    return gap is None or (gap.with_effect or gap.recalibrated).value < 0.5 * gap.nominal.value
 
 
 def whole_band(gaps: Sequence[Gap]) -> list[Gap]:
@@ -142,25 +176,6 @@ def whole_band(gaps: Sequence[Gap]) -> list[Gap]:
         if width > 0 and (held is None or width > held.band_hz[1] - held.band_hz[0]):
             best[gap.channel] = gap
     return list(best.values())
-
-
-def band_in_words(band: tuple[float, float]) -> str:
-    """`20-3000 Hz`, or `mean` for the band [0, 0]."""
-    return "mean" if band[1] == 0 else f"{band[0]:g}–{band[1]:g} Hz"
-
-
-def number(value: float, digits: int = 3) -> str:
-    """A number with that many significant digits, without exponent between 1e-3 and 1e6."""
-    if not isfinite(value):
-        return str(value)
-    if value == 0:
-        return "0"
-    power = floor(log10(abs(value)))
-    if power < -3 or power >= 6:
-        return f"{value:.{digits - 1}e}".replace("e-0", "e-").replace("e+0", "e")
-    rounded = round(value, digits - 1 - power)
-    power = floor(log10(abs(rounded)))  # 9.996 has become 10.0
-    return f"{rounded:.{max(0, digits - 1 - power)}f}"
 
 
 def with_std(value: float, std: float) -> str:
@@ -180,19 +195,3 @@ def interval(value: Range | None, unit: str) -> str:
         return "–"
     scale = SHOWN_UNITS.get(unit, (1.0, unit))[0]
     return f"{length(scale * value.value)} ({length(scale * value.low, 2)}–{length(scale * value.high, 2)})"
-
-
-def length(value: float, digits: int = 3) -> str:
-    """A number with that many significant digits but at most four decimals: a tenth of a nanometre in um."""
-    if not isfinite(value) or abs(value) >= 1e-4 * 10 ** (digits - 1):
-        return number(value, digits)
-    return f"{value:.4f}" if round(value, 4) else "0"
-
-
-def percent(value: float) -> str:
-    """A probability or share: `97 %`, `0.4 %`, never 100 % for less than all."""
-    if 0.995 <= value < 1.0:
-        return "> 99 %"
-    if 0.0 < value < 0.001:
-        return "< 0.1 %"
-    return f"{100 * value:.1f} %" if value < 0.1 and value else f"{100 * value:.0f} %"

@@ -11,7 +11,7 @@ from typing import Any
 from gearbench.bench.plan.workers import processors
 from gearbench.challenge.answers import Answer, read_answers
 from gearbench.challenge.errors import ChallengeError
-from gearbench.challenge.scoring.outcomes import VERDICTS, Outcome, judge, without
+from gearbench.challenge.scoring.outcomes import VERDICTS, Outcome, judge, said, without
 
 VERDICT = "verdict.json"
 # Diagnoses the records with the nominal case and writes verdict.json into a folder: (records, nominal, folder,
@@ -138,6 +138,6 @@ def _read(path: Path, read: Read) -> Mapping[str, Any]:
     except ValueError as error:
         sentence = str(error)
         raise ChallengeError(sentence if str(path) in sentence else f"{path}: {sentence}") from None
-    if verdict.get("verdict") not in VERDICTS or "place" not in verdict:
+    if said(verdict) not in VERDICTS or "place" not in verdict:
         raise ChallengeError(f"{path} must give verdict, one of {', '.join(VERDICTS)}, and place")
     return verdict

@@ -21,6 +21,8 @@ from typing import Any
 from gearbench.challenge.answers import Answer
 
 VERDICTS = ("effect", "none", "unknown")
+# What version 2 of a verdict says for those of version 1.
+_NOW = {"effects": "effect"}
 # Which probability a perfect program gives 1, by the kind of the case.
 TRUE_VERDICT = {"effect": "effect", "none": "none", "foreign": "unknown"}
 
@@ -50,6 +52,11 @@ def named_effects(verdict: Verdict) -> tuple[str, ...]:
     return tuple(effect["name"] for effect in verdict.get("effects", ()))
 
 
+def said(verdict: Verdict) -> str:
+    """Which of `VERDICTS` a verdict of either version says; what it says otherwise as it stands."""
+    return _NOW.get(str(verdict.get("verdict")), str(verdict.get("verdict")))
+
+
 def judge(name: str, answer: Answer, verdict: Verdict | None) -> Outcome:
     """The outcome of one case."""
     if verdict is None:
@@ -58,11 +65,11 @@ def judge(name: str, answer: Answer, verdict: Verdict | None) -> Outcome:
 
 
 def _result(answer: Answer, verdict: Verdict) -> str:
-    said = verdict["verdict"]
+    word = said(verdict)
     if answer.kind == "none":
-        return {"none": "right", "effect": "named", "unknown": "flagged"}[said]
-    if said != "effect":
-        return {"none": "missed", "unknown": "refused"}[said]
+        return {"none": "right", "effect": "named", "unknown": "flagged"}[word]
+    if word != "effect":
+        return {"none": "missed", "unknown": "refused"}[word]
     if answer.kind == "foreign":
         return "blamed"
     named, true = set(named_effects(verdict)), set(answer.effects)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from gearbench.challenge.scoring.intervals import COVERAGE, Rate, brier, middle, reliability
-from gearbench.challenge.scoring.outcomes import TRUE_VERDICT, VERDICTS, Outcome, named_effects
+from gearbench.challenge.scoring.outcomes import TRUE_VERDICT, VERDICTS, Outcome, named_effects, said
 from gearbench.challenge.scoring.reach import reach_table
 from gearbench.challenge.truth.effects import EFFECTS, SEVERITY
 from gearbench.rig.contract import rank_of
@@ -97,11 +97,11 @@ def _confusion(outcomes: Sequence[Outcome]) -> Table:
     table: dict[str, dict[str, int]] = {}
     for outcome in outcomes:
         true = "+".join(outcome.answer.effects) or "none"
-        said = "failed"
+        name = "failed"
         if outcome.verdict is not None:
-            said = "+".join(sorted(named_effects(outcome.verdict))) or str(outcome.verdict["verdict"])
+            name = "+".join(sorted(named_effects(outcome.verdict))) or said(outcome.verdict)
         row = table.setdefault(true, {})
-        row[said] = row.get(said, 0) + 1
+        row[name] = row.get(name, 0) + 1
     return table
 
 
@@ -111,17 +111,17 @@ def _calibration(outcomes: Sequence[Outcome]) -> Table:
     given = [o for o in outcomes if o.verdict is not None]
     stated = [[float(o.verdict["probability"][key]) for key in VERDICTS] for o in given if o.verdict is not None]
     truth = [VERDICTS.index(TRUE_VERDICT[o.answer.kind]) for o in given]
-    said = [VERDICTS.index(o.verdict["verdict"]) for o in given if o.verdict is not None]
+    told = [VERDICTS.index(said(o.verdict)) for o in given if o.verdict is not None]
     named: list[tuple[float, bool]] = []
     for outcome in given:
         assert outcome.verdict is not None
         for effect in outcome.verdict.get("effects", ()):
             true = outcome.answer.kind == "effect" and effect["name"] in outcome.answer.effects
             named.append((float(effect["probability"]), true))
-    chosen = [p[i] for p, i in zip(stated, said, strict=True)]
+    chosen = [p[i] for p, i in zip(stated, told, strict=True)]
     return {
         "brier": brier(stated, truth),
-        "verdict": reliability(chosen, [a == b for a, b in zip(said, truth, strict=True)]),
+        "verdict": reliability(chosen, [a == b for a, b in zip(told, truth, strict=True)]),
         "effect": reliability([p for p, _ in named], [hit for _, hit in named]),
     }
 
@@ -130,7 +130,7 @@ def parameter_errors(outcomes: Sequence[Outcome]) -> list[Table]:
     """Errors of the parameters of rightly named effects that the verdict gives in the answer's unit: per effect and
     name the number, bias, rms and median magnitude, the last also relative, and how often the truth lies within the
     stated 90 % interval."""
-    found: dict[tuple[str, str, str], list[tuple[float, float, float]]] = {}
+    found: dict[tuple[str, str, str], list[tuple[float, float, float, float]]] = {}
     for outcome in outcomes:
         if outcome.result != "right" or outcome.verdict is None:
             continue
@@ -139,10 +139,10 @@ def parameter_errors(outcomes: Sequence[Outcome]) -> list[Table]:
             for name, given in effect.get("parameters", {}).items():
                 if name in true and true[name]["unit"] == given["unit"]:
                     key = (effect["name"], name, str(given["unit"]))
-                    found.setdefault(key, []).append((given["value"], given["std"], true[name]["value"]))
+                    found.setdefault(key, []).append((given["value"], *_interval(given), true[name]["value"]))
     rows = []
     for (effect_name, name, unit), values in found.items():
-        value, std, true_value = np.array(values, dtype=float).T
+        value, low, high, true_value = np.array(values, dtype=float).T
         error = value - true_value
         relative = np.abs(error[true_value != 0] / true_value[true_value != 0])
         rows.append(
@@ -155,10 +155,18 @@ def parameter_errors(outcomes: Sequence[Outcome]) -> list[Table]:
                 "rms": float(np.sqrt(np.mean(error**2))),
                 "median": float(np.median(np.abs(error))),
                 "median_relative": float(np.median(relative)) if relative.size else None,
-                "within": Rate(int((np.abs(error) <= 1.645 * std).sum()), len(values)).plain(),
+                "within": Rate(int(((low <= true_value) & (true_value <= high)).sum()), len(values)).plain(),
             }
         )
     return rows
+
+
+def _interval(given: Mapping[str, Any]) -> tuple[float, float]:
+    """The 90 % interval of a parameter; version 1 gives a standard deviation."""
+    if "std" in given:
+        reach = 1.645 * float(given["std"])
+        return float(given["value"]) - reach, float(given["value"]) + reach
+    return float(given["low"]), float(given["high"])
 
 
 def shrinkage(outcomes: Sequence[Outcome]) -> Table:

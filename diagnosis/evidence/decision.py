@@ -21,7 +21,7 @@ SHARPNESS = 3.0  # nats over which a probability goes from 1/2 to 3/4 or so
 
 @dataclass(frozen=True)
 class Decision:
-    """`verdict` effect, none or unknown; `place`; the winner (effect only); probabilities of the three; `because` says
+    """`verdict` effects, none or unknown; `place`; the winner (effect only); probabilities of the three; `because` says
     in one sentence what decided."""
 
     verdict: Outcome
@@ -37,22 +37,23 @@ def decide(search: Search, silent: Array, unsteady: Array, limits: Limits = LIMI
     best, free = named(search, limits), search.best_free
     place, over = worst(unsteady, limits.unsteady)
     if over > 1.0:
-        return _unknown(place, f"the force missing {at_place(place)} changes from one repetition to the next")
+        return _unknown(place, f"the force missing {at_place(place)} changes from one repetition to the next", over)
     needed = limits.free
     if best:
         needed = limits.competitor_factor * best.log_bayes_factor + limits.competitor_offset
     if free and free.log_bayes_factor > needed:
         found = free.hypothesis.place
-        return _unknown(found, f"a force {at_place(found)} without any given form explains the records clearly better")
+        because = f"a force {at_place(found)} without any given form explains the records clearly better"
+        return _unknown(found, because, free.log_bayes_factor / needed)
     place, over = worst(silent, limits.silent)
     left = float(silent[PLACES.index(place)])
     if over > 1.0 and not (best and best.log_bayes_factor > left):
-        return _unknown(place, f"a force {at_place(place)} remains that no effect of the library explains")
+        return _unknown(place, f"a force {at_place(place)} remains that no effect of the library explains", over)
     if best:
         assert best.hypothesis.effect is not None
         margin = best.log_bayes_factor - limits.of(best.hypothesis.effect)
         because = "its evidence exceeds what rigs without an effect reach"
-        return Decision("effect", best.hypothesis.place, best, _probabilities(margin), because)
+        return Decision("effects", best.hypothesis.place, best, _probabilities(margin), because)
     margins = [
         one.log_bayes_factor - limits.of(one.hypothesis.effect)
         for one in search.tried
@@ -94,8 +95,15 @@ def at_place(place: str) -> str:
     return f"{'in' if place == 'mesh' else 'at'} the {place.replace('-', ' ')}"
 
 
-def _unknown(place: Place, because: str) -> Decision:
-    return Decision("unknown", place, None, {"effect": 0.1, "none": 0.05, "unknown": 0.85}, because)
+def unknown_by(over: float) -> dict[str, float]:
+    """Probabilities where something unknown shows: by how far its sign lies beyond its limit."""
+    unknown = 1.0 - 0.5 / max(over, 1.0)
+    rest = 0.5 * (1.0 - unknown)
+    return {"effect": rest, "none": rest, "unknown": unknown}
+
+
+def _unknown(place: Place, because: str, over: float) -> Decision:
+    return Decision("unknown", place, None, unknown_by(over), because)
 
 
 def _probabilities(ahead: float) -> dict[str, float]:

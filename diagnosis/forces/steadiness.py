@@ -13,14 +13,17 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+from scipy.stats import gamma
 
 from gearbench.diagnosis.forces.condition import prepare
-from gearbench.diagnosis.forces.covariance import ALIASED, BLOCK, expected_squares, noise_of_equations
+from gearbench.diagnosis.forces.covariance import ALIASED, BLOCK, KINDS, expected_squares, kinds_of, noise_of_equations
 from gearbench.diagnosis.forces.equations import MESH, PLACES
 from gearbench.diagnosis.forces.nominal import NominalModel
 from gearbench.diagnosis.forces.residuals import residuals
 from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.intake.measurements import Measurement
+from gearbench.diagnosis.intake.signals import measured_channels
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -30,6 +33,7 @@ ROUNDS = 60
 COLOURED = 12.0
 # Part of a channel's fluctuation that a sound rig's slow changes leave between repetitions.
 SLOW = 3e-3
+NEIGHBOURS = 41  # quiet lines that tell the noise of a line between them
 
 
 def unsteadiness(
@@ -38,9 +42,11 @@ def unsteadiness(
     """Excess scatter (equations + 1,) between repetitions: sum over blocks of bins of count log lambda, the mesh last.
 
     Zero where there is one repetition only, and where no channel changes by more than a sound rig's slow changes make.
+    What noise puts into an equation is read off its quiet lines, those that nothing excites, so that no stiffness or
+    filter needs to be known for it.
     """
     total = np.zeros(len(PLACES))
-    if changing_part(measurements) < SLOW:
+    if max(changing_parts(measurements, band).values(), default=0.0) < SLOW:
         return total
     for measured in measurements:
         if measured.repetitions < 2:
@@ -53,28 +59,49 @@ def unsteadiness(
             single.append(last.left)
         whole = prepare(measured, model, band)
         scatter = np.stack(single) - np.mean(single, axis=0)
+        scatter = scatter / np.sqrt(1 - 1 / measured.repetitions)
         variance = noise_of_equations(model, whole) * measured.repetitions + (ALIASED * whole.force_level) ** 2
-        total += excess_of(scatter / np.sqrt(1 - 1 / measured.repetitions), last.mesh_factor, variance)
+        quiet = kinds_of(whole) == KINDS.index("other")
+        variance[:MESH] = np.maximum(variance[:MESH], quiet_level(scatter, quiet))
+        total += excess_of(scatter, last.mesh_factor, variance)
     return total
 
 
-def changing_part(measurements: Sequence[Measurement]) -> float:
-    """Largest rms, of any channel and record, of what scatters between repetitions beyond white noise, over that of the
-    channel's fluctuation; 0 where there is one repetition only."""
-    largest = 0.0
+def quiet_level(scatter: Complex, quiet: NDArray[np.bool_]) -> Array:
+    """Variance (equations, K) of the scatter (P, equations, K) as neighbouring quiet lines (K,) have it; zero without
+    enough of them."""
+    rows, lines = scatter.shape[1], scatter.shape[2]
+    out = np.zeros((rows, lines))
+    at = np.flatnonzero(quiet)
+    if at.size < 2 * NEIGHBOURS:
+        return out
+    # Energies of P departures from their mean are like a gamma distribution of shape P - 1.
+    free = len(scatter) - 1
+    middle = float(gamma.median(free)) / free
+    for row in range(rows):
+        energy = (np.abs(scatter[:, row, at]) ** 2).mean(axis=0)
+        if np.isfinite(energy).all():
+            level = median_filter(energy, NEIGHBOURS, mode="nearest") / middle
+            out[row] = np.interp(np.arange(lines), at, level)
+    return out
+
+
+def changing_parts(measurements: Sequence[Measurement], band: float) -> dict[str, float]:
+    """By channel the largest rms, of any record, of what scatters between repetitions beyond white noise up to `band`
+    [Hz], over that of the channel's fluctuation; empty where there is one repetition only."""
+    largest: dict[str, float] = {}
     for measured in measurements:
         if measured.repetitions < 2:
             continue
-        for name, repetitions in measured.periods.items():
-            if name.startswith("temperature"):
-                continue
-            lines = np.fft.rfft(repetitions, axis=-1)[:, 1:]
+        for name, repetitions in measured_channels(measured).items():
+            last = int(band * repetitions.shape[-1] / measured.sampling_rate)
+            lines = np.fft.rfft(repetitions, axis=-1)[:, 1 : max(last, 2)]
             apart = (np.abs(lines - lines.mean(axis=0)) ** 2).sum(axis=0) / (len(lines) - 1)
             white = float(np.median(apart)) / np.log(2.0)
             coloured = float(apart[apart > COLOURED * white].sum())
             level = float((np.abs(lines.mean(axis=0)) ** 2).sum())
             if level > 0.0:
-                largest = max(largest, float(np.sqrt(coloured / level)))
+                largest[name] = max(largest.get(name, 0.0), float(np.sqrt(coloured / level)))
     return largest
 
 

@@ -25,7 +25,8 @@ from gearbench.diagnosis.effects.torque_ripple import ORDERS
 from gearbench.diagnosis.forces.basis import waves
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.intake.signals import measured_channels
-from gearbench.diagnosis.output.layout import ACROSS, ENCODER, GAIN, Layout
+from gearbench.diagnosis.output.layout import Layout
+from gearbench.diagnosis.output.structure import ENCODER, GAIN, STRUCTURE_MOVED
 from gearbench.diagnosis.output.target import Target
 
 if TYPE_CHECKING:
@@ -37,7 +38,7 @@ Flags = NDArray[np.bool_]
 Integers = NDArray[np.int64]
 
 # Moved and simulated, by this part of their standard deviation as background.
-MOVED = (FRICTION, COMPLIANCE, ACROSS)
+MOVED = (FRICTION, COMPLIANCE, *STRUCTURE_MOVED)
 SMALLEST = 1e-4  # of a support's reference deflection, below which its logarithm is cut
 STEP = 0.05
 

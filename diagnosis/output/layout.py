@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import exp
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,25 +25,18 @@ from gearbench.diagnosis.effects.tooth_crack import LARGEST
 from gearbench.diagnosis.effects.torque_ripple import KEY as RIPPLE
 from gearbench.diagnosis.forces.condition import Condition
 from gearbench.diagnosis.forces.nominal import NominalModel
-from gearbench.diagnosis.forces.unknowns import Group, Unknowns, group, unknowns_of
+from gearbench.diagnosis.forces.unknowns import Group, Unknowns, unknowns_of
+from gearbench.diagnosis.output.structure import held, sensed, structure_groups
 from gearbench.geometry import pair
 from gearbench.lumped.nonlinear.law import MeshLaw
-from gearbench.rig import Across, Case, Rig
+from gearbench.rig import Case, Rig
 from gearbench.rig.gear import Crack
 
 Array = NDArray[np.float64]
 
 # Of the background those that no field of a rig holds.
 FORCES_ONLY = ("curvature", "compliance", "radial")
-# Compliance of a support across over that along: bearings are several times stiffer across than pedestals along.
-ACROSS, ACROSS_SD, ACROSS_LARGEST = "across", 0.15, 1.0
-# Gain of the reaction's sensor: torque sensors are good to a few tenths of a per cent, their mounting to one.
-GAIN, GAIN_SD = "gain", 0.01
-# Encoder run-out along the base circle [m]: what grating and centring of a good encoder leave.
-ENCODER, ENCODER_SD = "encoder", 0.2e-6
 NEARLY_RIGID = 1e-3  # compliance of a coupling below this part of its prior is left out of the rig
-# Across: softer than the former part of the support a rig has it, and then at least the latter: steps stay long.
-FELT, STIFFEST = 0.01, 0.03
 LEAST_LOSS = 1e-6
 MOST_MESH_RATIO = 0.49
 
@@ -68,6 +61,13 @@ class Layout:
         """Values of the unknowns as effects take them."""
         return Fitted(self.model, self.unknowns, p, np.zeros(p.size) if std is None else std, self.torque_mean)
 
+    @cached_property
+    def mesh_stiffness(self) -> float:
+        """Mean stiffness [N/m] of the nominal mesh at the largest load of its table."""
+        law = self.model.law
+        _, tangent = law.evaluate(law.approach[-1], np.arange(law.phases) / law.phases)
+        return self.model.scale * float(tangent.mean())
+
     def law_of(self, case: Case) -> MeshLaw:
         """The force law of the mesh of a rig of these unknowns."""
         return replace(self.model.law, backlash=max(pair(case.rig).backlash_normal, 0.0))
@@ -82,8 +82,8 @@ class Layout:
             if effect.name in ("friction", "eccentricity", "pitch-error", "backlash"):
                 rig = effect.add(rig, _all_of(effect.name), fitted)[0]
         rig = _cracked(rig, self, p)
-        rig = _supports(rig, self, p)
-        rig = _sensors(rig, self, p)
+        rig = held(_supports(rig, self, p), self.model, self.unknowns, p, self.mesh_stiffness)
+        rig = sensed(rig, self.model, self.unknowns, p, DELAYS)
         rig = _drive(rig, self, fitted, condition)
         return with_rig(case, rig)
 
@@ -100,12 +100,7 @@ def layout_of(
     groups: list[Group] = [one for one in background(model) if one.key not in FORCES_ONLY]
     for effect in LIBRARY:
         groups += effect.unknowns(model, conditions)
-    groups += [
-        group(ACROSS, "1", SIDES, ACROSS_SD, slot="structure", low=0.0, high=ACROSS_LARGEST),
-        group(GAIN, "1", ("torque_driven",), GAIN_SD, slot="structure", first=2),
-        group(ENCODER, "m", [f"{s}.{part}" for s in SIDES for part in ("cos", "sin")], ENCODER_SD,
-              slot="structure", first=3),
-    ]  # fmt: skip
+    groups += structure_groups(nominal.rig)
     # Bases belong to force residuals: here unknowns are moved one by one.
     plain = [replace(one, basis=None) for one in groups]
     means = {condition.name: condition.torque_mean for condition in conditions}
@@ -127,36 +122,12 @@ def _cracked(rig: Rig, layout: Layout, p: Array) -> Rig:
 def _supports(rig: Rig, layout: Layout, p: Array) -> Rig:
     unknowns, model = layout.unknowns, layout.model
     update = {}
-    soft = p[unknowns[ACROSS]]
     for number, side in enumerate(SIDES):
         support = getattr(rig.support, side)
         exponent = model.exponent[number] + float(p[unknowns[BEARINGS[side]]][0])
-        more: dict[str, object] = {}
-        if exponent:
-            more |= {"exponent": exponent, "reference_deflection": model.reference[number]}
-        if support.across is None and soft.max() > FELT and support.stiffness is not None:
-            stiffness = support.stiffness / max(float(soft[number]), STIFFEST)
-            damping = support.damping * (stiffness / support.stiffness) ** 0.5
-            more["across"] = Across(stiffness=stiffness, damping=damping)
+        more = {"exponent": exponent, "reference_deflection": model.reference[number]} if exponent else {}
         update[side] = support.model_copy(update=more)
     return changed(rig, "support", **update)
-
-
-def _sensors(rig: Rig, layout: Layout, p: Array) -> Rig:
-    unknowns, sensors = layout.unknowns, rig.sensors
-    update = {}
-    for channel, key in DELAYS.items():
-        field = f"delay_{channel}"
-        update[field] = getattr(sensors, field) + float(p[unknowns[key]][0])
-    update["gain_torque_driven"] = sensors.gain_torque_driven * exp(float(p[unknowns[GAIN]][0]))
-    parts = p[unknowns[ENCODER]]
-    for number, side in enumerate(SIDES):
-        field, radius = f"encoder_runout_{side}", layout.model.base_radius[number]
-        phase = getattr(sensors, f"{field}_phase")
-        turning = getattr(sensors, field) * np.exp(1j * phase)
-        turning += (parts[2 * number] + 1j * parts[2 * number + 1]) / radius
-        update[field], update[f"{field}_phase"] = float(abs(turning)), float(np.angle(turning))
-    return changed(rig, "sensors", **update)
 
 
 def _drive(rig: Rig, layout: Layout, fitted: Fitted, condition: str | None) -> Rig:

@@ -17,6 +17,7 @@ from gearbench.diagnosis.effects.effect import Hypothesis
 from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.output.fit import Optimum, Sensitivity, cost_of, fit, sensitivity_of
 from gearbench.diagnosis.output.simulator import Simulator
+from gearbench.diagnosis.output.structure import housings
 
 Array = NDArray[np.float64]
 Report = Callable[[str], None]
@@ -75,6 +76,7 @@ def select(
     chosen = np.ones(unknowns.size, dtype=bool)
     report("simulating: background")
     begin = min(background, key=lambda p: cost_of(simulator, p, sd))
+    begin = min(housings(unknowns, begin), key=lambda p: cost_of(simulator, p, sd))
     first = sensitivity_of(simulator, begin, unknowns.prior(), chosen)
     base = fit(simulator, begin, sd, first, renewals=RENEWALS_BASE, chosen=chosen) if first else None
     if base is None:
@@ -213,6 +215,30 @@ def with_entered(simulator: Simulator, selection: Selection, one: Weighed) -> Se
     chosen = np.ones(simulator.layout.unknowns.size, dtype=bool)
     bare = _without(simulator, selection.base, [one.hypothesis], chosen)
     return replace(selection, bare=bare, best=one.optimum, entered=(one,))
+
+
+def only(simulator: Simulator, selection: Selection, kept: Sequence[Weighed]) -> Selection:
+    """The selection with only these of the effects that entered: the others go back to a background's size."""
+    base, unknowns = selection.base, simulator.layout.unknowns
+    chosen = np.ones(unknowns.size, dtype=bool)
+    if not kept:
+        return replace(selection, bare=base, best=base, entered=())
+    sd = base.sd
+    for one in kept:
+        sd = widened_prior(unknowns, sd, one.hypothesis)
+    p, near = selection.best.p, selection.best.sensitivity
+    p = np.where(sd > 0.0, np.clip(p, -3.0 * sd, 3.0 * sd), 0.0)
+    best = fit(simulator, p, sd, near, renewals=0, chosen=chosen) or selection.best
+    bare = _without(simulator, base, [one.hypothesis for one in kept], chosen)
+    return replace(selection, bare=bare, best=best, entered=tuple(kept))
+
+
+def taken_out(simulator: Simulator, selection: Selection, hypothesis: Hypothesis) -> Optimum:
+    """The optimum without any part of one of the effects that entered, all else fitted again."""
+    if len(selection.entered) == 1:
+        return selection.bare
+    chosen = np.ones(simulator.layout.unknowns.size, dtype=bool)
+    return _without(simulator, selection.best, [hypothesis], chosen)
 
 
 def _without(simulator: Simulator, base: Optimum, effects: Sequence[Hypothesis], chosen: NDArray[np.bool_]) -> Optimum:

@@ -17,9 +17,10 @@ from gearbench.diagnosis.evidence.problem import Problem
 from gearbench.diagnosis.evidence.search import Search
 from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.intake.measurements import Measurement
-from gearbench.diagnosis.output.layout import ACROSS, Layout, layout_of
+from gearbench.diagnosis.output.layout import Layout, layout_of
 from gearbench.diagnosis.output.selection import LIMIT, WORTH, Selection, Start, Weighed, select
 from gearbench.diagnosis.output.simulator import Simulate, Simulator
+from gearbench.diagnosis.output.structure import beginnings
 from gearbench.diagnosis.output.target import target_of
 from gearbench.rig import Case
 
@@ -28,7 +29,6 @@ Report = Callable[[str], None]
 
 # Part of the time without contact from which a record is too rough to follow downhill: small changes make jumps.
 LOSING = 0.01
-ACROSS_BEGIN = 0.15  # compliance across over along: below some per cent a rig does not show it
 SPACING = 0.15  # of the backlash, between the values that are tried
 CRACKED = 4  # teeth that may be cracked: those that the force residuals rank first
 
@@ -158,11 +158,8 @@ def carried_over(layout: Layout, unknowns: Unknowns, p: Array) -> Array:
 
 
 def _beginnings(layout: Layout, by_forces: Array) -> list[Array]:
-    """Where to begin without an effect: the nominal rig, and the force residuals' one with centres that do not and do
-    move across their supports."""
-    moving = by_forces.copy()
-    moving[layout.unknowns[ACROSS]] = ACROSS_BEGIN
-    return [np.zeros(layout.size), by_forces, moving]
+    """Where to begin without an effect: the nominal rig, and the force residuals' one without and with structure."""
+    return [np.zeros(layout.size), *beginnings(layout.unknowns, by_forces)]
 
 
 def _starts(

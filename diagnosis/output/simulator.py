@@ -97,6 +97,8 @@ class Simulator:
         unknowns = self.layout.unknowns
         low, high = unknowns.bounds()
         for key in (*MOVED, "inertia"):
+            if key not in unknowns.slices:
+                continue
             for index in range(*unknowns[key].indices(unknowns.size)):
                 if not chosen[index] or sd[index] <= 0.0 or out[index].any():
                     continue

@@ -45,7 +45,7 @@ class Block:
 @dataclass(frozen=True, eq=False)
 class Target:
     """Measured lines (K,) of all blocks in a row; `plan` says which: record, channel, line numbers. `of_line` (K,)
-    their blocks; floors s^2, independent counts n and sizes (blocks,)."""
+    their blocks; floors s^2, the noise in them, independent counts n and sizes (blocks,)."""
 
     measurements: tuple[Measurement, ...]
     plan: tuple[tuple[int, str, Integers], ...]
@@ -53,6 +53,7 @@ class Target:
     of_line: Integers
     blocks: tuple[Block, ...]
     floors: Array
+    noise: Array
     counts: Array
     sizes: Array
 
@@ -89,6 +90,7 @@ def target_of(measurements: Sequence[Measurement], conditions: Sequence[Conditio
     labels: list[Integers] = []
     blocks: list[Block] = []
     floors: list[float] = []
+    noises: list[float] = []
     counts: list[int] = []
     for number, (one, condition) in enumerate(zip(measurements, conditions, strict=True)):
         kinds, frequency = kinds_of(condition), frequencies(one)[: condition.bins]
@@ -105,7 +107,8 @@ def target_of(measurements: Sequence[Measurement], conditions: Sequence[Conditio
                 level = float(np.mean(np.abs(spectrum[inside]) ** 2))
                 label[inside] = len(blocks)
                 blocks.append(Block(one.name, channel, kind, band))
-                floors.append(float(noise[inside].mean()) + LEVEL**2 * level + leak + TINY)
+                noises.append(float(noise[inside].mean()))
+                floors.append(noises[-1] + LEVEL**2 * level + leak + TINY)
                 counts.append(min(INDEPENDENT, int(inside.sum())))
             kept = np.flatnonzero(label >= 0)
             plan.append((number, channel, kept))
@@ -119,6 +122,7 @@ def target_of(measurements: Sequence[Measurement], conditions: Sequence[Conditio
         of_line,
         tuple(blocks),
         np.array(floors),
+        np.array(noises),
         np.array(counts, dtype=float),
         np.bincount(of_line, minlength=len(blocks)).astype(float),
     )

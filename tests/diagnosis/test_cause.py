@@ -26,7 +26,7 @@ def test_torque_ripple_from_records_to_the_rig_that_has_it() -> None:
     steps: list[str] = []
     found = find_cause([base], nominal, report=steps.append)
 
-    assert (found.verdict, found.place) == ("effect", "drive")
+    assert (found.verdict, found.place) == ("effects", "drive")
     assert [effect.name for effect in found.effects] == ["torque-ripple"]
     assert found.probability["effect"] > 0.9 and sum(found.probability.values()) == pytest.approx(1.0)
     assert found.candidates[0].effects == ("torque-ripple",)

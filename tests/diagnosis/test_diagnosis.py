@@ -31,7 +31,7 @@ def sets() -> list[xr.Dataset]:
 
 def test_datasets_and_files_are_diagnosed_alike(tmp_path: Path) -> None:
     made = diagnose(sets(), nominal())
-    assert isinstance(made, Diagnosis) and made.verdict.verdict == "effect"
+    assert isinstance(made, Diagnosis) and made.verdict.verdict == "effects"
     assert [one.name for one in made.inputs.measurements] == ["base", "light"]
     assert made.inputs.held_out is not None and made.verdict.held_out == "held-out"
     assert list(made.stages) == ["nominal", "recalibrated", "with_effect"]

@@ -14,28 +14,34 @@ from gearbench.diagnosis.errors import DiagnosisError
 from gearbench.diagnosis.verdict import (
     Candidate,
     Effect,
+    Found,
     Gap,
     Parameter,
+    Part,
     Probabilities,
     Range,
     Share,
     Verdict,
     parse_verdict,
     read_verdict,
+    verdict_json,
     write_verdict,
 )
 from gearbench.files import FileError
 
 # As another program would write it from the specification.
 TREE: dict[str, Any] = {
-    "schema": "gearbench-verdict/1",
-    "verdict": "effect",
+    "schema": "gearbench-verdict/2",
+    "verdict": "effects",
     "probability": {"effect": 0.9, "none": 0.04, "unknown": 0.06},
     "effects": [
         {
             "name": "friction",
             "probability": 0.88,
-            "parameters": {"coefficient": {"value": 0.05, "std": 0.01, "unit": ""}},
+            "due": True,
+            "parameters": {"coefficient": {"value": 0.05, "low": 0.04, "high": 0.07, "unit": ""}},
+            "share": 0.75,
+            "closes": {"dte": [1.5, 1.2, 1.9]},
         }
     ],
     "candidates": [
@@ -43,6 +49,21 @@ TREE: dict[str, Any] = {
         {"effects": [], "log_evidence": -90, "held_out": None},
     ],
     "place": "mesh",
+    "because": ["the gap is closed"],
+    "explained": [
+        {
+            "channel": "dte", "band_hz": [0, 200], "place": "mesh", "size": 2.2, "low": 2, "high": 2.5, "unit": "um",
+            "share": 0.6, "floors": 220,
+        }
+    ],
+    "remainder": [
+        {
+            "channel": "force", "band_hz": [0, 200], "place": "drive", "size": 12, "low": 12, "high": 12, "unit": "N",
+            "share": 0.1, "floors": None,
+        }
+    ],
+    "structure": [{"name": "housing", "value": 0.06, "low": 0.05, "high": 0.07, "unit": "1"}],
+    "limits": "population",
     "where": [{"kind": "channel", "name": "dte", "share": 0.75, "floor": 0.02}],
     "gap": [
         {
@@ -62,11 +83,16 @@ TREE: dict[str, Any] = {
 }
 
 VERDICT = Verdict(
-    verdict="effect",
+    verdict="effects",
     probability=Probabilities(effect=0.9, none=0.04, unknown=0.06),
     effects=(
         Effect(
-            name="friction", probability=0.88, parameters={"coefficient": Parameter(value=0.05, std=0.01, unit="")}
+            name="friction",
+            probability=0.88,
+            due=True,
+            parameters={"coefficient": Parameter(value=0.05, low=0.04, high=0.07, unit="")},
+            share=0.75,
+            closes={"dte": Range(value=1.5, low=1.2, high=1.9)},
         ),
     ),
     candidates=(
@@ -74,6 +100,17 @@ VERDICT = Verdict(
         Candidate(effects=(), log_evidence=-90.0),
     ),
     place="mesh",
+    because=("the gap is closed",),
+    explained=(
+        Part(channel="dte", band_hz=(0.0, 200.0), place="mesh", size=2.2, low=2.0, high=2.5, unit="um", share=0.6,
+             floors=220.0),
+    ),
+    remainder=(
+        Part(channel="force", band_hz=(0.0, 200.0), place="drive", size=12.0, low=12.0, high=12.0, unit="N",
+             share=0.1),
+    ),
+    structure=(Found(name="housing", value=0.06, low=0.05, high=0.07, unit="1"),),
+    limits="population",
     where=(Share(kind="channel", name="dte", share=0.75, floor=0.02),),
     gap=(
         Gap(
@@ -107,6 +144,20 @@ def test_what_is_written_is_the_specified_file(tmp_path: Path) -> None:
     assert list(tree) == list(TREE)
     assert read_verdict(path) == VERDICT
     assert [entry.name for entry in tmp_path.iterdir()] == ["verdict.json"]
+
+
+def test_version_1_reads_as_what_it_says_now() -> None:
+    old = {key: TREE[key] for key in ("candidates", "place", "where", "gap", "held_out", "indistinguishable", "advice")}
+    five = {"value": 5, "std": 1, "unit": ""}
+    effect = {"name": "friction", "probability": 0.88, "parameters": {"coefficient": five}}
+    tree = {"schema": "gearbench-verdict/1", "verdict": "effect", "probability": TREE["probability"], **old}
+    found = parse_verdict(json.dumps(tree | {"effects": [effect]}))
+    assert found.verdict == "effects" and found.gap == VERDICT.gap and found.effects[0].due is None
+    parameter = found.effects[0].parameters["coefficient"]
+    # Nine of ten draws of a normal distribution lie within 1.645 standard deviations.
+    assert (parameter.low, parameter.high) == (pytest.approx(3.3551, abs=1e-4), pytest.approx(6.6449, abs=1e-4))
+    assert parameter.std == pytest.approx(1.0)
+    assert parse_verdict(verdict_json(found)) == found
 
 
 def test_minimal_verdict_of_a_foreign_program() -> None:
@@ -155,25 +206,28 @@ def drop(*path: Any) -> Callable[[dict[str, Any]], None]:
 
 
 DEFECTS: list[tuple[Callable[[dict[str, Any]], None], str]] = [
-    (put("schema", "gearbench-verdict/2"), 'schema is "gearbench-verdict/2", but a verdict has "gearbench-verdict/1"'),
+    (put("schema", "gearbench-verdict/3"), 'schema is "gearbench-verdict/3", but a verdict has "gearbench-verdict/2"'),
     (drop("schema"), "schema is null"),
     (drop("place"), "key place is missing"),
     (drop("where", 0, "floor"), "key where.0.floor is missing"),
     (put("plase", "mesh"), "key plase is unknown; did you mean place?"),
     (put("where", 0, "shar", 1), "key where.0.shar is unknown; did you mean share?"),
     (put("place", "housing"), "place must be one of 'mesh', 'driver-support', 'driven-support', 'drive', 'load',"),
-    (put("verdict", "maybe"), "verdict must be one of 'effect', 'none' or 'unknown'"),
+    (put("verdict", "maybe"), "verdict must be one of 'effects', 'none' or 'unknown'"),
     (put("probability", "none", 0.5), "probability: effect + none + unknown = 1.46 must be 1"),
     (put("probability", {"effect": 1.2, "none": -0.2, "unknown": 0}), "probability.effect should be less than"),
     (put("probability", "none", float("nan")), "holds NaN, but numbers must be finite"),
     (put("candidates", 0, "log_evidence", float("-inf")), "holds -Infinity, but numbers must be finite"),
-    (put("effects", []), 'effects is empty, but verdict "effect" names at least one'),
+    (put("effects", []), 'effects is empty, but verdict "effects" names at least one'),
     (put("verdict", "unknown"), 'effects names friction, but verdict "unknown" names none'),
     (put("effects", 0, "name", ""), "effects.0.name"),
     (put("effects", 0, "probability", "0.9"), "effects.0.probability should be a valid number"),
     (put("effects", 0, "probability", True), "effects.0.probability should be a valid number"),
     (put("effects", TREE["effects"] * 2), 'effects names "friction" 2 times, must once'),
-    (put("effects", 0, "parameters", "coefficient", "std", -1), "effects.0.parameters.coefficient.std should be"),
+    (put("effects", 0, "parameters", "coefficient", "low", 0.06), "effects.0.parameters.coefficient: value 0.05"),
+    (put("effects", 0, "parameters", "coefficient", {"value": 1, "std": -1, "unit": ""}), "effects.0.param"),
+    (put("effects", 0, "closes", "dte", [1, 2]), "effects.0.closes.dte: must be a list of three numbers"),
+    (put("remainder", 0, "place", "housing"), "remainder.0.place must be one of 'mesh'"),
     (put("where", 0, "share", 1.5), "where.0.share should be less than or equal to 1"),
     (put("where", 0, "share", -0.1), "where.0.share should be greater than or equal to 0"),
     (put("where", 0, "kind", "row"), "where.0.kind must be one of 'channel', 'band'"),

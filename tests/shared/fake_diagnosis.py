@@ -29,6 +29,10 @@ class Finding:
     indistinguishable: tuple[tuple[str, ...], ...] = ()
     advice: tuple[str, ...] = ()
     calls: list = field(default_factory=list)
+    because: tuple[str, ...] = ("it was made by hand",)
+    structure: tuple = ()
+    missing: None = None
+    places: tuple[str, ...] = ()
 
 
 def recalibrated(nominal: Case) -> Case:
@@ -48,7 +52,7 @@ def with_friction(case: Case, coefficient: float = 0.0581) -> Case:
 def friction_found(nominal: Case) -> Finding:
     """A finding that blames friction."""
     base = recalibrated(nominal)
-    parameter = Parameter(value=0.0581, std=0.0012, unit="")
+    parameter = Parameter(value=0.0581, low=0.0581 - 1.645 * 0.0012, high=0.0581 + 1.645 * 0.0012, unit="")
     scores = {
         ("friction",): 0.0, ("pitch-error",): -38.4, ("tooth-crack",): -120.0, (): -151.2, ("backlash",): -152.0,
         ("coupling",): -140.0, ("torque-ripple",): -149.0, ("sensor-delay",): -150.5,
@@ -56,11 +60,11 @@ def friction_found(nominal: Case) -> Finding:
     }
     places = {"mesh": 0.81, "driver-support": 0.11, "driven-support": 0.05, "drive": 0.02, "load": 0.01}
     return Finding(
-        "effect",
+        "effects",
         {"effect": 0.969, "none": 0.003, "unknown": 0.028},
         base,
         with_friction(base),
-        (Effect(name="friction", probability=0.96, parameters={"coefficient": parameter}),),
+        (Effect(name="friction", probability=0.96, due=True, parameters={"coefficient": parameter}),),
         tuple(Candidate(effects=names, log_evidence=1e4 + score) for names, score in scores.items()),
         "mesh",
         tuple(Share(kind="place", name=name, share=share, floor=0.02) for name, share in places.items()),

@@ -38,6 +38,7 @@ def target(lines: np.ndarray, floor: float = 1e-6) -> Target:
         of_line=of_line,
         blocks=blocks,
         floors=np.full(BLOCKS, floor),
+        noise=np.zeros(BLOCKS),
         counts=np.full(BLOCKS, 8.0),
         sizes=np.bincount(of_line).astype(float),
     )

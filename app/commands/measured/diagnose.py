@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from gearbench.rig import Case
 
 PICTURES = {
+    "waterfall": "What recalibration and each effect take off the gap, step by step.",
     "where": "Shares of the gap between the records and the nominal rig.",
     "gap": "Rms gap from the nominal rig to the noise floor, channel by channel.",
     "traces": "What remains between the record and its simulations: in time, and by frequency.",
@@ -54,7 +55,7 @@ def diagnose(
     """Diagnose the gap between records and the nominal rig: where it is, what causes it, how far it shrinks."""
     nominal = load_case(rig, settings)
     from gearbench.diagnosis.diagnosis import take_in
-    from gearbench.words.diagnosis import confidence, headline
+    from gearbench.words.diagnosis import confidence, headline, sentences
 
     with Progress(f"diagnose {nominal.name}") as progress:
         progress.step("reading")
@@ -68,6 +69,8 @@ def diagnose(
         return
     typer.echo(headline(diagnosis.verdict))
     typer.echo(confidence(diagnosis.verdict))
+    for sentence in sentences(diagnosis.verdict):
+        typer.echo(f"  {sentence}")
     typer.echo(f"{out}: report.html, verdict.json, updated.toml")
 
 
@@ -79,7 +82,7 @@ def diagnosis_in(output: Output, inputs: Inputs, progress: Callable[[str], None]
 
     if all(output.has(name) for name in ("verdict.json", "recalibrated.toml", "updated.toml")):
         verdict = read_verdict(output.path("verdict.json"))
-        updated = read_case(output.path("updated.toml")) if verdict.verdict == "effect" else None
+        updated = read_case(output.path("updated.toml")) if verdict.verdict == "effects" else None
         return Diagnosis(inputs, verdict, read_case(output.path("recalibrated.toml")), updated)
     made = diagnosed(inputs, progress)
     output.write("recalibrated.toml", partial(_write_case, made.recalibrated))
@@ -109,6 +112,7 @@ def report_of(diagnosis: Diagnosis) -> Report:
     from gearbench.diagnosis.replay.traces import traces_of
     from gearbench.figures.diagnosis import draw_where
     from gearbench.figures.diagnosis_gap import draw_gap, draw_traces
+    from gearbench.figures.diagnosis_waterfall import draw_waterfall
     from gearbench.report.diagnosis import Report
 
     verdict, inputs = diagnosis.verdict, diagnosis.inputs
@@ -116,6 +120,9 @@ def report_of(diagnosis: Diagnosis) -> Report:
     if verdict.where:
         draws["where"] = partial(draw_where, shares=verdict.where)
     if verdict.gap:
+        draws["waterfall"] = partial(
+            draw_waterfall, gaps=verdict.gap, effects=verdict.effects, record=inputs.judged.name
+        )
         draws["gap"] = partial(draw_gap, gaps=verdict.gap, record=inputs.judged.name)
         simulate = replays_of(inputs.nominal, inputs.all)
         traces = traces_of(verdict.gap[0].channel, inputs.judged, diagnosis.stages, simulate)

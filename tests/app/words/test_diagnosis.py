@@ -105,7 +105,7 @@ def test_the_sentences_of_a_verdict() -> None:
     gaps = (gap("dte", (0.0, 200.0), 9e-6, 1e-6), whole, gap("dte", (0.0, 0.0), 1e-5, 0.0))
     assert whole_band(gaps) == [whole]
     found = Verdict(
-        verdict="effect", probability=Probabilities(effect=0.9, none=0.0, unknown=0.1), place="drive", gap=gaps,
+        verdict="effects", probability=Probabilities(effect=0.9, none=0.0, unknown=0.1), place="drive", gap=gaps,
         effects=(Effect(name="coupling", probability=0.8), Effect(name="torque-ripple", probability=0.7)),
     )
     assert headline(found) == "An elastic coupling and ripple of the driving torque explain the gap."

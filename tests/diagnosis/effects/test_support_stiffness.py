@@ -66,7 +66,7 @@ def test_its_prior_is_wide_for_one_support_alone(prepared: Prepared) -> None:
     assert np.flatnonzero(wide != plain).tolist() == [at]
 
 
-@pytest.mark.parametrize(("size", "verdict"), [(2.9, "none"), (3.1, "effect")])
+@pytest.mark.parametrize(("size", "verdict"), [(2.9, "none"), (3.1, "effects")])
 def test_it_is_named_beyond_three_standard_deviations(prepared: Prepared, size: float, verdict: str) -> None:
     one = np.ones(1)
     fit = Fit(one, one, np.eye(1), np.eye(1), one, (), 0.0, 0.0, 1)

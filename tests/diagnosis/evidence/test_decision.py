@@ -50,7 +50,7 @@ def decided(
     decision = decide(found, silent, unsteady, limits)
     assert sum(decision.probability.values()) == pytest.approx(1.0)
     assert min(decision.probability.values()) >= 0.0
-    assert (decision.winner is not None) == (decision.verdict == "effect")
+    assert (decision.winner is not None) == (decision.verdict == "effects")
     return decision
 
 
@@ -61,7 +61,7 @@ def at(number: int, value: float) -> np.ndarray:
 def test_the_effect_with_most_evidence_is_named_at_its_place() -> None:
     weak, strong = effect("friction", 8.0), effect("coupling", 12.0, place="drive")
     found = decided(weak, strong, free("mesh", 3.0))
-    assert (found.verdict, found.place) == ("effect", "drive")
+    assert (found.verdict, found.place) == ("effects", "drive")
     assert found.winner is strong
     assert found.probability["effect"] > 0.8
 
@@ -94,7 +94,7 @@ def test_an_effect_below_its_own_limit_gives_way_to_one_above() -> None:
 def test_a_large_rival_without_clearance_silences_a_weak_effect() -> None:
     assert decided(effect("pitch-error", 29.0), effect("friction", 14.0)).verdict == "none"
     small = effect("pitch-error", 29.0, size=1.9)
-    assert decided(small, effect("friction", 14.0)).verdict == "effect"
+    assert decided(small, effect("friction", 14.0)).verdict == "effects"
 
 
 def test_more_evidence_makes_an_effect_more_probable_and_none_less() -> None:
@@ -106,7 +106,7 @@ def test_more_evidence_makes_an_effect_more_probable_and_none_less() -> None:
 
 def test_a_free_form_that_explains_clearly_more_refutes_an_effect() -> None:
     # 1.5 * 20 + 20 = 50
-    assert decided(effect("friction", 20.0), free("drive", 49.0)).verdict == "effect"
+    assert decided(effect("friction", 20.0), free("drive", 49.0)).verdict == "effects"
     found = decided(effect("friction", 20.0), free("drive", 51.0))
     assert (found.verdict, found.place) == ("unknown", "drive")
     # Without an effect its own limit counts.
@@ -122,14 +122,14 @@ def test_a_force_beyond_its_limit_is_an_unknown_cause_there(number: int, place: 
     limit = HAND.silent[place]
     found = decided(strong, silent=at(number, 1.1 * limit))
     assert (found.verdict, found.place) == ("unknown", place)
-    assert decided(strong, silent=at(number, 0.9 * limit)).verdict == "effect"
+    assert decided(strong, silent=at(number, 0.9 * limit)).verdict == "effects"
     found = decided(effect("friction", 1e4), unsteady=at(number, 1.1 * HAND.unsteady[place]))
     assert (found.verdict, found.place) == ("unknown", place)
-    assert decided(strong, unsteady=at(number, 0.9 * HAND.unsteady[place])).verdict == "effect"
+    assert decided(strong, unsteady=at(number, 0.9 * HAND.unsteady[place])).verdict == "effects"
 
 
 def test_an_effect_that_explains_more_than_is_left_stays() -> None:
-    assert decided(effect("friction", 700.0), silent=at(4, 600.0)).verdict == "effect"
+    assert decided(effect("friction", 700.0), silent=at(4, 600.0)).verdict == "effects"
 
 
 def test_the_place_furthest_beyond_its_limit_gives_the_place() -> None:

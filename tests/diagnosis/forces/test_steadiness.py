@@ -18,7 +18,7 @@ from gearbench.diagnosis.forces.condition import prepare
 from gearbench.diagnosis.forces.covariance import BLOCK
 from gearbench.diagnosis.forces.equations import PLACES
 from gearbench.diagnosis.forces.nominal import NominalModel, nominal_model
-from gearbench.diagnosis.forces.steadiness import excess_of, unsteadiness
+from gearbench.diagnosis.forces.steadiness import excess_of, quiet_level, unsteadiness
 from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.intake.measurements import Measurement, measurement
 from gearbench.rig import Case, Ripple, read_case
@@ -69,6 +69,22 @@ def bench() -> Bench:
 def test_white_noise_counts_for_nothing(bench: Bench) -> None:
     assert bench.unsteadiness().max() < 10
     assert bench.unsteadiness(periods=12, noise=30.0).max() < 10  # its size is read off the record
+
+
+def test_noise_of_any_colour_counts_for_nothing(bench: Bench) -> None:
+    """What an equation makes of noise need not be known: a hundred times more of it in the resonance of a shaft."""
+    turn = np.random.default_rng(8)
+    shape = (2, 4, 4000)
+    colour = 1 + 30 / (1 + ((np.arange(4000) - 2000) / 100) ** 2)
+    scatter = colour * (turn.standard_normal(shape) + 1j * turn.standard_normal(shape)) / 2
+    scatter = (scatter - scatter.mean(axis=0)) * np.sqrt(2)
+    quiet = np.arange(4000) % 5 > 0
+    level = quiet_level(scatter, quiet)
+    assert np.median(level / (0.5 * colour**2)) == pytest.approx(1.0, rel=0.15)
+    blind = np.ones((5, 4000))
+    assert excess_of(scatter, np.ones((4, 4000), complex), blind).max() > 1000
+    assert excess_of(scatter, np.ones((4, 4000), complex), np.maximum(blind, level.max(axis=0))).max() < 50
+    assert not quiet_level(scatter, np.arange(4000) < 10).any()
 
 
 def test_one_period_says_nothing(bench: Bench) -> None:

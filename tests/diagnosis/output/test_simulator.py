@@ -11,8 +11,9 @@ from gearbench.bench import simulate
 from gearbench.cases import case_files
 from gearbench.diagnosis.evidence.problem import problem_of
 from gearbench.diagnosis.intake.measurements import measurement
-from gearbench.diagnosis.output.layout import ACROSS, ENCODER, GAIN, Layout, layout_of
+from gearbench.diagnosis.output.layout import Layout, layout_of
 from gearbench.diagnosis.output.simulator import Simulator
+from gearbench.diagnosis.output.structure import ACROSS, CROSS, ENCODER, GAIN, HOUSING, MODE, SHAFT, housings
 from gearbench.diagnosis.output.target import target_of
 from gearbench.diagnosis.replay.replays import replays
 from gearbench.rig import read_case
@@ -95,10 +96,23 @@ def test_unknowns_make_the_rig_that_they_name(bench: Bench) -> None:
     p[unknowns[ENCODER].start + 3] = 1e-6
     p[unknowns["delay-y_driven"]] = 2e-5
     p[unknowns["ripple"].start : unknowns["ripple"].start + 2] = 0.0, 1.5
+    p[unknowns[CROSS]] = 0.1, -0.2
+    p[unknowns[HOUSING]], p[unknowns[MODE].start], p[unknowns[SHAFT]] = 0.06, -0.2, 0.5
     rig = layout.case(p, "base").rig
     assert rig.support.driver.stiffness == pytest.approx(1e8 * np.exp(0.1))
     assert rig.support.driver.across is not None and rig.support.driven.across is not None
     assert rig.support.driver.across.stiffness == pytest.approx(5 * 1e8 * np.exp(0.1))
+    # A tenth of the root of 1e8 and 5e8, softer or stiffer by the same factor.
+    assert rig.support.driver.across.coupling == pytest.approx(0.1 * np.sqrt(5) * 1e8 * np.exp(0.1))
+    # 6 % of the supports' compliance; gears of 2 and 3 kg on 1e8 N/m: 2.5 kg on average; a twentieth of critical.
+    housing, frequency = rig.housing, np.sqrt(1e8 / 2.5) * np.exp(-0.2)
+    assert housing is not None and housing.stiffness == pytest.approx(1e8 / 0.06)
+    assert np.sqrt(housing.stiffness / housing.mass) == pytest.approx(frequency)
+    assert housing.damping == pytest.approx(2 * 0.05 * frequency * housing.mass)
+    # Half as stiff at the base circle as the mesh of some 3e8 N/m is twice.
+    assert rig.load.coupling is not None and rig.load.coupling.stiffness is not None
+    assert rig.load.coupling.stiffness / layout.model.base_radius[1] ** 2 == pytest.approx(2 * layout.mesh_stiffness)
+    assert 2e8 < layout.mesh_stiffness < 5e8
     assert rig.friction.coefficient == pytest.approx(0.05)
     assert rig.driver.runout == pytest.approx(1e-5) and rig.driver.runout_phase == pytest.approx(np.arctan2(4, 3))
     assert rig.driver.crack is None  # a gear has one crack, and the largest loss is none of a tooth that may be
@@ -108,6 +122,12 @@ def test_unknowns_make_the_rig_that_they_name(bench: Bench) -> None:
     assert rig.drive.ripple is not None and rig.drive.ripple.amplitude[0] == pytest.approx(1.5)
     # 1.5 sin is 1.5 cos(.. - pi/2)
     assert rig.drive.ripple.phase[0] == pytest.approx(-np.pi / 2)
+
+
+def test_a_housing_is_tried_at_several_frequencies_where_the_nominal_rig_has_none(bench: Bench) -> None:
+    trials = housings(bench.layout.unknowns, np.zeros(bench.layout.size))
+    cases = [bench.layout.case(p).rig.housing for p in trials]
+    assert cases[0] is None and len({one.mass for one in cases[1:] if one is not None}) == len(cases) - 1 == 4
 
 
 def test_what_no_rig_may_have_is_no_answer(bench: Bench) -> None:

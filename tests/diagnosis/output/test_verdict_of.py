@@ -1,4 +1,4 @@
-"""Decisions on selections made by hand: what is named, what is refused, and where."""
+"""Decisions on what was judged, made by hand: what is named, what is refused, and where."""
 
 from __future__ import annotations
 
@@ -8,48 +8,46 @@ from typing import Any
 
 import numpy as np
 import pytest
-from shared.fake_simulator import LINES, target, unknowns
 
 from gearbench.diagnosis.effects.effect import Hypothesis, Wide
 from gearbench.diagnosis.effects.library import LIBRARY
 from gearbench.diagnosis.evidence.calibration import LIMITS
-from gearbench.diagnosis.output.verdict_of import Decided, decide_simulated
+from gearbench.diagnosis.output.missing import Missing
+from gearbench.diagnosis.output.verdict_of import GREATER, OUTSTANDING, STRUCTURE, Decided, decide_simulated
 
 EFFECT = next(one for one in LIBRARY if one.name == "friction")
 FRICTION = Hypothesis("friction", "mesh", (Wide("friction"),), effect=EFFECT)
 QUIET = np.zeros(5)
 HAND = replace(LIMITS, competitor_factor=1.5, competitor_offset=20.0, free=10.0)
-MEASURED = np.ones(LINES, dtype=complex)
 
 
 def decided(
     worth: float | None,
     *,
-    without: float = 0.5,
     left: float = 0.05,
-    size: float = 0.4,
+    remains: float = 0.05,
+    share: float = 0.2,
     free: float = 0.0,
-    silent: np.ndarray = QUIET,
+    excess: np.ndarray = QUIET,
     unsteady: np.ndarray = QUIET,
+    changing: float = 0.0,
 ) -> Decided:
-    """`worth` nats of friction (None: nothing entered); `without` and `left` of the fluctuation without and with it."""
-    p = np.zeros(unknowns().size)
-    p[3] = size
-    base: Any = SimpleNamespace(lines=MEASURED * (1 - without))
-    best: Any = SimpleNamespace(lines=MEASURED * (1 - left), p=p, sd=np.full(8, 0.5))
+    """`worth` nats of friction (None: nothing was kept), which closes `share` of the gap; `left` of the nominal gap,
+    `remains` of a channel's fluctuation in the end."""
     entered: tuple[Any, ...] = ()
     if worth is not None:
         entered = (SimpleNamespace(hypothesis=FRICTION, log_bayes_factor=worth),)
-    selection = SimpleNamespace(base=base, best=best if entered else base, entered=entered, weighed=entered)
-    found: Any = SimpleNamespace(
-        selection=selection,
-        layout=SimpleNamespace(unknowns=unknowns()),
-        simulator=SimpleNamespace(target=target(MEASURED)),
-        std=np.full(8, 1e-3),
+    judged: Any = SimpleNamespace(
+        found=SimpleNamespace(selection=SimpleNamespace(entered=entered, weighed=entered)),
+        closings={"friction": SimpleNamespace(without={})},
+        share=lambda signals: share,
+        left=left,
+        remains=remains,
     )
     form = SimpleNamespace(hypothesis=Hypothesis("free drive", "drive", ()), log_bayes_factor=free)
     forces: Any = SimpleNamespace(best_free=form if free else None, tried=())
-    made = decide_simulated(found, forces, silent, unsteady, HAND)
+    missing = Missing(excess, ((0.0, 100.0),), np.ones((1, 5)))
+    made = decide_simulated(judged, forces, missing, unsteady, changing, HAND)
     assert sum(made.probability.values()) == pytest.approx(1.0) and min(made.probability.values()) >= 0.0
     return made
 
@@ -58,34 +56,49 @@ def at(number: int, value: float) -> np.ndarray:
     return np.where(np.arange(5) == number, value, 0.0)
 
 
-def test_what_entered_is_named_at_its_place_unless_a_good_rig_has_as_much() -> None:
+def test_what_was_kept_is_named_at_its_place_even_if_a_remainder_stays() -> None:
     made = decided(40.0)
-    assert (made.verdict, made.place) == ("effect", "mesh") and made.probability["effect"] > 0.9
-    assert decided(40.0, size=0.015).verdict == "none"
-    assert decided(None, without=0.05).verdict == "none"
+    assert (made.verdict, made.place) == ("effects", "mesh") and made.probability["effect"] > 0.9
+    made = decided(40.0, left=0.9, remains=5 * STRUCTURE, excess=at(0, 50.0))
+    assert made.verdict == "effects" and made.probability["effect"] < 0.95
+    assert decided(None).verdict == "none"
 
 
-def test_probabilities_follow_the_evidence() -> None:
+def test_the_greater_part_unexplained_is_unknown_unless_any_rig_leaves_as_much() -> None:
+    much = {"left": 1.1 * GREATER, "remains": 1.1 * STRUCTURE}
+    assert decided(None, **much).verdict == "unknown" and decided(None, **much).place == "none"
+    assert decided(None, **much, excess=at(3, 2 * OUTSTANDING["driven-support"])).place == "driven-support"
+    assert decided(None, **(much | {"left": 0.9 * GREATER})).verdict == "none"
+    assert decided(None, **(much | {"remains": 0.9 * STRUCTURE})).verdict == "none"
+
+
+def test_a_place_that_stands_out_is_unknown_only_over_a_visible_remainder() -> None:
+    out = at(0, 1.1 * OUTSTANDING["drive"])
+    made = decided(None, remains=1.1 * STRUCTURE, excess=out)
+    assert (made.verdict, made.place) == ("unknown", "drive")
+    assert decided(None, remains=0.9 * STRUCTURE, excess=out).verdict == "none"
+    assert decided(None, remains=1.1 * STRUCTURE, excess=at(0, 0.9 * OUTSTANDING["drive"])).verdict == "none"
+
+
+def test_probabilities_follow_the_evidence_and_the_remainder() -> None:
     sure = [decided(worth).probability["effect"] for worth in (8.5, 12.0, 30.0)]
     assert sure[0] < sure[1] < sure[2] and sure[0] < 0.7
-    near, far = (decided(None, without=0.5, silent=at(0, value)).probability["unknown"] for value in (160.0, 1600.0))
+    stands = [at(0, factor * OUTSTANDING["drive"]) for factor in (1.1, 8.0)]
+    near, far = (decided(None, remains=9 * STRUCTURE, excess=one).probability["unknown"] for one in stands)
     assert 0.5 < near < far < 1.0
 
 
 def test_a_form_without_a_name_outbids_only_an_effect_that_leaves_the_gap() -> None:
-    assert decided(40.0, without=0.5, left=0.4, free=90.0).verdict == "unknown"
-    assert decided(40.0, without=0.5, left=0.4, free=70.0).verdict == "effect"
-    assert decided(40.0, without=0.5, left=0.05, free=900.0).verdict == "effect"
-    assert decided(None, without=0.5, free=11.0).place == "drive"
-    assert decided(None, without=0.17, free=900.0).verdict == "none"  # a rig's structure leaves as much
+    assert decided(40.0, free=90.0).verdict == "unknown"
+    assert decided(40.0, free=70.0).verdict == "effects"
+    assert decided(40.0, share=0.8, free=900.0).verdict == "effects"
+    assert decided(None, free=900.0).verdict == "none"
 
 
-def test_audits_refuse_what_changes_and_what_remains() -> None:
-    limit = HAND.unsteady["driven-support"]
-    made = decided(900.0, unsteady=at(3, 1.1 * limit))
-    assert (made.verdict, made.place) == ("unknown", "driven-support") and "repetition" in made.because
-    limit = HAND.silent["drive"]
-    assert decided(None, without=0.5, silent=at(0, 1.1 * limit)).place == "drive"
-    assert decided(None, without=0.5, silent=at(0, 0.9 * limit)).verdict == "none"
-    assert decided(None, without=0.05, silent=at(0, 1.1 * limit)).verdict == "none"
-    assert decided(40.0, silent=at(0, 1e4)).verdict == "effect"
+def test_what_changes_counts_by_its_part_of_the_gap() -> None:
+    out = at(3, 1.1 * HAND.unsteady["driven-support"])
+    made = decided(900.0, unsteady=out, changing=0.3)
+    assert (made.verdict, made.place) == ("unknown", "driven-support") and "repetition" in made.because[0]
+    assert decided(900.0, unsteady=out, changing=0.03).verdict == "effects"
+    assert decided(None, unsteady=out, changing=0.03).verdict == "none"
+    assert decided(900.0, unsteady=out, changing=0.3, share=0.8).verdict == "effects"

@@ -16,7 +16,7 @@ from gearbench.diagnosis.verdict import Effect, Parameter, Probabilities, Verdic
 from gearbench.rig import dump_case
 
 FRICTION = Verdict(
-    verdict="effect",
+    verdict="effects",
     probability=Probabilities(effect=0.9, none=0.05, unknown=0.05),
     effects=(
         Effect(name="friction", probability=0.9, parameters={"coefficient": Parameter(value=0.05, std=0.01, unit="1")}),

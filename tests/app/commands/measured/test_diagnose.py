@@ -122,7 +122,7 @@ def test_all_products_and_what_they_hold(done: tuple[Path, dict, str, str]) -> N
     assert {path.name for path in out.iterdir()} == PRODUCTS | {"run.json"}
     assert (asked["names"], asked["held_out"].name, asked["without"]) == (["base", "light"], "held-out", ())
     verdict = read_verdict(out / "verdict.json")
-    assert (verdict.verdict, verdict.held_out, verdict.place) == ("effect", "held-out", "mesh")
+    assert (verdict.verdict, verdict.held_out, verdict.place) == ("effects", "held-out", "mesh")
     # The simulation lacks half of the 2 um of mesh order 1: 1 um, rms 0.707.
     first = verdict.gap[0]
     assert (first.channel, first.record) == ("dte", "held-out")
@@ -161,7 +161,7 @@ def test_the_report_is_one_page_that_opens_offline(done: tuple[Path, dict, str, 
     assert len(held.ids) == len(set(held.ids))
     assert {reference[1:] for reference in held.references} <= set(held.ids)
     assert set(re.findall(r"url\(#([^)]+)\)", whole)) <= set(held.ids)
-    assert held.tags.count("svg") == 3 and held.tags.count("h1") == 1
+    assert held.tags.count("svg") == 4 and held.tags.count("h1") == 1
     words = " ".join(" ".join(held.words).split())
     for expected in (
         "Friction between the flanks explains the gap.",
@@ -231,7 +231,7 @@ def test_json_is_the_verdict(
     assert run(records, done[0], "--json") == 0
     printed = json.loads(capsys.readouterr().out)
     assert printed == json.loads((done[0] / "verdict.json").read_text())
-    assert printed["schema"] == "gearbench-verdict/1"
+    assert printed["schema"] == "gearbench-verdict/2"
 
 
 def test_one_period_without_y_and_held_out_is_diagnosed_and_the_loss_is_stated(tmp_path: Path, asked: dict) -> None:

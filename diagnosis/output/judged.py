@@ -1,0 +1,200 @@
+"""Selection held against the record that had no part in it: what each effect closes there.
+
+Every effect that entered is taken out alone, everything else is fitted again on the records of the search, and both
+rigs answer the judged record. An effect is kept if the record is more likely with it, and if its gap grows by a tenth
+or more without it in some part that can be told apart: a channel in one band, or in one kind of line.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.diagnosis.evidence.problem import Problem
+from gearbench.diagnosis.forces.condition import prepare
+from gearbench.diagnosis.intake.measurements import Measurement
+from gearbench.diagnosis.intake.signals import measured_channels, noise_of_mean
+from gearbench.diagnosis.output.selection import Weighed, only, taken_out
+from gearbench.diagnosis.output.simulated import Simulated
+from gearbench.diagnosis.output.target import FITTED, Target, target_of
+
+Array = NDArray[np.float64]
+
+# By how much the gap must grow without an effect for it to be named.
+DUE = 1.1
+# Nats by which the judged record must be more likely with it: odds of 20.
+GAIN = 3.0
+# Part of a channel's whole gap below which a part of it counts for nothing.
+SEEN = 0.05
+
+
+@dataclass(frozen=True)
+class Closing:
+    """What an effect closes of the judged record: nats gained, the largest factor by which the gap of some part grows
+    without it, that part in words (channel, kind of line or band), and the signals (channel -> (N,)) without it."""
+
+    gain: float
+    growth: float
+    part: tuple[str, str]
+    without: Mapping[str, Array]
+
+    @property
+    def due(self) -> bool:
+        """Whether the effect closes a part of the gap that the record can see."""
+        return self.gain > GAIN and self.growth > DUE
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A selection on the judged record `measured`: `found` with the effects that are kept, what each closes by its
+    hypothesis' name, the signals (channel -> (N,)) of the nominal rig, of the one without any of them and with all of
+    them, and what was entered but closes nothing."""
+
+    measured: Measurement
+    found: Simulated
+    closings: Mapping[str, Closing]
+    nominal: Mapping[str, Array]
+    plain: Mapping[str, Array]
+    signals: Mapping[str, Array]
+    dropped: tuple[Weighed, ...] = ()
+
+    @cached_property
+    def sizes(self) -> dict[str, Sizes]:
+        """Rms values by channel."""
+        out = {}
+        for channel, repetitions in measured_channels(self.measured).items():
+            if channel not in FITTED or channel not in self.signals:
+                continue
+            mean = repetitions.mean(axis=0)
+            noise = 0.0
+            if len(repetitions) > 1:
+                noise = float(np.sqrt((noise_of_mean(repetitions) ** 2).sum(axis=0).mean()))
+            nominal, plain, final = (_rms(mean - one[channel]) for one in (self.nominal, self.plain, self.signals))
+            out[channel] = Sizes(_rms(mean), nominal, plain, final, noise)
+        return out
+
+    @property
+    def left(self) -> float:
+        """Rms of what is left of the nominal gap, over it, all channels in units of their own fluctuation, beyond
+        noise."""
+        gap = left = 0.0
+        for one in self.sizes.values():
+            gap += max(one.nominal**2 - one.noise**2, 0.0) / one.fluctuation**2
+            left += max(one.final**2 - one.noise**2, 0.0) / one.fluctuation**2
+        return float(np.sqrt(left / gap)) if gap > 0.0 else 0.0
+
+    @property
+    def remains(self) -> float:
+        """The largest part of any channel's fluctuation that is left beyond noise."""
+        parts = (np.sqrt(max(s.final**2 - s.noise**2, 0.0)) / s.fluctuation for s in self.sizes.values())
+        return float(max(parts, default=0.0))
+
+    def share(self, without: Mapping[str, Array]) -> float:
+        """Part of the nominal gap, by energy and all channels in units of their fluctuation, that comes back in a rig
+        with those signals."""
+        gap = back = 0.0
+        for channel, one in self.sizes.items():
+            mean = measured_channels(self.measured)[channel].mean(axis=0)
+            gap += max(one.nominal**2 - one.noise**2, 0.0) / one.fluctuation**2
+            back += (_rms(mean - without[channel]) ** 2 - one.final**2) / one.fluctuation**2
+        return float(np.clip(back / gap, 0.0, 1.0)) if gap > 0.0 else 0.0
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """Rms of one channel on the judged record, without means: its own, of the gap of the nominal rig, of the one
+    without any effect and of the final one, and of the noise."""
+
+    fluctuation: float
+    nominal: float
+    plain: float
+    final: float
+    noise: float
+
+
+def judged_on(problem: Problem, found: Simulated, measured: Measurement) -> Judged | None:
+    """The selection with only those effects that close a part of the gap of `measured`; None where the rig found cannot
+    answer that record."""
+    target = target_of([measured], [prepare(measured, problem.model, problem.conditions[0].band)])
+    dropped: list[Weighed] = []
+    while True:
+        try:
+            judged = _closings(found, target, measured)
+        except ValueError:
+            return None
+        poor = [one for one in found.selection.entered if not judged.closings[one.hypothesis.name].due]
+        if not poor:
+            return replace(judged, dropped=tuple(dropped))
+        worst = min(poor, key=lambda one: judged.closings[one.hypothesis.name].gain)
+        kept = [one for one in found.selection.entered if one is not worst]
+        dropped.append(worst)
+        selection = only(found.simulator, found.selection, kept)
+        found = replace(found, selection=selection, std=selection.best.std)
+
+
+def itself(problem: Problem, found: Simulated) -> Judged:
+    """The selection on the first record that it was found from, where no other can be answered."""
+    measured = found.simulator.target.measurements[0]
+    judged = judged_on(problem, found, measured)
+    assert judged is not None  # its optimum has been simulated there
+    return judged
+
+
+def _closings(found: Simulated, target: Target, measured: Measurement) -> Judged:
+    simulator, selection = found.simulator, found.selection
+    signals = simulator.channels(selection.best.p, measured)
+    with_all = target.lines - target.gathered([signals])
+    closings = {}
+    for one in selection.entered:
+        without = simulator.channels(taken_out(simulator, selection, one.hypothesis).p, measured)
+        rest = target.lines - target.gathered([without])
+        gain = target.cost(rest) - target.cost(with_all)
+        growth, part = _growth(target, target.energies(rest), target.energies(with_all))
+        closings[one.hypothesis.name] = Closing(gain, growth, part, without)
+    nothing = np.zeros(simulator.layout.size)
+    nominal, plain = (simulator.channels(p, measured) for p in (nothing, selection.bare.p))
+    return Judged(measured, found, closings, nominal, plain, signals)
+
+
+def _growth(target: Target, without: Array, with_all: Array) -> tuple[float, tuple[str, str]]:
+    """The largest factor between the rms gaps without and with an effect (blocks,), over the parts of each channel that
+    hold a visible part of the gap without it, and which part that is."""
+    lost, kept = without * target.sizes, with_all * target.sizes
+    noise = target.noise * target.sizes
+    best, where = 0.0, ("", "")
+    for channel in dict.fromkeys(block.channel for block in target.blocks):
+        inside = np.array([block.channel == channel for block in target.blocks])
+        whole = float(lost[inside].sum())
+        parts = {(block.kind, f"{block.band}") for block in target.blocks if block.channel == channel}
+        for label in sorted({kind for kind, _ in parts} | {band for _, band in parts}):
+            mine = inside & np.array([label in (block.kind, f"{block.band}") for block in target.blocks])
+            if float(lost[mine].sum()) < SEEN**2 * whole:
+                continue
+            factor = float(np.sqrt(lost[mine].sum() / max(float(kept[mine].sum()), float(noise[mine].sum()), 1e-300)))
+            if factor > best:
+                best, where = factor, (channel, label)
+    return best, where
+
+
+def rms_closed(measured: Measurement, channel: str, without: Array, with_all: Array) -> tuple[float, float, float]:
+    """Rms (value, low, high) by which a channel's gap grows without an effect, with its 90 % interval: the lines of the
+    difference of energies, each counted as one draw."""
+    real = measured_channels(measured)[channel].mean(axis=0)
+    energy = _energy(real - without) - _energy(real - with_all)
+    total, spread = float(energy.sum()), 1.6449 * float(np.sqrt(0.5 * (energy**2).sum()))
+    value, low, high = (float(np.sqrt(max(one, 0.0))) for one in (total, total - spread, total + spread))
+    return value, low, high
+
+
+def _rms(values: Array) -> float:
+    return max(float(np.std(values)), 1e-300)
+
+
+def _energy(values: Array) -> Array:
+    energy = np.asarray(np.abs(np.fft.rfft(values) / values.size) ** 2, dtype=np.float64)
+    energy[1 : (values.size + 1) // 2] *= 2
+    return energy[1:]

@@ -1,0 +1,168 @@
+"""Structure of real rigs that a nominal case leaves out, as unknowns around "nearly none": supports that yield across
+their direction and couple both, a housing behind them, an elastic shaft behind the driven gear, sensor gain, encoders.
+
+Every unknown is a ratio to numbers of the nominal rig (compliance over compliance, logarithm of a frequency over that
+of the supports), so that priors hold for rigs of any size.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import exp, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.diagnosis.effects.effect import SIDES, changed
+from gearbench.diagnosis.forces.nominal import NominalModel
+from gearbench.diagnosis.forces.unknowns import Group, Unknowns, group
+from gearbench.diagnosis.verdict import NINE_OF_TEN, Found
+from gearbench.rig import Across, Housing, OutputShaft, Rig
+
+Array = NDArray[np.float64]
+
+# Compliance of a support across over that along: bearings are several times stiffer across than pedestals along.
+ACROSS, ACROSS_SD, ACROSS_LARGEST = "across", 0.15, 1.0
+# Stiffness that couples both directions over the root of their product: asymmetric pedestals have a tenth.
+CROSS, CROSS_SD, CROSS_LARGEST = "cross", 0.1, 0.7
+# Housing: compliance over the supports' mean one (half a per cent to ten are usual), logarithms of its frequency over
+# that of a gear on its support, and of its damping ratio over a twentieth.
+HOUSING, HOUSING_SD, HOUSING_LARGEST = "housing", 0.04, 0.5
+MODE, MODE_SD, MODE_LARGEST, HOUSING_RATIO = "housing-mode", 0.7, 2.0, 0.05
+# Shaft behind the driven gear: compliance over that of the mesh, both at the base circle.
+SHAFT, SHAFT_SD, SHAFT_LARGEST, SHAFT_RATIO = "shaft", 0.3, 10.0, 0.03
+# Gain of the reaction's sensor: torque sensors are good to a few tenths of a per cent, their mounting to one.
+GAIN, GAIN_SD = "gain", 0.01
+# Encoder run-out along the base circle [m]: what grating and centring of a good encoder leave.
+ENCODER, ENCODER_SD = "encoder", 0.2e-6
+# Softer than the former part a rig has it, and then at least the latter: steps stay long.
+FELT, STIFFEST = 0.01, 0.03
+SHAFT_FELT, SHAFT_STIFFEST = 0.03, 0.06
+NONE = 1e-4  # compliance of a housing below which there is none
+# Moved and simulated: no small force at an unchanged motion stands for them.
+STRUCTURE_MOVED = (ACROSS, CROSS, HOUSING, MODE, SHAFT)
+# What is told of the structure that was found.
+NAMES = (
+    (ACROSS, "support compliance across over along", "1"),
+    (CROSS, "support cross-coupling over root of both stiffnesses", "1"),
+    (HOUSING, "housing compliance over the supports'", "1"),
+    (SHAFT, "output shaft compliance over the mesh's", "1"),
+    (GAIN, "gain of the reaction torque (logarithm)", "1"),
+)
+# Where a fit begins with them: below some per cent a rig does not show them.
+ACROSS_BEGIN, HOUSING_BEGIN, SHAFT_BEGIN = 0.15, 0.04, 0.5
+
+
+def structure_groups(rig: Rig) -> list[Group]:
+    """The unknowns of what the nominal rig does not say of its structure."""
+    groups = [
+        group(ACROSS, "1", SIDES, ACROSS_SD, slot="structure", low=0.0, high=ACROSS_LARGEST),
+        group(CROSS, "1", SIDES, CROSS_SD, slot="structure", first=4, low=-CROSS_LARGEST, high=CROSS_LARGEST),
+        group(GAIN, "1", ("torque_driven",), GAIN_SD, slot="structure", first=2),
+        group(ENCODER, "m", [f"{s}.{part}" for s in SIDES for part in ("cos", "sin")], ENCODER_SD,
+              slot="structure", first=6),
+    ]  # fmt: skip
+    if rig.housing is None:
+        groups.append(group(HOUSING, "1", ("compliance",), HOUSING_SD, slot="structure", first=10, low=0.0,
+                            high=HOUSING_LARGEST))  # fmt: skip
+        groups.append(group(MODE, "1", ("frequency", "damping"), MODE_SD, slot="structure", first=11,
+                            low=-MODE_LARGEST, high=MODE_LARGEST))  # fmt: skip
+    if rig.load.boundary == "speed" and not rig.load.twists:
+        groups.append(group(SHAFT, "1", ("compliance",), SHAFT_SD, slot="structure", first=13, low=0.0,
+                            high=SHAFT_LARGEST))  # fmt: skip
+    return groups
+
+
+def beginnings(unknowns: Unknowns, p: Array) -> list[Array]:
+    """`p` (size,) without and with centres that move across their supports, and those with a shaft that twists."""
+    moving = p.copy()
+    moving[unknowns[ACROSS]] = ACROSS_BEGIN
+    out = [p, moving]
+    if SHAFT in unknowns.slices:
+        twisting = moving.copy()
+        twisting[unknowns[SHAFT]] = SHAFT_BEGIN
+        out.append(twisting)
+    return out
+
+
+def housings(unknowns: Unknowns, p: Array) -> list[Array]:
+    """`p` (size,), and the same with housings of several frequencies."""
+    out = [p]
+    if HOUSING in unknowns.slices:
+        for frequency in (-1.0, -0.5, 0.0, 0.5):
+            trial = p.copy()
+            trial[unknowns[HOUSING]] = HOUSING_BEGIN
+            trial[unknowns[MODE].start] = frequency
+            out.append(trial)
+    return out
+
+
+def held(rig: Rig, model: NominalModel, unknowns: Unknowns, p: Array, stiffness: float) -> Rig:
+    """The rig with its supports across, housing and output shaft; `stiffness` [N/m] is the mean one of the mesh."""
+    soft, cross = p[unknowns[ACROSS]], p[unknowns[CROSS]]
+    supports = {}
+    for number, side in enumerate(SIDES):
+        support = getattr(rig.support, side)
+        if support.across is None and soft.max() > FELT and support.stiffness is not None:
+            along, ratio = support.stiffness, 1.0 / max(float(soft[number]), STIFFEST)
+            across = Across(
+                stiffness=along * ratio,
+                damping=support.damping * ratio**0.5,
+                coupling=float(cross[number]) * along * ratio**0.5,
+            )
+            support = support.model_copy(update={"across": across})
+        supports[side] = support
+    rig = changed(rig, "support", **supports)
+    if HOUSING in unknowns.slices and p[unknowns[HOUSING]][0] > NONE:
+        housing = housing_of(model, np.concatenate([p[unknowns[HOUSING]], p[unknowns[MODE]]]))
+        rig = rig.model_copy(update={"housing": housing})
+    if SHAFT in unknowns.slices and p[unknowns[SHAFT]][0] > SHAFT_FELT:
+        soft_shaft = max(float(p[unknowns[SHAFT]][0]), SHAFT_STIFFEST)
+        twist = stiffness * model.base_radius[1] ** 2 / soft_shaft
+        damping = 2 * SHAFT_RATIO * sqrt(twist * model.inertia[1])
+        before = rig.load.coupling.inertia if rig.load.coupling is not None else 0.0
+        shaft = OutputShaft(inertia=before, stiffness=twist, damping=damping)
+        rig = changed(rig, "load", coupling=shaft)
+    return rig
+
+
+def housing_of(model: NominalModel, values: Array) -> Housing:
+    """The housing of compliance, frequency and damping as unknowns."""
+    compliance, frequency, damping = (float(value) for value in values)
+    mean = 2.0 / (1.0 / model.stiffness[0] + 1.0 / model.stiffness[1])
+    stiffness = mean / compliance
+    omega = sqrt(mean / (0.5 * (model.mass[0] + model.mass[1]))) * exp(frequency)
+    mass = stiffness / omega**2
+    return Housing(mass=mass, stiffness=stiffness, damping=2 * HOUSING_RATIO * exp(damping) * omega * mass)
+
+
+def sensed(rig: Rig, model: NominalModel, unknowns: Unknowns, p: Array, delays: Mapping[str, str]) -> Rig:
+    """The rig with its sensors' delays, gain and encoders."""
+    sensors, update = rig.sensors, {}
+    for channel, key in delays.items():
+        field = f"delay_{channel}"
+        update[field] = getattr(sensors, field) + float(p[unknowns[key]][0])
+    update["gain_torque_driven"] = sensors.gain_torque_driven * exp(float(p[unknowns[GAIN]][0]))
+    parts = p[unknowns[ENCODER]]
+    for number, side in enumerate(SIDES):
+        field, radius = f"encoder_runout_{side}", model.base_radius[number]
+        phase = getattr(sensors, f"{field}_phase")
+        turning = getattr(sensors, field) * np.exp(1j * phase)
+        turning += (parts[2 * number] + 1j * parts[2 * number + 1]) / radius
+        update[field], update[f"{field}_phase"] = float(abs(turning)), float(np.angle(turning))
+    return changed(rig, "sensors", **update)
+
+
+def structure_found(unknowns: Unknowns, p: Array, std: Array) -> tuple[Found, ...]:
+    """What stands out of the structure (beyond two standard deviations), each with its 90 % interval."""
+    out = []
+    for key, name, unit in NAMES:
+        if key not in unknowns.slices:
+            continue
+        for index, part in enumerate(unknowns.group(key).names):
+            at = unknowns[key].start + index
+            if abs(p[at]) > 2.0 * std[at] > 0.0:
+                reach = NINE_OF_TEN * std[at]
+                out.append(Found(name=f"{part}.{name}" if part in SIDES else name, value=float(p[at]),
+                                 low=float(p[at] - reach), high=float(p[at] + reach), unit=unit))  # fmt: skip
+    return tuple(out)
