@@ -2,12 +2,14 @@
 
 `excitation`: multisines and residue combs. `spectra`: from records to spectra of force and DTE. `lpm`: the local
 polynomial method. `truth`: periodic systems whose exact response is known. `response`: the dataset of a time-varying
-frequency response, natural frequencies against mesh phase. `feedback`: the mesh-feedback estimator.
+frequency response, natural frequencies against mesh phase. `feedback`: the mesh-feedback estimator. `nonlinear`:
+noise, even and odd distortion, operating response.
 """
 
 from gearbench.identification.excitation.multisine import MultisineError, MultisineSignal, random_phase_multisine
 from gearbench.identification.identify import IdentificationSettings, identify
 from gearbench.identification.lpm.local_solve import LpmError
+from gearbench.identification.nonlinear.split import DistortionError, distortion, is_coset
 from gearbench.identification.response.exact import exact_frf, frozen_frf
 from gearbench.identification.response.frf import FrfError, htf, itf, make_frf, read_frf, validate_frf, write_frf
 from gearbench.identification.response.modes import frozen_modes, itf_modes
@@ -26,6 +28,7 @@ from gearbench.identification.truth.periodic import (
 
 __all__ = [
     "AngleOnlyWarning",
+    "DistortionError",
     "FrfError",
     "IdentificationSettings",
     "LpmError",
@@ -35,6 +38,7 @@ __all__ = [
     "PeriodicSystemError",
     "SpectraError",
     "TransmissionError",
+    "distortion",
     "dte",
     "exact_frf",
     "exact_itf",
@@ -47,6 +51,7 @@ __all__ = [
     "htf",
     "htf_from_itf",
     "identify",
+    "is_coset",
     "itf",
     "itf_from_htf",
     "itf_modes",
