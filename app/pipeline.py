@@ -15,6 +15,7 @@ from gearbench.shell.checkpoints import checkpoints_of
 from gearbench.shell.failure import InputError
 from gearbench.shell.output import Output, claimed
 from gearbench.shell.progress import Silent, Steps
+from gearbench.words.distortion import distortion_numbers
 from gearbench.words.summary import honest_warning, summary_text
 
 if TYPE_CHECKING:
@@ -118,7 +119,7 @@ def run_experiment(job: Job) -> tuple[dict[str, Any], RunPart | None]:
     from gearbench.bench.statics import static
     from gearbench.figures.of_run import FIGURES, RunResults
     from gearbench.geometry import pair
-    from gearbench.identification import read_frf, write_frf
+    from gearbench.identification import distortion, is_coset, read_frf, write_frf
     from gearbench.records import read_dataset, read_record, write_dataset, write_record
     from gearbench.rig import dump_case
 
@@ -152,8 +153,10 @@ def run_experiment(job: Job) -> tuple[dict[str, Any], RunPart | None]:
     span = contact_span(meshing)
     zones = fewest_pairs(span)
     numbers = run_numbers(case, statics, record, results, modes, zones)
-    drawn = RunResults(statics, record, results, modes, zones, zone_label(span), honest_warning(numbers))
-    for figure in FIGURES:
+    split = distortion([record]) if is_coset([record]) else None
+    numbers |= {"distortion": distortion_numbers(split)} if split is not None else {}
+    drawn = RunResults(statics, record, results, modes, zones, zone_label(span), honest_warning(numbers), split)
+    for figure in (one for one in FIGURES if one.fits(drawn)):
         job.picture(figure.name, partial(figure.draw, drawn))
     about = ABOUT | {figure.name: figure.about for figure in FIGURES} | {"summary.json": "the numbers of this summary"}
     held = {*job.output.files(), job.name("summary.json")}

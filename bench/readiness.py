@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from gearbench.bench.models import model_for
-from gearbench.bench.plan.excitation import comb_for
+from gearbench.bench.plan.excitation import comb_for, coset_modulus
 from gearbench.bench.plan.schedule import schedule
 from gearbench.bench.refusals.gears import check_gears
 from gearbench.geometry.mesh.element_size import flank_size
@@ -27,6 +27,7 @@ def check_timing(case: Case) -> None:
     for experiment in experiments_of(case):
         schedule(experiment.experiment, experiment.rig)
         comb_for(experiment.experiment, experiment.rig)
+        coset_modulus(experiment.experiment, experiment.rig)
 
 
 def experiments_of(case: Case) -> list[Case]:

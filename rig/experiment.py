@@ -18,13 +18,14 @@ class Multisine(Value):
     amplitude: float | None = quantity(None, "nm", gt=0.0, doc="peak of the multisine torque (or give rms)")
     rms: float | None = quantity(None, "nm", gt=0.0, doc="rms of the multisine torque (or give amplitude)")
     band: tuple[float, float] = quantity(unit="hz", doc="lowest and highest excited frequency")
-    grid: Literal["full", "odd", "comb"] = quantity(
-        "full", doc="excited lines: all, the odd ones, or comb: +-residue modulo the hunting period's lines"
+    grid: Literal["full", "odd", "comb", "coset"] = quantity(
+        "full",
+        doc="excited lines: all, odd, comb: +-residue modulo the hunting period's, coset: +-1 modulo the mesh period's",
     )
     residue: int | None = quantity(
         None, ge=1, le=10**9, doc="comb: lines +-residue modulo lcm(teeth); absent: the one that overlaps least"
     )
-    crest: float = quantity(1.7, ge=1.5, doc="crest factor reached by clipping")
+    crest: float = quantity(1.7, ge=1.5, doc="crest factor reached by clipping (coset: 1.95 or more)")
 
     @model_validator(mode="after")
     def _one_size(self) -> Multisine:

@@ -43,6 +43,8 @@ ROOMS: dict[str, tuple[str, ...]] = {
         *("plan", "record", "refusals", "linear", "elastic", "full", "nonlinear", "stress", "export", "results"),
         "study",
     ),
+    "identification": ("excitation", "spectra", "lpm", "truth", "response", "feedback", "nonlinear"),
+    "bench": ("plan", "record", "refusals", "linear", "elastic", "full", "nonlinear", "stress", "export", "results"),
     "diagnosis": ("intake", "forces", "effects", "evidence", "replay", "output"),
     "challenge": ("truth", "making", "scoring"),
     "app": ("shell", "words", "figures", "report", "commands"),

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import xarray as xr
 
+from gearbench.figures.distortion import draw_distortion
 from gearbench.figures.frf import draw_itf, draw_natural_frequencies
 from gearbench.figures.record import draw_record, draw_spectra, draw_stiffness
 from gearbench.figures.static import plot_static
@@ -19,7 +20,7 @@ class RunResults(NamedTuple):
 
     responses: frequency responses (`identified` and, for lumped cases, `exact` and `frozen`); modes: natural
     frequencies from elsewhere; zones: mesh phases with the fewest pairs in contact, and their label; warning: what a
-    picture of the identified response must say.
+    picture of the identified response must say; distortion: what `identification.distortion` finds, if it can.
     """
 
     static: xr.Dataset
@@ -29,14 +30,16 @@ class RunResults(NamedTuple):
     zones: Sequence[Span]
     label: str
     warning: str
+    distortion: xr.Dataset | None = None
 
 
 class RunFigure(NamedTuple):
-    """A picture: the name of its file, a line for the summary, and how it is drawn."""
+    """A picture: the name of its file, a line for the summary, how it is drawn, and of which runs."""
 
     name: str
     about: str
     draw: Callable[[RunResults, Path], None]
+    fits: Callable[[RunResults], bool] = lambda run: True
 
 
 def _stiffness(run: RunResults, path: Path) -> None:
@@ -63,6 +66,11 @@ def _natural_frequencies(run: RunResults, path: Path) -> None:
     draw_natural_frequencies(path, {**run.responses, **run.modes}, run.zones, run.label, run.warning)
 
 
+def _distortion(run: RunResults, path: Path) -> None:
+    assert run.distortion is not None
+    draw_distortion(path, run.distortion)
+
+
 FIGURES = (
     RunFigure("transmission_error.png", "static transmission error over the mesh period", _transmission_error),
     RunFigure("stiffness.png", "mesh stiffness over the mesh period", _stiffness),
@@ -70,4 +78,10 @@ FIGURES = (
     RunFigure("spectrum.png", "spectrum of the DTE", _spectrum),
     RunFigure("itf.png", "magnitude of the ITF over frequency and mesh phase", _itf),
     RunFigure("natural_frequency.png", "natural frequency against mesh phase", _natural_frequencies),
+    RunFigure(
+        "distortion.png",
+        "response, noise, even and odd distortion, line by line",
+        _distortion,
+        lambda run: run.distortion is not None,
+    ),
 )

@@ -5,6 +5,8 @@ from __future__ import annotations
 from math import isfinite
 from typing import Any
 
+from gearbench.words.distortion import distortion_lines
+
 AGREES = 0.75  # identified and linearised ranges further apart than this ratio are not the same mode
 ENOUGH = 0.02  # expected rms error of the ITF above which pictures carry a warning
 
@@ -39,6 +41,8 @@ def headline(numbers: dict[str, Any]) -> list[str]:
 def summary_text(numbers: dict[str, Any]) -> str:
     """summary.md: the answers first, then the account of how far they go."""
     parts = ["  \n".join(headline(numbers)), f"# {numbers['case']}", *_account(numbers), *_what(numbers)]
+    if "distortion" in numbers:
+        parts += ["## Noise and distortion", "\n".join(distortion_lines(numbers["distortion"]))]
     return "\n\n".join([*(part for part in parts if part), *_files(numbers)]) + "\n"
 
 

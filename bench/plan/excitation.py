@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from gearbench.bench.errors import BenchError
 from gearbench.bench.plan.schedule import PHASE_DRIFT
 from gearbench.identification.excitation.comb import CombError, check_residue, hunting_teeth, ranked_residues
-from gearbench.identification.excitation.multisine import MultisineSignal, random_phase_multisine
+from gearbench.identification.excitation.multisine import COSET_LEAST, MultisineSignal, random_phase_multisine
 from gearbench.rig import Experiment, Rig
 
 Array = NDArray[np.float64]
@@ -96,6 +96,29 @@ def _teeth_in_period(experiment: Experiment, rig: Rig) -> int:
     )
 
 
+def coset_modulus(experiment: Experiment, rig: Rig) -> int:
+    """Lines to the mesh frequency of a coset: mesh periods in one excitation period; 0 where the grid is another.
+
+    Raises BenchError unless they are an even number of at least COSET_LEAST.
+    """
+    if experiment.multisine is None or experiment.multisine.grid != "coset":
+        return 0
+    frequency, rate = experiment.mesh_frequency_for(rig.driver.teeth), experiment.sampling_rate
+    meshed = frequency * experiment.samples_per_period / rate
+    whole = 2 * round(meshed / 2)
+    if whole >= COSET_LEAST and abs(meshed - whole) <= PHASE_DRIFT:
+        return whole
+    wanted = max(whole, COSET_LEAST)
+    near = round(wanted * rate / frequency)
+    speed = "" if abs(wanted * rate / frequency - near) < PHASE_DRIFT else " and mesh_frequency_hz = "
+    speed += f"{wanted * rate / near:.17g}" if speed else ""
+    raise BenchError(
+        f'grid = "coset" needs an excitation period of an even number of mesh periods, at least {COSET_LEAST}, but'
+        f" samples_per_period = {experiment.samples_per_period} holds {meshed:.6g} of them: set samples_per_period ="
+        f" {near}{speed}"
+    )
+
+
 def torque_realisation(experiment: Experiment, number: int, rig: Rig) -> Torque:
     """Torque of realisation `number` (0, 1, ...); a comb depends on the rig's teeth.
 
@@ -115,7 +138,7 @@ def torque_realisation(experiment: Experiment, number: int, rig: Rig) -> Torque:
         rms=wanted.rms,
         grid=wanted.grid,
         crest=wanted.crest,
-        modulus=comb.modulus if comb else 0,
+        modulus=comb.modulus if comb else coset_modulus(experiment, rig),
         residue=comb.residue(number) if comb else 0,
         rng=stream,
     )

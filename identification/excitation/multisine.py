@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-Grid = Literal["full", "odd", "comb"]
+Grid = Literal["full", "odd", "comb", "coset"]
 
 CLIPPING_ROUNDS = 400
 # Fresh random phases where clipping stalls, as it does with few lines.
@@ -24,6 +24,12 @@ CLIPPING_POINTS = (4, 8)
 PEAK_POINTS = 32
 # How far above the wanted crest factor the result may end.
 CREST_SLACK = 1.02
+# A coset has at least so many lines to the mesh frequency: classes 0, +-1, +-2, +-3 and 4 are then apart.
+COSET_LEAST = 8
+# ... and asks for no lower crest factor than this: on its few lines clipping stalls at 1.8 to 1.9.
+COSET_CREST = 1.95
+# Of so many neighbouring lines of a coset, one drawn at random stays silent.
+COSET_GROUP = 4
 
 
 class MultisineError(ValueError):
@@ -105,9 +111,10 @@ def random_phase_multisine(
 
     `samples` points a period at `sampling_rate` [Hz]; either `amplitude` (peak of the whole multisine) or
     `rms` sets its size. Grid "full": every line of the band but 0; "odd": the odd ones; "comb": those that are
-    +-`residue` modulo `modulus` (see identification.comb). `phases` other than "random" are refused. Raises
-    MultisineError for an empty or unsampled band, sizes that are not positive, or a crest factor that this
-    number of lines cannot reach.
+    +-`residue` modulo `modulus` (see identification.comb); "coset": those that are +-1 modulo `modulus`, the lines to
+    the mesh frequency, of which one in COSET_GROUP, drawn at random, is left out. `phases` other than "random" are
+    refused. Raises MultisineError for an empty or unsampled band, sizes that are not positive, or a crest factor that
+    this number of lines cannot reach.
     """
     if phases != "random":
         raise MultisineError(
@@ -120,6 +127,8 @@ def random_phase_multisine(
     if not size or not np.isfinite(size) or size < 0:
         raise MultisineError(f"the size of the multisine, {size!r}, must be positive")
     lines = excited_lines(samples, sampling_rate, band, grid, modulus, residue)
+    if grid == "coset":
+        lines, crest = _thinned(lines, rng), max(crest, COSET_CREST)
     signal = _lowest_crest(samples, sampling_rate, lines, crest, rng)
     peak = signal.peak
     if peak > CREST_SLACK * crest * signal.rms:
@@ -151,10 +160,14 @@ def excited_lines(
 ) -> NDArray[np.int64]:
     """Lines (multiples of sampling_rate / samples) inside `band` [Hz] that the grid excites; never line 0.
 
-    `modulus` and `residue` belong to grid "comb". Raises MultisineError.
+    `modulus` belongs to grids "comb" and "coset" (even there), `residue` to "comb". Raises MultisineError.
     """
-    if grid not in ("full", "odd", "comb"):
-        raise MultisineError(f"grid = {grid!r} is unknown; grids are 'full', 'odd' and 'comb'")
+    if grid not in ("full", "odd", "comb", "coset"):
+        raise MultisineError(f"grid = {grid!r} is unknown; grids are 'full', 'odd', 'comb' and 'coset'")
+    if grid == "coset" and (modulus < COSET_LEAST or modulus % 2):
+        raise MultisineError(
+            f"a coset of {modulus} lines to the mesh frequency must have an even number of at least {COSET_LEAST}"
+        )
     if grid == "comb" and not 0 < 2 * residue < modulus:
         raise MultisineError(f"residue = {residue} of a comb must lie between 1 and half of its modulus = {modulus}")
     low, high = band
@@ -167,11 +180,20 @@ def excited_lines(
     lines = np.arange(max(first, 1), last + 1)
     if grid == "odd":
         lines = lines[lines % 2 == 1]
-    elif grid == "comb":
+    elif grid in ("comb", "coset"):
+        residue = residue if grid == "comb" else 1
         lines = lines[(lines % modulus == residue) | (lines % modulus == modulus - residue)]
     if not lines.size:
         raise MultisineError(f"band {low:g}-{high:g} Hz holds no line of grid {grid!r}; lines are {spacing:g} Hz apart")
     return lines
+
+
+def _thinned(lines: NDArray[np.int64], rng: np.random.Generator) -> NDArray[np.int64]:
+    """Lines without one of each COSET_GROUP neighbours, drawn at random (random harmonic grid; Pintelon and Schoukens
+    2012, section 4.3): each realisation then leaves other lines out."""
+    groups = lines.size // COSET_GROUP
+    silent = np.arange(groups) * COSET_GROUP + rng.integers(COSET_GROUP, size=groups)
+    return np.asarray(np.delete(lines, silent))
 
 
 def _points(highest: int, per_period: int) -> int:

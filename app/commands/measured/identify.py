@@ -10,6 +10,7 @@ import typer
 from gearbench.shell.failure import InputError
 from gearbench.shell.options import JsonOption, check_out, print_json
 from gearbench.shell.progress import Progress
+from gearbench.words.distortion import distortion_lines, distortion_numbers
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -47,7 +48,10 @@ def identify(
         progress.step("mesh feedback" if method == "mesh-feedback" else "local polynomial method")
         found = gb.identify(loaded, settings, progress=progress)
         gb.write_frf(found, out)
+        split = gb.identification.distortion(loaded) if gb.identification.is_coset(loaded) else None
     summary = frf_summary(found, out)
+    if split is not None:
+        summary["distortion"] = distortion_numbers(split)
     if as_json:
         print_json(summary)
         return
@@ -56,6 +60,8 @@ def identify(
         f"{out}: first mode {low:.4g}-{high:.4g} Hz; {summary['unknowns']} unknowns, {summary['equations']} equations"
         f" a window; expected error of the ITF {summary['expected_error']:.1%}"
     )
+    for line in distortion_lines(summary["distortion"]) if split is not None else []:
+        typer.echo(line)
     for warning in summary["warnings"]:
         typer.echo(f"warning: {warning}")
 

@@ -61,7 +61,7 @@ def test_realisations_differ_and_repeat_with_their_seed() -> None:
         ({"rms": 1.0}, "exactly one of amplitude and rms"),
         ({"amplitude": -1.0}, "-1.0.*positive"),
         ({"amplitude": float("nan")}, "nan.*positive"),
-        ({"grid": "coset"}, "coset.*'full', 'odd' and 'comb'"),
+        ({"grid": "even"}, "even.*'full', 'odd', 'comb' and 'coset'"),
         ({"crest": 1.2}, "crest = 1.2 cannot be reached with 891 line"),
     ],
 )
