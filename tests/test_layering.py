@@ -38,13 +38,11 @@ ROOMS: dict[str, tuple[str, ...]] = {
     "geometry": ("tooth", "pair", "mesh", "export"),
     "fem": ("gear", "contact", "motion", "full", "stress"),
     "lumped": ("stiffness", "linear", "nonlinear"),
-    "identification": ("excitation", "spectra", "lpm", "truth", "response", "feedback"),
     "bench": (
         *("plan", "record", "refusals", "linear", "elastic", "full", "nonlinear", "stress", "export", "results"),
         "study",
     ),
     "identification": ("excitation", "spectra", "lpm", "truth", "response", "feedback", "nonlinear"),
-    "bench": ("plan", "record", "refusals", "linear", "elastic", "full", "nonlinear", "stress", "export", "results"),
     "diagnosis": ("intake", "forces", "effects", "evidence", "replay", "output"),
     "challenge": ("truth", "making", "scoring"),
     "app": ("shell", "words", "figures", "report", "commands"),
