@@ -102,6 +102,11 @@ def run(case: Case, out: str | Path, *, force: bool = False, progress: Steps | N
                 "experiment.multisine is missing: without excitation run has nothing to identify; `simulate` and"
                 " `static` need none"
             )
+        if one.experiment.changes_speed:
+            raise InputError(
+                "experiment.speed_end_rpm or speed_table changes the speed: run identifies a response at a constant"
+                " mesh frequency; `simulate` makes the record"
+            )
     with claimed(Path(out), "run", fingerprint(dump_case(case), source_digest()), force) as output:
         jobs = [Job(one, output, progress or Silent(), f"-{name}" if name else "") for name, one in case.experiments()]
         done = [run_experiment(job) for job in jobs]

@@ -94,6 +94,10 @@ def design(
     wanted = case.experiment.multisine
     if wanted is None:
         raise BenchError("the case has no experiment.multisine: there is nothing to plan")
+    if case.experiment.changes_speed:
+        raise BenchError(
+            "experiment.speed_end_rpm or speed_table changes the speed: a multisine is planned for a constant one"
+        )
     if not -20.0 <= snr_db <= 200.0:
         raise BenchError(f"a signal-to-noise ratio of {snr_db:g} dB must lie between -20 and 200")
     report = progress or (lambda fraction, message: None)

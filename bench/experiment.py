@@ -85,7 +85,7 @@ def simulate(
     check_gears(case.rig)
     solver.refuse(case)
     plan = schedule(case.experiment, case.rig)
-    check_delays(case.rig, plan.wraps, plan.repeat_time)
+    check_delays(case.rig, plan.wraps, plan.repeat_time, case.experiment.changes_speed)
     prepared = solver.prepare(case, plan, lambda note: report(0.0, note))
     report(0.0, f"integrating with {prepared.substeps} steps a sample")
     shape = (case.experiment.realisations, kept_samples(plan, prepared.keep))
@@ -216,17 +216,20 @@ def _record(
     averaged = prepared.keep == "mean"
     first = max(run.first for run in runs)
     begin = first * plan.cycles_per_sample
-    if prepared.absolute:
+    absolute = prepared.absolute
+    if absolute:
         channels = _aligned(channels, runs, plan)
+    elif plan.rotation is not None:
+        channels, absolute = with_rotation(channels, plan), True
     if has_sensors(case.rig):
-        seed = case.experiment.seed
-        swings = with_rotation(channels, plan, begin, -1.0) if prepared.absolute else channels
+        seed, ramps = case.experiment.seed, absolute and plan.rotation is None
+        swings = with_rotation(channels, plan, begin, -1.0) if ramps else channels
         teeth = {name: values for name, values in channels.items() if name.startswith(("tooth_force_", "load_share_"))}
         channels = sensed(swings, case.rig, meshing, plan, samples=samples, seed=seed, first=begin)
-        channels = with_rotation(channels, plan, begin) if prepared.absolute else channels
+        channels = with_rotation(channels, plan, begin) if ramps else channels
         channels |= teeth  # no sensor sees them
     channels = {name: repeated(values, samples) for name, values in channels.items()}
-    channels = channels if prepared.absolute else with_rotation(channels, plan)
+    channels = channels if absolute else with_rotation(channels, plan)
     phase = mesh_phases(plan, samples, begin)
     channels["mesh_phase"] = np.broadcast_to(phase, channels["dte"].shape)
     lost = None if runs[0].lost is None else sum(run.lost or 0 for run in runs)
@@ -244,7 +247,7 @@ def _record(
         "settling_residual": max(run.residual for run in runs),
         "settling_periods": max(run.settling_periods for run in runs),
         "repeats_after_mesh_cycles": plan.repeat_cycles,
-        "hunting_period": plan.repeat_cycles * plan.mesh_period,
+        "hunting_period": None if plan.rotation else plan.repeat_cycles * plan.mesh_period,
         "contact_lost_samples": lost,
         "divided_steps": divided,
         "warnings": joined(*told, *prepared.warnings),

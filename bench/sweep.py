@@ -100,9 +100,8 @@ def _still(case: Case) -> Case:
 def _at(case: Case, speed: float) -> Case:
     """The case at a driver speed [rad/s], sampled in step with the mesh."""
     frequency = speed * case.rig.driver.teeth / (2 * pi)
-    values = {"mesh_frequency": None, "speed_driver": speed, "sampling_rate": SAMPLES * frequency}
-    values |= {"samples_per_period": SAMPLES * CYCLES, "periods": 1}
-    return case.model_copy(update={"experiment": case.experiment.model_copy(update=values)})
+    values = {"sampling_rate": SAMPLES * frequency, "samples_per_period": SAMPLES * CYCLES, "periods": 1}
+    return case.model_copy(update={"experiment": case.experiment.at_speed(speed).model_copy(update=values)})
 
 
 def _look(case: Case, solver: Model, speed: float, before: Any) -> tuple[Look, Any]:

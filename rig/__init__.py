@@ -5,7 +5,7 @@
 
 from gearbench.rig.casefile.case import Case, CaseError, dump_case, read_case
 from gearbench.rig.drive import Coupling, Drive, Load, OutputShaft, Ripple
-from gearbench.rig.experiment import Condition, Experiment, Identification, Multisine, Simulation
+from gearbench.rig.experiment import Condition, Experiment, Identification, Multisine, Simulation, SpeedTable
 from gearbench.rig.gear import Crack, Gear
 from gearbench.rig.mesh import Friction, MeshCorrection
 from gearbench.rig.neutral import effects_in, sound_gear
@@ -38,6 +38,7 @@ __all__ = [
     "Sensors",
     "Simulation",
     "Study",
+    "SpeedTable",
     "Support",
     "Supports",
     "dump_case",

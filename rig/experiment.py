@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from math import pi
 from typing import ClassVar, Literal
 
@@ -38,12 +39,40 @@ class Multisine(Value):
         return self
 
 
-class Experiment(Value):
-    """Speed, torque, excitation and sampling. Exactly one of mesh_frequency and speed_driver is given."""
+class SpeedTable(Value):
+    """Speed of the driver over the record, linear from entry to entry and constant before the first and after the
+    last."""
 
-    groups: ClassVar[tuple[tuple[str, ...], ...]] = (("mesh_frequency", "speed_driver"),)
+    time: tuple[float, ...] = quantity(unit="s", doc="instants of the record, rising from 0 or later")
+    driver: tuple[float, ...] = quantity(unit="rpm", doc="driver speed at each")
+
+    @model_validator(mode="after")
+    def _rising(self) -> SpeedTable:
+        if len(self.time) != len(self.driver) or len(self.time) < 2:
+            raise ValueError(
+                f"speed_table.time_s has {len(self.time)} entries and speed_table.driver_rpm {len(self.driver)}: both"
+                " need the same number, at least 2"
+            )
+        if self.time[0] < 0 or any(two <= one for one, two in pairwise(self.time)):
+            raise ValueError("speed_table.time_s must rise from entry to entry, from 0 s or later")
+        if min(self.driver) <= 0:
+            least = min(self.driver) * 30 / pi
+            raise ValueError(f"speed_table.driver_rpm = {least:g} must be greater than 0 everywhere")
+        return self
+
+
+class Experiment(Value):
+    """Speed, torque, excitation and sampling. Exactly one of mesh_frequency, speed_driver and speed_table is given."""
+
+    groups: ClassVar[tuple[tuple[str, ...], ...]] = (
+        ("mesh_frequency", "speed_driver", "speed_table"),
+        ("speed_end", "speed_table"),
+    )
     mesh_frequency: float | None = quantity(None, "hz", gt=0.0, doc="tooth mesh frequency (or give speed_driver)")
     speed_driver: float | None = quantity(None, "rpm", gt=0.0, doc="driver speed (or give mesh_frequency)")
+    speed_end: float | None = quantity(
+        None, "rpm", gt=0.0, doc="driver speed at the end of a linear run-up or run-down; absent: constant"
+    )
     torque_mean: float = quantity(unit="nm", gt=0.0, doc="mean driver torque")
     sampling_rate: float = quantity(unit="hz", gt=0.0, doc="sampling rate of the record")
     samples_per_period: int = quantity(ge=16, le=2**24, doc="samples of one excitation period")
@@ -60,11 +89,15 @@ class Experiment(Value):
         4, ge=1, le=10_000, doc="excitation periods after which failing to settle is an error"
     )
     multisine: Multisine | None = quantity(None, doc="absent: constant torque")
+    speed_table: SpeedTable | None = quantity(None, doc="absent: constant, or linear to speed_end")
 
     @model_validator(mode="after")
     def _one_speed(self) -> Experiment:
-        if (self.mesh_frequency is None) == (self.speed_driver is None):
-            raise ValueError("give exactly one of mesh_frequency_hz and speed_driver_rpm")
+        given = [one for one in (self.mesh_frequency, self.speed_driver, self.speed_table) if one is not None]
+        if len(given) != 1:
+            raise ValueError("give exactly one of mesh_frequency_hz and speed_driver_rpm, or a speed_table")
+        if self.speed_table is not None and self.speed_end is not None:
+            raise ValueError("speed_end_rpm belongs to mesh_frequency_hz or speed_driver_rpm, not to speed_table")
         if self.multisine and self.multisine.band[1] >= self.sampling_rate / 2:
             raise ValueError(
                 f"multisine.band_hz ends at {self.multisine.band[1]:g}, which must lie below half of"
@@ -73,11 +106,29 @@ class Experiment(Value):
         return self
 
     def mesh_frequency_for(self, teeth_driver: int) -> float:
-        """Tooth mesh frequency [Hz] of a driver with that many teeth."""
+        """Tooth mesh frequency [Hz] of a driver with that many teeth; where speed changes, that at the beginning."""
         if self.mesh_frequency is not None:
             return self.mesh_frequency
-        assert self.speed_driver is not None
-        return self.speed_driver * teeth_driver / (2 * pi)
+        speed = self.speed_table.driver[0] if self.speed_table is not None else self.speed_driver
+        assert speed is not None
+        return speed * teeth_driver / (2 * pi)
+
+    @property
+    def changes_speed(self) -> bool:
+        """Whether the speed changes over the record."""
+        return self.speed_table is not None or self.speed_end is not None
+
+    def at_speed(self, speed_driver: float) -> Experiment:
+        """The experiment at a constant driver speed [rad/s]."""
+        return self._at(speed_driver=speed_driver)
+
+    def at_mesh_frequency(self, mesh_frequency: float) -> Experiment:
+        """The experiment at a constant mesh frequency [Hz]."""
+        return self._at(mesh_frequency=mesh_frequency)
+
+    def _at(self, **speed: float) -> Experiment:
+        none = dict.fromkeys(("mesh_frequency", "speed_driver", "speed_end", "speed_table"))
+        return self.model_copy(update={**none, **speed})
 
 
 class Simulation(Value):

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.bench.errors import BenchError
+from gearbench.bench.plan.rotation import Rotation
 from gearbench.bench.plan.schedule import Schedule
 from gearbench.bench.record.attributes import bodies_of
 from gearbench.fem.contact.law import PAIRS, Law, elastic_pair
@@ -20,6 +21,7 @@ from gearbench.fem.gear.store import stored_gear
 from gearbench.fem.motion.hubs import ABSENT, hubs_at_rest, spring_tangent
 from gearbench.fem.motion.imposed import stiffness_factor
 from gearbench.fem.motion.machine import (
+    STEADY,
     Machine,
     contact_rows,
     damping_matrix,
@@ -68,11 +70,18 @@ def elastic_rig(
 
 
 def machine_for(
-    elastic: ElasticRig, mesh_frequency: float, mean_torque: float = 0.0, duration: float = 1.0
+    elastic: ElasticRig,
+    mesh_frequency: float,
+    mean_torque: float = 0.0,
+    duration: float = 1.0,
+    rotation: Rotation | None = None,
 ) -> Machine:
-    """Equations of motion at a mesh frequency [Hz], mean torque [N m] and duration of the record [s]."""
-    e = elastic
-    return make_machine(e.rig, e.pair, e.law, e.gears, e.bodies, mesh_frequency, mean_torque, duration)
+    """Equations of motion at a mesh frequency [Hz], mean torque [N m] and duration of the record [s]; `rotation`:
+    where the speed changes."""
+    e, course = elastic, STEADY
+    if rotation is not None:
+        course = course._replace(time=rotation.time, speed=rotation.speed, angle=rotation.angle)
+    return make_machine(e.rig, e.pair, e.law, e.gears, e.bodies, mesh_frequency, mean_torque, duration, course)
 
 
 def natural_frequencies(machine: Machine, torque: float, phase: float) -> Array:
@@ -141,7 +150,7 @@ def choose_substeps(machine: Machine, case: Case, plan: Schedule) -> int:
     )
     inside = modes[modes <= band[1]]
     highest = float(inside.max()) if len(inside) else band[1]
-    least = ceil(STEPS_PER_MESH / (plan.mesh_period * plan.sampling_rate))
+    least = ceil(STEPS_PER_MESH / (plan.shortest_mesh_period * plan.sampling_rate))
 
     def error(substeps: int) -> float:
         step = 1.0 / (plan.sampling_rate * substeps)

@@ -64,12 +64,17 @@ class Elastic:
     sampling_rate: float
     samples_per_period: int
     teeth: bool = False  # whether a record holds tooth forces
+    changes: bool = False  # whether the speed changes
 
     keep: ClassVar[Keep] = "every"
     piece: ClassVar[int] = 512
     absolute: ClassVar[bool] = True
-    decay: ClassVar[float | None] = None
     warnings: ClassVar[tuple[str, ...]] = ()
+
+    @property
+    def decay(self) -> float | None:
+        # A record whose speed changes has no periods that could be compared.
+        return self.settling if self.changes else None
 
     @property
     def settings(self) -> dict[str, Any]:
@@ -164,9 +169,8 @@ class Elastic:
 def prepare(case: Case, plan: Schedule, note: Note) -> Elastic:
     """Gears condensed, contact tabulated, step chosen. Raises GeometryError, ContactError or BenchError."""
     elastic = elastic_rig(case.rig, case.simulation, note)
-    machine = machine_for(
-        elastic, plan.mesh_frequency, case.experiment.torque_mean, (plan.record_samples - 1) / plan.sampling_rate
-    )
+    duration = (plan.record_samples - 1) / plan.sampling_rate
+    machine = machine_for(elastic, plan.mesh_frequency, case.experiment.torque_mean, duration, plan.rotation)
     substeps = choose_substeps(machine, case, plan)
     return Elastic(
         elastic=elastic,
@@ -177,4 +181,5 @@ def prepare(case: Case, plan: Schedule, note: Note) -> Elastic:
         sampling_rate=plan.sampling_rate,
         samples_per_period=plan.samples_per_period,
         teeth=case.simulation.outputs == "teeth",
+        changes=plan.rotation is not None,
     )

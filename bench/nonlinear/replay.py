@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import ceil, log
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -159,11 +159,11 @@ def _experiment(
     base: Experiment, torque: Array, frequency: float, rate: float, samples: int, periods: int
 ) -> Experiment:
     """The record's experiment, as far as step and tables ask for it."""
-    values = {"mesh_frequency": frequency, "speed_driver": None, "torque_mean": float(torque.mean())}
+    values: dict[str, Any] = {"torque_mean": float(torque.mean())}
     values |= {"sampling_rate": rate, "samples_per_period": samples, "periods": periods}
     if base.multisine is not None and base.multisine.band[1] >= rate / 2:
         values["multisine"] = None
-    return base.model_copy(update=values)
+    return base.at_mesh_frequency(frequency).model_copy(update=values)
 
 
 def _settled(setup: Setup, drive: Drive) -> tuple[Array, float]:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from gearbench.bench.nonlinear.law_table import mesh_law
 from gearbench.bench.nonlinear.together import under_excitation, under_ripple
 from gearbench.bench.plan.excitation import Torque
+from gearbench.bench.plan.rotation import Rotation
 from gearbench.bench.plan.schedule import Schedule
 from gearbench.bench.plan.settling import Keep
 from gearbench.bench.plan.substeps import runge_kutta_substeps
@@ -27,7 +28,7 @@ from gearbench.geometry import Pair, pair
 from gearbench.lumped.nonlinear.law import MeshLaw
 from gearbench.lumped.nonlinear.model import NonLinear, nonlinear_model
 from gearbench.lumped.nonlinear.step import Outputs, columns, integrate
-from gearbench.lumped.nonlinear.tables import Motion, Table, tables
+from gearbench.lumped.nonlinear.tables import Motion, Table, Varied, tables
 from gearbench.lumped.stiffness.potential_energy import outside_foundation_fit
 from gearbench.rig import Case, Experiment
 
@@ -62,6 +63,7 @@ class Setup:
     table: Table | None = None
     first_phase: float = 0.0
     record_samples: int = 1  # over which the mesh stiffness drifts
+    rotation: Rotation | None = None  # where the speed changes
 
     keep: ClassVar[Keep] = "one"
     piece: ClassVar[int] = 0
@@ -74,7 +76,7 @@ class Setup:
 
     @property
     def mesh_frequency(self) -> float:
-        """Mesh frequency [Hz]."""
+        """Mesh frequency [Hz], before the record where the speed changes."""
         return self.cycles_per_sample * self.sampling_rate
 
     @property
@@ -103,6 +105,8 @@ class Setup:
 
     def phase_at(self, sample: int) -> float:
         """Mesh phase [cycles] of a sample."""
+        if self.rotation is not None:
+            return float(self.rotation.cycles(np.array([sample / self.sampling_rate]))[0])
         return self.first_phase + sample * self.cycles_per_sample
 
     def table_for(self, start: int, samples: int) -> Table:
@@ -115,6 +119,7 @@ class Setup:
                 entries=entries,
                 step=self.step,
                 first_phase=self.phase_at(start),
+                varied=self._varied(start, entries),
             ),
         )
         drift = self.model.rig.mesh.stiffness_drift
@@ -122,6 +127,15 @@ class Setup:
             return table
         passed = (start + np.arange(entries + 1) / (2 * self.substeps)) / max(self.record_samples - 1, 1)
         return table._replace(gain=table.gain * (1.0 + drift * np.clip(passed, 0.0, 1.0)))
+
+    def _varied(self, start: int, entries: int) -> Varied | None:
+        """The rotation from sample `start` on, where its speed changes."""
+        turning = self.rotation
+        if turning is None:
+            return None
+        time = start / self.sampling_rate + np.arange(-1.0, entries + 2) * (self.step / 2)
+        along = self.meshing.driver.base_radius * turning.acceleration(time[1:-1])
+        return Varied(turning.cycles(time), turning.frequency(time[1:-1]) / self.mesh_frequency, along)
 
     def drive(self, torque: Torque) -> Drive:
         fine = torque.sample(2 * self.substeps * self.samples_per_period)
@@ -238,10 +252,11 @@ def make_setup(case: Case, plan: Schedule, law: MeshLaw | None = None, first_pha
         sampling_rate=plan.sampling_rate,
         samples_per_period=plan.samples_per_period,
         cycles_per_sample=plan.cycles_per_sample,
-        block_samples=(plan.periods if plan.drifts else plan.repeat_periods) * plan.samples_per_period,
+        block_samples=(plan.periods if plan.drifts or plan.rotation else plan.repeat_periods) * plan.samples_per_period,
         warnings=tuple(outside_foundation_fit(rig, meshing)) if tabled else (),
         first_phase=first_phase,
         record_samples=plan.record_samples,
+        rotation=plan.rotation,
     )
     if not plan.repeats or 2 * setup.substeps * setup.block_samples > MOST_ENTRIES:
         return setup

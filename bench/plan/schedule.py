@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from math import gcd, lcm, pi
 
 from gearbench.bench.errors import BenchError
+from gearbench.bench.plan.rotation import Rotation, rotation_of
 from gearbench.geometry.tooth.iso1328 import drawn_gear
 from gearbench.geometry.tooth.micro import teeth_alike
 from gearbench.rig import Experiment, Gear, Rig
@@ -25,7 +26,8 @@ class Schedule:
     `samples_per_period` samples; the record has `periods` of them. A block is what is run at a time: a repetition, or
     the whole record where that is shorter; it holds `mesh_cycles` mesh periods. `sampling_rate` in Hz, speeds in rad/s,
     each positive in its gear's own direction; `repeat_cycles` is the number of mesh cycles after which the same teeth
-    meet again. A rig that `drifts` never repeats exactly.
+    meet again. A rig that `drifts` never repeats exactly, nor does one with a `rotation`, whose speed changes: its
+    speeds and mesh frequency are those before the record, which need not hold whole mesh periods.
     """
 
     sampling_rate: float
@@ -37,11 +39,13 @@ class Schedule:
     speed_driven: float
     repeat_cycles: int = 1
     drifts: bool = False
+    rotation: Rotation | None = None
+    teeth_driven: int = 0  # asked for where the speed changes
 
     @property
     def wraps(self) -> bool:
         """Whether the record is at least as long as what repeats, but for a slow drift."""
-        return self.repeat_periods <= self.periods
+        return self.rotation is None and self.repeat_periods <= self.periods
 
     @property
     def repeats(self) -> bool:
@@ -51,7 +55,7 @@ class Schedule:
     @property
     def block_periods(self) -> int:
         """Excitation periods of one block."""
-        return self.periods if self.drifts else min(self.repeat_periods, self.periods)
+        return self.periods if self.drifts or self.rotation else min(self.repeat_periods, self.periods)
 
     @property
     def blocks(self) -> int:
@@ -75,12 +79,14 @@ class Schedule:
 
     @property
     def cycles_per_sample(self) -> float:
-        """Mesh cycles that pass in a sample."""
-        return self.mesh_cycles / self.block_samples
+        """Mesh cycles that pass in a sample, before the record where speed changes."""
+        return self.mesh_frequency / self.sampling_rate if self.rotation else self.mesh_cycles / self.block_samples
 
     @property
     def mesh_frequency(self) -> float:
         """Mesh frequency [Hz], such that a block holds a whole number of mesh periods exactly."""
+        if self.rotation is not None:
+            return float(self.rotation.speed[0]) * self.rotation.teeth / (2 * pi)
         return self.mesh_cycles * self.sampling_rate / self.block_samples
 
     @property
@@ -88,16 +94,24 @@ class Schedule:
         """Mesh period [s]."""
         return 1.0 / self.mesh_frequency
 
+    @property
+    def shortest_mesh_period(self) -> float:
+        """Mesh period [s] where the gears turn fastest."""
+        return self.mesh_period if self.rotation is None else 1.0 / self.rotation.highest
+
 
 def schedule(experiment: Experiment, rig: Rig) -> Schedule:
-    """The schedule of an experiment on a rig. Raises BenchError unless the record holds a whole number of mesh
-    periods."""
-    wanted = experiment.mesh_frequency_for(rig.driver.teeth)
+    """The schedule of an experiment on a rig. Raises BenchError unless the record holds a whole number of mesh periods
+    or its speed changes."""
+    rotation = rotation_of(experiment, rig)
+    wanted = rotation.highest if rotation else experiment.mesh_frequency_for(rig.driver.teeth)
     if wanted >= experiment.sampling_rate / 2:
         raise BenchError(
             f"the mesh frequency of {wanted:g} Hz (experiment.mesh_frequency_hz or speed_driver_rpm) must lie below"
             f" half of experiment.sampling_rate_hz, {experiment.sampling_rate / 2:g} Hz"
         )
+    if rotation is not None:
+        return _changing(experiment, rig, rotation)
     period = experiment.samples_per_period / experiment.sampling_rate
     record = experiment.periods * period
     cycles = round(wanted * record)
@@ -125,6 +139,28 @@ def schedule(experiment: Experiment, rig: Rig) -> Schedule:
         speed_driven=2 * pi * frequency / rig.driven.teeth,
         repeat_cycles=repeat,
         drifts=drifts,
+    )
+
+
+def _changing(experiment: Experiment, rig: Rig, rotation: Rotation) -> Schedule:
+    """The schedule of an experiment whose speed changes. Raises BenchError for a comb."""
+    if experiment.multisine is not None and experiment.multisine.grid == "comb":
+        raise BenchError(
+            'experiment.multisine.grid = "comb" keeps its lines between those of a constant speed, but the speed'
+            ' changes: set "full" or "odd"'
+        )
+    return Schedule(
+        sampling_rate=experiment.sampling_rate,
+        samples_per_period=experiment.samples_per_period,
+        periods=experiment.periods,
+        repeat_periods=experiment.periods,
+        mesh_cycles=0,
+        speed_driver=float(rotation.speed[0]),
+        speed_driven=float(rotation.speed[0]) * rig.driver.teeth / rig.driven.teeth,
+        repeat_cycles=cycles_to_repeat(rig),
+        drifts=rig.mesh.stiffness_drift != 0.0,
+        rotation=rotation,
+        teeth_driven=rig.driven.teeth,
     )
 
 

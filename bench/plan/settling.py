@@ -161,6 +161,8 @@ def _after_decay(course: Course, plan: Schedule, experiment: Experiment, decay: 
             experiment,
         )
     settling = periods * plan.samples_per_period
+    if plan.rotation:  # an excitation period may be the whole record: the part of it that is needed is enough
+        settling = max(ceil(wanted / decay * plan.samples_per_period), 1)
     _, outputs = course(-settling, (settling, plan.record_samples))
     return Steady(outputs, experiment.settling_tolerance, periods)
 

@@ -13,4 +13,4 @@ def runge_kutta_substeps(fastest: float, experiment: Experiment, simulation: Sim
     """Steps per sample for modes up to `fastest` [rad/s]. Raises LumpedError where the case asks for fewer."""
     # The forced response is a mode of that frequency as far as the time step is concerned.
     forced = 2 * pi * experiment.multisine.band[1] if experiment.multisine is not None else 0.0
-    return choose_substeps(max(fastest, forced), plan.mesh_period, plan.sampling_rate, simulation.substeps)
+    return choose_substeps(max(fastest, forced), plan.shortest_mesh_period, plan.sampling_rate, simulation.substeps)

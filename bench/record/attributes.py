@@ -53,12 +53,13 @@ def shown_mean(rig: Rig, torque_mean: float) -> float:
 
 
 def experiment_attributes(plan: Schedule, periods: int, torque_mean: float) -> dict[str, Any]:
-    """Record attributes of sampling and mesh period [s], of a record that holds that many excitation periods."""
+    """Record attributes of sampling and mesh period [s], None where speed changes, of a record that holds that many
+    excitation periods."""
     return {
         "sampling_rate": plan.sampling_rate,
         "samples_per_period": plan.samples_per_period,
         "periods": periods,
-        "mesh_period": plan.mesh_period,
+        "mesh_period": None if plan.rotation else plan.mesh_period,
         "mesh_phase_origin": "geometry",
         "torque_mean": torque_mean,
     }
@@ -83,7 +84,7 @@ def lost_contact(lost: int, total: int) -> str | None:
 
 def unlike_periods(plan: Schedule) -> str | None:
     """Warning where the mesh period is not the period of what happens."""
-    if plan.repeat_cycles == 1:
+    if plan.repeat_cycles == 1 or plan.rotation is not None:
         return None
     after = (
         f"mesh periods differ from one another, so the rig repeats after {plan.repeat_cycles} mesh periods"

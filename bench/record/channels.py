@@ -79,12 +79,13 @@ def sensed(
     swings: dict[str, Array], rig: Rig, meshing: Pair, plan: Schedule, *, samples: int, seed: int, first: float = 0.0
 ) -> dict[str, Array]:
     """Motions (realisations, n) that repeat, as the rig's sensors show them over `samples` samples from the mesh phase
-    `first` [cycles] on; DTE and force are those of the measured channels. Angles are without the steady rotation."""
-    speeds = {"angle_driver": plan.speed_driver, "angle_driven": plan.speed_driven}
+    `first` [cycles] on; DTE and force are those of the measured channels. Angles are without the steady rotation, but
+    with one whose speed changes."""
+    speeds = {"angle_driver": plan.speed_driver, "angle_driven": plan.speed_driven} if plan.rotation is None else {}
     signals = {name: Signal(swing, speeds.get(name, 0.0)) for name, swing in swings.items()}
     for gear, teeth in (("driver", rig.driver.teeth), ("driven", rig.driven.teeth)):
         if getattr(rig.sensors, f"encoder_runout_{gear}"):
-            swing, ramp = signals[f"angle_{gear}"].swing, speeds[f"angle_{gear}"]
+            swing, ramp = signals[f"angle_{gear}"].swing, signals[f"angle_{gear}"].ramp
             rotation = 2 * pi / teeth * mesh_phases(plan, swing.shape[-1], first)
             signals[f"angle_{gear}"] = Signal(swing + encoder_error(rig.sensors, gear, rotation), ramp)
     found = measured(
@@ -107,15 +108,21 @@ def sensed(
 
 def mesh_phases(plan: Schedule, samples: int, first: float = 0.0) -> Array:
     """Mesh phase (samples,) [cycles] from `first` on."""
+    if plan.rotation is not None:
+        return first + plan.rotation.cycles(np.arange(samples) / plan.sampling_rate)
     return np.asarray(first + np.arange(samples) * plan.cycles_per_sample)
 
 
 def with_rotation(
     swings: dict[str, Array], plan: Schedule, first: float = 0.0, times: float = 1.0
 ) -> dict[str, Array]:
-    """The channels with the steady rotation of both gears, which turn by `first` [cycles] of the mesh before the first
+    """The channels with the nominal rotation of both gears, which turn by `first` [cycles] of the mesh before the first
     sample; `times` -1 takes it off."""
     count = swings["angle_driver"].shape[-1]
+    if plan.rotation is not None:
+        cycles = mesh_phases(plan, count, first)
+        turned = {"angle_driver": plan.rotation.teeth, "angle_driven": plan.teeth_driven}
+        return {**swings, **{name: swings[name] + times * 2 * pi / z * cycles for name, z in turned.items()}}
     time = (np.arange(count) + first / plan.cycles_per_sample) / plan.sampling_rate
     speeds = {"angle_driver": plan.speed_driver, "angle_driven": plan.speed_driven}
     return {**swings, **{name: swings[name] + times * speed * time for name, speed in speeds.items()}}

@@ -180,12 +180,18 @@ def sensor_attributes(rig: Rig, names: Mapping[str, Any]) -> dict[str, dict[str,
     return {name: dict(about) for name in names if name in CHANNELS}
 
 
-def check_delays(rig: Rig, repeats: bool, seconds: float) -> None:
-    """Refuse delays and filters of channels in a record that does not repeat: nothing tells what came before it."""
+def check_delays(rig: Rig, repeats: bool, seconds: float, changes: bool = False) -> None:
+    """Refuse delays and filters of channels in a record that does not repeat, also because its speed `changes`: nothing
+    tells what came before it."""
     if repeats:
         return
     keys = [f"delay_{name}" for name in CHANNELS if getattr(rig.sensors, f"delay_{name}", 0.0)]
     found = [f"{key}_us" for key in keys] + (["filter_hz"] if rig.sensors.filter is not None else [])
+    if found and changes:
+        raise BenchError(
+            f"rig.sensors.{found[0]} needs a record that repeats, but the speed changes (experiment.speed_end_rpm or"
+            " speed_table)"
+        )
     if found:
         raise BenchError(
             f"rig.sensors.{found[0]} needs a record that repeats: what differs from tooth to tooth does so"

@@ -35,8 +35,10 @@ LUMPED = tuple(
 
 
 def is_nonlinear(case: Case) -> bool:
-    """Whether the lumped model of a case is the non-linear one: it has effects, or a mesh law from finite elements."""
-    return case.simulation.mesh_stiffness == "finite-element" or bool(effects_in(case.rig))
+    """Whether the lumped model of a case is the non-linear one: it has effects, a mesh law from finite elements, or a
+    speed that changes."""
+    law = case.simulation.mesh_stiffness == "finite-element"
+    return law or case.experiment.changes_speed or bool(effects_in(case.rig))
 
 
 def refuse_effects(rig: Rig, model: str, tables: tuple[str, ...] = ("rig",), represented: Collection[str] = ()) -> None:

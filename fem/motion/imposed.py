@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.fem.contact.law import Meetings
-from gearbench.fem.motion.machine import Correction, Machine
+from gearbench.fem.motion.machine import Correction, Machine, Pace
 from gearbench.kernels.compiled import INLINED, compiled
 
 Array = NDArray[np.float64]
@@ -28,6 +28,25 @@ def impose(machine: Machine, torque: float, theta1: float, outer: Array) -> floa
     if machine.loaded_at >= 0:
         outer[machine.loaded_at] = -load
     return load
+
+
+@compiled(**INLINED)
+def lag(machine: Machine, now: Pace, outer: Array) -> None:
+    """Take off `outer`, which holds the torques of drive and load, what it takes to speed up all that turns with the
+    nominal rotation: the unknowns are departures from it. Where neither speed is prescribed, the load's torque makes up
+    for that."""
+    at, n1 = machine.at, len(machine.hub1)
+    one, two = now.pull1, now.pull2
+    for i, pull in ((at.driver, one), (at.drive_end, one), (at.driven, two), (at.load_end, two)):
+        if i >= 0:
+            torque = outer[i] if i == machine.driven_at or i == machine.loaded_at else 0.0
+            outer[i] = torque - machine.mass[i] * pull
+    if machine.loaded_at >= 0:
+        outer[machine.loaded_at] += machine.course.inertia2 * now.pull2
+    for k in range(n1):
+        outer[machine.hubs + k] = -machine.hub1[k, 2] * now.pull1
+    for k in range(len(machine.hub2)):
+        outer[machine.hubs + n1 + k] = machine.hub2[k, 2] * now.pull2
 
 
 class Excess(NamedTuple):

@@ -66,6 +66,22 @@ class Balance(NamedTuple):
     losses: float
 
 
+class Course(NamedTuple):
+    """A nominal rotation whose speed changes, arrays (n,), empty where it is constant: instants [s] that rise from 0,
+    the driver's speed [rad/s], linear between them and constant beyond, and its rotation [rad] there; inertias [kg m^2]
+    that the torques of drive and load speed up beside the unknowns: what turns rigidly at a prescribed speed, or, at
+    the load where neither is prescribed, all that turns, seen from the driven gear."""
+
+    time: Array
+    speed: Array
+    angle: Array
+    inertia1: float
+    inertia2: float
+
+
+STEADY = Course(np.zeros(0), np.zeros(0), np.zeros(0), 0.0, 0.0)
+
+
 class Machine(NamedTuple):
     """Equations of motion of the reduced rig.
 
@@ -75,7 +91,8 @@ class Machine(NamedTuple):
     hub_damping, hub_stiffness (hubs, hubs), springs, held, driven_at, loaded_at: as in `Hubs`; drive_shaft, load_shaft:
     stiffness and damping of shafts to a prescribed speed; squares (modes,): modal stiffnesses, with the damping beta
     [s] times as large; hub1, hub2 (modes, 3): coupling mass of modes and hub; shapes1, shapes2 (2, teeth, n, modes): of
-    both flank sides, as in the contact law's kernels; speed1, speed2: nominal speeds [rad/s].
+    both flank sides, as in the contact law's kernels; speed1, speed2: nominal speeds [rad/s], up to time 0 where
+    `course` changes them.
     """
 
     law: Law
@@ -105,6 +122,7 @@ class Machine(NamedTuple):
     speed1: float
     speed2: float
     beta: float
+    course: Course = STEADY
 
 
 def make_machine(
@@ -116,9 +134,11 @@ def make_machine(
     mesh_frequency: float,
     mean_torque: float = 0.0,
     duration: float = 1.0,
+    course: Course = STEADY,
 ) -> Machine:
     """The reduced model of a rig at a mesh frequency [Hz]; gears and bodies: driver first. Where a constant torque is
-    imposed it is the mean one [N m]; stiffness drifts over the duration [s]."""
+    imposed it is the mean one [N m]; stiffness drifts over the duration [s]; `course` changes the speed from time 0 on
+    (its inertias are those of the rig)."""
     driver, driven = gears
     hubs = hubs_of(rig, bodies)
     squares = np.concatenate([driver.omega, driven.omega]) ** 2
@@ -161,7 +181,23 @@ def make_machine(
         speed1=2 * pi * mesh_frequency / driver.teeth,
         speed2=2 * pi * mesh_frequency / driven.teeth,
         beta=rig.damping.beta,
+        course=_course(course, rig, bodies),
     )
+
+
+def _course(course: Course, rig: Rig, bodies: tuple[Body, Body]) -> Course:
+    """The course with the inertias of the rig."""
+    sides = (rig.drive, rig.load)
+    beyond = [side.coupling.inertia if side.coupling is not None else 0.0 for side in sides]
+    whole = [gear.inertia + more for gear, more in zip(bodies, beyond, strict=True)]
+    if rig.turns_freely:
+        ratio = rig.driven.teeth / rig.driver.teeth
+        return course._replace(inertia2=whole[0] * ratio**2 + whole[1])
+    ends = (
+        (more if side.twists else all_of_it) if side.boundary == "speed" else 0.0
+        for side, more, all_of_it in zip(sides, beyond, whole, strict=True)
+    )
+    return course._replace(inertia1=next(ends), inertia2=next(ends))
 
 
 def _waves(rig: Rig) -> Waves:
@@ -245,11 +281,44 @@ def mass_matrix(machine: Machine, theta1: float, theta2: float) -> Array:
     return out
 
 
+class Pace(NamedTuple):
+    """The nominal rotation of both gears: angles [rad], speeds [rad/s], accelerations [rad/s^2]."""
+
+    angle1: float
+    angle2: float
+    speed1: float
+    speed2: float
+    pull1: float
+    pull2: float
+
+
+@compiled(forceinline=True)
+def pace(machine: Machine, t: float) -> Pace:
+    """The nominal rotation at time t; at an instant of its course the acceleration is that before it."""
+    course, last = machine.course, len(machine.course.time) - 1
+    if last < 0 or t <= 0.0:
+        return Pace(machine.speed1 * t, machine.speed2 * t, machine.speed1, machine.speed2, 0.0, 0.0)
+    low, high = 0, last + 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        if course.time[middle] < t:
+            low = middle
+        else:
+            high = middle
+    since, slope = t - course.time[low], 0.0
+    if low < last:
+        slope = (course.speed[low + 1] - course.speed[low]) / (course.time[low + 1] - course.time[low])
+    speed = course.speed[low] + slope * since
+    angle = course.angle[low] + 0.5 * (course.speed[low] + speed) * since
+    ratio = machine.speed2 / machine.speed1
+    return Pace(angle, ratio * angle, speed, ratio * speed, slope, ratio * slope)
+
+
 @compiled(forceinline=True)
 def angles(machine: Machine, d: Array, t: float) -> tuple[float, float]:
     """Angles of driver and driven gear [rad] at time t."""
-    theta1 = machine.speed1 * t + d[0]
-    theta2 = machine.speed2 * t
+    nominal = pace(machine, t)
+    theta1, theta2 = nominal.angle1 + d[0], nominal.angle2
     return theta1, theta2 + d[machine.at.driven] if machine.at.driven >= 0 else theta2
 
 

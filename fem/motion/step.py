@@ -16,8 +16,8 @@ from gearbench.fem.contact.coupling import couple, find_places
 from gearbench.fem.contact.law import meet
 from gearbench.fem.contact.sharing import share
 from gearbench.fem.contact.static import MARGIN
-from gearbench.fem.motion.imposed import common_excess, impose, lean, stiffness_factor, thicken
-from gearbench.fem.motion.machine import Machine, angles, centres, write_hub_coupling, write_rows
+from gearbench.fem.motion.imposed import common_excess, impose, lag, lean, stiffness_factor, thicken
+from gearbench.fem.motion.machine import Machine, Pace, angles, centres, pace, write_hub_coupling, write_rows
 from gearbench.fem.motion.scheme import Scheme
 from gearbench.fem.motion.stage import Room, Stage
 from gearbench.fem.motion.yielding import expect, linearise, rubs, settled, write_slides, yield_to, yields
@@ -251,7 +251,7 @@ def conclude(machine: Machine, scheme: Scheme, new: Stage, n: int, gain: float, 
 
 
 @compiled(fastmath=ROUNDING, **INLINED)
-def torques(machine: Machine, new: Stage, n: int, load: float, room: Room) -> Torques:
+def torques(machine: Machine, new: Stage, n: int, load: float, nominal: Pace, room: Room) -> Torques:
     """Torques on the outer ends of drive and load under the load's torque [N m] without its balance of losses."""
     at, hubs = machine.at, machine.hubs
     n1, n2 = len(machine.hub1), len(machine.hub2)
@@ -278,11 +278,12 @@ def torques(machine: Machine, new: Stage, n: int, load: float, room: Room) -> To
         two = load + balanced
     elif stiffness > 0.0:
         two = stiffness * new.d[at.driven] + damping * new.v[at.driven]
-    return Torques(one, two)
+    course = machine.course
+    return Torques(one + course.inertia1 * nominal.pull1, two - course.inertia2 * nominal.pull2)
 
 
 @compiled(fastmath=ROUNDING, **INLINED)
-def seek(machine: Machine, new: Stage, theta1: float, theta2: float, room: Room) -> int:
+def seek(machine: Machine, new: Stage, theta1: float, theta2: float, nominal: Pace, room: Room) -> int:
     """Find the tooth pairs near contact at the unknowns of the new stage; returns how many."""
     apart = centres(machine, new.d)
     pitch = machine.law.driven.pitch
@@ -293,7 +294,7 @@ def seek(machine: Machine, new: Stage, theta1: float, theta2: float, room: Room)
     write_rows(machine, new.pairs, n, room.places, room.rows)
     lean(machine, new.pairs, n, room.lean)
     if rubs(machine):
-        write_slides(machine, new, n, apart, room)
+        write_slides(machine, new, n, apart, nominal, room)
     for i in range(machine.hubs):
         room.sought[i] = new.d[i]
     return n
@@ -322,8 +323,11 @@ def try_step(
     # The modes turn with their gear: the balance is that of the instant within the step at which it is struck.
     late = (1.0 - scheme.alpha_f) * h
     theta1, theta2 = angles(machine, old.d, t)
-    write_hub_coupling(machine, theta1 + late * machine.speed1, theta2 + late * machine.speed2, room.corner)
-    load = impose(machine, torque, theta1 + h * (machine.speed1 + old.v[0]), room.outer)
+    before, nominal = pace(machine, t), pace(machine, t + h)
+    write_hub_coupling(machine, theta1 + late * before.speed1, theta2 + late * before.speed2, room.corner)
+    load = impose(machine, torque, theta1 + h * (before.speed1 + old.v[0]), room.outer)
+    if len(machine.course.time) > 0:
+        lag(machine, nominal, room.outer)
     predict(machine, scheme, old, room)
     n, gain, soft, found = 0, 1.0, 1.0, False
     if yields(machine):
@@ -336,7 +340,7 @@ def try_step(
         if turn == 0:
             theta1, theta2 = angles(machine, new.d, t + h)
             soft = 1.0 / stiffness_factor(machine.correction, theta2 / machine.law.driven.pitch, t + h)
-            n = seek(machine, new, theta1, theta2, room)
+            n = seek(machine, new, theta1, theta2, nominal, room)
             gain = recall(old, known, new, n, machine, h, lately, room)
             if rubs(machine):
                 expect(machine, scheme, old, n, room)
@@ -352,5 +356,5 @@ def try_step(
             room.desk.known[p] = False
     if yields(machine):
         yield_to(machine, new, n, room)
-    held = torques(machine, new, n, load, room)
+    held = torques(machine, new, n, load, nominal, room)
     return Tried(found, n, held.driver, held.driven)

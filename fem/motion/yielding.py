@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.fem.contact.kinematics import CORNER1, EDGE1
-from gearbench.fem.motion.machine import Machine, Vector
+from gearbench.fem.motion.machine import Machine, Pace, Vector
 from gearbench.fem.motion.scheme import Scheme
 from gearbench.fem.motion.stage import Room, Stage
 from gearbench.kernels.compiled import INLINED, ROUNDING, compiled
@@ -42,7 +42,7 @@ def yields(machine: Machine) -> bool:
 
 
 @compiled(fastmath=ROUNDING, **INLINED)
-def write_slides(machine: Machine, new: Stage, n: int, apart: Vector, room: Room) -> None:
+def write_slides(machine: Machine, new: Stage, n: int, apart: Vector, nominal: Pace, room: Room) -> None:
     """How the hubs' unknowns make n pairs slide, and how friction acts on them, the load's balance of it included."""
     at, ratio = machine.at, machine.law.driven.rb / machine.law.driver.rb
     for p in range(n):
@@ -52,7 +52,7 @@ def write_slides(machine: Machine, new: Stage, n: int, apart: Vector, room: Room
         arm1 = along_normal - k.xi2 if k.slave == EDGE1 or k.slave == CORNER1 else k.xi1
         arm2 = along_normal - arm1
         room.arm1[p], room.arm2[p] = arm1, arm2
-        room.steady[p] = arm1 * machine.speed1 - arm2 * machine.speed2
+        room.steady[p] = arm1 * nominal.speed1 - arm2 * nominal.speed2
         slide = room.slide[p]
         slide[at.driver] = arm1
         if at.driven >= 0:

@@ -146,6 +146,13 @@ def mesh_period(record: xr.Dataset) -> float:
     elif "mesh_phase" in record:
         phase = record["mesh_phase"].values[0]
         time = np.arange(phase.size) / float(record.attrs["sampling_rate"])
+        line = np.polynomial.Polynomial.fit(time, phase, 1)
+        wander = float(np.abs(phase - line(time)).max())
+        if wander > DRIFT:
+            raise SpectraError(
+                f"the mesh phase departs by {wander:.3g} cycles from that of a constant speed (limit {DRIFT:g}): a"
+                " response is identified at a constant one"
+            )
         period = 1.0 / float(np.polyfit(time, phase, 1)[0])
     else:
         raise SpectraError("the record has neither attribute mesh_period nor channel mesh_phase")

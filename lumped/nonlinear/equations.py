@@ -31,6 +31,8 @@ class Equations(NamedTuple):
     structure: Structure | tuple[()]
     free: float
     mean: float
+    drive_end: float = 0.0
+    load_end: float = 0.0
 
 
 class Answer(NamedTuple):
@@ -118,12 +120,43 @@ def _answered(
 
 
 @compiled(fastmath=ROUNDING)
-def _rubbed(f: float, v: Coordinates, r: Any, position: float, p: Constants, rubbing: Rubbing | None) -> Rubbed:
+def _rubbed(f: float, v: Coordinates, r: Any, at: Entry, p: Constants, rubbing: Rubbing | None) -> Rubbed:
     """Friction [N] under the normal force f."""
     if rubbing is not None and f > 0.0:  # without friction rubbing is None, known to the compiler
-        per = friction(v, r, position, rubbing, p.factor)
+        per = friction(v, r, at, rubbing, p.factor)
         return Rubbed(f * per.driver, f * per.along, f * per.across, f * per.driven)
     return Rubbed(0.0, 0.0, 0.0, 0.0)
+
+
+@compiled(fastmath=ROUNDING)
+def _rigid_load(s: Any) -> float:
+    """1 where the load acts on the driven gear itself."""
+    return 1.0 if len(s) == 0 else s.rigid_load
+
+
+@compiled(fastmath=ROUNDING)
+def _behind(further: Any, pull: float, pushed: float, s: Any) -> Any:
+    """Accelerations of further coordinates, the load's end lagging behind the rotation but for a force on it [N]."""
+    if len(further) == 0:
+        return ()
+    lag = pull if s.inverse_load > 0.0 else 0.0
+    return Further(further.load - lag + s.inverse_load * pushed, further.housing, further.x1, further.x2)
+
+
+@compiled(fastmath=ROUNDING)
+def _accelerated(found: Answer, pull: float, of: Equations) -> Answer:
+    """The answer in departures from a rotation that gains speed by pull [m/s^2] along the line of action: what turns
+    lags behind it, what is held at its speed takes a force, and a load that balances both gears pushes."""
+    p, a, pushed = of.constants, found.acceleration, of.free * of.load_end * pull
+    acceleration = Coordinates(
+        u1=a.u1 - pull if p.inverse_u1 > 0.0 else a.u1,
+        y1=a.y1,
+        y2=a.y2,
+        u2=a.u2 - pull + p.inverse_u2 * _rigid_load(of.structure) * pushed if p.inverse_u2 > 0.0 else a.u2,
+        w=a.w - pull if p.inverse_w > 0.0 else a.w,
+    )
+    load, drive = found.load_force - of.load_end * pull, found.drive_force + of.drive_end * pull
+    return Answer(acceleration, _behind(found.further, pull, pushed, of.structure), found.mesh_force, load, drive)
 
 
 @compiled(fastmath=ROUNDING)
@@ -136,6 +169,7 @@ def answer(q: Coordinates, v: Coordinates, e: Any, r: Any, at: Entry, force: flo
         mesh=f,
         shaft=p.shaft_stiffness * (q.w - q.u1) + p.shaft_damping * (v.w - v.u1),
         drive=force + at.ripple,
-        rubbed=_rubbed(f, v, r, at.position, p, of.rubbing),
+        rubbed=_rubbed(f, v, r, at, p, of.rubbing),
     )
-    return _answered(q, v, e, r, felt, force, of.mean, p, s, of.free)
+    found = _answered(q, v, e, r, felt, force, of.mean, p, s, of.free)
+    return found if at.pull == 0.0 else _accelerated(found, at.pull, of)

@@ -25,6 +25,8 @@ class Entry(NamedTuple):
     gain: float
     ripple: float
     back: float
+    pace: float
+    pull: float
 
 
 class Rubbed(NamedTuple):
@@ -40,6 +42,7 @@ class Rubbed(NamedTuple):
 @compiled(fastmath=ROUNDING)
 def entry(table: Table, i: int) -> Entry:
     """Entry i of the table."""
+    changes = len(table.pull) > 0
     return Entry(
         position=table.position[i],
         excess=table.excess[i],
@@ -47,6 +50,8 @@ def entry(table: Table, i: int) -> Entry:
         gain=table.gain[i],
         ripple=table.ripple[i],
         back=table.back[i],
+        pace=table.pace[i] if changes else 1.0,
+        pull=table.pull[i] if changes else 0.0,
     )
 
 
@@ -99,14 +104,15 @@ def _aside(sliding: float, r: Any, factor: float) -> float:
 
 
 @compiled(fastmath=ROUNDING)
-def friction(v: Coordinates, further: Any, position: float, r: Rubbing, factor: float) -> Rubbed:
+def friction(v: Coordinates, further: Any, at: Entry, r: Rubbing, factor: float) -> Rubbed:
     """What friction does per normal force, at the rates v and `further`; factor: g."""
+    position = at.position
     row = int(position)
     weight = position - row
     cycle = position / (r.share.shape[0] - 1)
     # The sliding velocity is linear in the distance from the pitch point.
     middle = _aside(r.centre1 * v.u1 - r.centre2 * v.u2 + r.slide * (v.y1 - v.y2), further, factor)
-    slope = r.drift + r.pitch1 * v.u1 + r.pitch2 * v.u2
+    slope = at.pace * r.drift + r.pitch1 * v.u1 + r.pitch2 * v.u2
     m1, s, m2 = 0.0, 0.0, 0.0
     for o in range(r.share.shape[1]):
         part = r.share[row, o] + weight * (r.share[row + 1, o] - r.share[row, o])

@@ -33,7 +33,11 @@ m2/rb2); the mean speed then stays, and ripple alone moves both gears together.
 What else a real rig has (a shaft behind the driven gear, a housing, supports across, other boundaries) is a
 `lumped.nonlinear.structure` beside these equations.
 
-Mesh phase and shaft angles are those of the steady rotation, not of the vibrating gears: vibrations of 10 um shift
+Where the speed changes, u_i and w are departures from the changing rotation: all of them that move lag behind its
+acceleration A = rb1 Omega1', and what is held at its speed takes M A; where both gears turn freely, T2/rb2 is less by
+what all of them take.
+
+Mesh phase and shaft angles are those of the nominal rotation, not of the vibrating gears: vibrations of 10 um shift
 the phase by a thousandth of a cycle. With a prescribed driven speed the phase is exact, as it is the driven gear's.
 """
 
@@ -129,6 +133,21 @@ class NonLinear:
     def elastic_shaft(self) -> bool:
         """Whether the rotor is a coordinate of its own."""
         return self.masses[2] > 0
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """What the torques of drive and load speed up beside the coordinates [kg], on the base circles: what turns
+        rigidly at a prescribed speed, or, at the load where neither is prescribed, all that turns."""
+        if self.free:
+            return 0.0, sum(self.masses[:3]) + self.outer
+        drive = self.masses[2] if self.elastic_shaft else self.masses[0]
+        load, shaft = self.masses[1], self.rig.load.coupling
+        if self.rig.load.twists and shaft is not None:
+            load = shaft.inertia / self.base_radii[1] ** 2
+        return (
+            drive if self.rig.drive.boundary == "speed" else 0.0,
+            load if self.rig.load.boundary == "speed" else 0.0,
+        )
 
     @property
     def shaft(self) -> tuple[float, float]:

@@ -76,6 +76,8 @@ def integrate(
         structure=structure or (),
         free=1.0 if model.free else 0.0,
         mean=float(force.mean()),
+        drive_end=model.ends[0],
+        load_end=model.ends[1],
     )
     place, further = parted(state[:size])
     rate, further_rate = parted(state[size:])

@@ -1,6 +1,6 @@
 """What the non-linear mesh reads at every half step: phase, excess material, gain, ripple.
 
-Tooth numbers, mesh phase and shaft angles are those of the steady rotation; the tables hold one stretch of it. Filled
+Tooth numbers, mesh phase and shaft angles are those of the nominal rotation; the tables hold one stretch of it. Filled
 by a compiled loop, since diagnosis fills them again for every trial of an effect.
 """
 
@@ -21,7 +21,7 @@ Integers = NDArray[np.int64]
 
 
 class Table(NamedTuple):
-    """What the mesh is at each half step; arrays (entries + 1,)."""
+    """What the mesh is at each half step; arrays (entries + 1,), pace and pull empty where the speed is constant."""
 
     position: Array  # in rows of the force table, which are phases
     excess: Array  # a [m]
@@ -29,6 +29,8 @@ class Table(NamedTuple):
     gain: Array  # of the force
     ripple: Array  # [N]
     back: Array  # excess on the back flanks [m]
+    pace: Array = np.empty(0)  # speed of the nominal rotation over the one that friction is told of
+    pull: Array = np.empty(0)  # acceleration of the nominal rotation along the line of action [m/s^2]
 
 
 class Series(NamedTuple):
@@ -64,17 +66,28 @@ class Correction(NamedTuple):
     error: Series
 
 
+class Varied(NamedTuple):
+    """A rotation whose speed changes: mesh phase [cycles] at the entries, one before and one behind them included
+    (entries + 3,); pace and pull (entries + 1,) as in `Table`."""
+
+    phase: Array
+    pace: Array
+    pull: Array
+
+
 @dataclass(frozen=True)
 class Motion:
     """Steady rotation on the half-step grid: entry n has mesh phase first_phase + cycles n / entries [cycles].
 
-    The table is made for entries + 1 instants; `step` [s] is the whole integration step, two entries.
+    The table is made for entries + 1 instants; `step` [s] is the whole integration step, two entries. `varied`: the
+    rotation where its speed changes, in place of that phase.
     """
 
     cycles: float
     entries: int
     step: float
     first_phase: float = 0.0
+    varied: Varied | None = None
 
     @property
     def mesh_frequency(self) -> float:
@@ -118,13 +131,18 @@ def tables(model: NonLinear, motion: Motion) -> Table:
     )
     # One entry before and one behind, for the rate of the excess.
     table = Table(*np.empty((len(Table._fields), motion.entries + 3)))
-    step = motion.cycles / motion.entries
+    varied = motion.varied
+    if varied is None:
+        phase = motion.first_phase + np.arange(-1.0, motion.entries + 2) * (motion.cycles / motion.entries)
+    else:
+        phase = varied.phase
     _fill(
-        table, motion.first_phase, step, law.offsets, share, bending,
+        table, phase, law.offsets, share, bending,
         teeth_of(model), correction, _runout(model), _waves(model),
     )  # fmt: skip
     rate = (table.excess[2:] - table.excess[:-2]) / motion.step
-    return Table(*(column[1:-1] for column in table))._replace(excess_rate=rate)
+    pace, pull = (np.empty(0), np.empty(0)) if varied is None else varied[1:]
+    return Table(*(column[1:-1] for column in table))._replace(excess_rate=rate, pace=pace, pull=pull)
 
 
 def _runout(model: NonLinear) -> Runout:
@@ -159,14 +177,14 @@ def _wave(series: Series, phase: float) -> float:
 
 @compiled
 def _fill(
-    out: Table, first_phase: float, step: float, offsets: Integers, share: Array, bending: Array,
+    out: Table, phases: Array, offsets: Integers, share: Array, bending: Array,
     teeth: Teeth, correction: Correction, runout: Runout, waves: Waves,
 ) -> None:  # fmt: skip
-    """Fill the table but for `excess_rate`; entry n belongs to the phase first_phase + (n - 1) step."""
+    """Fill the table but for `excess_rate`, pace and pull; entry n belongs to the n-th of `phases` [cycles]."""
     rows = share.shape[0] - 1
     z1, z2 = len(teeth.excess1), len(teeth.excess2)
     for n in range(len(out.position)):
-        phase = first_phase + (n - 1) * step
+        phase = phases[n]
         whole = floor(phase)
         cycle = phase - whole
         position = min(cycle * rows, rows * (1.0 - 1e-16))

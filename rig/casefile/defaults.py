@@ -20,6 +20,8 @@ PERIOD = 1.0
 OVERSAMPLING = 1.28
 # Samples of a mesh period without excitation.
 SAMPLES_PER_MESH = 256
+# Keys of a changing speed: how long its record is only the case can say.
+CHANGING = {"speed_end_rpm", "speed_table"}
 
 # Stands for an experiment where a case has none; nothing reads it but what asks whether there is one.
 PLACEHOLDER: Table = {
@@ -81,7 +83,7 @@ def _sampling(experiment: Table, driver: Any) -> list[str]:
     quarter above twice the highest excited frequency; without excitation, one mesh period."""
     rate, samples = experiment.get("sampling_rate_hz"), experiment.get("samples_per_period")
     mesh = _mesh_frequency(experiment, driver)
-    if (rate is not None and samples is not None) or not mesh:
+    if (rate is not None and samples is not None) or not mesh or experiment.keys() & CHANGING:
         return []
     multisine = experiment.get("multisine")
     top = None
