@@ -89,6 +89,10 @@ def campaign(
     plan = plan_of(case, settings, {name: value for name, value in given.items() if value is not None}, teller)
     if workers is not None and workers < 1:
         raise InputError(f"--workers {workers} must be at least 1")
+    if cluster:
+        from gearbench.bench.study.cluster import check_cluster
+
+        check_cluster(cluster)
     with claimed(Path(out), "campaign", plan.identity, force) as output:
         table, fresh = members(plan, output, workers, cluster, teller)
         if fresh or not all(output.has(name) for name in _expected(table)):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
@@ -12,7 +13,17 @@ from gearbench.bench.study.member import Found, Task, compute, in_words
 
 CONNECT = 10.0  # s that a scheduler is waited for
 FAILURES = 2  # workers that a member may take with it
+_ADDRESS = re.compile(r"((tcp|tls|ws|wss|ucx)://)?[^\s:/]+:\d{1,5}")
 _EXTRA = "install the extra `distributed`: pip install 'gearbench[distributed]'"
+
+
+def check_cluster(address: str) -> None:
+    """Raise BenchError where no work can be sent to `address`, as far as that shows without asking it."""
+    _distributed()
+    if address == "slurm":
+        _slurm()
+    elif not _ADDRESS.fullmatch(address):
+        raise BenchError(f"--cluster {address} must be the address of a dask scheduler, tcp://HOST:PORT, or slurm")
 
 
 def _distributed() -> Any:
@@ -21,6 +32,20 @@ def _distributed() -> Any:
     except ImportError as error:
         raise BenchError(f"--cluster needs the package distributed, which is missing: {_EXTRA}") from error
     return distributed
+
+
+def _slurm() -> Any:
+    """The class of dask-jobqueue's Slurm clusters."""
+    try:
+        from dask_jobqueue import SLURMCluster
+    except ImportError as error:
+        raise BenchError(f"--cluster slurm needs the package dask-jobqueue, which is missing: {_EXTRA}") from error
+    if shutil.which("sbatch") is None:
+        raise BenchError(
+            "--cluster slurm needs Slurm's command sbatch, which is not on the path: run it on a login node of the"
+            " cluster, or give the address of a scheduler"
+        )
+    return SLURMCluster
 
 
 def compute_there(tasks: Iterable[Task], address: str, workers: int) -> Iterator[Found]:
@@ -85,21 +110,13 @@ def slurm_cluster() -> Any:
     """A scheduler in this process whose workers are Slurm jobs of one processor each, as dask's own configuration
     (jobqueue.slurm: queue, account, memory, walltime, job_script_prologue) has them. Raises BenchError where
     dask-jobqueue or sbatch is missing, or dask-jobqueue refuses that configuration."""
-    try:
-        from dask_jobqueue import SLURMCluster
-    except ImportError as error:
-        raise BenchError(f"--cluster slurm needs the package dask-jobqueue, which is missing: {_EXTRA}") from error
-    if shutil.which("sbatch") is None:
-        raise BenchError(
-            "--cluster slurm needs Slurm's command sbatch, which is not on the path: run it on a login node of the"
-            " cluster, or give the address of a scheduler"
-        )
+    kind = _slurm()
     import dask
 
     with dask.config.set({"distributed.scheduler.allowed-failures": FAILURES}):
         asked = {"cores": 1, "processes": 1, "memory": dask.config.get("jobqueue.slurm.memory", None) or "2GB"}
         try:
-            return SLURMCluster(**asked)
+            return kind(**asked)
         except (ValueError, TypeError) as error:
             raise BenchError(f"dask-jobqueue refuses its configuration jobqueue.slurm: {_short(error)}") from error
 

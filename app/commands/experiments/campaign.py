@@ -59,8 +59,8 @@ def campaign(
 ) -> None:
     """Compute many members of a case: grids, Latin hypercubes, Sobol designs; table, indices, pictures, report.
 
-    Resumes in its own folder. What is not given here is taken from the case's [study]. docs/campaigns.md lists the
-    results.
+    Resumes in its own folder. What is not given here is taken from the case's table "study". docs/campaigns.md lists
+    the results.
     """
     loaded = load_case(case, settings)
     import gearbench as gb
