@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Annotated
@@ -20,12 +21,20 @@ def cases(
         Path | None,
         typer.Option("--copy", metavar="FOLDER", help="copy the case and the gear files into a folder"),
     ] = None,
+    pictures: Annotated[
+        Path | None,
+        typer.Option("--pictures", metavar="FOLDER", help="draw the gear pair of each case (or of NAME) into a folder"),
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """List the shipped cases; print one; or copy one, ready to change and to run."""
+    """List the shipped cases; print one; copy one, ready to change and to run; or draw their gears."""
     from gearbench.cases import case_files
 
     shipped = case_files()
+    if pictures is not None and copy is None and (name is None or name in shipped):
+        for path in draw_pairs([name] if name else list(shipped), pictures):
+            typer.echo(str(path))
+        return
     if name is None:
         if copy is not None:
             raise InputError("--copy needs the name of a case: gearbench cases NAME --copy FOLDER")
@@ -37,6 +46,20 @@ def cases(
         typer.echo(shipped[name].read_text(encoding="utf-8"), nl=False)
         return
     typer.echo(str(copy_case(shipped[name], copy)))
+
+
+def draw_pairs(names: Sequence[str], folder: Path) -> Iterator[Path]:
+    """Draw the gear pair of each shipped case at mesh phase 0; the pictures, one after the other."""
+    from gearbench.cases import read_case
+    from gearbench.figures.gear import draw_pair
+    from gearbench.geometry import pair
+
+    folder.mkdir(parents=True, exist_ok=True)
+    for name in names:
+        rig = read_case(name).rig
+        path = folder / f"{name}.png"
+        draw_pair(path, rig, pair(rig), None)
+        yield path
 
 
 def copy_case(source: Path, folder: Path) -> Path:
