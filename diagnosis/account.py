@@ -127,8 +127,7 @@ def sentence_of_effect(noun: str, closing: Closing, share: float) -> str:
     """What an effect closes of the judged record."""
     channel, part = closing.part
     where = CHANNELS.get(channel, channel)
-    label = part.strip("()").replace(", ", "–")
-    lines = LINES.get(label, f"at {label} Hz")
+    lines = LINES.get(part, f"at {part} Hz")
     return (
         f"Without {noun} the gap of the {where} {lines} is {number(closing.growth, 2)} times as large; that is"
         f" {percent(share)} of the nominal rig's whole gap"

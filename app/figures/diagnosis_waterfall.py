@@ -46,7 +46,7 @@ def draw_waterfall(path: Path, gaps: Sequence[Gap], effects: Sequence[Effect], r
     rows = steps_of(gap, effects)
     unit = SHOWN_UNITS.get(gap.unit, (1.0, gap.unit))[1]
     largest = max(value for _, value, _ in rows)
-    with figure(1, 1, (6.4, 1.0 + 0.46 * len(rows))) as (drawing, axes):
+    with figure(1, 1, (7.0, 1.0 + 0.46 * len(rows))) as (drawing, axes):
         for number, (_, value, colour) in enumerate(rows):
             y = len(rows) - 1 - number
             axes.barh(y, value, height=0.6, color=colour)

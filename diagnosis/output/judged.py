@@ -169,9 +169,9 @@ def _growth(target: Target, without: Array, with_all: Array) -> tuple[float, tup
     for channel in dict.fromkeys(block.channel for block in target.blocks):
         inside = np.array([block.channel == channel for block in target.blocks])
         whole = float(lost[inside].sum())
-        parts = {(block.kind, f"{block.band}") for block in target.blocks if block.channel == channel}
-        for label in sorted({kind for kind, _ in parts} | {band for _, band in parts}):
-            mine = inside & np.array([label in (block.kind, f"{block.band}") for block in target.blocks])
+        labels = [(block.kind, f"{block.band[0]:g}–{block.band[1]:g}") for block in target.blocks]
+        for label in sorted({one for part, here in zip(labels, inside, strict=True) if here for one in part}):
+            mine = inside & np.array([label in part for part in labels])
             if float(lost[mine].sum()) < SEEN**2 * whole:
                 continue
             factor = float(np.sqrt(lost[mine].sum() / max(float(kept[mine].sum()), float(noise[mine].sum()), 1e-300)))

@@ -24,12 +24,12 @@ Array = NDArray[np.float64]
 # Of the nominal gap, rms over rms and all channels in units of their own fluctuation: more than this part left is "the
 # greater part", by section 7 of the design; content that changes between repetitions counts from that part on.
 GREATER, CHANGING = 0.5, 0.1
-# Part of a channel's fluctuation that sound rigs leave at most, whatever their structure beyond the unknowns is, and
-# what stands out at a place on average over its lines [nats], by place: both from rigs without an effect of the
-# development family and with housings, shafts and cross-coupling (benchmarks/diagnosis.md).
-STRUCTURE = 0.1
+# Part of a channel's fluctuation that sound rigs leave at most, whatever their structure beyond the unknowns is; from
+# half of it on a place can stand out; and what stands out there on average over the lines [nats]. From rigs without an
+# effect: development family, housing with cross-coupling, and the finite-element model (benchmarks/diagnosis.md).
+STRUCTURE, VISIBLE = 0.1, 0.05
 OUTSTANDING: Mapping[str, float] = {
-    "drive": 0.1, "driver-support": 0.15, "load": 1.0, "driven-support": 0.15, "mesh": 0.5,
+    "drive": 0.5, "driver-support": 1.2, "load": 1.2, "driven-support": 1.2, "mesh": 2.5,
 }  # fmt: skip
 # Part of the nominal gap that the named effects must close for content that changes, or a form without a name, not to
 # outbid them.
@@ -78,16 +78,17 @@ def decide_simulated(
     if size > 1.0 and judged.left > GREATER:
         because = "no effect of the library closes the gap, and the greater part of it stays"
         return _unknown(place if over > 1.0 else "none", because, min(judged.left / GREATER, size))
-    if size > 1.0 and over > 1.0:
+    if judged.remains > VISIBLE and over > 1.0:
         because = f"a force {at_place(place)} remains that no effect of the library explains"
-        return _unknown(place, because, min(over, size))
+        return _unknown(place, because, min(over, judged.remains / VISIBLE))
     ahead = max((one.log_bayes_factor for one in selection.weighed), default=-LIMIT)
     because = (
         "no effect brings the simulation closer to the records than a good rig's share of it; what remains, at most"
         f" {percent(judged.remains)} of any channel's fluctuation, is"
         + (f" within the {percent(STRUCTURE)} that sound rigs leave" if size <= 1.0 else " the smaller part of the gap")
     )
-    said = _probabilities(min(ahead, LIMIT) - LIMIT, max(min(judged.left / GREATER, size), min(over, size)))
+    seen = min(over, judged.remains / VISIBLE)
+    said = _probabilities(min(ahead, LIMIT) - LIMIT, max(min(judged.left / GREATER, size), seen))
     return Decided("none", "none", (), said, (because,))
 
 

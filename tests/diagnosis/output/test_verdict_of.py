@@ -13,7 +13,7 @@ from gearbench.diagnosis.effects.effect import Hypothesis, Wide
 from gearbench.diagnosis.effects.library import LIBRARY
 from gearbench.diagnosis.evidence.calibration import LIMITS
 from gearbench.diagnosis.output.missing import Missing
-from gearbench.diagnosis.output.verdict_of import GREATER, OUTSTANDING, STRUCTURE, Decided, decide_simulated
+from gearbench.diagnosis.output.verdict_of import GREATER, OUTSTANDING, STRUCTURE, VISIBLE, Decided, decide_simulated
 
 EFFECT = next(one for one in LIBRARY if one.name == "friction")
 FRICTION = Hypothesis("friction", "mesh", (Wide("friction"),), effect=EFFECT)
@@ -74,9 +74,9 @@ def test_the_greater_part_unexplained_is_unknown_unless_any_rig_leaves_as_much()
 
 def test_a_place_that_stands_out_is_unknown_only_over_a_visible_remainder() -> None:
     out = at(0, 1.1 * OUTSTANDING["drive"])
-    made = decided(None, remains=1.1 * STRUCTURE, excess=out)
+    made = decided(None, remains=1.1 * VISIBLE, excess=out)
     assert (made.verdict, made.place) == ("unknown", "drive")
-    assert decided(None, remains=0.9 * STRUCTURE, excess=out).verdict == "none"
+    assert decided(None, remains=0.9 * VISIBLE, excess=out).verdict == "none"
     assert decided(None, remains=1.1 * STRUCTURE, excess=at(0, 0.9 * OUTSTANDING["drive"])).verdict == "none"
 
 

@@ -1,0 +1,46 @@
+"""The waterfall of the gap: its steps, and that it is drawn."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from gearbench.diagnosis.verdict import Effect, Gap, Range
+from gearbench.figures.diagnosis_waterfall import draw_waterfall, steps_of
+
+
+def about(value: float) -> Range:
+    return Range(value=value, low=value, high=value)
+
+
+def gap(with_effect: float | None) -> Gap:
+    return Gap(
+        record="r", channel="dte", band_hz=(0.0, 3000.0), unit="m", nominal=about(13e-6), recalibrated=about(5e-6),
+        with_effect=None if with_effect is None else about(with_effect), floor=about(1e-6),
+    )  # fmt: skip
+
+
+def effect(name: str, closes: float) -> Effect:
+    return Effect(name=name, probability=0.9, closes={"dte": about(closes)})
+
+
+def test_each_step_leaves_what_the_later_ones_take_off() -> None:
+    # By energy 5^2 = 3^2 + 4^2: with coupling and friction 3 um are left, and friction alone takes 4 of the rest off.
+    rows = steps_of(gap(3e-6), (effect("friction", 2.0), effect("coupling", 3.4641016)))
+    assert [words for words, _, _ in rows] == [
+        "nominal rig", "recalibrated", "+ an elastic coupling", "+ friction between the flanks", "noise floor",
+    ]  # fmt: skip
+    assert [value for _, value, _ in rows] == pytest.approx([13.0, 5.0, 13**0.5, 3.0, 1.0])
+    assert [words for words, _, _ in steps_of(gap(None), ())] == ["nominal rig", "recalibrated", "noise floor"]
+
+
+def test_no_step_is_drawn_above_the_one_before() -> None:
+    rows = steps_of(gap(3e-6), (effect("friction", 9.0), effect("coupling", 8.0)))
+    assert [value for _, value, _ in rows] == pytest.approx([13.0, 5.0, 5.0, 3.0, 1.0])
+
+
+def test_it_is_a_picture(tmp_path: Path) -> None:
+    draw_waterfall(tmp_path / "w.svg", (gap(3e-6),), (effect("friction", 4.0),), "held-out")
+    words = (tmp_path / "w.svg").read_text(encoding="utf-8")
+    assert "+ friction between the flanks" in words and "record held-out [um]" in words

@@ -1,0 +1,114 @@
+"""What was selected held against a record that had no part in it, on lines made by hand."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from shared.fake_simulator import LINES, FakeSimulator, sensitivities, target
+
+from gearbench.diagnosis.effects.effect import Hypothesis, Wide
+from gearbench.diagnosis.output import judged as module
+from gearbench.diagnosis.output.judged import Judged, Sizes, judged_on, rms_closed
+from gearbench.diagnosis.output.selection import Selection, select
+from gearbench.diagnosis.output.simulated import Simulated
+from gearbench.diagnosis.output.target import Target
+
+MATRIX, OTHER = sensitivities(3), sensitivities(4)  # the records of the search, and the judged one
+FRICTION = Hypothesis("friction", "mesh", (Wide("friction"),))
+RIPPLE = Hypothesis("torque-ripple", "drive", (Wide("ripple"),))
+BACKGROUND = np.array([0.08, -0.1, 0.02, 0.004, -0.005, 0.006, 0.0, 0.0])
+
+
+class OfLines(Target):
+    """A target whose signals are the lines themselves."""
+
+    def gathered(self, channels: Sequence[Mapping[str, np.ndarray]]) -> np.ndarray:
+        return channels[0]["lines"]
+
+
+@dataclass
+class Answering(FakeSimulator):
+    def channels(self, p: np.ndarray, measured: Any) -> dict[str, np.ndarray]:
+        return {"lines": p @ OTHER, "dte": np.zeros(8)}
+
+
+def noisy(lines: np.ndarray, seed: int) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    return lines + 0.02 * (rng.standard_normal(LINES) + 1j * rng.standard_normal(LINES))
+
+
+def judged(searched: dict[int, float], there: dict[int, float], monkeypatch: pytest.MonkeyPatch) -> Judged:
+    """Effects of these sizes in the records of the search, and in the judged one."""
+    p, q = BACKGROUND.copy(), BACKGROUND.copy()
+    for number, value in searched.items():
+        p[number] = value
+    for number, value in there.items():
+        q[number] = value
+    simulator = Answering(lambda one: one @ MATRIX, target(noisy(p @ MATRIX, 11)))
+    simulator.layout.size = 8
+    selection = select(simulator, (FRICTION, RIPPLE), [np.zeros(8)], {})
+    assert isinstance(selection, Selection)
+    plain = target(noisy(q @ OTHER, 12))
+    held = OfLines(**{one.name: getattr(plain, one.name) for one in fields(plain)})
+    monkeypatch.setattr(module, "target_of", lambda measurements, conditions: held)
+    monkeypatch.setattr(module, "prepare", lambda measured, model, band: None)
+    problem: Any = SimpleNamespace(model=None, conditions=[SimpleNamespace(band=1.0)])
+    layout: Any = simulator.layout
+    found = judged_on(problem, Simulated(layout, simulator, selection, selection.best.std), None)  # type: ignore[arg-type]
+    assert found is not None
+    return found
+
+
+def names(listed: Sequence[Any]) -> list[str]:
+    return [one.hypothesis.name for one in listed]
+
+
+def test_an_effect_that_the_judged_record_has_too_is_kept_with_what_it_closes(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = judged({3: 0.4}, {3: 0.4}, monkeypatch)
+    assert names(found.found.selection.entered) == ["friction"] and not found.dropped
+    closing = found.closings["friction"]
+    assert closing.due and closing.gain > 100 and closing.part[0] == "dte"
+    # 0.4 of its sensitivities over the noise left, in the band of ten lines that shows it best.
+    assert 0.4 / 0.02 < closing.growth < 2 * 0.4 / 0.02
+
+
+def test_an_effect_that_leaves_the_judged_record_as_it_was_is_not(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = judged({3: 0.4, 4: 0.3, 5: -0.2}, {3: 0.4}, monkeypatch)
+    assert names(found.dropped) == ["torque-ripple"]
+    assert names(found.found.selection.entered) == ["friction"]
+    # It goes back to what a good rig may have, and what is kept keeps its size.
+    best = found.found.selection.best.p
+    assert abs(best[4]) < 0.05 and best[3] == pytest.approx(0.4, abs=0.05)
+    none = judged({4: 0.3, 5: -0.2}, {}, monkeypatch)
+    assert not none.found.selection.entered and none.found.selection.best is none.found.selection.base
+
+
+def test_each_of_two_effects_is_taken_out_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = judged({3: 0.5, 4: 0.2, 5: -0.15}, {3: 0.5, 4: 0.2, 5: -0.15}, monkeypatch)
+    assert set(names(found.found.selection.entered)) == {"friction", "torque-ripple"}
+    friction, ripple = found.closings["friction"], found.closings["torque-ripple"]
+    assert friction.growth / ripple.growth == pytest.approx(0.5 / 0.25, rel=0.4)
+
+
+def test_parts_of_the_gap_are_energies_beyond_noise_in_units_of_each_channel(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(2)
+    measured = {name: size * rng.standard_normal((1, 4096)) for name, size in (("dte", 1.0), ("y_driver", 10.0))}
+    monkeypatch.setattr(module, "measured_channels", lambda one: measured)
+    gap = {name: values[0] - values[0].std() * rng.standard_normal(4096) for name, values in measured.items()}
+    nominal = {name: values[0] - 0.5 * gap[name] for name, values in measured.items()}
+    final = {name: values[0] - 0.1 * gap[name] for name, values in measured.items()}
+    half = {**final, "dte": measured["dte"][0] - 0.4 * gap["dte"]}
+    made = Judged(None, None, {}, nominal, nominal, final)  # type: ignore[arg-type]
+    assert isinstance(made.sizes["dte"], Sizes)
+    assert made.left == pytest.approx(0.1 / 0.5)
+    assert made.remains == pytest.approx(0.1 * np.sqrt(2), rel=0.05)
+    assert made.share(nominal) == pytest.approx(1 - 0.2**2)
+    assert made.share(half) == pytest.approx(0.5 * (0.4**2 - 0.1**2) / 0.5**2, rel=0.05)
+    assert made.share(final) == 0.0
+    value, low, high = rms_closed(None, "dte", half["dte"], final["dte"])  # type: ignore[arg-type]
+    assert low < value < high < 1.1 * value and value == pytest.approx(np.sqrt(0.15) * gap["dte"].std(), rel=1e-6)
