@@ -11,6 +11,7 @@ from gearbench.identification.identify import IdentificationSettings, identify
 from gearbench.identification.lpm.local_solve import LpmError
 from gearbench.identification.nonlinear.split import DistortionError, distortion, is_coset
 from gearbench.identification.response.exact import exact_frf, frozen_frf
+from gearbench.identification.response.export import export_frf
 from gearbench.identification.response.frf import FrfError, htf, itf, make_frf, read_frf, validate_frf, write_frf
 from gearbench.identification.response.modes import frozen_modes, itf_modes
 from gearbench.identification.spectra.joint import SpectraError
@@ -42,6 +43,7 @@ __all__ = [
     "dte",
     "exact_frf",
     "exact_itf",
+    "export_frf",
     "floquet_multipliers",
     "force",
     "frozen_frf",

@@ -28,6 +28,7 @@ SMALL = {
     "identification.window": "6",
 }
 PICTURES = {"gears.png", "stiffness.png", "record.png", "itf.png", "natural_frequency.png"}
+PICTURES |= {"uncertainty.png", "htf.png", "quality.png", "orders.png"}
 DATA = {"record.nc", "static.nc", "frf.nc", "exact.nc", "frozen.nc"}
 
 
