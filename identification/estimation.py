@@ -20,6 +20,7 @@ from gearbench.identification.lpm.local_solve import LpmError
 from gearbench.identification.lpm.regression import Window
 from gearbench.identification.lpm.selection import LADDER, choose_window
 from gearbench.identification.response.frf import make_frf
+from gearbench.identification.response.mode_spread import natural_frequency_deviation
 from gearbench.identification.response.modes import itf_modes
 from gearbench.identification.spectra.joint import Spectra
 from gearbench.identification.spectra.records import record_spectra
@@ -280,6 +281,9 @@ def _dataset(
     response = itf_from_htf(result.htf, settings.phases)
     variance = result.itf_variance(settings.phases)
     modes = itf_modes(frequency, response, variance, modes=settings.modes)
+    # A window's estimates have about as many independent errors as a polynomial has coefficients.
+    step = int(result.lines[1] - result.lines[0])
+    together = max(1.0, window.width / (window.order + 1) / step)
     accuracy = expected_accuracy(result, cost)
     rule = record_rule(spectra, window.harmonics, window.order, *modes, accuracy.truncation)
     warnings = [*notes, *_warnings(accuracy, rule, spectra)]
@@ -320,6 +324,8 @@ def _dataset(
         modes=modes,
         itf_variance=variance,
         htf_variance=result.htf_variance,
+        coherence=result.coherence,
+        natural_frequency_sd=natural_frequency_deviation(frequency, response, variance, modes, together),
         attributes=attributes,
     )
 

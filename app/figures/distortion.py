@@ -41,6 +41,13 @@ def draw_distortion(path: Path, split: xr.Dataset) -> None:
         axes.set_xlim(0.0, frequency[-1])
         axes.set_xlabel("frequency [Hz]")
         axes.set_ylabel("DTE of a line, rms [nm]")
-        axes.set_title(f"Distortion is {float(split.attrs['share']):.2g} of the response")
+        axes.set_title(_title(split))
         axes.legend(loc="upper right", frameon=True, framealpha=0.9, markerscale=2.0, fontsize=9)
         save(drawing, path)
+
+
+def _title(split: xr.Dataset) -> str:
+    parts = split.sel(part=["even", "odd"])
+    if bool((parts["rms"] <= parts["limit"]).all()):
+        return "No distortion stands out of the noise"
+    return f"Distortion is {float(split.attrs['share']):.2g} of the response"

@@ -47,7 +47,7 @@ def draw_itf(path: Path, results: Mapping[str, xr.Dataset], warning: str = "") -
     with figure(1, len(maps), (max(width, 6.6), 5.2), sharey=True, squeeze=False) as (drawing, axes):
         for panel, (name, values) in zip(axes[0], maps.items(), strict=True):
             frf = results[name]
-            image = panel.pcolormesh(*_coarse(frf, values), norm=norm, cmap="viridis", rasterized=True)
+            image = panel.pcolormesh(*coarse_map(frf, values), norm=norm, cmap="viridis", rasterized=True)
             panel.set_title(_TITLES.get(name, name))
             phase_axis(panel, label="mesh phase [cycles]")
             panel.grid(False)
@@ -69,7 +69,8 @@ def draw_itf(path: Path, results: Mapping[str, xr.Dataset], warning: str = "") -
 def draw_natural_frequencies(
     path: Path, results: Mapping[str, xr.Dataset], zones: Sequence[Span], label: str, warning: str = ""
 ) -> None:
-    """Natural frequencies against mesh phase, with the zones of fewest pairs in contact shaded."""
+    """Natural frequencies against mesh phase, with bands of two standard deviations where they are known, and the zones
+    of fewest pairs in contact shaded."""
     with figure(size=(8.0, 4.8)) as (drawing, axes):
         shade(axes, zones, label)
         phase_axis(axes)
@@ -80,6 +81,9 @@ def draw_natural_frequencies(
                 title = _TITLES.get(name, name) if number == 0 else None
                 phase, curve = closed(frf["phase"].values, values)
                 axes.plot(phase, curve, **style, **marker, label=title)
+                if "natural_frequency_sd" in frf:
+                    _, half = closed(frf["phase"].values, 2.0 * frf["natural_frequency_sd"].values[number])
+                    axes.fill_between(phase, curve - half, curve + half, color=style["color"], alpha=0.2, lw=0)
                 if name == "identified" and number == 0:
                     explain_gaps(axes, phase, curve, NO_MODE)
         axes.set_ylabel("natural frequency [Hz]")
@@ -108,7 +112,7 @@ def _zoom_on_found(axes: Any, results: Mapping[str, xr.Dataset]) -> None:
         axes.set_ylim(low - margin, high + 1.6 * margin)
 
 
-def _coarse(frf: xr.Dataset, values: Array) -> tuple[Array, Array, Array]:
+def coarse_map(frf: xr.Dataset, values: Array) -> tuple[Array, Array, Array]:
     """Phases, frequencies and values of a map, thinned to what a picture shows: cells are not averaged."""
     rows = slice(None, None, max(1, len(values) // _PIXELS))
     columns = slice(None, None, max(1, values.shape[1] // _PIXELS))

@@ -12,6 +12,9 @@ from gearbench.figures.distortion import draw_distortion
 from gearbench.figures.frf import draw_itf, draw_natural_frequencies
 from gearbench.figures.record import draw_record, draw_spectra, draw_stiffness
 from gearbench.figures.static import plot_static
+from gearbench.figures.frf_quality import draw_branches, draw_quality, draw_uncertainty
+from gearbench.figures.of_identified import draw_record_orders
+from gearbench.figures.record import draw_record, draw_stiffness
 from gearbench.geometry.pair.zones import Span
 
 
@@ -66,6 +69,22 @@ def _natural_frequencies(run: RunResults, path: Path) -> None:
     draw_natural_frequencies(path, {**run.responses, **run.modes}, run.zones, run.label, run.warning)
 
 
+def _uncertainty(run: RunResults, path: Path) -> None:
+    draw_uncertainty(path, run.responses["identified"])
+
+
+def _branches(run: RunResults, path: Path) -> None:
+    draw_branches(path, run.responses["identified"])
+
+
+def _quality(run: RunResults, path: Path) -> None:
+    draw_quality(path, run.responses["identified"])
+
+
+def _orders(run: RunResults, path: Path) -> None:
+    draw_record_orders(path, [run.record])
+
+
 def _distortion(run: RunResults, path: Path) -> None:
     assert run.distortion is not None
     draw_distortion(path, run.distortion)
@@ -78,6 +97,10 @@ FIGURES = (
     RunFigure("spectrum.png", "spectrum of the DTE", _spectrum),
     RunFigure("itf.png", "magnitude of the ITF over frequency and mesh phase", _itf),
     RunFigure("natural_frequency.png", "natural frequency against mesh phase", _natural_frequencies),
+    RunFigure("uncertainty.png", "the identified ITF beside its standard deviation", _uncertainty),
+    RunFigure("htf.png", "strongest branches of the identified HTF, with bands", _branches),
+    RunFigure("quality.png", "residual and variance against frequency", _quality),
+    RunFigure("orders.png", "amplitudes of the DTE by shaft order", _orders),
     RunFigure(
         "distortion.png",
         "response, noise, even and odd distortion, line by line",

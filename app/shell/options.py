@@ -68,6 +68,29 @@ def check_out(out: Path, inputs: Sequence[Path | str] = ()) -> None:
         raise InputError(f"--out {out} is one of the inputs, which it would replace: choose another name")
 
 
+def check_export(path: Path, inputs: Sequence[Path | str] = (), option: str = "--export") -> None:
+    """Refuse an export that cannot be written, or that would replace an input, before any work is done."""
+    from gearbench.identification.response.export import SUFFIXES
+    from gearbench.shell.failure import InputError
+
+    if not path.parent.is_dir():
+        raise InputError(f"{option} {path} cannot be written: the folder {path.parent} must exist")
+    if path.suffix.lower() not in SUFFIXES:
+        raise InputError(f"{option} {path} must end in {' or '.join(SUFFIXES)}")
+    if any(path.resolve() == Path(one).resolve() for one in inputs):
+        raise InputError(f"{option} {path} is one of the other files, which it would replace: choose another name")
+
+
+def check_folder(path: Path, option: str = "--pictures") -> None:
+    """Refuse a folder for pictures that is a file, or whose parent does not exist, before any work is done."""
+    from gearbench.shell.failure import InputError
+
+    if path.exists() and not path.is_dir():
+        raise InputError(f"{option} {path} is a file, but must be a folder")
+    if not path.resolve().parent.is_dir():
+        raise InputError(f"{option} {path} cannot be made: the folder {path.parent} must exist")
+
+
 def check_picture(path: Path, inputs: Sequence[Path | str] = (), option: str = "--figure") -> None:
     """Refuse a picture that cannot be written, or that would replace an input, before any work is done."""
     from gearbench.shell.failure import InputError

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from gearbench.identification.feedback.estimate import Feedback
 from gearbench.identification.feedback.result import (
     along_phase,
+    coherence,
     drawn_models,
     followed,
     furthest_line,
@@ -20,6 +21,7 @@ from gearbench.identification.feedback.result import (
     unexplained,
 )
 from gearbench.identification.response.frf import make_frf
+from gearbench.identification.response.mode_spread import natural_frequency_deviation
 from gearbench.identification.response.modes import itf_modes
 from gearbench.identification.spectra.joint import Floats, Spectra
 from gearbench.identification.truth.periodic import itf_from_htf
@@ -79,6 +81,9 @@ def feedback_frf(
         modes=natural,
         itf_variance=itf_variance,
         htf_variance=htf_variance,
+        coherence=coherence(found, lines),
+        # A model of few parameters errs alike over all of a resonance: an upper bound.
+        natural_frequency_sd=natural_frequency_deviation(frequency, itf, itf_variance, natural, float(lines.size)),
         attributes={
             **attributes,
             "harmonics": branches,

@@ -86,6 +86,20 @@ def along_phase(model: Model, data: ClassData, phases: int) -> tuple[Floats, Flo
     return stiffness, damping
 
 
+def coherence(found: Feedback, lines: NDArray[np.int64]) -> Floats:
+    """1 - residual over response (F,), powers of the lines within half of COMPARED of each output line."""
+    data = found.data
+    power, left = np.zeros(data.top + 1), np.zeros(data.top + 1)
+    counted = np.abs(data.dte) > 0
+    at = np.abs(data.lines)
+    for total, values in ((power, data.dte), (left, found.refined.left)):
+        np.add.at(total, at[data.valid], np.sum(np.abs(values) ** 2 * counted, axis=2)[data.valid])
+    sums = [np.concatenate([[0.0], np.cumsum(total)]) for total in (left, power)]
+    low, high = np.clip(lines - COMPARED // 2, 0, data.top), np.clip(lines + COMPARED // 2, 0, data.top) + 1
+    part, whole = (one[high] - one[low] for one in sums)
+    return np.asarray(np.maximum(1.0 - part / np.maximum(whole, np.finfo(float).tiny), 0.0))
+
+
 def unexplained(found: Feedback, band: tuple[int, int]) -> float:
     """Estimated sum over the lines k of the `band` and all branches of |error of G_l(k)|^2 [m^2/N^2].
 

@@ -36,7 +36,8 @@ CROSS_WORK = 1e11
 class LpmResult:
     """Identified branches on the output lines.
 
-    `lines` (F,); `htf`, `htf_variance` (2L+1, F), l = -L..L [m/N]; `itf_covariance` (Q+1, F): sums over l
+    `lines` (F,); `coherence` (F,): 1 - residual over response, powers of a line in the window around each;
+    `htf`, `htf_variance` (2L+1, F), l = -L..L [m/N]; `itf_covariance` (Q+1, F): sums over l
     of E[dG_l conj(dG_{l+q})], q = 0 first, which give the ITF's variance at any phase; `missing`: estimated sum over
     output lines and branches of |error of G_l|^2 that the variance does not hold, `missing_bound` the same with all
     of the residual taken for it unless repeated periods tell the noise; `residual`: rms of
@@ -59,6 +60,7 @@ class LpmResult:
     windows: int
     variance_sampled: int
     cross_terms: str
+    coherence: Floats
 
     @property
     def harmonics(self) -> int:
@@ -177,6 +179,7 @@ class _Sweep:
             self.cross_terms = "exact"
             self.cross = CrossCovariance(regression, window, self.place, shifts)
         self.residual = self.power = 0.0
+        self.coherence = np.zeros(lines.size)
         self.missing = MissingPower(regression, lines, window.harmonics)
         self.condition = 0.0
 
@@ -195,7 +198,7 @@ class _Sweep:
             if want:
                 last = diagonal_variance(fit, self.window)
             assert last is not None
-            noise = self._account(fit, source)
+            noise = self._account(fit, source, rows)
             self._read(fit, centre, rows, noise * last)
             self.missing.add(fit, rows, self.window.width)
             if self.cross is not None:
@@ -204,12 +207,15 @@ class _Sweep:
                 progress(done / len(self.centres), f"window {done + 1} of {len(self.centres)}")
         return self._result()
 
-    def _account(self, fit: LocalFit, source: WindowRows) -> float:
-        """Residual variance of the window; adds to the overall ratio of residual to response."""
+    def _account(self, fit: LocalFit, source: WindowRows, rows: Lines) -> float:
+        """Residual variance of the window; adds to the overall ratio of residual to response, and to `coherence`."""
         noise = fit.residual / fit.freedom
         data = source.data
+        power = float(np.sum(np.abs(data) ** 2)) / max(int(np.count_nonzero(data)), 1)
         self.residual += noise
-        self.power += float(np.sum(np.abs(data) ** 2)) / max(int(np.count_nonzero(data)), 1)
+        self.power += power
+        column = self.place[rows[(rows > 0) & (rows < self.place.size)]]
+        self.coherence[column[column >= 0]] = max(1.0 - noise / power, 0.0) if power else 0.0
         return noise
 
     def _read(self, fit: LocalFit, centre: int, rows: Lines, variance: Floats) -> None:
@@ -249,4 +255,5 @@ class _Sweep:
             len(self.centres),
             self.sampled,
             self.cross_terms,
+            self.coherence,
         )

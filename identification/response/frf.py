@@ -25,8 +25,13 @@ VARIABLES: dict[str, tuple[tuple[str, ...], str]] = {
     "natural_frequency": (("mode", "phase"), "Hz"),
     "damping_ratio": (("mode", "phase"), "1"),
 }
+# What a response may hold besides; results of other kinds and older files do not.
+OPTIONAL: dict[str, tuple[tuple[str, ...], str]] = {
+    "coherence": (("frequency",), "1"),
+    "natural_frequency_sd": (("mode", "phase"), "Hz"),
+}
 # Modes may be missing at a phase.
-MAY_BE_NAN = ("natural_frequency", "damping_ratio")
+MAY_BE_NAN = ("natural_frequency", "damping_ratio", "natural_frequency_sd")
 COORDINATES = {"frequency": "Hz", "phase": "cycles", "harmonic": "1", "mode": "1"}
 
 
@@ -43,12 +48,15 @@ def make_frf(
     modes: tuple[Floats, Floats],
     itf_variance: Floats | None = None,
     htf_variance: Floats | None = None,
+    coherence: Floats | None = None,
+    natural_frequency_sd: Floats | None = None,
     attributes: Mapping[str, Any] | None = None,
 ) -> xr.Dataset:
     """The dataset of an ITF (frequency, phase) on uniform phases 0, 1/Q, ... and an HTF (2L+1, frequency), l = -L..L.
 
     frequency [Hz]; modes: natural frequencies [Hz] and damping ratios, each (mode, phase); variances are
-    E|error|^2 and 0 by default. Attributes that are None are dropped. Raises FrfError for shapes that do
+    E|error|^2 and 0 by default; coherence (frequency): part of the response's power that the result explains;
+    natural_frequency_sd (mode, phase) [Hz]. Attributes that are None are dropped. Raises FrfError for shapes that do
     not fit.
     """
     limit, phases = htf.shape[0] // 2, itf.shape[1]
@@ -89,6 +97,10 @@ def make_frf(
             **{k: v for k, v in (attributes or {}).items() if v is not None},
         },
     )
+    for name, more in (("coherence", coherence), ("natural_frequency_sd", natural_frequency_sd)):
+        if more is not None:
+            dimensions, unit = OPTIONAL[name]
+            dataset[name] = (dimensions, np.asarray(more, dtype=float), {"units": unit})
     validate_frf(dataset)
     return dataset
 
@@ -99,7 +111,9 @@ def validate_frf(dataset: xr.Dataset) -> None:
         raise FrfError(f"schema is {dataset.attrs.get('schema')!r}, but a frequency response has {SCHEMA!r}")
     if dataset.attrs.get("kind") not in KINDS:
         raise FrfError(f"kind is {dataset.attrs.get('kind')!r}, but must be one of {', '.join(KINDS)}")
-    for name, (dimensions, _) in VARIABLES.items():
+    for name, (dimensions, _) in (VARIABLES | OPTIONAL).items():
+        if name not in dataset and name in OPTIONAL:
+            continue
         if name not in dataset:
             raise FrfError(f"variable {name} is missing")
         if dataset[name].dims != dimensions:

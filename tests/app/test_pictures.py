@@ -70,7 +70,7 @@ def test_natural_frequencies_zoom_on_what_was_found(drawn: list[Figure]) -> None
 
 def test_maps_are_thinned_without_averaging() -> None:
     large = frf(rows=3000, phases=64)
-    phase, frequency, values = figures_frf._coarse(large, figures_frf.magnitude(large))
+    phase, frequency, values = figures_frf.coarse_map(large, figures_frf.magnitude(large))
     assert values.shape == (frequency.size, phase.size) and frequency.size <= 1000
     whole = figures_frf.magnitude(large)
     rows = np.searchsorted(large["frequency"].values, frequency)

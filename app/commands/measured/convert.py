@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from gearbench.shell.failure import InputError
-from gearbench.shell.options import JsonOption, SetOption, check_out, load_case, print_json
+from gearbench.shell.options import JsonOption, SetOption, check_export, check_out, load_case, print_json
 from gearbench.shell.progress import Progress
 from gearbench.words.convert import guess_lines, record_summary, source_lines, summary_lines
 
@@ -49,12 +49,16 @@ def convert(
 ) -> None:
     """Convert measured files into a record that identify, compare and diagnose take.
 
-    A guessed map is used at once where names and units leave no doubt, else only with --yes.
+    A guessed map is used at once where names and units leave no doubt, else only with --yes. A frequency response
+    (frf.nc) and an OUT that ends in .uff or .mat: the response is written for other programs.
     """
     if show:
         _show(files, as_json)
         return
     inputs, out = (files, None) if len(files) == 1 else (files[:-1], files[-1])
+    if out is not None and len(inputs) == 1 and inputs[0].suffix == ".nc" and out.suffix != ".nc":
+        _export(inputs[0], out, as_json)
+        return
     if out is None and write_map is None:
         raise InputError(f"OUT is missing: gearbench convert {inputs[0]} record.nc (or --show, to see what is in it)")
     if out is not None:
@@ -70,6 +74,22 @@ def convert(
     found = _map(source, channel_map, known, write_map, yes or out is None)
     if out is not None:
         _convert(inputs, out, source, found, known, runs, as_json)
+
+
+def _export(frf: Path, out: Path, as_json: bool) -> None:
+    """A frequency response for other programs."""
+    from gearbench.identification import export_frf, read_frf
+
+    check_export(out, [frf], "OUT")
+    with Progress("convert") as progress:
+        progress.step("writing")
+        found = read_frf(frf)
+        export_frf(found, out)
+    sizes = {str(name): int(size) for name, size in found.sizes.items()}
+    if as_json:
+        print_json({"file": str(out), **sizes})
+    else:
+        typer.echo(f"{out}: {', '.join(f'{size} {name}' for name, size in sizes.items())}")
 
 
 def _show(files: list[Path], as_json: bool) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from gearbench.shell.failure import InputError
-from gearbench.shell.options import JsonOption, check_out, print_json
+from gearbench.shell.options import JsonOption, check_export, check_folder, check_out, print_json
 from gearbench.shell.progress import Progress
 from gearbench.words.distortion import distortion_lines, distortion_numbers
 
@@ -32,15 +32,26 @@ def identify(
     window: Annotated[
         int | None, typer.Option("--window", help="half-width n of the local window in lines; absent: chosen")
     ] = None,
+    export: Annotated[
+        list[Path] | None, typer.Option("--export", metavar="FILE", help="write it as .uff or .mat too; repeatable")
+    ] = None,
+    pictures: Annotated[
+        Path | None, typer.Option("--pictures", metavar="DIR", help="draw response, uncertainty and quality here")
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Identify the time-varying frequency response from force to DTE out of records."""
     import gearbench as gb
+    from gearbench.figures.of_identified import draw_identified
 
     check_out(out, records)
     seen = {path.resolve() for path in records}
     if len(seen) < len(records):
         raise InputError(f"RECORD is given {len(records)} times but names {len(seen)} file(s): each one counts once")
+    for path in export or []:
+        check_export(path, [*records, out])
+    if pictures is not None:
+        check_folder(pictures)
     settings = gb.IdentificationSettings(method=method, harmonics=harmonics, order=order, window=window, band=band_hz)
     with Progress("identify") as progress:
         progress.step("reading")
@@ -49,6 +60,11 @@ def identify(
         found = gb.identify(loaded, settings, progress=progress)
         gb.write_frf(found, out)
         split = gb.identification.distortion(loaded) if gb.identification.is_coset(loaded) else None
+        for path in export or []:
+            gb.identification.export_frf(found, path)
+        if pictures is not None:
+            progress.step("pictures")
+            draw_identified(pictures, found, loaded, split)
     summary = frf_summary(found, out)
     if split is not None:
         summary["distortion"] = distortion_numbers(split)

@@ -56,10 +56,17 @@ def test_identify_prints_the_table_of_a_coset_record(tmp_path: Path, capsys: pyt
     path, out = tmp_path / "record.nc", tmp_path / "frf.nc"
     write_record(record(0.05, periods=1), path)
     lpm = ["--harmonics", "1", "--order", "1", "--window", "40"]
-    assert run_command_line(["identify", str(path), "--out", str(out), *lpm]) == 0
+    more = ["--pictures", str(tmp_path / "pictures"), "--export", str(tmp_path / "frf.mat")]
+    assert run_command_line(["identify", str(path), "--out", str(out), *lpm, *more]) == 0
+    assert (tmp_path / "frf.mat").stat().st_size > 10_000
+    drawn = {one.name for one in (tmp_path / "pictures").iterdir() if one.stat().st_size > 10_000}
+    assert drawn >= {"itf.png", "htf.png", "quality.png", "orders.png", "distortion.png"}
     assert "| even distortion | " in capsys.readouterr().out
     assert run_command_line(["identify", str(path), "--out", str(out), *lpm, "--json"]) == 0
     numbers = json.loads(capsys.readouterr().out)["distortion"]
+    for more, words in ((["--export", "frf.xls"], "must end in .uff"), (["--pictures", str(path)], "must be a folder")):
+        assert run_command_line(["identify", str(path), "--out", str(out), *more]) == 2
+        assert words in capsys.readouterr().err
     assert numbers["noise_um"] is None and 0.02 < numbers["share"] < 0.06
 
 
