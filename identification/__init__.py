@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from gearbench.identification.lpm.local_solve import LpmError
     from gearbench.identification.nonlinear.split import DistortionError, distortion, is_coset
     from gearbench.identification.response.exact import exact_frf, frozen_frf
+    from gearbench.identification.response.export import export_frf
     from gearbench.identification.response.frf import FrfError, htf, itf, make_frf, read_frf, validate_frf, write_frf
     from gearbench.identification.response.modes import frozen_modes, itf_modes
     from gearbench.identification.spectra.joint import SpectraError
@@ -31,26 +32,6 @@ if TYPE_CHECKING:
         itf_from_htf,
         truncation_error,
     )
-from gearbench.identification.excitation.multisine import MultisineError, MultisineSignal, random_phase_multisine
-from gearbench.identification.identify import IdentificationSettings, identify
-from gearbench.identification.lpm.local_solve import LpmError
-from gearbench.identification.nonlinear.split import DistortionError, distortion, is_coset
-from gearbench.identification.response.exact import exact_frf, frozen_frf
-from gearbench.identification.response.export import export_frf
-from gearbench.identification.response.frf import FrfError, htf, itf, make_frf, read_frf, validate_frf, write_frf
-from gearbench.identification.response.modes import frozen_modes, itf_modes
-from gearbench.identification.spectra.joint import SpectraError
-from gearbench.identification.spectra.transmission_error import AngleOnlyWarning, TransmissionError, dte, force
-from gearbench.identification.truth.harmonic_balance import harmonic_balance_itf
-from gearbench.identification.truth.monodromy import exact_itf, floquet_multipliers
-from gearbench.identification.truth.periodic import (
-    PeriodicSystem,
-    PeriodicSystemError,
-    frozen_itf,
-    htf_from_itf,
-    itf_from_htf,
-    truncation_error,
-)
 
 __all__ = [
     "AngleOnlyWarning",
@@ -91,6 +72,7 @@ __all__ = [
 ]
 
 _HOMES = {
+    "export_frf": "gearbench.identification.response.export",
     "DistortionError": "gearbench.identification.nonlinear.split",
     "distortion": "gearbench.identification.nonlinear.split",
     "is_coset": "gearbench.identification.nonlinear.split",

@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 import typer.main
-from shared import pages as runner
-from shared.pages import LANGUAGES, ROOT, Block, blocks, pages, run_page
+from shared import code_blocks as runner
+from shared.code_blocks import LANGUAGES, ROOT, Block, blocks, pages, run_page
 
 from gearbench.cli import _LISTS, app
 from gearbench.shell.options import expand_lists

@@ -10,11 +10,10 @@ import xarray as xr
 
 from gearbench.figures.distortion import draw_distortion
 from gearbench.figures.frf import draw_itf, draw_natural_frequencies
-from gearbench.figures.record import draw_record, draw_spectra, draw_stiffness
-from gearbench.figures.static import plot_static
 from gearbench.figures.frf_quality import draw_branches, draw_quality, draw_uncertainty
 from gearbench.figures.of_identified import draw_record_orders
-from gearbench.figures.record import draw_record, draw_stiffness
+from gearbench.figures.record import draw_record, draw_spectra, draw_stiffness
+from gearbench.figures.static import plot_static
 from gearbench.geometry.pair.zones import Span
 
 

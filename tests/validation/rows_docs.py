@@ -7,7 +7,7 @@ import tempfile
 from functools import partial
 from pathlib import Path
 
-from shared.pages import blocks, pages, run_page
+from shared.code_blocks import blocks, pages, run_page
 
 from gearbench.commands.house.checks import Check, Got
 

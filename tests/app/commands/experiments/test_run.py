@@ -32,7 +32,6 @@ PICTURES = {
     "gears.png", "transmission_error.png", "stiffness.png", "record.png", "spectrum.png", "itf.png",
     "natural_frequency.png",
 }  # fmt: skip
-PICTURES = {"gears.png", "stiffness.png", "record.png", "itf.png", "natural_frequency.png"}
 PICTURES |= {"uncertainty.png", "htf.png", "quality.png", "orders.png"}
 DATA = {"record.nc", "static.nc", "frf.nc", "exact.nc", "frozen.nc"}
 
