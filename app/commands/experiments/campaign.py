@@ -10,7 +10,6 @@ import typer
 
 from gearbench.shell.options import CaseArgument, JsonOption, SetOption, load_case, print_json
 from gearbench.shell.progress import Progress
-from gearbench.words.study import best, decider, effects_from, failures, span_line
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -79,6 +78,7 @@ def campaign(
         typer.echo("\n".join(_lines(table, summary, folder)))
     if summary["failed"] == summary["members"]:
         from gearbench.shell.failure import InputError
+        from gearbench.words.study import failures
 
         raise InputError(f"no member has a result: {failures(table)[0][0]}")
 
@@ -108,6 +108,8 @@ def study_summary(table: xr.Dataset, folder: Path) -> dict[str, Any]:
 
 
 def _lines(table: xr.Dataset, summary: dict[str, Any], folder: Path) -> list[str]:
+    from gearbench.words.study import best, decider, effects_from, failures, span_line
+
     lines = [span_line(table, name) for name in summary["results"]]
     effects = effects_from((folder / "effects.csv").read_text(encoding="utf-8"))
     lines += [line for one in effects if (line := decider(one))]
