@@ -45,6 +45,7 @@ class Job:
     output: Output
     progress: Steps
     suffix: str = ""
+    workers: int | None = None
 
     def name(self, base: str) -> str:
         """File name of a product: record.nc, or record-CONDITION.nc."""
@@ -69,12 +70,20 @@ class Job:
             self.output.write(name, draw)
 
 
-def run(case: Case, out: str | Path, *, force: bool = False, progress: Steps | None = None) -> list[dict[str, Any]]:
+def run(
+    case: Case,
+    out: str | Path,
+    *,
+    force: bool = False,
+    progress: Steps | None = None,
+    workers: int | None = None,
+) -> list[dict[str, Any]]:
     """The main job of a case: geometry, mesh, simulation, identification, pictures and summary in the folder `out`.
 
     Returns the numbers of each experiment's summary (one, or one for each condition). Resumes in the folder of the same
     case and sources; another's is refused unless `force`, which removes what that run wrote. `progress` hears of steps
-    and of fractions done. Raises InputError for the folder or a case without multisine, and what a step raises.
+    and of fractions done; `workers` as in `simulate`. Raises InputError for the folder or a case without multisine, and
+    what a step raises.
 
     >>> import gearbench as gb
     >>> short = ["realisations=4", "samples_per_period=4096", "multisine.band_hz=[900, 1500]"]
@@ -104,7 +113,10 @@ def run(case: Case, out: str | Path, *, force: bool = False, progress: Steps | N
                 " mesh frequency; `simulate` makes the record"
             )
     with claimed(Path(out), "run", fingerprint(dump_case(case), source_digest()), force) as output:
-        jobs = [Job(one, output, progress or Silent(), f"-{name}" if name else "") for name, one in case.experiments()]
+        jobs = [
+            Job(one, output, progress or Silent(), f"-{name}" if name else "", workers)
+            for name, one in case.experiments()
+        ]
         return [run_experiment(job) for job in jobs]
 
 
@@ -131,7 +143,7 @@ def run_experiment(job: Job) -> dict[str, Any]:
         record = job.dataset(
             "record.nc",
             read_record,
-            lambda: simulate(case, progress=progress, checkpoints=checkpoints),
+            lambda: simulate(case, progress=progress, checkpoints=checkpoints, workers=job.workers),
             write_record,
         )
     modes: dict[str, xr.Dataset] = {}

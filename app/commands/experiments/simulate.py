@@ -9,7 +9,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from gearbench.shell.checkpoints import checkpoints_of
-from gearbench.shell.options import CaseArgument, JsonOption, ModelOption, SetOption, check_out, load_case, print_json
+from gearbench.shell.options import (
+    CaseArgument,
+    JsonOption,
+    ModelOption,
+    SetOption,
+    WorkersOption,
+    check_out,
+    load_case,
+    print_json,
+)
 from gearbench.shell.progress import Progress
 
 if TYPE_CHECKING:
@@ -34,6 +43,7 @@ def simulate(
     every: Annotated[
         float | None, typer.Option("--fields-every", metavar="SECONDS", help="fields at every so many seconds")
     ] = None,
+    workers: WorkersOption = None,
     settings: SetOption = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -57,7 +67,7 @@ def simulate(
         for experiment, path in experiments(loaded, out):
             progress.step(path.name)
             with checkpoints_of(path) as checkpoints:
-                record = gb.simulate(experiment, model, progress, checkpoints=checkpoints)
+                record = gb.simulate(experiment, model, progress, checkpoints=checkpoints, workers=workers)
                 gb.write_record(record, path)
             if times[path]:
                 write_fields(experiment, record, times[path], path, progress)
