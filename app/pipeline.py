@@ -49,6 +49,7 @@ class Job:
     output: Output
     progress: Steps
     suffix: str = ""
+    workers: int | None = None
 
     def name(self, base: str) -> str:
         """File name of a product: record.nc, or record-CONDITION.nc."""
@@ -73,12 +74,20 @@ class Job:
             self.output.write(name, draw)
 
 
-def run(case: Case, out: str | Path, *, force: bool = False, progress: Steps | None = None) -> list[dict[str, Any]]:
+def run(
+    case: Case,
+    out: str | Path,
+    *,
+    force: bool = False,
+    progress: Steps | None = None,
+    workers: int | None = None,
+) -> list[dict[str, Any]]:
     """The main job of a case: geometry, mesh, simulation, identification, pictures and summary in the folder `out`.
 
     Returns the numbers of each experiment's summary (one, or one for each condition). Resumes in the folder of the same
     case and sources; another's is refused unless `force`, which removes what that run wrote. `progress` hears of steps
-    and of fractions done. Raises InputError for the folder or a case without multisine, and what a step raises.
+    and of fractions done; `workers` as in `simulate`. Raises InputError for the folder or a case without multisine, and
+    what a step raises.
 
     >>> import gearbench as gb
     >>> short = ["realisations=4", "samples_per_period=4096", "multisine.band_hz=[900, 1500]"]
@@ -114,6 +123,11 @@ def run(case: Case, out: str | Path, *, force: bool = False, progress: Steps | N
             jobs[0].progress.step(REPORT)
             _write_report(case, output, [part for _, part in done if part is not None])
         return [numbers for numbers, _ in done]
+        jobs = [
+            Job(one, output, progress or Silent(), f"-{name}" if name else "", workers)
+            for name, one in case.experiments()
+        ]
+        return [run_experiment(job) for job in jobs]
 
 
 def run_experiment(job: Job) -> tuple[dict[str, Any], RunPart | None]:
@@ -139,7 +153,7 @@ def run_experiment(job: Job) -> tuple[dict[str, Any], RunPart | None]:
         record = job.dataset(
             "record.nc",
             read_record,
-            lambda: simulate(case, progress=progress, checkpoints=checkpoints),
+            lambda: simulate(case, progress=progress, checkpoints=checkpoints, workers=job.workers),
             write_record,
         )
     modes: dict[str, xr.Dataset] = {}

@@ -13,6 +13,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from gearbench.bench.errors import BenchError
 from gearbench.bench.models import model_for
 from gearbench.bench.plan.excitation import torque_realisation
 from gearbench.bench.plan.schedule import ProgressReport, Schedule, schedule
@@ -62,6 +63,7 @@ def simulate(
     progress: ProgressReport | None = None,
     *,
     checkpoints: str | Path | None = None,
+    workers: int | None = None,
 ) -> xr.Dataset:
     """Record of the case's experiment, simulated with `model` (absent: the case's own).
 
@@ -70,9 +72,9 @@ def simulate(
     the folder.
 
     `progress(fraction, note)` is called now and then, from any thread. A case with conditions has one experiment for
-    each: simulate each of `case.experiments()`. The realisations run on all processors that this process may use; the
-    result does not depend on their number. Raises BenchError for an unknown model and for a motion that does not
-    settle, and what the solver raises, one sentence each.
+    each: simulate each of `case.experiments()`. The realisations run on `workers` threads (absent: as many as this
+    process may use processors); the result does not depend on their number. Raises BenchError for an unknown model and
+    for a motion that does not settle, and what the solver raises, one sentence each.
 
     >>> import gearbench as gb
     >>> record = gb.simulate(gb.read_case("quick_lumped", ["experiment.realisations=2"]))
@@ -84,6 +86,8 @@ def simulate(
     case, solver = model_for(case, model)
     check_gears(case.rig)
     solver.refuse(case)
+    if workers is not None and workers < 1:
+        raise BenchError(f"workers = {workers} must be at least 1")
     plan = schedule(case.experiment, case.rig)
     check_delays(case.rig, plan.wraps, plan.repeat_time, case.experiment.changes_speed)
     prepared = solver.prepare(case, plan, lambda note: report(0.0, note))
@@ -92,7 +96,8 @@ def simulate(
     # Filled row by row as realisations end: a hundred long ones are large, and must not be in memory twice.
     channels = {"torque_driver": np.empty(shape)}
     shelf = None if checkpoints is None else Shelf(Path(checkpoints), fingerprint(dump_case(case), source_digest()))
-    return _record(case, plan, prepared, channels, _realise(case, plan, prepared, channels, report, shelf))
+    runs = _realise(case, plan, prepared, channels, report, shelf, workers)
+    return _record(case, plan, prepared, channels, runs)
 
 
 def _realise(
@@ -102,6 +107,7 @@ def _realise(
     channels: dict[str, Array],
     report: ProgressReport,
     shelf: Shelf | None,
+    workers: int | None,
 ) -> list[Realisation]:
     """All realisations of an experiment, told about and interrupted between their pieces; each fills its row of the
     channels (realisations, n), before any sensor. Those beside torque_driver are added as the model has them."""
@@ -141,7 +147,7 @@ def _realise(
         return _realisation(prepared, plan, steady)
 
     try:
-        return realisations(run, total, stop)
+        return realisations(run, total, stop, workers)
     except BaseException:
         if shelf:
             shelf.flush()

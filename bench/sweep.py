@@ -32,6 +32,7 @@ SAMPLES = 128  # of a mesh period
 CYCLES = 16  # mesh periods of a look: subharmonics down to a sixteenth show as lines of their own
 TRANSIENT = 1e-3  # of its size, that free vibrations keep before the first look
 TOLERANCE = 1e-3  # change of the DTE from look to look, over its standard deviation
+WAIT = 128  # looks that pass at most before the first one: 2048 mesh periods
 LOOKS = 12  # after which a motion counts as one that does not settle
 DIRECTIONS = ("up", "down")
 
@@ -53,13 +54,15 @@ class Sweepable(Protocol):
 
 class Look(NamedTuple):
     """What is kept of a speed: rms of the DTE about its mean [m], its mean [m], largest mesh force over the static one,
-    part of the time without contact, change from look to look, amplitudes (orders,) [m]."""
+    part of the time without contact, change from look to look, whether free vibrations had to be left to die out for
+    longer than `WAIT`, amplitudes (orders,) [m]."""
 
     dte_rms: float
     dte_mean: float
     dynamic_factor: float
     contact_loss: float
     residual: float
+    hurried: bool
     spectrum: Array
 
 
@@ -116,7 +119,8 @@ def _look(case: Case, solver: Model, speed: float, before: Any) -> tuple[Look, A
     drive = prepared.drive(Torque(there.experiment.torque_mean))
     state = prepared.start(0) if before is None else prepared.resume(before)
     rate = there.experiment.sampling_rate
-    wait = max(ceil(log(1 / TRANSIENT) / max(prepared.settling, 1.0) * rate / (SAMPLES * CYCLES)), 1)
+    wanted = waiting(prepared.settling, rate)
+    wait = min(wanted, WAIT)
     block = SAMPLES * CYCLES
     outputs: Array | None = None
     residual = np.inf
@@ -128,7 +132,13 @@ def _look(case: Case, solver: Model, speed: float, before: Any) -> tuple[Look, A
         if residual <= TOLERANCE:
             break
     assert outputs is not None
-    return _measured(prepared, prepared, outputs, residual, there), state
+    return _measured(prepared, prepared, outputs, residual, there)._replace(hurried=wanted > WAIT), state
+
+
+def waiting(settling: float, rate: float) -> int:
+    """Looks, of that sampling rate [Hz], in which vibrations that die out at the rate `settling` [1/s] keep the part
+    TRANSIENT; those that die out more slowly than at 1/s count as if at that."""
+    return max(ceil(log(1 / TRANSIENT) / max(settling, 1.0) * rate / (SAMPLES * CYCLES)), 1)
 
 
 def _measured(prepared: Prepared[Any], mesh: Sweepable, outputs: Array, residual: float, case: Case) -> Look:
@@ -140,6 +150,7 @@ def _measured(prepared: Prepared[Any], mesh: Sweepable, outputs: Array, residual
         dynamic_factor=float(mesh.mesh_force(outputs).max()) / static,
         contact_loss=0.0 if apart is None else float(apart.mean()),
         residual=residual,
+        hurried=False,
         spectrum=2 * np.abs(np.fft.rfft(dte - dte.mean()))[: SAMPLES * CYCLES // 4] / dte.size,
     )
 
@@ -200,5 +211,17 @@ def _dataset(case: Case, solver: Model, speeds: Array, looks: dict[str, list[Loo
             "torque_mean": case.experiment.torque_mean,
             "teeth_driver": case.rig.driver.teeth,
             "iso_resonance_speed": resonance,
+            "warnings": _hurried([look for each in looks.values() for look in each]),
         },
+    )
+
+
+def _hurried(looks: list[Look]) -> str:
+    """A sentence where free vibrations were not waited for; empty where they were."""
+    count = sum(look.hurried for look in looks)
+    if not count:
+        return ""
+    return (
+        f"at {count} of {len(looks)} speeds free vibrations need more than {WAIT * CYCLES} mesh periods to die out to"
+        f" {TRANSIENT:g} of their size, and the first look came after that many: more damping settles faster"
     )

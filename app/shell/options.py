@@ -50,6 +50,10 @@ ModelOption = Annotated[
         "--model", parser=_known_model, metavar=f"[{'|'.join(MODELS)}]", help="absent: the case's simulation.model"
     ),
 ]
+WorkersOption = Annotated[
+    int | None,
+    typer.Option("--workers", min=1, metavar="N", help="realisations side by side; absent: as many as processors"),
+]
 JsonOption = Annotated[bool, typer.Option("--json", help="print the summary as JSON")]
 ReportOption = Annotated[
     bool, typer.Option("--report/--no-report", help="write the page NAME.html beside --out NAME.nc")

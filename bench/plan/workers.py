@@ -18,13 +18,15 @@ def processors() -> int:
     return min(int(told), here) if told.isdecimal() and int(told) else here
 
 
-def realisations(run: Callable[[int], Result], total: int, stop: Event) -> list[Result]:
-    """Results of run(0) .. run(total - 1), in order, on as many threads as there are processors.
+def realisations(
+    run: Callable[[int], Result], total: int, stop: Event, workers: int | None = None
+) -> list[Result]:
+    """Results of run(0) .. run(total - 1), in order, on that many threads (absent: as there are processors).
 
     When one fails or the caller is interrupted, what has not begun is dropped and `stop` is set: `run` looks at it
     now and then, or the end of what has begun would have to be waited for.
     """
-    pool = ThreadPoolExecutor(min(total, processors()))
+    pool = ThreadPoolExecutor(min(total, workers or processors()))
     try:
         return [future.result() for future in [pool.submit(run, number) for number in range(total)]]
     except BaseException:

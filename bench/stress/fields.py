@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import pi
+from math import floor, pi
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from gearbench.bench.elastic.rig import ElasticRig
 from gearbench.bench.errors import BenchError
 from gearbench.fem.contact.static import static_cycle
-from gearbench.fem.stress.fields import ElasticGear, GearField, elastic_gear, gear_field, loaded_sectors
-from gearbench.fem.stress.loaded import Pressed, all_strips, pair_loads, pressed_teeth
+from gearbench.fem.stress.fields import ElasticGear, GearField, elastic_gear, gear_field, loaded_sectors, unloaded_field
+from gearbench.fem.stress.loaded import PairLoad, Pressed, all_strips, pair_loads, pressed_teeth
 from gearbench.fem.stress.pressure import Strips
 from gearbench.fem.stress.recovery import principal, rotated, turn_stress, von_mises
 from gearbench.fem.stress.zoom import divided
@@ -94,19 +94,44 @@ def pair_fields(
 
     reach: sectors on either side of the loaded ones, None: the whole gears. Raises BenchError where nothing touches.
     """
-    law, meshing = elastic.law, elastic.pair
+    law = elastic.law
     pairs = pair_loads(law, phase, dte)
     if not pairs:
         raise BenchError(f"no stress at mesh phase {phase:g}: a DTE of {1e6 * dte:.4g} um closes no tooth pair")
-    theta = phase * law.driver.pitch + dte / law.driver.rb, -phase * law.driven.pitch
-    angles = law.driver.zero + theta[0], pi + law.driven.zero + theta[1]
+    theta = phase * law.driver.pitch + dte / law.driver.rb, phase * law.driven.pitch
+    centres = np.array([[0.0, 0.0], [law.centre, 0.0]])
+    return fields_at(elastic, gears, Stand(theta, centres, tuple(pairs), phase, dte), reach)
+
+
+@dataclass(frozen=True)
+class Stand:
+    """Where a pair stands and what presses: angles [rad] of driver and driven gear, each in its own direction, their
+    centres (2, 2) [m], the loaded tooth pairs, mesh phase [cycles] and DTE [m]."""
+
+    theta: tuple[float, float]
+    centres: Array
+    pairs: tuple[PairLoad, ...]
+    phase: float
+    dte: float
+
+
+def fields_at(
+    elastic: ElasticRig, gears: tuple[ElasticGear, ElasticGear], stand: Stand, reach: int | None = REACH
+) -> PairFields:
+    """Fields of both gears in a stand; `reach` as in `pair_fields`. Where nothing is loaded they are zero, on the teeth
+    around the pitch point."""
+    law, meshing = elastic.law, elastic.pair
+    angles = law.driver.zero + stand.theta[0], pi + law.driven.zero - stand.theta[1]
     parts = []
-    for number, pressed in enumerate(pressed_teeth(law, (meshing.driver, meshing.driven), pairs)):
+    for number, pressed in enumerate(pressed_teeth(law, (meshing.driver, meshing.driven), stand.pairs)):
         gear, teeth = gears[number], gears[number].shape.teeth
-        sectors = loaded_sectors([p.sector for p in pressed], teeth, reach)
-        field = gear_field(gear, all_strips(teeth, pressed), sectors)
-        at = np.array([number * law.centre, 0.0])
-        parts.append(_placed(field, pressed, number, angles[number], at))
+        if pressed:
+            sectors = loaded_sectors([p.sector for p in pressed], teeth, reach)
+            field = gear_field(gear, all_strips(teeth, pressed), sectors)
+        else:
+            middle = sector_of(floor(stand.phase + 0.5), number, teeth)
+            field = unloaded_field(gear, loaded_sectors([middle], teeth, reach))
+        parts.append(_placed(field, pressed, number, angles[number], stand.centres[number]))
     strain = elastic.rig.material.poisson if elastic.rig.material.state == "plane-strain" else 0.0
     stress = np.concatenate([part.stress for part in parts])
     return PairFields(
@@ -115,9 +140,9 @@ def pair_fields(
         stress=stress,
         out_of_plane=strain * (stress[:, 0] + stress[:, 1]),
         contacts=parts[0].contacts,
-        phase=phase,
-        torque=float(sum((1 - 2 * p.side) * p.force * p.contact.lever1 for p in pairs)),
-        dte=dte,
+        phase=stand.phase,
+        torque=float(sum((1 - 2 * p.side) * p.force * p.contact.lever1 for p in stand.pairs)),
+        dte=stand.dte,
     )
 
 

@@ -97,3 +97,10 @@ def gear_field(gear: ElasticGear, strips: Strips, sectors: Sequence[int]) -> Gea
     found = ring_response(gear.ring, forces, hub, wanted)[:, :, 0].reshape(len(wanted), -1, 2)
     stress = ring_stress(gear.recovery, gear.mesh, dict(zip(sectors, found, strict=True)))
     return GearField(gear, tuple(sectors), found, np.array([stress[j] for j in sectors]), strips)
+
+
+def unloaded_field(gear: ElasticGear, sectors: Sequence[int]) -> GearField:
+    """The field of sectors of a gear that nothing presses."""
+    shape = (len(sectors), len(gear.mesh.points))
+    none = Strips(*(np.zeros((0, 2)) for _ in range(3)), *(np.zeros(0) for _ in range(3)))
+    return GearField(gear, tuple(sectors), np.zeros((*shape, 2)), np.zeros((*shape, 3)), none)

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from gearbench.shell.options import CaseArgument, JsonOption, SetOption, load_case, print_json
+from gearbench.shell.options import CaseArgument, JsonOption, SetOption, WorkersOption, load_case, print_json
 from gearbench.shell.progress import Progress
 from gearbench.words.summary import headline
 
@@ -19,6 +19,7 @@ def run(
     force: Annotated[
         bool, typer.Option("--force", help="replace what another case or other sources left in the folder")
     ] = False,
+    workers: WorkersOption = None,
     settings: SetOption = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -28,7 +29,7 @@ def run(
 
     folder = out or Path(f"out_{re.sub(r'[^A-Za-z0-9._-]+', '_', loaded.name)}")
     with Progress(f"run {loaded.name}") as progress:
-        summaries = gb.run(loaded, folder, force=force, progress=progress)
+        summaries = gb.run(loaded, folder, force=force, progress=progress, workers=workers)
     if as_json:
         print_json(summaries if loaded.conditions else summaries[0])
         return

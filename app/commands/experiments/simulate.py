@@ -2,23 +2,48 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from gearbench.shell.checkpoints import checkpoints_of
-from gearbench.shell.options import CaseArgument, JsonOption, ModelOption, SetOption, check_out, load_case, print_json
+from gearbench.shell.options import (
+    CaseArgument,
+    JsonOption,
+    ModelOption,
+    SetOption,
+    WorkersOption,
+    check_out,
+    load_case,
+    print_json,
+)
 from gearbench.shell.progress import Progress
 
 if TYPE_CHECKING:
     from gearbench.rig import Case
+
+MOST_FIELDS = 1000
 
 
 def simulate(
     case: CaseArgument,
     out: Annotated[Path, typer.Option("--out", help="record to write (NetCDF-4); NAME-CONDITION.nc with conditions")],
     model: ModelOption = None,
+    fields: Annotated[
+        list[float] | None,
+        typer.Option(
+            "--fields",
+            metavar="TIME",
+            help="times [s] after the first sample at which displacement and stress are written beside --out, as .vtu"
+            " files and a .pvd that ParaView opens; the record then holds tooth forces",
+        ),
+    ] = None,
+    every: Annotated[
+        float | None, typer.Option("--fields-every", metavar="SECONDS", help="fields at every so many seconds")
+    ] = None,
+    workers: WorkersOption = None,
     settings: SetOption = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -34,13 +59,18 @@ def simulate(
     from gearbench.bench.readiness import check_timing
 
     check_timing(loaded)
+    if fields or every is not None:
+        loaded = with_teeth(loaded)
+    times = {path: field_times(one, model, fields or [], every) for one, path in experiments(loaded, out)}
     summaries = []
     with Progress(f"simulate {loaded.name}") as progress:
         for experiment, path in experiments(loaded, out):
             progress.step(path.name)
             with checkpoints_of(path) as checkpoints:
-                record = gb.simulate(experiment, model, progress, checkpoints=checkpoints)
+                record = gb.simulate(experiment, model, progress, checkpoints=checkpoints, workers=workers)
                 gb.write_record(record, path)
+            if times[path]:
+                write_fields(experiment, record, times[path], path, progress)
             summaries.append(record_summary(record, path))
     if as_json:
         print_json(summaries if loaded.conditions else summaries[0])
@@ -50,6 +80,41 @@ def simulate(
             f"{summary['file']}: {summary['realisations']} x {summary['duration_s']:g} s at"
             f" {summary['sampling_rate_hz']:g} Hz, DTE {summary['dte_peak_to_peak_um']:.4g} um peak to peak"
         )
+
+
+def with_teeth(case: Case) -> Case:
+    """The case with tooth forces in its record."""
+    return case.model_copy(update={"simulation": case.simulation.model_copy(update={"outputs": "teeth"})})
+
+
+def field_times(case: Case, model: str | None, fields: Sequence[float], every: float | None) -> list[float]:
+    """Times [s] at which an experiment's fields are wanted, rising. Raises InputError, BenchError."""
+    from gearbench.shell.failure import InputError
+
+    times = set(fields)
+    if every is not None:
+        experiment = case.experiment
+        last = (experiment.periods * experiment.samples_per_period - 1) / experiment.sampling_rate
+        if not every > 0 or last / every > MOST_FIELDS:
+            raise InputError(
+                f"--fields-every {every:g} must be at least {last / MOST_FIELDS:.3g} s, which are {MOST_FIELDS} files"
+            )
+        times |= {number * every for number in range(int(last / every * (1 + 1e-12)) + 1)}
+    if times:
+        from gearbench.bench.stress.series import check_series
+
+        check_series(case, sorted(times), model)
+    return sorted(times)
+
+
+def write_fields(case: Case, record: Any, times: Sequence[float], out: Path, progress: Progress) -> None:
+    """The fields of a record at some times, beside it."""
+    from gearbench.bench.stress.series import record_fields, write_series
+
+    progress.step("stress fields")
+    moments = record_fields(case, record, times)
+    series, *_ = write_series(moments, out.parent, out.stem, lambda done: progress(done / len(times), "fields"))
+    typer.echo(f"{series}: {len(times)} instants", err=True)
 
 
 def experiments(case: Case, out: Path) -> list[tuple[Case, Path]]:

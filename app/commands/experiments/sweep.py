@@ -101,7 +101,7 @@ def sweep_summary(result: Any, out: Path) -> dict[str, Any]:
     at = int(rms.max(axis=0).argmax())
     apart = abs(rms[0] - rms[1]) > 0.1 * rms.max(axis=0)
     restless = int((result["settled"].values == 0).sum())
-    warnings = []
+    warnings = [result.attrs["warnings"]] if result.attrs.get("warnings") else []
     if restless:
         warnings.append(f"{restless} of {rms.size} speeds have no steady answer that repeats within 16 mesh periods")
     return {

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from gearbench.fem.contact.static import static_cycle
+from gearbench.fem.contact.static import StaticCycle, static_cycle
 from gearbench.fem.full.contact import meet
 from gearbench.fem.full.energy import Ledger, flank_energy, ledger
 from gearbench.fem.full.machine import Machine, angles
-from gearbench.fem.full.record import advance, columns
+from gearbench.fem.full.record import Samples, advance, columns
 from gearbench.fem.full.start import initial_state
 from gearbench.fem.full.transient import State, make_integrator, take_step
 from gearbench.fem.motion import start as reduced_start
@@ -58,9 +58,32 @@ def test_slow_motion_is_the_static_solution(twins: Any, build: Callable[..., Mac
     dte = machine.law.driver.rb * out.angle_driver - machine.law.driven.rb * out.angle_driven
     dte = dte + along * (out.y_driver - out.y_driven)
     phases = (np.arange(steps) + 1) / steps
-    still = static_cycle(machine.law, phases, torque=[TORQUE]).transmission_error[0]
-    assert np.abs(dte[3:] / still[3:] - 1).max() < 1e-3
+    rest = static_cycle(machine.law, phases, torque=[TORQUE])
+    assert np.abs(dte[3:] / rest.transmission_error[0][3:] - 1).max() < 1e-3
     assert set(out.loaded.astype(int)) == {1, 2}
+    _teeth_carry_the_torque(machine, out, phases, rest)
+
+
+def _teeth_carry_the_torque(machine: Machine, out: Samples, phases: Array, rest: StaticCycle) -> None:
+    """The columns of tooth forces: their sum holds the hub's torque, each is the static share of its tooth, and the
+    pair that enters becomes the middle one, then the one that leaves."""
+    law, settled = machine.law, slice(3, None)
+    forces = np.stack([out.leaving, out.middle, out.entering], axis=1)
+    on_line = (forces > 0.0).sum(axis=1) == 1
+    held = forces.sum(axis=1) * law.driven.rb
+    # The twins' base radii are the same. A tip edge has another lever about its own gear only: the driven gear's
+    # enters, the driver's leaves.
+    off = np.minimum(np.abs(held / TORQUE - 1), np.abs(held / out.torque_driven - 1))
+    assert off[settled].max() < 1e-3
+    assert held[on_line][3:] == pytest.approx(out.torque_driven[on_line][3:], rel=1e-4)
+    shares = np.sort(forces / forces.sum(axis=1)[:, None], axis=1)[settled, ::-1]
+    truth = np.sort(rest.load_share[0], axis=1)[settled, ::-1]
+    width = min(truth.shape[1], 3)
+    assert shares[:, :width] == pytest.approx(truth[:, :width], abs=5e-3)
+    # Phase 0: a tooth at the pitch point; up to 0.5 the next one enters, from there on the last one leaves.
+    early, late = (phases > 0.05) & (phases < 0.48), phases > 0.52
+    assert not out.leaving[early].any() and not out.entering[late & (phases < 0.95)].any() and not out.back.any()
+    assert out.entering[(phases > 0.4) & early].min() > 0.0 and out.leaving[late & (phases < 0.6)].min() > 0.0
 
 
 def ledgers(machine: Machine, steps: int, radius: float, duration: float = 4e-4) -> tuple[list[State], list[Ledger]]:
