@@ -121,10 +121,12 @@ def effects_from(text: str) -> list[Effects]:
         return float(cell) if cell else float("nan")
 
     def effect(row: dict[str, str]) -> Effect:
-        ends = ("mean_at_lowest", "mean_at_highest", "least_mean", "most_mean")
         return Effect(
             row["factor"],
-            *(number(row[key]) for key in ends),
+            low=number(row["mean_at_lowest"]),
+            high=number(row["mean_at_highest"]),
+            least=number(row["least_mean"]),
+            most=number(row["most_mean"]),
             first=number(row["first_index"]),
             first_interval=(number(row["first_low"]), number(row["first_high"])),
             total=number(row["total_index"]),

@@ -73,12 +73,15 @@ def effects_of(design: Design, dataset: xr.Dataset, result: str, seed: int = 0) 
     for place, factor in enumerate(design.factors):
         means = _means(groups[place][good], values[good])
         known = means[np.isfinite(means)]
-        ends = (known[0], known[-1], known.min(), known.max()) if known.size else (np.nan,) * 4
+        ends = known if known.size else np.array([np.nan])
         numbers = np.asarray(dataset[factor.name].values[good], dtype=float) if factor.numeric else None
         each.append(
             Effect(
                 factor.name,
-                *(float(end) for end in ends),
+                low=float(ends[0]),
+                high=float(ends[-1]),
+                least=float(ends.min()),
+                most=float(ends.max()),
                 first=float(first[place]),
                 first_interval=intervals[place][0],
                 total=float(total[place]),

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -14,6 +16,8 @@ from gearbench.words.study import best, decider, effects_from, failures, span_li
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from gearbench.bench.study.indices import Effects
 
 MOST_SENTENCES = 5
 
@@ -72,11 +76,12 @@ def campaign(
             positions=positions, cycles=cycles, settings=settings or (), workers=workers, cluster=cluster, force=force,
             progress=progress,
         )  # fmt: skip
-    summary = study_summary(table, folder)
+    effects = effects_from((folder / "effects.csv").read_text(encoding="utf-8"))
+    summary = study_summary(table, effects, folder)
     if as_json:
         print_json(summary)
     else:
-        typer.echo("\n".join(_lines(table, summary, folder)))
+        typer.echo("\n".join(_lines(table, effects, summary, folder)))
     if summary["failed"] == summary["members"]:
         from gearbench.shell.failure import InputError
 
@@ -88,28 +93,30 @@ def split(of: list[str] | None) -> list[str]:
     return [name.strip() for text in of or () for name in text.split(",") if name.strip()]
 
 
-def study_summary(table: xr.Dataset, folder: Path) -> dict[str, Any]:
+def study_summary(table: xr.Dataset, effects: Sequence[Effects], folder: Path) -> dict[str, Any]:
     """Members, failures, and each result's range and indices."""
     from gearbench.bench.study.table import named
 
     good = table["sentence"].values == ""
-    results = {}
+    results: dict[str, dict[str, Any]] = {}
     for name in named(table, "result"):
         values = table[name].values[good]
         spread = {"least": values.min(), "mean": values.mean(), "most": values.max()} if values.size else {}
         results[name] = {"unit": table[name].attrs["units"], **{key: float(one) for key, one in spread.items()}}
+    for one in effects:
+        results[one.result]["effects"] = [asdict(each) for each in one.each]
     return {
         "folder": str(folder),
         "members": int(table.sizes["member"]),
         "failed": int((~good).sum()),
         "factors": named(table, "factor"),
         "results": results,
+        "sentences": dict(failures(table)),
     }
 
 
-def _lines(table: xr.Dataset, summary: dict[str, Any], folder: Path) -> list[str]:
+def _lines(table: xr.Dataset, effects: Sequence[Effects], summary: dict[str, Any], folder: Path) -> list[str]:
     lines = [span_line(table, name) for name in summary["results"]]
-    effects = effects_from((folder / "effects.csv").read_text(encoding="utf-8"))
     lines += [line for one in effects if (line := decider(one))]
     first = next(iter(summary["results"]))
     lines += [line for line in [best(table, first, summary["factors"])] if line]
