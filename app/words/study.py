@@ -45,6 +45,17 @@ def span_line(table: xr.Dataset, result: str) -> str:
     )
 
 
+def span_title(table: xr.Dataset, result: str) -> str:
+    """Range of one result, for a headline."""
+    values = np.asarray(table[result].values, dtype=float)
+    good = values[np.isfinite(values)]
+    words = str(table[result].attrs["long_name"])
+    words = words[:1].upper() + words[1:]
+    if not good.size:
+        return f"{words}: no member has it"
+    return f"{words}: {good.min():.4g} to {good.max():.4g}{unit(str(table[result].attrs['units']))}"
+
+
 def decider(effects: Effects) -> str:
     """Which factor decides a result; nothing where there is only one or nothing is known."""
     known = [one for one in effects.each if isfinite(one.first)]
@@ -52,8 +63,10 @@ def decider(effects: Effects) -> str:
         return ""
     ranked = sorted(known, key=lambda one: -(one.total if isfinite(one.total) else one.first))
     first = ranked[0]
-    with_others = f", {percent(first.total)} with its interactions" if isfinite(first.total) else ""
-    line = f"{first.factor} decides {percent(first.first)} of the variance of {effects.result}{with_others}"
+    low, high = first.first_interval
+    sure = f" (90 %: {percent(low)[:-2]} to {percent(high)})" if isfinite(low) else ""
+    line = f"{first.factor} decides {percent(first.first)}{sure} of the variance of {effects.result}"
+    line += f", {percent(first.total)} with its interactions" if first.total > first.first + 0.005 else ""
     if len(ranked) > 1:
         second = ranked[1]
         line += f"; then {second.factor} ({percent(second.total if isfinite(second.total) else second.first)})"
@@ -80,8 +93,8 @@ def failures(table: xr.Dataset) -> list[tuple[str, int]]:
 
 
 def percent(part: float) -> str:
-    """A part as per cent; a small negative index is noise about 0."""
-    return f"{100 * max(part, 0.0):.0f} %" if isfinite(part) else "-"
+    """A part as per cent; an estimate a little below 0 or above 1 is noise about it."""
+    return f"{100 * min(max(part, 0.0), 1.0):.0f} %" if isfinite(part) else "-"
 
 
 def between(interval: Interval) -> str:
@@ -121,10 +134,12 @@ def effects_from(text: str) -> list[Effects]:
         return float(cell) if cell else float("nan")
 
     def effect(row: dict[str, str]) -> Effect:
-        ends = ("mean_at_lowest", "mean_at_highest", "least_mean", "most_mean")
         return Effect(
             row["factor"],
-            *(number(row[key]) for key in ends),
+            low=number(row["mean_at_lowest"]),
+            high=number(row["mean_at_highest"]),
+            least=number(row["least_mean"]),
+            most=number(row["most_mean"]),
             first=number(row["first_index"]),
             first_interval=(number(row["first_low"]), number(row["first_high"])),
             total=number(row["total_index"]),

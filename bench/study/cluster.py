@@ -75,7 +75,7 @@ def _gathered(distributed: Any, client: Any, tasks: list[Task], address: str) ->
         )
     futures = {client.submit(compute, task, pure=False): task.number for task in tasks}
     try:
-        for future in distributed.as_completed(futures):
+        for future in distributed.as_completed(list(futures), loop=client.loop):
             try:
                 yield future.result()
             except distributed.KilledWorker:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -13,6 +15,8 @@ from gearbench.shell.progress import Progress
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from gearbench.bench.study.indices import Effects
 
 MOST_SENTENCES = 5
 
@@ -63,6 +67,7 @@ def campaign(
     """
     loaded = load_case(case, settings)
     import gearbench as gb
+    from gearbench.words.study import effects_from, failures
 
     folder = out or Path(f"study_{re.sub(r'[^A-Za-z0-9._-]+', '_', loaded.name)}")
     with Progress(f"campaign {loaded.name}") as progress:
@@ -71,11 +76,12 @@ def campaign(
             positions=positions, cycles=cycles, settings=settings or (), workers=workers, cluster=cluster, force=force,
             progress=progress,
         )  # fmt: skip
-    summary = study_summary(table, folder)
+    effects = effects_from((folder / "effects.csv").read_text(encoding="utf-8"))
+    summary = study_summary(table, effects, folder)
     if as_json:
         print_json(summary)
     else:
-        typer.echo("\n".join(_lines(table, summary, folder)))
+        typer.echo("\n".join(_lines(table, effects, summary, folder)))
     if summary["failed"] == summary["members"]:
         from gearbench.shell.failure import InputError
         from gearbench.words.study import failures
@@ -88,30 +94,35 @@ def split(of: list[str] | None) -> list[str]:
     return [name.strip() for text in of or () for name in text.split(",") if name.strip()]
 
 
-def study_summary(table: xr.Dataset, folder: Path) -> dict[str, Any]:
+def study_summary(table: xr.Dataset, effects: Sequence[Effects], folder: Path) -> dict[str, Any]:
     """Members, failures, and each result's range and indices."""
     from gearbench.bench.study.table import named
+    from gearbench.words.study import failures
 
     good = table["sentence"].values == ""
-    results = {}
+    results: dict[str, dict[str, Any]] = {}
     for name in named(table, "result"):
         values = table[name].values[good]
         spread = {"least": values.min(), "mean": values.mean(), "most": values.max()} if values.size else {}
         results[name] = {"unit": table[name].attrs["units"], **{key: float(one) for key, one in spread.items()}}
+    for one in effects:
+        results[one.result]["effects"] = [asdict(each) for each in one.each]
     return {
         "folder": str(folder),
         "members": int(table.sizes["member"]),
         "failed": int((~good).sum()),
         "factors": named(table, "factor"),
         "results": results,
+        "sentences": dict(failures(table)),
     }
 
 
 def _lines(table: xr.Dataset, summary: dict[str, Any], folder: Path) -> list[str]:
     from gearbench.words.study import best, decider, effects_from, failures, span_line
+def _lines(table: xr.Dataset, effects: Sequence[Effects], summary: dict[str, Any], folder: Path) -> list[str]:
+    from gearbench.words.study import best, decider, failures, span_line
 
     lines = [span_line(table, name) for name in summary["results"]]
-    effects = effects_from((folder / "effects.csv").read_text(encoding="utf-8"))
     lines += [line for one in effects if (line := decider(one))]
     first = next(iter(summary["results"]))
     lines += [line for line in [best(table, first, summary["factors"])] if line]

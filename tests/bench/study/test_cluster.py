@@ -27,7 +27,7 @@ SLOW = [
     "experiment.realisations=8", "experiment.samples_per_period=16384", "experiment.periods=2",
     "experiment.multisine.band_hz=[4,2500]", "identification.band_hz=[4,2500]",
 ]  # fmt: skip
-VARY = ["rig.driver.face_width_mm=10:20:12"]
+VARY = ["rig.driver.face_width_mm=10:20:8"]
 
 
 def dask(*arguments: str) -> subprocess.Popen[bytes]:
