@@ -53,9 +53,9 @@ def test_quick_page_runs(name: str, tmp_path: Path) -> None:
 
 
 def test_what_fails_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "docs").mkdir()
+    (tmp_path / "pages").mkdir()
     (tmp_path / "page").mkdir()
-    page = tmp_path / "docs" / "page.md"
+    page = tmp_path / "pages" / "page.md"
     page.write_text(
         "```sh\n./gearbench --version   # fine\n./gearbench check \\\n    none.toml\n```\n\n"
         "```python\nraise SystemExit('no')\n```\n\n"
@@ -65,7 +65,7 @@ def test_what_fails_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     )
     monkeypatch.setattr(runner, "ROOT", tmp_path)
     failed = run_page(page, tmp_path / "page")
-    assert [one.split(": ")[0] for one in failed] == ["docs/page.md:1", "docs/page.md:7"]
+    assert [one.split(": ")[0] for one in failed] == ["pages/page.md:1", "pages/page.md:7"]
     assert "none.toml" in failed[0] and failed[1].endswith("no")
     assert (tmp_path / "page" / "a.toml").read_text(encoding="utf-8") == "x = 1\n"
     assert [block.language for block in blocks(page)] == ["sh", "python", "sh", "toml", "matlab", "text"]
