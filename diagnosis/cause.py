@@ -24,7 +24,7 @@ from gearbench.diagnosis.forces.steadiness import changing_parts, unsteadiness
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.intake.signals import UNITS, measured_channels
 from gearbench.diagnosis.output.judged import Closing, Judged, itself, judged_on, rms_closed
-from gearbench.diagnosis.output.missing import Missing, missing_forces
+from gearbench.diagnosis.output.missing import Missing, missing_forces, nothing_missing
 from gearbench.diagnosis.output.selection import only, with_entered
 from gearbench.diagnosis.output.simulated import Simulated, simulated
 from gearbench.diagnosis.output.structure import structure_found
@@ -96,9 +96,12 @@ def find_cause(
     judged = judgement(problem, found, held_out)
     found = judged.found
     best_p, smooth = found.selection.best.p, found.simulator.target.measurements
-    missing = missing_forces(
-        problem, nominal, smooth, lambda one: simulate(found.layout.case(best_p, one.name), one.record)
-    )
+    try:
+        missing = missing_forces(
+            problem, nominal, smooth, lambda one: simulate(found.layout.case(best_p, one.name), one.record)
+        )
+    except ValueError:  # an audit that cannot be made costs the place of the remainder, not the verdict
+        missing = nothing_missing()
     changing = changing_of(judged, changing_parts(measurements, band))
     decided = decide_simulated(judged, result, missing, unsteady, changing)
     kept = [one.hypothesis for one in decided.named]

@@ -50,6 +50,11 @@ class Missing:
         return np.asarray(np.sqrt((self.force[inside] ** 2).sum(axis=0)))
 
 
+def nothing_missing() -> Missing:
+    """Where nothing can be said of the forces."""
+    return Missing(np.zeros(len(PLACES)), (), np.zeros((0, len(PLACES))))
+
+
 def missing_forces(
     problem: Problem,
     nominal: Case,
