@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from gearbench.identification.feedback.estimate import mesh_feedback
 from gearbench.identification.feedback.frf import feedback_frf
+from gearbench.identification.feedback.varying_frf import LOST, signals_of, speed_varies, varying_frf
 from gearbench.identification.lpm.accuracy import MISSING, Accuracy, RecordRule, expected_accuracy, record_rule
 from gearbench.identification.lpm.estimate import LpmResult, local_polynomial
 from gearbench.identification.lpm.local_solve import LpmError
@@ -22,7 +23,7 @@ from gearbench.identification.lpm.selection import LADDER, choose_window
 from gearbench.identification.response.frf import make_frf
 from gearbench.identification.response.mode_spread import natural_frequency_deviation
 from gearbench.identification.response.modes import itf_modes
-from gearbench.identification.spectra.joint import Spectra
+from gearbench.identification.spectra.joint import Spectra, SpectraError
 from gearbench.identification.spectra.records import record_spectra
 from gearbench.identification.truth.periodic import itf_from_htf
 from gearbench.records import RecordError
@@ -110,6 +111,13 @@ def identify(
     for record in records:
         for name in record.data_vars:
             require_finite(record[name])
+    if settings.method == "mesh-feedback" and speed_varies(records):
+        return _at_varying_speed(records, settings, report)
+    if speed_varies(records, LOST):
+        raise SpectraError(
+            f"the mesh phase departs from constant speed, which the local polynomial method needs, by more than"
+            f" {LOST:g} cycles; method mesh-feedback follows the measured phase"
+        )
     sidebands = settings.harmonics if settings.harmonics is not None else LADDER[-1]
     spectra, excited, notes = record_spectra(
         records, top=settings.band[1] if settings.band else None, sidebands=sidebands
@@ -201,6 +209,27 @@ def _by_feedback(
         record=cost,
         attributes={"method": settings.method, "settings": json.dumps(asdict(settings)), **_about(part)},
     )
+
+
+def _at_varying_speed(records: Sequence[xr.Dataset], settings: IdentificationSettings, report: Progress) -> xr.Dataset:
+    """Mesh feedback with the measured phase."""
+    doubts, cost = _doubts(records)
+    signals, spectra = signals_of(records, ENOUGH)
+    excited = (signals.lowest * spectra.spacing, signals.excited * spectra.spacing)
+    frf = varying_frf(
+        signals,
+        spectra,
+        output_lines(spectra, settings.band or excited, excited, settings.step),
+        harmonics=settings.harmonics,
+        phases=settings.phases,
+        modes=settings.modes,
+        notes=doubts,
+        record=cost,
+        attributes={"method": settings.method, "settings": json.dumps(asdict(settings)), **_about(spectra)},
+        progress=lambda part, message: report(0.1 + 0.6 * part, message),
+    )
+    report(1.0, "identified")
+    return frf
 
 
 def _second_opinion(

@@ -171,15 +171,13 @@ def prepare(spectra: Spectra, *, transient: bool, reach: int) -> Regression:
     force[:, ~excited] = 0.0
     origin = -((-highest - reach) // d)
     count = (highest + reach) // d + 1 + origin
-    arrays = [np.zeros((d, spectra.realisations, count), dtype=complex) for _ in range(2)]
-    mask = np.zeros((d, count), dtype=bool)
-    for c in range(d):
-        lines = np.arange(-highest, highest + 1)
-        chosen = lines[lines % d == c]
-        place = chosen // d + origin
-        for array, source in zip(arrays, (force, dte), strict=True):
-            array[c][:, place] = source[:, chosen + highest]
-        mask[c, place] = excited[chosen + highest]
+    # Class c holds the lines c + d i: columns of the lines from -origin d on, written d to a row.
+    begin = origin * d - highest
+    padded = np.zeros((2 * spectra.realisations + 1, count * d), dtype=complex)
+    padded[:, begin : begin + 2 * highest + 1] = np.concatenate([force, dte, excited[None]])
+    by_class = padded.reshape(-1, count, d).transpose(2, 0, 1)
+    arrays = [np.ascontiguousarray(part) for part in np.split(by_class[:, :-1], 2, axis=1)]
+    mask = np.ascontiguousarray(by_class[:, -1].real > 0)
     return Regression(arrays[0], arrays[1], mask, origin, highest, same, phase)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 from shared.reference_rig import ReferenceRig, reference_record
+from shared.varying_rig import ramp, truth_at, varying_record, wandering
 
 from gearbench.commands.house.checks import Check, NotRun
 from gearbench.identification import (
@@ -30,6 +31,10 @@ EXPECTED: tuple[tuple[float, float, int, tuple[tuple[int, int, int], ...]], ...]
     (200.0, 0.0, 1, ((4, 1, 16), (8, 2, 40), (12, 1, 40), (18, 2, 80))),
     (200.0, 0.03, 4, ((4, 1, 6), (12, 2, 16), (18, 3, 28))),
     (50.0, 0.01, 4, ((8, 1, 8), (15, 2, 20), (30, 1, 24), (30, 2, 40))),
+)
+COURSES: tuple[tuple[Literal["wander", "ramp"], str], ...] = (
+    ("wander", "20 Hz mesh wandering by 20 %"),
+    ("ramp", "a mesh frequency that rises from 16 to 24 Hz"),
 )
 METHODS: tuple[tuple[Literal["lpm", "mesh-feedback"], float], ...] = (("lpm", 0.025), ("mesh-feedback", 0.01))
 
@@ -78,6 +83,15 @@ def at_speed(mesh_frequency: float, method: Literal["lpm", "mesh-feedback"]) -> 
     settings = IdentificationSettings(method=method, band=BAND, step=16, phases=128, modes=0)
     found = itf(identify([record], settings)).sel(frequency=frequency).values
     return relative(found, exact_itf(rig.system(512), frequency, np.arange(128) / 128))
+
+
+def varying_error(course: Literal["wander", "ramp"]) -> float:
+    """Mesh feedback from one second at a speed that wanders by 20 % or rises by half, 40 dB, by DOP853."""
+    rig = ReferenceRig(mesh_frequency=20.0, edge=0.05)
+    phase = wandering(20.0, 1.0) if course == "wander" else ramp(16.0, 24.0, 1.0)
+    record = varying_record(rig, phase, duration=1.0, noise=0.01)
+    frf = identify([record], IdentificationSettings("mesh-feedback", band=BAND, step=40, phases=128, modes=0))
+    return relative(itf(frf).values, truth_at(rig, frf))
 
 
 def expected_errors() -> float:
@@ -145,6 +159,10 @@ CHECKS = [
         Check(f"{method}-{mesh}hz", f"{method}, {mesh} Hz mesh, 4 s, 40 dB", reach, "", partial(at_speed, mesh, method))
         for method, reach in METHODS
         for mesh in (50, 200, 500)
+    ),
+    *(
+        Check(f"varying-{course}", f"mesh-feedback, 1 s at {words}, 40 dB", 0.01, "", partial(varying_error, course))
+        for course, words in COURSES
     ),
     Check("lpm-expected", "LPM: expected against actual error, worst of 20 settings", 2.0, "times", expected_errors),
     *(

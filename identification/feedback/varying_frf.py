@@ -1,0 +1,160 @@
+"""From records whose speed varies to a frequency response by mesh feedback."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from math import hypot
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from gearbench.identification.feedback.data import ClassData
+from gearbench.identification.feedback.result import DRAWS, along_phase, followed, htf_on
+from gearbench.identification.feedback.start import gauged
+from gearbench.identification.feedback.varying import Signals, varying_feedback
+from gearbench.identification.response.frf import make_frf
+from gearbench.identification.response.modes import itf_modes
+from gearbench.identification.spectra.joint import Floats, Spectra, SpectraError
+from gearbench.identification.spectra.transmission_error import dte, force
+from gearbench.identification.truth.periodic import itf_from_htf
+
+# Departure of the mesh phase from constant speed [cycles] from which on a record counts as of varying speed.
+VARIES = 0.05
+# ... and beyond which no branch of the local polynomial method is left.
+LOST = 0.25
+# A line counts as excited if its force exceeds this part of the strongest one's.
+EXCITED = 1e-2
+BRANCHES = 160
+
+
+def mesh_phase(record: xr.Dataset) -> Floats | None:
+    """Mesh phase (E, N) [cycles]: the channel `mesh_phase`, else teeth times the driver's turns, else None."""
+    if "mesh_phase" in record:
+        return np.asarray(record["mesh_phase"].values, dtype=float)
+    if "mesh_period" not in record.attrs and "angle_driver" in record and "teeth_driver" in record.attrs:
+        return np.asarray(record["angle_driver"].values * float(record.attrs["teeth_driver"]) / (2 * np.pi))
+    return None
+
+
+def speed_varies(records: Sequence[xr.Dataset], limit: float = VARIES) -> bool:
+    """Whether the mesh phase of a record departs from constant speed by more than `limit` [cycles]."""
+    for record in records:
+        phase = mesh_phase(record)
+        if phase is None:
+            continue
+        steps = np.arange(phase.shape[1])
+        for row in phase:
+            if np.abs(row - np.polyval(np.polyfit(steps, row, 1), steps)).max() > limit:
+                return True
+    return False
+
+
+def signals_of(records: Sequence[xr.Dataset], most: int) -> tuple[Signals, Spectra]:
+    """Signals of all realisations, `most` lines of all at most, and their plain spectra: lines `d` to the mean mesh
+    frequency. Raises SpectraError for records of different sampling or of a phase that does not rise."""
+    sampling = {(record.sizes["time"], float(record.attrs["sampling_rate"])) for record in records}
+    if len(sampling) != 1:
+        raise SpectraError("records of varying speed must have the same sampling_rate and number of samples")
+    ((size, rate),) = sampling
+    rows: list[tuple[Floats, Floats, Floats]] = []
+    for record in records:
+        phase = mesh_phase(record)
+        if phase is None or not (np.diff(phase, axis=1) > 0).all():
+            raise SpectraError("a varying speed needs a mesh_phase that rises from sample to sample in every record")
+        rows += zip(dte(record).values, force(record).values, phase, strict=True)
+    strength = np.sqrt(np.mean([np.abs(np.fft.rfft(one[1] - one[1].mean())) ** 2 for one in rows], axis=0))
+    if not strength.max() > 1e-12 * size * max(abs(float(one[1].mean())) for one in rows):
+        raise SpectraError("the force is constant: without excitation nothing can be identified")
+    excited = np.flatnonzero(strength > EXCITED * strength.max())
+    low, high = max(int(excited[0]), 1), int(excited[-1])
+    rows = rows[: max(1, -(-most // high))]
+    response, driving, cycles = (np.stack(part) for part in zip(*rows, strict=True))
+    units = float(np.mean(response.std(axis=1))), float(np.mean(driving.std(axis=1)))
+    speed = float(np.mean((cycles[:, -1] - cycles[:, 0]) / (size - 1))) * size  # mesh cycles of the record
+    spectra = Spectra(
+        np.fft.rfft(driving, axis=1) / size,
+        np.fft.rfft(response, axis=1) / size,
+        rate / size,
+        max(1, round(speed)),
+        cycles[:, 0],
+        False,
+    )
+    return Signals(response / units[0], driving / units[1], cycles, rate, low, high, *units), spectra
+
+
+def varying_frf(
+    signals: Signals,
+    spectra: Spectra,
+    lines: NDArray[np.int64],
+    *,
+    harmonics: int | None,
+    phases: int,
+    modes: int | None,
+    notes: Sequence[str],
+    record: float,
+    attributes: Mapping[str, Any],
+    progress: Callable[[float, str], None] | None = None,
+) -> xr.Dataset:
+    """Dataset of kind "identified" on the output `lines` at the record's mean mesh frequency, with `mesh_stiffness` and
+    `mesh_damping` (phase). `record`: what doubtful channels may cost."""
+    found = varying_feedback(signals, harmonics, progress)
+    about = _as_data(signals, spectra)
+    branches = min(BRANCHES, 2 * signals.top // spectra.mesh_lines)
+    frequency = np.asarray(lines * spectra.spacing, dtype=float)
+    model = gauged(found.model, about)
+    response = htf_on(model, about, lines, branches)
+    itf = itf_from_htf(response, phases)
+    chosen = followed(lines)
+    centre = htf_on(model, about, chosen, branches)
+    values, vectors = np.linalg.eigh(0.5 * (found.covariance + found.covariance.T))
+    root, rng = vectors * np.sqrt(np.maximum(values, 0.0)), np.random.default_rng(0)
+    draws = [
+        gauged(found.model.moved(found.model.vector() + root @ rng.standard_normal(values.size)), about)
+        for _ in range(DRAWS)
+    ]
+    errors = [htf_on(one, about, chosen, branches) - centre for one in draws]
+    htf_spread = np.mean([np.abs(error) ** 2 for error in errors], axis=0)
+    itf_spread = np.mean([np.abs(itf_from_htf(error, phases)) ** 2 for error in errors], axis=0)
+    htf_variance = np.stack([np.interp(lines, chosen, row) for row in htf_spread])
+    itf_variance = np.stack([np.interp(lines, chosen, column) for column in itf_spread.T], axis=1)
+    variance = float(np.sqrt(htf_variance.sum() / np.sum(np.abs(response) ** 2)))
+    curves = np.array([along_phase(one, about, phases) for one in (model, *draws)])
+    spread = np.mean((curves[1:] - curves[0]) ** 2, axis=0)
+    frf = make_frf(
+        "identified",
+        frequency=frequency,
+        itf=itf,
+        htf=response,
+        modes=itf_modes(frequency, itf, itf_variance, modes=modes),
+        itf_variance=itf_variance,
+        htf_variance=htf_variance,
+        attributes={
+            **attributes,
+            "speed": "varying",
+            "harmonics": branches,
+            "mesh_harmonics": model.harmonics,
+            "unknowns": found.unknowns,
+            "equations": found.equations,
+            "residual": found.residual,
+            "variance_error": variance,
+            "record_error": record,
+            "expected_error": hypot(variance, record),
+            "warnings": "\n".join(notes),
+        },
+    )
+    for number, (name, unit) in enumerate((("mesh_stiffness", "N/m"), ("mesh_damping", "N s/m"))):
+        frf[name] = ("phase", curves[0, number], {"units": unit})
+        frf[f"{name}_var"] = ("phase", spread[number], {"units": f"({unit})^2"})
+    return frf
+
+
+def _as_data(signals: Signals, spectra: Spectra) -> ClassData:
+    """What the functions of a model ask of its data: units and lines, without the response."""
+    lines = np.arange(signals.lowest, signals.excited + 1)[None]
+    ones = np.ones((*lines.shape, 1), dtype=complex)
+    return ClassData(
+        lines, np.ones(lines.shape, dtype=bool), ones, ones, np.ones(1), spectra.mesh_lines, spectra.spacing,
+        signals.excited, signals.top, signals.force_unit, signals.dte_unit, float(lines.size),
+    )  # fmt: skip

@@ -1,0 +1,70 @@
+"""Mesh feedback at a speed that varies, against an outside integrator."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from shared.reference_rig import ReferenceRig
+from shared.varying_rig import truth_at, varying_record, wandering
+
+from gearbench.identification import IdentificationSettings, SpectraError, identify, itf
+from gearbench.identification.feedback.varying_frf import mesh_phase, signals_of, speed_varies
+
+RIG = ReferenceRig(mesh_frequency=60.0, edge=0.2)
+SETTINGS = IdentificationSettings("mesh-feedback", 16, band=(700.0, 1900.0), phases=64, modes=1, step=20)
+
+
+@pytest.fixture(scope="module")
+def record() -> xr.Dataset:
+    course = wandering(60.0, 0.5)
+    return varying_record(RIG, course, duration=0.5, rate=6000.0, band=(2.0, 2000.0), noise=0.01, tolerance=1e-6)
+
+
+@pytest.fixture(scope="module")
+def identified(record: xr.Dataset) -> xr.Dataset:
+    return identify([record], SETTINGS)
+
+
+def relative(a: np.ndarray, b: np.ndarray) -> float:
+    return float(np.linalg.norm(a - b) / np.linalg.norm(b))
+
+
+def test_a_wander_of_a_fifth_costs_no_accuracy(identified: xr.Dataset) -> None:
+    """Half a second, 40 dB: the error is small and expected."""
+    error = relative(itf(identified).values, truth_at(RIG, identified))
+    assert error < 0.02
+    assert 0.5 < identified.attrs["expected_error"] / error < 2.0
+    assert identified.attrs["speed"] == "varying"
+    stiffness = RIG.stiffness(identified.phase.values)
+    assert relative(identified["mesh_stiffness"].values, stiffness) < 0.02
+    frozen = np.nanmean(identified["natural_frequency"].values)
+    assert 1000 < frozen < 1250
+
+
+def test_phase_comes_from_the_angle_where_it_is_not_measured(record: xr.Dataset) -> None:
+    angle = record["mesh_phase"] * 2 * np.pi / 31
+    by_angle = record.drop_vars("mesh_phase").assign(angle_driver=angle).assign_attrs(teeth_driver=31)
+    found = mesh_phase(by_angle)
+    assert found is not None
+    assert found == pytest.approx(record["mesh_phase"].values, abs=1e-12)
+    assert speed_varies([by_angle]) and speed_varies([record])
+    even = 60.0 * np.arange(record.sizes["time"])[None] / 6000.0
+    assert not speed_varies([record.assign(mesh_phase=(("realisation", "time"), even))])
+    assert mesh_phase(record.drop_vars("mesh_phase")) is None
+
+
+def test_what_a_varying_speed_cannot_do_without_is_named(record: xr.Dataset) -> None:
+    back = record.assign(mesh_phase=-record["mesh_phase"])
+    with pytest.raises(SpectraError, match="rises from sample to sample"):
+        signals_of([back], 1000)
+    with pytest.raises(SpectraError, match="same sampling_rate"):
+        signals_of([record, record.isel(time=slice(100))], 1000)
+    with pytest.raises(SpectraError, match="constant"):
+        signals_of([record.assign(force=record["force"] * 0 + 2000.0)], 1000)
+    with pytest.raises(ValueError, match=r"under-determined: \d+ unknowns"):
+        identify([record], IdentificationSettings("mesh-feedback", 400, band=(700.0, 1900.0)))
+
+
+def test_the_local_polynomial_method_points_to_mesh_feedback(record: xr.Dataset) -> None:
+    assert speed_varies([record], 0.25)
+    with pytest.raises(SpectraError, match="mesh-feedback follows"):
+        identify([record], IdentificationSettings(harmonics=4))
