@@ -15,6 +15,7 @@ from gearbench.commands.experiments.multisine import multisine
 from gearbench.commands.experiments.run import run
 from gearbench.commands.experiments.simulate import simulate
 from gearbench.commands.experiments.sweep import sweep
+from gearbench.commands.gears.animate import animate
 from gearbench.commands.gears.check import check
 from gearbench.commands.gears.mesh import mesh
 from gearbench.commands.gears.static import static
@@ -43,6 +44,7 @@ COMMANDS = (
     run,
     simulate,
     static,
+    animate,
     sweep,
     multisine,
     convert,
