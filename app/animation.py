@@ -57,6 +57,9 @@ def animate(
     check_gears(case.rig)
     refuse_cracks(case.rig)
     curve: tuple[Any, Any] | None
+    load = mean_torque(case) if torque is None and record is None else torque
+    if load is not None and not 0.0 < load < float("inf"):
+        raise InputError(f"--torque-nm {load:g} must be finite and greater than 0")
     steps.step("positions")
     elastic = elastic_rig(case.rig, case.simulation)
     if record is not None:
@@ -64,9 +67,7 @@ def animate(
         instants = recorded_instants(held, frames, cycles, elastic.pair.driver.base_radius)
         curve, words = _recorded_curve(held, instants[0].phase, cycles), "DTE"
     else:
-        load = mean_torque(case) if torque is None else torque
-        if not 0.0 < load < float("inf"):
-            raise InputError(f"--torque-nm {load:g} must be finite and greater than 0")
+        assert load is not None
         instants = static_instants(elastic, load, cycles * np.arange(frames) / frames)
         phases = np.linspace(0.0, cycles, 1 + round(CURVE * max(cycles, 1.0)))
         errors = np.array([one.dte for one in static_instants(elastic, load, phases)])
