@@ -17,6 +17,7 @@ from gearbench.commands.experiments.optimise import optimise
 from gearbench.commands.experiments.run import run
 from gearbench.commands.experiments.simulate import simulate
 from gearbench.commands.experiments.sweep import sweep
+from gearbench.commands.gears.animate import animate
 from gearbench.commands.gears.check import check
 from gearbench.commands.gears.mesh import mesh
 from gearbench.commands.gears.static import static
@@ -47,6 +48,7 @@ COMMANDS = (
     run,
     simulate,
     static,
+    animate,
     sweep,
     campaign,
     optimise,

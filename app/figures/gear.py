@@ -48,7 +48,7 @@ def draw_pair(path: Path, rig: Rig, meshing: Pair, mesh: PairMesh | None) -> Non
         save(drawing, path)
 
 
-def _placed(points: Array, angle: float, centre: float) -> Array:
+def placed(points: Array, angle: float, centre: float) -> Array:
     """Points (n, 2) [m] turned by an angle and moved along x, in mm."""
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     return 1e3 * (points @ turn.T + np.array([centre, 0.0]))
@@ -71,7 +71,7 @@ def _gears(rig: Rig, meshing: Pair) -> list[tuple[str, str, Profile, float, floa
     ]
 
 
-def _outline(tooth: Profile) -> Array:
+def outline(tooth: Profile) -> Array:
     """Closed outline (n, 2) [m] of the whole gear in its own frame."""
     from gearbench.geometry.tooth.outline import half_outline
 
@@ -84,7 +84,7 @@ def _outline(tooth: Profile) -> Array:
 
 def _draw_outlines(axes: Any, rig: Rig, meshing: Pair) -> None:
     for name, colour, tooth, angle, centre, _, _ in _gears(rig, meshing):
-        axes.plot(*_placed(_outline(tooth), angle, centre).T, color=colour, lw=0.9, label=name)
+        axes.plot(*placed(outline(tooth), angle, centre).T, color=colour, lw=0.9, label=name)
 
 
 def _draw_circles(axes: Any, rig: Rig, meshing: Pair) -> None:
@@ -92,7 +92,7 @@ def _draw_circles(axes: Any, rig: Rig, meshing: Pair) -> None:
     circle = np.column_stack((np.cos(turn), np.sin(turn)))
     for _, colour, tooth, _, centre, hub, bore in _gears(rig, meshing):
         for radius, style in ((tooth.base_radius, ":"), (hub, "--"), (bore, "-")):
-            axes.plot(*_placed(radius * circle, 0.0, centre).T, color=colour, lw=0.8, ls=style)
+            axes.plot(*placed(radius * circle, 0.0, centre).T, color=colour, lw=0.8, ls=style)
     axes.plot([], [], color="k", lw=0.8, ls=":", label="base circles")
     axes.plot([], [], color="k", lw=0.8, ls="--", label="rigid hub circles")
     if rig.driver.bore_radius or rig.driven.bore_radius:

@@ -37,6 +37,11 @@ _STYLE: dict[Any, Any] = {
 }
 
 
+def style() -> dict[Any, Any]:
+    """Settings of the common style, for figures that are laid out by hand."""
+    return dict(_STYLE)
+
+
 @contextmanager
 def figure(
     rows: int = 1, columns: int = 1, size: tuple[float, float] = (8.0, 4.5), **options: Any

@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.tri import Triangulation
 from numpy.typing import NDArray
 
+from gearbench.bench.stress.motion import quarters
 from gearbench.figures.plotting import BLUE, GREY, ORANGE, figure, save
 
 if TYPE_CHECKING:
@@ -60,7 +61,7 @@ def rounded_up(value: float) -> float:
 
 def plot_fields(fields: PairFields, module: float, path: Path) -> None:
     """Von Mises and largest principal stress around the contacts, and the most loaded contact close up."""
-    triangles = _quarters(fields.mesh.cells)
+    triangles = quarters(fields.mesh.cells)
     middle, half = view(fields, module)
     tops = limits(fields, module)
     close = max(fields.contacts, key=lambda one: one.half_width)
@@ -86,11 +87,6 @@ def plot_fields(fields: PairFields, module: float, path: Path) -> None:
             _frame(panel, middle, half)
         _frame(axes[2], close.middle, reach)
         save(drawing, path)
-
-
-def _quarters(triangles: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Each quadratic triangle as four straight ones."""
-    return np.concatenate([triangles[:, [0, 3, 5]], triangles[:, [3, 1, 4]], triangles[:, [5, 4, 2]], triangles[:, 3:]])
 
 
 def _contours(

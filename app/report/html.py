@@ -34,10 +34,13 @@ h1, h2, p, li, figcaption { overflow-wrap: anywhere; } figure img { max-width: 1
 .sliders { display: flex; flex-wrap: wrap; gap: .2rem 1.5rem; font-size: .85rem; margin: .4rem 0; }
 .sliders label { flex: 1 1 20rem; }
 .sliders input { width: 45%; vertical-align: middle; }
+.player img { display: block; width: 100%; max-width: 840px; height: auto; }
+.controls { display: flex; gap: .6rem; max-width: 840px; margin: .4rem 0; } .controls[hidden] { display: none; }
+.controls input { flex: 1; min-width: 0; } .controls button { min-width: 5em; }
 pre { overflow-x: auto; font: .8rem/1.4 "DejaVu Sans Mono", Consolas, monospace; background: #f5f6f8; padding: .6rem; }
 .warn { border-left: 4px solid #d1600a; padding: .1rem 0 .1rem .7rem; }
 @media print { body { max-width: none; font-size: 11px; } h2, figure, table { break-inside: avoid; }
-  h2 { break-after: avoid; } .live.drawn .plots { display: none; } .live.drawn .still { display: block; }
+  h2 { break-after: avoid; } .live.drawn .plots, .controls { display: none; } .live.drawn .still { display: block; }
   .wide { overflow-x: visible; } }
 """
 

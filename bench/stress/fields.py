@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import floor, pi
+from dataclasses import dataclass, field, replace
+from math import pi
 from pathlib import Path
 
 import numpy as np
@@ -32,10 +34,11 @@ GROWTH = 0.35  # of element size per distance from there
 
 @dataclass(frozen=True)
 class Contact:
-    """Middle (2,) [m] of a contact and its half-width [m]."""
+    """Middle (2,) [m] of a contact, its half-width [m], and the force (2,) [N] on the driver."""
 
     middle: Array
     half_width: float
+    force: Array = field(default_factory=lambda: np.zeros(2))
 
 
 @dataclass(frozen=True)
@@ -132,6 +135,12 @@ def fields_at(
             middle = sector_of(floor(stand.phase + 0.5), number, teeth)
             field = unloaded_field(gear, loaded_sectors([middle], teeth, reach))
         parts.append(_placed(field, pressed, number, angles[number], stand.centres[number]))
+        sectors = loaded_sectors([p.sector for p in pressed], teeth, reach)
+        found = gear_field(gear, all_strips(teeth, pressed), sectors)
+        at = np.array([number * law.centre, 0.0])
+        parts.append(_placed(found, pressed, number, angles[number], at))
+    width = elastic.rig.driver.face_width
+    contacts = tuple(replace(one, force=width * one.force) for one in parts[0].contacts)
     strain = elastic.rig.material.poisson if elastic.rig.material.state == "plane-strain" else 0.0
     stress = np.concatenate([part.stress for part in parts])
     return PairFields(
@@ -143,6 +152,10 @@ def fields_at(
         phase=stand.phase,
         torque=float(sum((1 - 2 * p.side) * p.force * p.contact.lever1 for p in stand.pairs)),
         dte=stand.dte,
+        contacts=contacts,
+        phase=phase,
+        torque=float(sum((1 - 2 * p.side) * p.force * p.contact.lever1 for p in pairs)),
+        dte=dte,
     )
 
 
@@ -156,22 +169,24 @@ class _Part:
     contacts: tuple[Contact, ...]
 
 
-def _placed(field: GearField, pressed: Sequence[Pressed], number: int, angle: float, centre: Array) -> _Part:
+def _placed(found: GearField, pressed: Sequence[Pressed], number: int, angle: float, centre: Array) -> _Part:
     """Regular and half-plane part together, elements divided near the contacts, turned into the world."""
-    teeth, mesh = field.gear.shape.teeth, field.gear.mesh
+    teeth, mesh = found.gear.shape.teeth, found.gear.mesh
     points, triangles, tooth, moved, stress, contacts = [], [], [], [], [], []
     count = 0
-    for sector, u, regular in zip(field.sectors, field.displacement, field.stress, strict=True):
+    for sector, u, regular in zip(found.sectors, found.displacement, found.stress, strict=True):
         own = [_spot(p.strips) for p in pressed if p.sector == sector]
         cells, values = divided(mesh.cells, np.hstack([mesh.points, u, regular]), _size(own))
-        strips, turn = field.strips_in(sector), angle + 2 * pi * sector / teeth
+        strips, turn = found.strips_in(sector), angle + 2 * pi * sector / teeth
         x = values[:, :2]
         points.append(centre + rotated(x, turn))
-        moved.append(rotated(values[:, 2:4] + strips.displacement(x, field.gear.moduli), turn))
+        moved.append(rotated(values[:, 2:4] + strips.displacement(x, found.gear.moduli), turn))
         stress.append(turn_stress(values[:, 4:] + strips.stress(x), turn))
         triangles.append(count + cells)
         tooth.append(np.full(len(cells), sector_of(sector, number, teeth)))
-        contacts += [Contact(centre + rotated(one.middle, turn), one.half_width) for one in own]
+        contacts += [
+            Contact(centre + rotated(one.middle, turn), one.half_width, rotated(one.force, turn)) for one in own
+        ]
         count += len(x)
     cells = np.concatenate(triangles)
     return _Part(
@@ -183,9 +198,9 @@ def _placed(field: GearField, pressed: Sequence[Pressed], number: int, angle: fl
 
 
 def _spot(strips: Strips) -> Contact:
-    """Middle of the pressure, and half of the width of its strips."""
+    """Middle of the pressure, half of the width of its strips, and their force per unit thickness."""
     force = strips.half * strips.mean
-    return Contact(force @ strips.middle / force.sum(), float(strips.half.sum()))
+    return Contact(force @ strips.middle / force.sum(), float(strips.half.sum()), strips.force)
 
 
 def _size(contacts: Sequence[Contact]) -> Callable[[Array], Array]:

@@ -2,25 +2,32 @@
 
 from __future__ import annotations
 
+from base64 import b64decode
 from pathlib import Path
 
 import pytest
 from shared.pages import CHROMIUM, WIDTHS, browsed
 from shared.small_run import SMALL_RUN
 
+from gearbench.cases import read_case
 from gearbench.cli import run_command_line
+from gearbench.report.animation import animation_page
 
 needs_browser = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine")
 
 
 @needs_browser
-def test_a_page_that_goes_wrong_is_seen(tmp_path: Path) -> None:
+def test_a_page_that_goes_wrong_is_seen_and_a_player_is_not_one(tmp_path: Path) -> None:
     page = tmp_path / "bad.html"
     policy = '<meta http-equiv="Content-Security-Policy" content="default-src \'unsafe-inline\'">'
     wide = '<div style="width:2000px">wide</div><img src="https://example.org/a.png"><script>missing()</script>'
     page.write_text(f"<html><head>{policy}</head><body>{wide}</body></html>", encoding="utf-8")
-    heard = browsed([page], tmp_path)
+    player = tmp_path / "player.html"
+    dot = ("image/gif", b64decode("R0lGODlhAQABAAAAACH5BAEKAAEALAAAAAABAAEAAAICTAEAOw=="))
+    player.write_text(animation_page(read_case("quick_lumped"), "Moving", ["One."], [dot, dot], 8.0), encoding="utf-8")
+    heard = browsed([page, player], tmp_path)
     for width in WIDTHS:
+        assert heard[f"player {width}"]["wrong"] == [] and heard[f"player {width}"]["beyond"] <= 0
         told = heard[f"bad {width}"]
         assert told["beyond"] >= 2000 - width
         assert any("missing" in words for words in told["wrong"])
