@@ -117,17 +117,15 @@ def run(
                 " mesh frequency; `simulate` makes the record"
             )
     with claimed(Path(out), "run", fingerprint(dump_case(case), source_digest()), force) as output:
-        jobs = [Job(one, output, progress or Silent(), f"-{name}" if name else "") for name, one in case.experiments()]
+        jobs = [
+            Job(one, output, progress or Silent(), f"-{name}" if name else "", workers)
+            for name, one in case.experiments()
+        ]
         done = [run_experiment(job) for job in jobs]
         if not output.has(REPORT):
             jobs[0].progress.step(REPORT)
             _write_report(case, output, [part for _, part in done if part is not None])
         return [numbers for numbers, _ in done]
-        jobs = [
-            Job(one, output, progress or Silent(), f"-{name}" if name else "", workers)
-            for name, one in case.experiments()
-        ]
-        return [run_experiment(job) for job in jobs]
 
 
 def run_experiment(job: Job) -> tuple[dict[str, Any], RunPart | None]:

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from math import floor, pi
 from dataclasses import dataclass, field, replace
-from math import pi
+from math import floor, pi
 from pathlib import Path
 
 import numpy as np
@@ -130,15 +128,11 @@ def fields_at(
         gear, teeth = gears[number], gears[number].shape.teeth
         if pressed:
             sectors = loaded_sectors([p.sector for p in pressed], teeth, reach)
-            field = gear_field(gear, all_strips(teeth, pressed), sectors)
+            found = gear_field(gear, all_strips(teeth, pressed), sectors)
         else:
             middle = sector_of(floor(stand.phase + 0.5), number, teeth)
-            field = unloaded_field(gear, loaded_sectors([middle], teeth, reach))
-        parts.append(_placed(field, pressed, number, angles[number], stand.centres[number]))
-        sectors = loaded_sectors([p.sector for p in pressed], teeth, reach)
-        found = gear_field(gear, all_strips(teeth, pressed), sectors)
-        at = np.array([number * law.centre, 0.0])
-        parts.append(_placed(found, pressed, number, angles[number], at))
+            found = unloaded_field(gear, loaded_sectors([middle], teeth, reach))
+        parts.append(_placed(found, pressed, number, angles[number], stand.centres[number]))
     width = elastic.rig.driver.face_width
     contacts = tuple(replace(one, force=width * one.force) for one in parts[0].contacts)
     strain = elastic.rig.material.poisson if elastic.rig.material.state == "plane-strain" else 0.0
@@ -148,14 +142,10 @@ def fields_at(
         displacement=np.concatenate([part.displacement for part in parts]),
         stress=stress,
         out_of_plane=strain * (stress[:, 0] + stress[:, 1]),
-        contacts=parts[0].contacts,
+        contacts=contacts,
         phase=stand.phase,
         torque=float(sum((1 - 2 * p.side) * p.force * p.contact.lever1 for p in stand.pairs)),
         dte=stand.dte,
-        contacts=contacts,
-        phase=phase,
-        torque=float(sum((1 - 2 * p.side) * p.force * p.contact.lever1 for p in pairs)),
-        dte=dte,
     )
 
 

@@ -117,8 +117,6 @@ def study_summary(table: xr.Dataset, effects: Sequence[Effects], folder: Path) -
     }
 
 
-def _lines(table: xr.Dataset, summary: dict[str, Any], folder: Path) -> list[str]:
-    from gearbench.words.study import best, decider, effects_from, failures, span_line
 def _lines(table: xr.Dataset, effects: Sequence[Effects], summary: dict[str, Any], folder: Path) -> list[str]:
     from gearbench.words.study import best, decider, failures, span_line
 
