@@ -36,7 +36,7 @@ def simulate(
         typer.Option(
             "--fields",
             metavar="TIME",
-            help="times [s] after the first sample at which displacement and stress are written beside --out, as .vtu"
+            help="times in s after the first sample at which displacement and stress are written beside --out, as .vtu"
             " files and a .pvd that ParaView opens; the record then holds tooth forces",
         ),
     ] = None,
