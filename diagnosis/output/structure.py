@@ -50,7 +50,7 @@ NAMES = (
     (GAIN, "gain of the reaction torque (logarithm)", "1"),
 )
 # Where a fit begins with them: below some per cent a rig does not show them.
-ACROSS_BEGIN, HOUSING_BEGIN, SHAFT_BEGIN = 0.15, 0.04, 0.5
+ACROSS_BEGIN, HOUSING_BEGIN, SHAFT_BEGINS = 0.15, 0.04, (0.1, 0.7)
 
 
 def structure_groups(rig: Rig) -> list[Group]:
@@ -74,13 +74,13 @@ def structure_groups(rig: Rig) -> list[Group]:
 
 
 def beginnings(unknowns: Unknowns, p: Array) -> list[Array]:
-    """`p` (size,) without and with centres that move across their supports, and those with a shaft that twists."""
+    """`p` (size,) without and with centres that move across their supports, and those with shafts that twist."""
     moving = p.copy()
     moving[unknowns[ACROSS]] = ACROSS_BEGIN
     out = [p, moving]
-    if SHAFT in unknowns.slices:
+    for soft in SHAFT_BEGINS if SHAFT in unknowns.slices else ():
         twisting = moving.copy()
-        twisting[unknowns[SHAFT]] = SHAFT_BEGIN
+        twisting[unknowns[SHAFT]] = soft
         out.append(twisting)
     return out
 

@@ -31,8 +31,11 @@ def test_torque_ripple_from_records_to_the_rig_that_has_it() -> None:
     assert found.probability["effect"] > 0.9 and sum(found.probability.values()) == pytest.approx(1.0)
     assert found.candidates[0].effects == ("torque-ripple",)
     assert "background" in steps and "torque-ripple" in steps
-    # What no equation of a steady, complete model keeps.
-    assert max(found.audits["unsteady"]) < 100 and max(found.audits["silent"][1:]) < 100
+    # What no equation of a steady, complete model keeps, and how the verdict says so.
+    assert max(found.audits["unsteady"]) < 100 and max(found.audits["missing"]) < 0.3
+    assert found.effects[0].due and found.effects[0].closes["dte"].value > 0.0
+    assert "ripple" in found.because[1] and found.where[0].kind == "place"
+    assert max(found.where, key=lambda share: share.share).name == "drive"
 
     parameters = found.effects[0].parameters
     for order, amplitude in ((6, 1.5), (12, 0.8)):
