@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 # Titles of the panels, in their order; teeth get a panel of their own below.
 PANELS = {
-    "place": "Place (force residuals)",
+    "place": "Place, beyond recalibration",
     "channel": "Channel",
     "band": "Band",
     "class": "Residue class of the line",

@@ -180,7 +180,8 @@ def _where(report: Report) -> list[str]:
     return [
         text("Where the gap is", "h2"),
         text(
-            f"{words}Below, the gap of the nominal rig is divided in several ways; each adds up to 100 %. The marks"
+            f"{words}Below, the gap of the nominal rig (by place: what recalibration does not close of it) is divided"
+            " in several ways; each adds up to 100 %. The marks"
             " show how much of a part measurement noise and the uncertainty of the nominal rig could make: where a mark"
             " lies beyond its bar, the size of that part alone is no sign of an effect."
         ),
