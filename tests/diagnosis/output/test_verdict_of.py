@@ -12,8 +12,8 @@ import pytest
 from gearbench.diagnosis.effects.effect import Hypothesis, Wide
 from gearbench.diagnosis.effects.library import LIBRARY
 from gearbench.diagnosis.evidence.calibration import LIMITS
-from gearbench.diagnosis.output.missing import Missing
-from gearbench.diagnosis.output.verdict_of import GREATER, OUTSTANDING, STRUCTURE, VISIBLE, Decided, decide_simulated
+from gearbench.diagnosis.output.missing import OUTSTANDING, Missing
+from gearbench.diagnosis.output.verdict_of import GREATER, STRUCTURE, VISIBLE, Decided, decide_simulated
 
 EFFECT = next(one for one in LIBRARY if one.name == "friction")
 FRICTION = Hypothesis("friction", "mesh", (Wide("friction"),), effect=EFFECT)
