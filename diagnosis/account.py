@@ -12,7 +12,6 @@ from gearbench.diagnosis.effects.effect import Hypothesis
 from gearbench.diagnosis.forces.equations import PLACES
 from gearbench.diagnosis.output.judged import Closing, Judged
 from gearbench.diagnosis.output.missing import Missing
-from gearbench.diagnosis.output.verdict_of import OUTSTANDING
 from gearbench.diagnosis.verdict import Gap, Part, Range, Share
 from gearbench.diagnosis.words import CHANNELS, SHOWN_UNITS, band_in_words, length, number, percent
 from gearbench.diagnosis.words import PLACES as IN_WORDS
@@ -35,7 +34,7 @@ FLOORS = 2.0
 def weights(missing: Missing) -> Array:
     """Parts (places,) that the places have in what remains, each by how far it stands out over what sound rigs leave
     there; they add up to one."""
-    over = missing.excess / np.array([OUTSTANDING[place] for place in PLACES])
+    over = missing.over
     whole = float(over.sum())
     return over / whole if whole > 0.0 else np.full(len(PLACES), 1.0 / len(PLACES))
 
@@ -115,7 +114,7 @@ def _forces(missing: Missing | None) -> list[Part]:
     share = weights(missing)
     for number_, place in enumerate(PLACES):
         size = float(missing.in_band(band)[number_])
-        if missing.excess[number_] > OUTSTANDING[place] and size > 0.0:
+        if missing.over[number_] > 1.0 and size > 0.0:
             out.append(
                 Part(channel="force", band_hz=band, place=place, size=size, low=size, high=size, unit="N",
                      share=float(share[number_]))

@@ -102,6 +102,8 @@ def find_cause(
         )
     except ValueError:  # an audit that cannot be made costs the place of the remainder, not the verdict
         missing = nothing_missing()
+    lines = sum(float(blocks.count.sum()) for blocks in problem.blocks)
+    missing = replace(missing, silent=missing_by_equation(problem, fit) / lines)
     changing = changing_of(judged, changing_parts(measurements, band))
     decided = decide_simulated(judged, result, missing, unsteady, changing)
     kept = [one.hypothesis for one in decided.named]
@@ -123,6 +125,7 @@ def find_cause(
         audits={
             "unsteady": tuple(unsteady),
             "missing": tuple(missing.excess),
+            "silent": tuple(missing.silent),
             "changing": (changing,),
             "left": (judged.left, judged.remains),
         },

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,8 +12,7 @@ from gearbench.diagnosis.account import parts_of, place_in, places_of, sentence_
 from gearbench.diagnosis.effects.effect import Hypothesis
 from gearbench.diagnosis.forces.equations import PLACES
 from gearbench.diagnosis.output.judged import Closing
-from gearbench.diagnosis.output.missing import Missing, nothing_missing
-from gearbench.diagnosis.output.verdict_of import OUTSTANDING
+from gearbench.diagnosis.output.missing import OUTSTANDING, SILENT, Missing, nothing_missing
 from gearbench.diagnosis.verdict import Gap, Range
 
 BANDS = ((0.0, 200.0), (200.0, 3000.0))
@@ -51,6 +51,9 @@ MISSING = Missing(
 def test_places_share_what_remains_by_how_far_they_stand_out() -> None:
     assert weights(MISSING) == pytest.approx(at("drive", 2 / 3) + at("mesh", 1 / 3))
     assert place_in(MISSING, (0.0, 200.0)) == "mesh" and place_in(MISSING, (200.0, 3000.0)) == "drive"
+    # What the force residuals account for by a filter of an equation's own does not stand out there.
+    silent = 0.1 * at("drive", SILENT["drive"]) + 9 * at("mesh", SILENT["mesh"])
+    assert weights(replace(MISSING, silent=silent)) == pytest.approx(at("drive", 0.1 / 1.1) + at("mesh", 1 / 1.1))
     assert place_in(nothing_missing(), (0.0, 200.0)) == "none"
     judged: Any = type("J", (), {"closings": {"f": Closing(9.0, 2.0, ("dte", "excited"), {})}, "left": 0.5})()
     judged.share = lambda without: 0.5

@@ -12,8 +12,8 @@ import pytest
 from gearbench.diagnosis.effects.effect import Hypothesis, Wide
 from gearbench.diagnosis.effects.library import LIBRARY
 from gearbench.diagnosis.evidence.calibration import LIMITS
-from gearbench.diagnosis.output.missing import Missing
-from gearbench.diagnosis.output.verdict_of import GREATER, OUTSTANDING, STRUCTURE, VISIBLE, Decided, decide_simulated
+from gearbench.diagnosis.output.missing import OUTSTANDING, Missing
+from gearbench.diagnosis.output.verdict_of import GREATER, STRUCTURE, VISIBLE, Decided, decide_simulated
 
 EFFECT = next(one for one in LIBRARY if one.name == "friction")
 FRICTION = Hypothesis("friction", "mesh", (Wide("friction"),), effect=EFFECT)
@@ -99,6 +99,7 @@ def test_what_changes_counts_by_its_part_of_the_gap() -> None:
     out = at(3, 1.1 * HAND.unsteady["driven-support"])
     made = decided(900.0, unsteady=out, changing=0.3)
     assert (made.verdict, made.place) == ("unknown", "driven-support") and "repetition" in made.because[0]
-    assert decided(900.0, unsteady=out, changing=0.03).verdict == "effects"
-    assert decided(None, unsteady=out, changing=0.03).verdict == "none"
+    assert decided(900.0, unsteady=out, changing=0.02).verdict == "effects"
+    assert decided(None, unsteady=out, changing=0.02).verdict == "none"
+    assert decided(None, unsteady=out, changing=0.04).place == "driven-support"
     assert decided(900.0, unsteady=out, changing=0.3, share=0.8).verdict == "effects"

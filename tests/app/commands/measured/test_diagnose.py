@@ -24,7 +24,8 @@ from gearbench.records import read_record
 from gearbench.report.html import bar, items, page, table, text
 from gearbench.rig import Case, read_case
 
-PRODUCTS = {"verdict.json", "updated.toml", "recalibrated.toml", "report.html", "where.png", "gap.png", "traces.png"}
+PICTURES = {"where.png", "waterfall.png", "gap.png", "traces.png"}
+PRODUCTS = {"verdict.json", "updated.toml", "recalibrated.toml", "report.html"} | PICTURES
 EMPTY = {"meta", "link", "br", "hr", "img", "input"}
 
 
