@@ -114,9 +114,9 @@ def _near(
     net = None
     if len(frame.points):
         points = 1e3 * frame.points
-        seen = (np.abs(points - [pitch, 0.0]) < [1.1 * wide, 1.1 * half]).all(axis=1)
+        seen = (np.abs(points[:, 0] - pitch) < 1.1 * wide) & (np.abs(points[:, 1]) < 1.1 * half)
         used, renumbered = np.unique(frame.triangles[seen[frame.triangles].any(axis=1)], return_inverse=True)
-        triangles = Triangulation(*points[used].T, renumbered.reshape(-1, 3))
+        triangles = Triangulation(points[used, 0], points[used, 1], renumbered.reshape(-1, 3))
         values = 1e-6 * frame.von_mises[used]
         net = axes.tripcolor(triangles, values, shading="gouraud", cmap="turbo", vmin=0.0, vmax=shared.top)
         for body, colour in zip(bodies, (BLUE, ORANGE), strict=True):

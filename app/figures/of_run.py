@@ -49,7 +49,7 @@ def _stiffness(run: RunResults, path: Path) -> None:
 
 
 def _transmission_error(run: RunResults, path: Path) -> None:
-    plot_static(run.static, path)
+    plot_static(run.static, path, run.zones, run.label)
 
 
 def _spectrum(run: RunResults, path: Path) -> None:

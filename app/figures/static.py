@@ -2,26 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gearbench.figures.plotting import BLUE, GREY, ORANGE, closed, figure, phase_axis, save
+from gearbench.figures.plotting import BLUE, GREY, ORANGE, closed, figure, phase_axis, save, shade
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from gearbench.geometry.pair.zones import Span
+
 MOST_CURVES = 12
 
 
-def plot_static(result: xr.Dataset, path: Path) -> None:
-    """Transmission error at every load over mesh phase, without load where known, and its swing over the load."""
+def plot_static(result: xr.Dataset, path: Path, zones: Sequence[Span] = (), label: str = "") -> None:
+    """Transmission error at every load over mesh phase, without load where known, and its swing over the load; `zones`
+    are shaded where there is one load."""
     te = 1e6 * result["transmission_error"].values
     loads, unit = result["load"].values, result["load"].attrs["units"]
     if len(loads) == 1:  # no swing over the load
         with figure(size=(8.0, 4.5)) as (drawing, axes):
+            shade(axes, zones, label)
             _curves(axes, result, te, loads, unit)
+            if zones:
+                axes.legend(loc="best")
             save(drawing, path)
         return
     with figure(1, 2, size=(11.0, 4.5), width_ratios=(3, 2)) as (drawing, (left, right)):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -42,7 +43,7 @@ def run_part(
     def own(base: str) -> str:
         return f"{base}-{name}" if name else base
 
-    shaded = {"zones": results.zones, "zone_words": results.label}
+    shaded = partial(over_phase, zones=results.zones, zone_words=results.label)
     phase, static = results.static["phase"].values, results.static
     te = [("transmission error", phase, 1e6 * static["transmission_error"].values[0])]
     stiffness = stiffness_curves(static)
@@ -54,13 +55,13 @@ def run_part(
         text("Frequency response over the mesh cycle", "h2"),
         itf_map(own("itf"), results.responses, still("itf")),
         text("Transmission error and stiffness", "h2"),
-        over_phase(
+        shaded(
             own("te"), te, "TE [um]", still("transmission_error"),
-            f"Static transmission error at {held['torque_mean_nm']:g} N m over one mesh period.", **shaded,
+            f"Static transmission error at {held['torque_mean_nm']:g} N m over one mesh period.",
         ),
-        over_phase(
+        shaded(
             own("stiffness"), stiffness, "mesh stiffness [N/um]", still("stiffness"),
-            "Mesh stiffness over one mesh period, hub to hub.", from_zero=True, **shaded,
+            "Mesh stiffness over one mesh period, hub to hub.", from_zero=True,
         ),
         text("The record", "h2"),
         over_time(own("time"), record, still("record")),
