@@ -187,17 +187,16 @@ def make_machine(
 
 def _course(course: Course, rig: Rig, bodies: tuple[Body, Body]) -> Course:
     """The course with the inertias of the rig."""
-    sides = (rig.drive, rig.load)
-    beyond = [side.coupling.inertia if side.coupling is not None else 0.0 for side in sides]
-    whole = [gear.inertia + more for gear, more in zip(bodies, beyond, strict=True)]
+    shafts = rig.drive.coupling, rig.load.coupling
+    one, two = (shaft.inertia if shaft is not None else 0.0 for shaft in shafts)
+    driver, driven = bodies[0].inertia + one, bodies[1].inertia + two
     if rig.turns_freely:
         ratio = rig.driven.teeth / rig.driver.teeth
-        return course._replace(inertia2=whole[0] * ratio**2 + whole[1])
-    ends = (
-        (more if side.twists else all_of_it) if side.boundary == "speed" else 0.0
-        for side, more, all_of_it in zip(sides, beyond, whole, strict=True)
+        return course._replace(inertia2=driver * ratio**2 + driven)
+    return course._replace(
+        inertia1=(one if rig.drive.twists else driver) if rig.drive.boundary == "speed" else 0.0,
+        inertia2=(two if rig.load.twists else driven) if rig.load.boundary == "speed" else 0.0,
     )
-    return course._replace(inertia1=next(ends), inertia2=next(ends))
 
 
 def _waves(rig: Rig) -> Waves:
