@@ -111,7 +111,8 @@ def distortion(
         attributes |= _told_apart(spectra, other, lines[part == 0])
     attributes["warnings"] = "\n".join(_doubts(attributes, noise))
     rms = np.asarray(np.sqrt(power), dtype=float)
-    return _dataset(lines * spectra.spacing, rms, limit, response, noise, part, attributes)
+    frequency = np.asarray(lines * spectra.spacing, dtype=float)
+    return _dataset(frequency, rms, limit, response, noise, part, attributes)
 
 
 def line_parts(lines: NDArray[np.int64], mesh_lines: int) -> NDArray[np.int64]:
