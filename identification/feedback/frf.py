@@ -14,6 +14,7 @@ from gearbench.identification.feedback.estimate import Feedback
 from gearbench.identification.feedback.result import (
     along_phase,
     coherence,
+    doubt_beyond,
     drawn_models,
     followed,
     furthest_line,
@@ -60,9 +61,10 @@ def feedback_frf(
     itf_variance = np.mean([np.abs(itf_from_htf(error, phases)) ** 2 for error in errors], axis=0)
     htf_variance = _between(lines, chosen, htf_variance.T).T
     itf_variance = _between(lines, chosen, itf_variance)
-    # Sidebands beyond the record's lines are extrapolated: nothing says that they are right.
+    # Sidebands beyond the record's lines are extrapolated: those that it holds tell how well.
     order = np.arange(-branches, branches + 1)[:, None]
     extrapolated = np.where(np.abs(lines + order * data.mesh_lines) > data.top, np.abs(response) ** 2, 0.0)
+    extrapolated *= doubt_beyond(found)
     htf_variance += extrapolated
     itf_variance += extrapolated.sum(axis=0)[:, None]
     power = float(np.sum(np.abs(response) ** 2))

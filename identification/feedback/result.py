@@ -52,6 +52,20 @@ def furthest_line(model: Model, data: ClassData) -> int:
     return min(2 * data.top, data.top + BEYOND * data.mesh_lines)
 
 
+def doubt_beyond(found: Feedback) -> float:
+    """Part of the power of sidebands beyond the record's lines that may be wrong.
+
+    The lines above the excited band hold sidebands only, as those beyond do: what the model leaves of their power,
+    noise included, is what its extrapolation is not trusted with. 1 where the record has no such lines.
+    """
+    data = found.data
+    above = data.valid & (np.abs(data.lines) > data.excited)
+    counted = (np.abs(data.dte) > 0) & above[:, :, None]
+    power = float(np.sum(np.abs(data.dte[counted]) ** 2))
+    left = float(np.sum(np.abs(found.refined.left[counted]) ** 2))
+    return min(left / power, 1.0) if power > 0 else 1.0
+
+
 def followed(lines: NDArray[np.int64]) -> NDArray[np.int64]:
     """Some of the output lines, on which the drawn models are solved."""
     step = max(1, -(-lines.size // FOLLOWED))

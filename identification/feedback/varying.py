@@ -245,8 +245,9 @@ class _Fit:
         mean = float(signals.dte[row].mean())
 
         def applied(stacked: Floats) -> Floats:
-            lines = stacked[: signals.top] + 1j * stacked[signals.top :]
-            force = stiffness * signals.along_time(lines) + damping * signals.along_time(1j * signals.omega * lines)
+            lines = np.asarray(stacked[: signals.top] + 1j * stacked[signals.top :], dtype=complex)
+            fast = np.asarray(1j * signals.omega * lines, dtype=complex)
+            force = stiffness * signals.along_time(lines) + damping * signals.along_time(fast)
             value = lines + signals.lines(force) / d
             return np.concatenate([value.real, value.imag])
 

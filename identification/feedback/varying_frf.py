@@ -11,9 +11,10 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from gearbench.identification.feedback.data import ClassData
+from gearbench.identification.feedback.model import Model
 from gearbench.identification.feedback.result import DRAWS, along_phase, followed, htf_on
 from gearbench.identification.feedback.start import gauged
-from gearbench.identification.feedback.varying import Signals, varying_feedback
+from gearbench.identification.feedback.varying import Signals, Varying, varying_feedback
 from gearbench.identification.response.frf import make_frf
 from gearbench.identification.response.modes import itf_modes
 from gearbench.identification.spectra.joint import Floats, Spectra, SpectraError
@@ -106,19 +107,8 @@ def varying_frf(
     model = gauged(found.model, about)
     response = htf_on(model, about, lines, branches)
     itf = itf_from_htf(response, phases)
-    chosen = followed(lines)
-    centre = htf_on(model, about, chosen, branches)
-    values, vectors = np.linalg.eigh(0.5 * (found.covariance + found.covariance.T))
-    root, rng = vectors * np.sqrt(np.maximum(values, 0.0)), np.random.default_rng(0)
-    draws = [
-        gauged(found.model.moved(found.model.vector() + root @ rng.standard_normal(values.size)), about)
-        for _ in range(DRAWS)
-    ]
-    errors = [htf_on(one, about, chosen, branches) - centre for one in draws]
-    htf_spread = np.mean([np.abs(error) ** 2 for error in errors], axis=0)
-    itf_spread = np.mean([np.abs(itf_from_htf(error, phases)) ** 2 for error in errors], axis=0)
-    htf_variance = np.stack([np.interp(lines, chosen, row) for row in htf_spread])
-    itf_variance = np.stack([np.interp(lines, chosen, column) for column in itf_spread.T], axis=1)
+    draws = _draws(found, about)
+    htf_variance, itf_variance = _variances(model, draws, about, lines, branches, phases)
     variance = float(np.sqrt(htf_variance.sum() / np.sum(np.abs(response) ** 2)))
     curves = np.array([along_phase(one, about, phases) for one in (model, *draws)])
     spread = np.mean((curves[1:] - curves[0]) ** 2, axis=0)
@@ -148,6 +138,29 @@ def varying_frf(
         frf[name] = ("phase", curves[0, number], {"units": unit})
         frf[f"{name}_var"] = ("phase", spread[number], {"units": f"({unit})^2"})
     return frf
+
+
+def _draws(found: Varying, about: ClassData) -> list[Model]:
+    """Models with parameters drawn from their covariance."""
+    values, vectors = np.linalg.eigh(0.5 * (found.covariance + found.covariance.T))
+    root, rng = vectors * np.sqrt(np.maximum(values, 0.0)), np.random.default_rng(0)
+    steps = (root @ rng.standard_normal(values.size) for _ in range(DRAWS))
+    return [gauged(found.model.moved(found.model.vector() + step), about) for step in steps]
+
+
+def _variances(
+    model: Model, draws: list[Model], about: ClassData, lines: NDArray[np.int64], branches: int, phases: int
+) -> tuple[Floats, Floats]:
+    """Variances of HTF (2L+1, F) and ITF (F, phases), from the drawn models on some of the lines."""
+    chosen = followed(lines)
+    centre = htf_on(model, about, chosen, branches)
+    errors = [htf_on(one, about, chosen, branches) - centre for one in draws]
+    of_htf = np.mean([np.abs(error) ** 2 for error in errors], axis=0)
+    of_itf = np.mean([np.abs(itf_from_htf(error, phases)) ** 2 for error in errors], axis=0)
+    return (
+        np.stack([np.interp(lines, chosen, row) for row in of_htf]),
+        np.stack([np.interp(lines, chosen, column) for column in of_itf.T], axis=1),
+    )
 
 
 def _as_data(signals: Signals, spectra: Spectra) -> ClassData:

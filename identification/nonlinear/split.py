@@ -110,7 +110,9 @@ def distortion(
     if other is not None:
         attributes |= _told_apart(spectra, other, lines[part == 0])
     attributes["warnings"] = "\n".join(_doubts(attributes, noise))
-    return _dataset(lines * spectra.spacing, np.sqrt(power), limit, response, noise, part, attributes)
+    rms = np.asarray(np.sqrt(power), dtype=float)
+    frequency = np.asarray(lines * spectra.spacing, dtype=float)
+    return _dataset(frequency, rms, limit, response, noise, part, attributes)
 
 
 def line_parts(lines: NDArray[np.int64], mesh_lines: int) -> NDArray[np.int64]:

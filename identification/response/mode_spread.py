@@ -25,7 +25,7 @@ def natural_frequency_deviation(
     natural, damping = modes
     result = np.full(natural.shape, np.nan)
     for (mode, phase), value in np.ndenumerate(natural):
-        ratio = damping[mode, phase]
+        ratio = float(damping[mode, phase])
         if not np.isfinite(value):
             continue
         reach = 2 * FIT_BANDWIDTHS * ratio * value
