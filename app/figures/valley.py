@@ -55,7 +55,7 @@ def _curves(axes: Any, found: Optimum, key: int) -> None:
                 colour = COLOURS[number % len(COLOURS)] if len(found.loads) > 1 else GREY
                 axes.axvline(relief, color=colour, ls=":", lw=1.2, label=f"textbook at {load:g} N m")
     axes.set_xlabel(found.names[key].replace("+", "\n+ "))
-    axes.set_ylim(0, None)
+    axes.set_ylim(0, 1.06 * axes.get_ylim()[1])
 
 
 def _contours(drawing: Any, axes: Any, found: Optimum) -> None:

@@ -52,8 +52,10 @@ def decider(effects: Effects) -> str:
         return ""
     ranked = sorted(known, key=lambda one: -(one.total if isfinite(one.total) else one.first))
     first = ranked[0]
-    with_others = f", {percent(first.total)} with its interactions" if isfinite(first.total) else ""
-    line = f"{first.factor} decides {percent(first.first)} of the variance of {effects.result}{with_others}"
+    low, high = first.first_interval
+    sure = f" (90 %: {percent(low)[:-2]} to {percent(high)})" if isfinite(low) else ""
+    line = f"{first.factor} decides {percent(first.first)}{sure} of the variance of {effects.result}"
+    line += f", {percent(first.total)} with its interactions" if first.total > first.first + 0.005 else ""
     if len(ranked) > 1:
         second = ranked[1]
         line += f"; then {second.factor} ({percent(second.total if isfinite(second.total) else second.first)})"
@@ -80,8 +82,8 @@ def failures(table: xr.Dataset) -> list[tuple[str, int]]:
 
 
 def percent(part: float) -> str:
-    """A part as per cent; a small negative index is noise about 0."""
-    return f"{100 * max(part, 0.0):.0f} %" if isfinite(part) else "-"
+    """A part as per cent; an estimate a little below 0 or above 1 is noise about it."""
+    return f"{100 * min(max(part, 0.0), 1.0):.0f} %" if isfinite(part) else "-"
 
 
 def between(interval: Interval) -> str:

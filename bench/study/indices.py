@@ -5,8 +5,9 @@ Analysis: The Primer, 2008). By the sample:
 
 * grid: both exactly, for levels that are equally likely, by sums over the full factorial; nothing is drawn, so there is
   no interval;
-* sobol: Saltelli's estimator of S_i, Jansen's of T_i (Saltelli et al., Comput. Phys. Commun. 181 (2010) 259, table 2 b
-  and f), 90 % intervals by the bootstrap over base points;
+* sobol: from correlations of Saltelli's samples, S_i = r(B, AB_i), T_i = 1 - r(A, AB_i) (Martinez' estimator: Baudin et
+  al., Sensitivity Analysis of Model Output, 2016), which unlike those with products keep their meaning with few base
+  points: a factor that decides alone has S = 1 exactly; 90 % intervals by the bootstrap over base points;
 * lhs, and a grid in which single members failed: S_i from the variance between bins of x_i, less what chance alone puts
   between them (epsilon squared: Kelley, PNAS 21 (1935) 554), 90 % intervals by the bootstrap over members; T_i is
   not known.
@@ -102,7 +103,7 @@ def _indices(
     if design.base:
         blocks = values.reshape(count + 2, design.base)
         whole = blocks[:, np.isfinite(blocks).all(axis=0)]
-        method = f"Saltelli and Jansen, {whole.shape[1]} of {design.base} base points"
+        method = f"Sobol design, {whole.shape[1]} of {design.base} base points"
         if whole.shape[1] < 2 or not np.ptp(whole[:2]):
             return np.full(count, np.nan), np.full(count, np.nan), none, method, whole.size
         first, total = saltelli(whole)
@@ -137,12 +138,12 @@ def _whole_grid(design: Design, values: Array) -> Array | None:
 
 def saltelli(blocks: Array) -> tuple[Array, Array]:
     """First and total indices (factors,) from results (factors + 2, n) of the samples A, B, AB_1 .. AB_d."""
-    centred = blocks - blocks[:2].mean()
+    centred = blocks - blocks.mean(axis=1, keepdims=True)
+    scale = np.sqrt((centred**2).mean(axis=1))
     a, b, mixed = centred[0], centred[1], centred[2:]
-    variance = centred[:2].var()
     with np.errstate(invalid="ignore", divide="ignore"):
-        first = (b * (mixed - a)).mean(axis=1) / variance
-        total = 0.5 * ((a - mixed) ** 2).mean(axis=1) / variance
+        first = (mixed * b).mean(axis=1) / (scale[2:] * scale[1])
+        total = 1 - (mixed * a).mean(axis=1) / (scale[2:] * scale[0])
     return first, total
 
 
