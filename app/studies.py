@@ -206,7 +206,10 @@ def _table(plan: Plan, found: Sequence[Found]) -> xr.Dataset:
 
 def _expected(table: xr.Dataset) -> list[str]:
     """Names of the products."""
-    return ["study.csv", "study.nc", "effects.csv", "report.html", "scatter.png"]
+    from gearbench.bench.study.table import named
+
+    pictures = ["scatter.png", "tornado.png"] if len(named(table, "factor")) > 1 else ["scatter.png"]
+    return ["study.csv", "study.nc", "effects.csv", "report.html", *pictures]
 
 
 def products(plan: Plan, table: xr.Dataset, output: Output) -> None:

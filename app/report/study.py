@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gearbench.report.html import folded, items, page, picture, table, text
-from gearbench.words.study import SAMPLES, best, between, decider, failures, percent, shown, span_line
+from gearbench.words.study import SAMPLES, best, between, decider, failures, percent, shown, span_line, span_title
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -34,7 +34,6 @@ def study_page(
     """The page as one HTML text."""
     results = [one.result for one in effects]
     factors = [factor.name for factor in design.factors]
-    headline = span_line(members, results[0])
     deciders = [line for line in map(decider, effects) if line]
     counted = int((members["sentence"].values == "").sum())
     drawn = ", ".join(factors)
@@ -43,7 +42,7 @@ def study_page(
     kept = "study.csv, study.nc and effects.csv hold the numbers, members/ the case and the result of each."
     body = [
         text(f"gearbench study · {title}", style="mark"),
-        text(headline[:1].upper() + headline[1:], "h1"),
+        text(span_title(members, results[0]), "h1"),
         text(answer, style="lead"),
         *(picture(pictures[name], name, CAPTIONS[name]) for name in ("tornado", "scatter") if name in pictures),
         *_others(members, results, deciders),
@@ -58,8 +57,8 @@ def study_page(
 
 
 def _others(members: xr.Dataset, results: Sequence[str], deciders: Sequence[str]) -> list[str]:
-    lines = [span_line(members, name) for name in results[1:]]
-    return [text("The other results", "h2"), items([*lines, *deciders[1:]])] if lines else []
+    lines = [span_line(members, name) for name in results]
+    return [text("All results", "h2"), items([*lines, *deciders[1:]])]
 
 
 def _effects(effects: Sequence[Effects]) -> list[str]:

@@ -45,6 +45,17 @@ def span_line(table: xr.Dataset, result: str) -> str:
     )
 
 
+def span_title(table: xr.Dataset, result: str) -> str:
+    """Range of one result, for a headline."""
+    values = np.asarray(table[result].values, dtype=float)
+    good = values[np.isfinite(values)]
+    words = str(table[result].attrs["long_name"])
+    words = words[:1].upper() + words[1:]
+    if not good.size:
+        return f"{words}: no member has it"
+    return f"{words}: {good.min():.4g} to {good.max():.4g}{unit(str(table[result].attrs['units']))}"
+
+
 def decider(effects: Effects) -> str:
     """Which factor decides a result; nothing where there is only one or nothing is known."""
     known = [one for one in effects.each if isfinite(one.first)]

@@ -43,6 +43,8 @@ class Shelf:
         folder.mkdir(parents=True, exist_ok=True)
         if task.case:
             write_text(folder / CASE, task.case)
+        else:
+            (folder / CASE).unlink(missing_ok=True)
         about = provenance(task.case, seed, {"member": task.number, "ask": list(task.ask), "values": values})
         data = {
             "member": task.number,

@@ -12,7 +12,6 @@ import typer
 
 from gearbench.shell.options import CaseArgument, JsonOption, SetOption, load_case, print_json
 from gearbench.shell.progress import Progress
-from gearbench.words.study import best, decider, effects_from, failures, span_line
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -68,6 +67,7 @@ def campaign(
     """
     loaded = load_case(case, settings)
     import gearbench as gb
+    from gearbench.words.study import effects_from, failures
 
     folder = out or Path(f"study_{re.sub(r'[^A-Za-z0-9._-]+', '_', loaded.name)}")
     with Progress(f"campaign {loaded.name}") as progress:
@@ -96,6 +96,7 @@ def split(of: list[str] | None) -> list[str]:
 def study_summary(table: xr.Dataset, effects: Sequence[Effects], folder: Path) -> dict[str, Any]:
     """Members, failures, and each result's range and indices."""
     from gearbench.bench.study.table import named
+    from gearbench.words.study import failures
 
     good = table["sentence"].values == ""
     results: dict[str, dict[str, Any]] = {}
@@ -116,6 +117,8 @@ def study_summary(table: xr.Dataset, effects: Sequence[Effects], folder: Path) -
 
 
 def _lines(table: xr.Dataset, effects: Sequence[Effects], summary: dict[str, Any], folder: Path) -> list[str]:
+    from gearbench.words.study import best, decider, failures, span_line
+
     lines = [span_line(table, name) for name in summary["results"]]
     lines += [line for one in effects if (line := decider(one))]
     first = next(iter(summary["results"]))
