@@ -17,7 +17,7 @@ from gearbench.bench.study.quantities import Ask
 from gearbench.cases import read_case
 from gearbench.rig import dump_case
 
-EACH, ROUNDS = 24, 5
+EACH, ROUNDS = 12, 3
 ASK = Ask(("te-peak-to-peak", "te-orders"), 100.0)
 
 
