@@ -75,7 +75,8 @@ def draw_scatter(table: xr.Dataset, path: Path) -> None:
             good = np.isfinite(values)
             for column, factor in enumerate(factors):
                 one = axes[row, column]
-                _points(one, table[factor].values, values, alone=len(factors) == 1)
+                joined = len(factors) == 1 and not str(factor).endswith("seed")
+                _points(one, table[factor].values, values, joined)
                 one.set_xlabel(_factor_label(table, str(factor)) if row == rows - 1 else "")
                 _failed(one, table[factor].values, good, show=row == 0 and column == 0)
             axes[row, 0].set_ylabel(fill(_label(table, str(result)), 34), fontsize=9)
@@ -88,7 +89,8 @@ def draw_scatter(table: xr.Dataset, path: Path) -> None:
         save(drawing, path)
 
 
-def _points(axes: Any, factor: Any, values: Any, alone: bool) -> None:
+def _points(axes: Any, factor: Any, values: Any, joined: bool) -> None:
+    """Members as dots; of a single factor joined by a line, of several with the mean of each level."""
     good = np.isfinite(values)
     if factor.dtype == object:
         names = list(dict.fromkeys(map(str, factor)))
@@ -100,14 +102,14 @@ def _points(axes: Any, factor: Any, values: Any, alone: bool) -> None:
         places = factor
     rising = np.argsort(places[good], kind="stable")
     distinct = len(np.unique(places[good])) == good.sum()
-    style = "o-" if alone and distinct and factor.dtype != object else "o"
+    style = "o-" if joined and distinct and factor.dtype != object else "o"
     many = good.sum() > 300
     axes.plot(
         places[good][rising], values[good][rising], style, color=BLUE, ms=2.0 if many else 3.5, lw=1.0,
         alpha=0.5 if many else 0.85, mew=0,
     )  # fmt: skip
     levels = np.unique(places[good])
-    if not alone and 1 < len(levels) <= MOST_NAMES and len(levels) < good.sum():
+    if 1 < len(levels) <= MOST_NAMES and len(levels) < good.sum():
         means = [values[good][places[good] == level].mean() for level in levels]
         axes.plot(levels, means, "-", color=ORANGE, lw=1.4, label="mean")
 

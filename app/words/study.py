@@ -53,7 +53,8 @@ def span_title(table: xr.Dataset, result: str) -> str:
     words = words[:1].upper() + words[1:]
     if not good.size:
         return f"{words}: no member has it"
-    return f"{words}: {good.min():.4g} to {good.max():.4g}{unit(str(table[result].attrs['units']))}"
+    spread = f", mean {good.mean():.4g}, standard deviation {good.std(ddof=1):.3g}" if good.size > 1 else ""
+    return f"{words}: {good.min():.4g} to {good.max():.4g}{unit(str(table[result].attrs['units']))}{spread}"
 
 
 def decider(effects: Effects) -> str:
