@@ -27,6 +27,7 @@ Evaluate = Callable[[tuple[float, ...]], Array]
 
 SCAN = (17, 9)  # points a key of the first look: at one key, at two
 SOBOL_POINTS = 32  # a key, at three and more
+HALVINGS = 3  # of the spacing in which an edge of the valley lies
 SLICE = 9  # points of a cut through the lowest point
 CLOSE = 1e-3  # of the range of a key: where the search ends
 ROUNDS = 60  # of Nelder and Mead, a key
@@ -134,11 +135,11 @@ def _nelder_mead(trail: _Trail, start: Array) -> None:
 
 
 def _flat(trail: _Trail, keys: int) -> tuple[tuple[float, float], ...]:
-    """How far the valley reaches along each key, through its lowest point, between what was computed linearly."""
+    """How far the valley reaches along each key, through its lowest point."""
     best = min(trail.seen, key=lambda point: aim_of(trail.seen[point], trail.over))
     part = (np.array(best) - trail.low) / (trail.high - trail.low)
     limit = (1 + FLAT) * aim_of(trail.seen[best], trail.over)
-    found = []
+    found: list[tuple[float, ...]] = []
     for key in range(keys):
         for place in np.linspace(0.0, 1.0, SLICE if keys > 1 else SCAN[0]):
             trail.at(np.where(np.arange(keys) == key, place, part))
@@ -150,16 +151,38 @@ def _flat(trail: _Trail, keys: int) -> tuple[tuple[float, float], ...]:
         )
         places, aims = np.array(line).T
         at = int(np.argmin(np.abs(places - best[key])))
-        found.append((_edge(places, aims, at, limit, -1), _edge(places, aims, at, limit, 1)))
-    return tuple(found)
+        found.append(tuple(_edge(_Cut(trail, part, key), places, aims, at, limit, step) for step in (-1, 1)))
+    return tuple((low, high) for low, high in found)
 
 
-def _edge(places: Array, aims: Array, at: int, limit: float, step: int) -> float:
-    """Where the aim crosses the limit, from `at` on; the end of the range if it does not."""
+@dataclass
+class _Cut:
+    """The aim along one key, the others where `part` has them."""
+
+    trail: _Trail
+    part: Array
+    key: int
+
+    def at(self, place: float) -> float:
+        """The aim at a value of the key."""
+        low, high = self.trail.low[self.key], self.trail.high[self.key]
+        return self.trail.at(np.where(np.arange(len(self.part)) == self.key, (place - low) / (high - low), self.part))
+
+
+def _edge(cut: _Cut, places: Array, aims: Array, at: int, limit: float, step: int) -> float:
+    """Where the aim crosses the limit, from `at` on, found by halving; the end of the range if it does not."""
     while 0 <= at + step < len(places):
-        here, there = aims[at], aims[at + step]
-        if there > limit:
-            part = (limit - here) / (there - here) if np.isfinite(there) else 0.0
-            return float(places[at] + part * (places[at + step] - places[at]))
-        at += step
+        if aims[at + step] <= limit:
+            at += step
+            continue
+        (inside, here), (outside, there) = (places[at], aims[at]), (places[at + step], aims[at + step])
+        for _ in range(HALVINGS):
+            middle = 0.5 * (inside + outside)
+            aim = cut.at(middle)
+            if aim > limit:
+                outside, there = middle, aim
+            else:
+                inside, here = middle, aim
+        part = (limit - here) / (there - here) if np.isfinite(there) else 0.0
+        return float(inside + part * (outside - inside))
     return float(places[at])
