@@ -54,6 +54,7 @@ def case(tmp_path_factory: pytest.TempPathFactory) -> Case:
     return read_case(path)
 
 
+@pytest.mark.validation
 def test_slow_fields_are_those_of_statics(case: Case, tmp_path: Path) -> None:
     """In single contact and where two pairs carry; without friction, so that the load is all normal."""
     record, times = simulate(case), [0.01, 0.15]

@@ -155,6 +155,7 @@ def test_friction_knows_the_speed_of_the_moment() -> None:
     assert fast / slow == pytest.approx((60 + 180 * 15 / 16) / 60, rel=0.05)
 
 
+@pytest.mark.validation
 def test_a_slow_run_up_passes_through_the_steady_answers() -> None:
     stiff = ("rig.support.stiffness_n_per_m=1e10", "rig.mesh.stiffness_scale=1.0001", "rig.damping.mesh_ratio=0.1")
     resonance = float(np.sqrt(3.1e8 / (INERTIA / RADIUS**2 / 2))) / 62 * 30 / pi
