@@ -10,7 +10,7 @@ from gearbench.shell.failure import InputError
 from gearbench.shell.progress import Silent, Steps
 
 if TYPE_CHECKING:
-    from gearbench.figures.motion import Picture
+    from gearbench.figures.gears.motion import Picture
     from gearbench.rig import Case
 
 ENDINGS = (".html", ".gif", ".mp4")
@@ -49,7 +49,7 @@ def animate(
     from gearbench.bench.refusals.stated import mean_torque
     from gearbench.bench.stress.fields import refuse_cracks
     from gearbench.bench.stress.motion import moving_frames, recorded_instants, static_instants
-    from gearbench.figures.motion import film, pictures
+    from gearbench.figures.gears.motion import film, pictures
     from gearbench.records import read_record
 
     steps = progress or Silent()
@@ -101,7 +101,7 @@ def _recorded_curve(record: Any, first: float, cycles: float) -> tuple[Any, Any]
 
 def _write(out: Path, images: list[Picture], case: Case, sentences: tuple[str, ...]) -> None:
     """The animation under its name when it is whole."""
-    from gearbench.figures.motion import as_webp, write_gif, write_mp4
+    from gearbench.figures.gears.motion import as_webp, write_gif, write_mp4
     from gearbench.files import write_text, write_whole
     from gearbench.report.animation import animation_page
 

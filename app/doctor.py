@@ -123,7 +123,7 @@ def mesher(command: tuple[str, ...] = (sys.executable, "-P", "-c", "import gmsh"
 
 def drawing() -> Finding:
     """Whether pyvista draws without a screen, and whether there is one."""
-    from gearbench.figures.stress_scene import can_render
+    from gearbench.figures.gears.stress_scene import can_render
 
     screen = any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
     where = "with a screen" if screen else "without a screen"

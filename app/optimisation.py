@@ -189,7 +189,7 @@ def textbook_relief(base: Case, factors: Sequence[Factor], loads: Sequence[float
 
 def write_optimum(found: Optimum, output: Output) -> None:
     """All that was computed, its picture, the answer and the case with it."""
-    from gearbench.figures.valley import draw_valley
+    from gearbench.figures.studies.valley import draw_valley
     from gearbench.rig import dump_case
     from gearbench.shell.options import json_text
     from gearbench.words.valley import optimum_data, valley_csv

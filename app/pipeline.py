@@ -203,7 +203,7 @@ def _write_report(case: Case, output: Output, parts: list[RunPart]) -> None:
 
 
 def _draw_gears(job: Job, meshing: Pair) -> None:
-    from gearbench.figures.gear import draw_pair
+    from gearbench.figures.gears.gear import draw_pair
 
     def draw(path: Path) -> None:
         from gearbench.bench.models import model_for

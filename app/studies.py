@@ -216,7 +216,7 @@ def products(plan: Plan, table: xr.Dataset, output: Output) -> None:
     """Table, effects, pictures and report of a study, in its folder."""
     from gearbench.bench.study.indices import effects_of
     from gearbench.bench.study.table import csv_text, named
-    from gearbench.figures.study import draw_scatter, draw_tornado
+    from gearbench.figures.studies.study import draw_scatter, draw_tornado
     from gearbench.records import write_dataset
     from gearbench.report.study import study_page
     from gearbench.words.study import effects_csv

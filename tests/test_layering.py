@@ -129,7 +129,7 @@ def test_rooms_import_only_lower_rooms(package: str) -> None:
     [
         ("fem", "from gearbench.fem.contact.law import Law"),
         ("fem", "module = 'gearbench.fem.motion.transient'"),
-        ("app", "from gearbench.figures.frf import draw"),
+        ("app", "from gearbench.figures.responses.frf import draw"),
     ],
 )
 def test_an_import_that_climbs_is_seen(

@@ -8,12 +8,12 @@ from typing import NamedTuple
 
 import xarray as xr
 
-from gearbench.figures.distortion import draw_distortion
-from gearbench.figures.frf import draw_itf, draw_natural_frequencies
-from gearbench.figures.frf_quality import draw_branches, draw_quality, draw_uncertainty
-from gearbench.figures.of_identified import draw_record_orders
-from gearbench.figures.record import draw_record, draw_spectra, draw_stiffness
-from gearbench.figures.static import plot_static
+from gearbench.figures.gears.static import plot_static
+from gearbench.figures.records.record import draw_record, draw_spectra, draw_stiffness
+from gearbench.figures.responses.distortion import draw_distortion
+from gearbench.figures.responses.frf import draw_itf, draw_natural_frequencies
+from gearbench.figures.responses.frf_quality import draw_branches, draw_quality, draw_uncertainty
+from gearbench.figures.responses.of_identified import draw_record_orders
 from gearbench.geometry.pair.zones import Span
 
 

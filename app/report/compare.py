@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gearbench.figures.compare import FINE, named, paired_curves, paired_responses
-from gearbench.figures.record import draw_spectra
+from gearbench.figures.records.compare import FINE, named, paired_curves, paired_responses
+from gearbench.figures.records.record import draw_spectra
 from gearbench.report.curves import itf_map, over_phase, spectrum
 from gearbench.report.html import drawing, folded, image, table, text
 from gearbench.report.live import live_page

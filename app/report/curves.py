@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.figures.frf import NO_MODE, magnitude
 from gearbench.figures.plotting import BLUE, GREEN, GREY, ORANGE, SINGLE_ZONE, closed
-from gearbench.figures.record import dte_spectrum
+from gearbench.figures.records.record import dte_spectrum
+from gearbench.figures.responses.frf import NO_MODE, magnitude
 from gearbench.identification import dte
 from gearbench.report.live import MOST, Quantity, Sheet, axes, curve, live, live_map, log_axis, thinned
 

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gearbench.figures.gears.static import draw_harris_map, plot_static
+from gearbench.figures.gears.stiffness import COLOURS, draw_stiffness_table
+from gearbench.figures.gears.stress import GEARS, plot_root_stress, tooth_history
 from gearbench.figures.plotting import BLUE
-from gearbench.figures.static import draw_harris_map, plot_static
-from gearbench.figures.stiffness import COLOURS, draw_stiffness_table
-from gearbench.figures.stress import GEARS, plot_root_stress, tooth_history
 from gearbench.report.curves import over_phase
 from gearbench.report.html import drawing, items, table, text
 from gearbench.report.live import Quantity, Sheet, axes, curve, live, live_map, live_page

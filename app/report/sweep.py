@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gearbench.figures.plotting import BLUE, GREY, ORANGE
-from gearbench.figures.sweep import FLOOR, ROWS, SHOWN, plot_sweep, plot_waterfall
+from gearbench.figures.records.sweep import FLOOR, ROWS, SHOWN, plot_sweep, plot_waterfall
 from gearbench.report.html import drawing, table, text
 from gearbench.report.live import Quantity, Sheet, axes, curve, live, live_map, live_page
 from gearbench.report.parts import files_table, lead, limits, mark, provenance, versions, warned

@@ -17,7 +17,7 @@ from gearbench.bench.stress.fields import Contact
 from gearbench.bench.stress.motion import Frame, Instant
 from gearbench.cases import read_case
 from gearbench.cli import run_command_line
-from gearbench.figures.motion import Picture, as_webp, film, pictures, write_gif, write_mp4
+from gearbench.figures.gears.motion import Picture, as_webp, film, pictures, write_gif, write_mp4
 from gearbench.geometry import pair
 from gearbench.report.animation import animation_page
 

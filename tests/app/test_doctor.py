@@ -12,7 +12,7 @@ import pytest
 from gearbench import doctor
 from gearbench.cli import run_command_line
 from gearbench.doctor import Finding
-from gearbench.figures import stress_scene
+from gearbench.figures.gears import stress_scene
 from gearbench.kernels import trust
 
 

@@ -10,13 +10,13 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from gearbench.cases import case_path
-from gearbench.figures import frf as figures_frf
-from gearbench.figures import gear as figures_gear
-from gearbench.figures import static as figures_static
-from gearbench.figures.frf import draw_itf, draw_natural_frequencies
-from gearbench.figures.gear import draw_pair
+from gearbench.figures.gears import gear as figures_gear
+from gearbench.figures.gears import static as figures_static
+from gearbench.figures.gears.gear import draw_pair
 from gearbench.figures.plotting import closed
-from gearbench.figures.record import draw_record
+from gearbench.figures.records.record import draw_record
+from gearbench.figures.responses import frf as figures_frf
+from gearbench.figures.responses.frf import draw_itf, draw_natural_frequencies
 from gearbench.geometry import pair
 from gearbench.rig import read_case
 from gearbench.words.summary import headline, honest_warning

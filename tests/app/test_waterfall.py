@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from gearbench.diagnosis.verdict import Effect, Gap, Range
-from gearbench.figures.diagnosis_waterfall import draw_waterfall, steps_of
+from gearbench.figures.gaps.diagnosis_waterfall import draw_waterfall, steps_of
 
 
 def about(value: float) -> Range:

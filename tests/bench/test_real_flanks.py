@@ -12,7 +12,7 @@ from gearbench.bench import BenchError
 from gearbench.bench.experiment import simulate
 from gearbench.bench.plan.schedule import cycles_to_repeat, schedule
 from gearbench.bench.statics import static
-from gearbench.figures.static import plot_static
+from gearbench.figures.gears.static import plot_static
 from gearbench.geometry import GeometryError
 from gearbench.rig import Case, read_case
 

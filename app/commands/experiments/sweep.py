@@ -64,11 +64,11 @@ def sweep(
         result = swept(loaded, [float(one) for one in np.linspace(low, high, points) * pi / 30], model, progress)
         write_dataset(result, out)
         if figure is not None:
-            from gearbench.figures.sweep import plot_sweep
+            from gearbench.figures.records.sweep import plot_sweep
 
             plot_sweep(result, figure)
         if waterfall is not None:
-            from gearbench.figures.sweep import plot_waterfall
+            from gearbench.figures.records.sweep import plot_waterfall
 
             plot_waterfall(result, waterfall)
         summary = sweep_summary(result, out)

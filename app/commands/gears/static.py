@@ -96,7 +96,7 @@ def static(
         write_dataset(result, out)
         if figure is not None:
             progress.step("figure")
-            from gearbench.figures.static import plot_static
+            from gearbench.figures.gears.static import plot_static
 
             plot_static(result, figure)
         written = _stress_files(loaded, result, files, root_figure, progress)
@@ -171,7 +171,7 @@ def _stress_files(
 ) -> list[Path]:
     """Write fields and the picture of root stress where asked for; the fields' files."""
     if root_figure is not None:
-        from gearbench.figures.stress import plot_root_stress
+        from gearbench.figures.gears.stress import plot_root_stress
 
         (largest,) = sorted(root_tables(case, result), key=lambda one: float(one["torque_nm"]))[-1:]
         iso = {name: gear["sigma_f0_mpa"] for name, gear in largest["gears"].items() if gear["sigma_f0_mpa"]}

@@ -47,7 +47,7 @@ def largest(tables: list[StiffnessTable]) -> StiffnessTable:
 
 def draw_largest(tables: list[StiffnessTable], path: Path) -> None:
     """Picture of the stiffness by every method under the largest torque. Raises InputError where no load carries."""
-    from gearbench.figures.stiffness import draw_stiffness_table
+    from gearbench.figures.gears.stiffness import draw_stiffness_table
     from gearbench.shell.failure import InputError
 
     if not tables:

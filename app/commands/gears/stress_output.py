@@ -55,8 +55,8 @@ def write_all(
     """Recover, write and draw the fields at each phase under the largest load of a static result."""
     from gearbench.bench.elastic.rig import elastic_rig
     from gearbench.bench.stress.fields import field_dte, pair_fields, stress_gears, write_fields
-    from gearbench.figures.stress import plot_fields
-    from gearbench.figures.stress_scene import can_render, render_fields
+    from gearbench.figures.gears.stress import plot_fields
+    from gearbench.figures.gears.stress_scene import can_render, render_fields
     from gearbench.files import write_whole
 
     progress.step("stress fields")

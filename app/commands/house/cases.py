@@ -51,7 +51,7 @@ def cases(
 def draw_pairs(names: Sequence[str], folder: Path) -> Iterator[Path]:
     """Draw the gear pair of each shipped case at mesh phase 0; the pictures, one after the other."""
     from gearbench.cases import read_case
-    from gearbench.figures.gear import draw_pair
+    from gearbench.figures.gears.gear import draw_pair
     from gearbench.geometry import pair
 
     folder.mkdir(parents=True, exist_ok=True)

@@ -25,7 +25,7 @@ def compare(
     """Compare two runs, records or results: compare.csv and one picture a quantity."""
     import gearbench as gb
     from gearbench.bench.results.compare import write_csv
-    from gearbench.figures.compare import draw_comparison
+    from gearbench.figures.records.compare import draw_comparison
 
     found = gb.compare(a, b)
     with claimed(out, "compare", fingerprint(str(a.resolve()), str(b.resolve())), force) as output:

@@ -110,9 +110,9 @@ def report_of(diagnosis: Diagnosis) -> Report:
     """What the report shows of a diagnosis."""
     from gearbench.diagnosis.diagnosis import replays_of
     from gearbench.diagnosis.replay.traces import traces_of
-    from gearbench.figures.diagnosis import draw_where
-    from gearbench.figures.diagnosis_gap import draw_gap, draw_traces
-    from gearbench.figures.diagnosis_waterfall import draw_waterfall
+    from gearbench.figures.gaps.diagnosis import draw_where
+    from gearbench.figures.gaps.diagnosis_gap import draw_gap, draw_traces
+    from gearbench.figures.gaps.diagnosis_waterfall import draw_waterfall
     from gearbench.report.diagnosis import Report
 
     verdict, inputs = diagnosis.verdict, diagnosis.inputs

@@ -42,7 +42,7 @@ def identify(
 ) -> None:
     """Identify the time-varying frequency response from force to DTE out of records."""
     import gearbench as gb
-    from gearbench.figures.of_identified import draw_identified
+    from gearbench.figures.responses.of_identified import draw_identified
 
     check_out(out, records)
     seen = {path.resolve() for path in records}

@@ -8,7 +8,7 @@ import pytest
 from gearbench.diagnosis.effects.library import LIBRARY
 from gearbench.diagnosis.intake.signals import CHANNELS
 from gearbench.diagnosis.verdict import Effect, Gap, Probabilities, Range, Verdict
-from gearbench.figures.diagnosis_gap import octave_bands
+from gearbench.figures.gaps.diagnosis_gap import octave_bands
 from gearbench.rig.contract import PLACES
 from gearbench.words.diagnosis import CHANNELS as CHANNEL_WORDS
 from gearbench.words.diagnosis import PLACES as PLACE_WORDS

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from shared.small_run import SMALL_RUN
 
 from gearbench.cli import run_command_line
-from gearbench.figures import distortion as figures_distortion
+from gearbench.figures.responses import distortion as figures_distortion
 from gearbench.identification import distortion
 from gearbench.identification.excitation.multisine import random_phase_multisine
 from gearbench.records import make_record, write_record

@@ -11,7 +11,7 @@ from gearbench.bench.results.stiffness_table import StiffnessTable, stiffness_ta
 from gearbench.bench.statics import static
 from gearbench.cases import case_path
 from gearbench.commands.gears.static_methods import draw_largest, methods_data, methods_lines, stiffness_tables
-from gearbench.figures.stiffness import draw_stiffness_table
+from gearbench.figures.gears.stiffness import draw_stiffness_table
 from gearbench.geometry import pair
 from gearbench.lumped.stiffness.iso6336_root import root_stress
 from gearbench.rig import Case, read_case

@@ -45,7 +45,8 @@ def here(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr("gearbench.bench.study.processes.compute_here", compute_here)
     for name in ("scatter", "tornado"):
-        monkeypatch.setattr(f"gearbench.figures.study.draw_{name}", lambda *held: held[-1].write_text("<svg></svg>"))
+        target = f"gearbench.figures.studies.study.draw_{name}"
+        monkeypatch.setattr(target, lambda *held: held[-1].write_text("<svg></svg>"))
 
 
 @pytest.fixture(scope="module")

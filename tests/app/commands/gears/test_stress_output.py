@@ -13,7 +13,7 @@ from gearbench.bench.stress.fields import Contact, PairFields
 from gearbench.cases import case_path
 from gearbench.cli import run_command_line
 from gearbench.commands.gears.stress_output import field_files, field_phases
-from gearbench.figures.stress import limits, plot_fields, plot_root_stress, rounded_up, tooth_history
+from gearbench.figures.gears.stress import limits, plot_fields, plot_root_stress, rounded_up, tooth_history
 from gearbench.geometry import PairMesh
 from gearbench.lumped.stiffness.iso6336_root import root_stress
 from gearbench.rig import Case, read_case

@@ -22,7 +22,7 @@ def test_pair_of_a_case_is_drawn(tmp_path: Path, capsys: pytest.CaptureFixture[s
 
 def test_all_pairs_are_drawn_without_a_name(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     drawn: list[str] = []
-    monkeypatch.setattr("gearbench.figures.gear.draw_pair", lambda path, *_: drawn.append(path.stem))
+    monkeypatch.setattr("gearbench.figures.gears.gear.draw_pair", lambda path, *_: drawn.append(path.stem))
     assert [path.stem for path in draw_pairs(list(case_files()), tmp_path)] == drawn == list(case_files())
 
 

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import xarray as xr
 
-from gearbench.figures.distortion import draw_distortion
-from gearbench.figures.frf import draw_natural_frequencies
-from gearbench.figures.frf_quality import draw_branches, draw_orders, draw_quality, draw_uncertainty
+from gearbench.figures.responses.distortion import draw_distortion
+from gearbench.figures.responses.frf import draw_natural_frequencies
+from gearbench.figures.responses.frf_quality import draw_branches, draw_orders, draw_quality, draw_uncertainty
 from gearbench.identification.spectra.orders import order_spectrum
 
 

@@ -58,7 +58,7 @@ def render_fields(fields: PairFields, module: float, path: Path) -> None:
     import pyvista
     from vtkmodules.vtkCommonCore import vtkLogger
 
-    from gearbench.figures.stress import heading, limits, view
+    from gearbench.figures.gears.stress import heading, limits, view
 
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)  # not that there is no screen, which is no secret
     points = np.column_stack([1e3 * fields.mesh.points, np.zeros(len(fields.mesh.points))])

@@ -17,9 +17,9 @@ from matplotlib.patches import Polygon
 from matplotlib.tri import Triangulation
 from numpy.typing import NDArray
 
-from gearbench.figures.gear import outline, placed
+from gearbench.figures.gears.gear import outline, placed
+from gearbench.figures.gears.stress import AWAY, rounded_up
 from gearbench.figures.plotting import BLUE, GREY, ORANGE, style
-from gearbench.figures.stress import AWAY, rounded_up
 
 if TYPE_CHECKING:
     from gearbench.bench.stress.motion import Frame

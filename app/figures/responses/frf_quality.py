@@ -10,8 +10,8 @@ from matplotlib.colors import LogNorm
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, PercentFormatter
 from numpy.typing import NDArray
 
-from gearbench.figures.frf import coarse_map, magnitude
 from gearbench.figures.plotting import BLUE, GREEN, GREY, ORANGE, figure, phase_axis, save
+from gearbench.figures.responses.frf import coarse_map, magnitude
 
 Array = NDArray[np.float64]
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.figures.frf import NO_MODE, draw_itf
 from gearbench.figures.plotting import BLUE, ORANGE, closed, explain_gaps, figure, phase_axis, save
+from gearbench.figures.responses.frf import NO_MODE, draw_itf
 from gearbench.words.summary import ENOUGH
 
 if TYPE_CHECKING:

@@ -1,0 +1,1 @@
+"""Pictures of a diagnosis: where the gap is, what closes it."""

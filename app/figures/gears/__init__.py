@@ -1,0 +1,1 @@
+"""Pictures of gears at rest: teeth, static transmission error, stiffness, stress."""

@@ -1,0 +1,1 @@
+"""Pictures of records: against time, side by side, over speed."""

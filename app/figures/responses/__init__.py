@@ -1,0 +1,1 @@
+"""Pictures of frequency responses: maps, branches, quality, distortion, orders."""

@@ -1,0 +1,1 @@
+"""Pictures of studies: which key decides, the valley around an optimum."""
