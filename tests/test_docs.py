@@ -14,7 +14,7 @@ from shared.code_blocks import LANGUAGES, ROOT, Block, blocks, pages, run_page
 from gearbench.cli import _LISTS, app
 from gearbench.shell.options import expand_lists
 
-QUICK = ("how-to/swap-a-gear", "how-to/design-a-multisine")
+QUICK = ("how-to/swap-a-gear",)
 BLOCKS = [block for page in pages() for block in blocks(page)]
 
 

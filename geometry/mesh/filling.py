@@ -7,9 +7,10 @@ on the exact profile.
 
 from __future__ import annotations
 
+import signal
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -48,6 +49,15 @@ def _import_gmsh() -> Any:
     return gmsh
 
 
+def _initialize(gmsh: Any) -> None:
+    """Begin gmsh's session. It lets a write to a closed pipe kill the process; here that stays an error."""
+    before = signal.getsignal(signal.SIGPIPE) if hasattr(signal, "SIGPIPE") else None
+    gmsh.initialize(readConfigFiles=False, interruptible=False)
+    if before is not None:
+        with suppress(ValueError):  # only the main thread may set it
+            signal.signal(signal.SIGPIPE, before)
+
+
 @contextmanager
 def gmsh_session() -> Iterator[Any]:
     """gmsh, for one thread at a time; someone else's session is left as it was. Raises MeshingUnavailable."""
@@ -55,7 +65,7 @@ def gmsh_session() -> Iterator[Any]:
     with _GMSH:
         ours = not gmsh.isInitialized()
         if ours:
-            gmsh.initialize(readConfigFiles=False, interruptible=False)
+            _initialize(gmsh)
         before = [] if ours else [(option, gmsh.option.getNumber(option)) for option, _ in _OPTIONS]
         current = "" if ours else gmsh.model.getCurrent()
         try:

@@ -17,6 +17,7 @@ from gearbench.rig import read_case
 RIPPLE = {"orders": "[6, 12]", "amplitude_nm": "[1.5, 0.8]", "phase_deg": "[30, -60]"}
 
 
+@pytest.mark.validation
 def test_torque_ripple_from_records_to_the_rig_that_has_it() -> None:
     path = case_files()["gap_demo"]
     nominal = read_case(path)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import multiprocessing
 import os
 import stat
 import time
@@ -100,3 +101,20 @@ def test_the_names_of_temporary_files_are_those_that_are_removed(tmp_path: Path)
     for name in ("a.nc", "no_suffix", "b.tar.gz"):
         write_whole(tmp_path / name, killed)
         (tmp_path / name).unlink()
+
+
+def test_what_a_killed_writer_left_goes_with_the_next_write(tmp_path: Path) -> None:
+    def killed(temporary: Path) -> None:
+        temporary.write_text("half")
+        os._exit(9)
+
+    process = multiprocessing.get_context("fork").Process(target=write_whole, args=(tmp_path / "a.txt", killed))
+    process.start()
+    process.join()
+    (left,) = names(tmp_path)
+    assert process.exitcode == 9 and left.startswith(".gearbench-")
+    # One of the same number on another machine may still be at work.
+    elsewhere = left.replace(left.split("-")[1], "00000000")
+    (tmp_path / elsewhere).write_text("half")
+    write_text(tmp_path / "a.txt", "text")
+    assert names(tmp_path) == sorted(["a.txt", elsewhere])

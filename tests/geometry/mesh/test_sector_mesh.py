@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import builtins
+import os
 import sys
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -24,6 +25,7 @@ from gearbench.geometry import (
     sector_mesh,
 )
 from gearbench.geometry.mesh.assembly import assembled
+from gearbench.geometry.mesh.filling import gmsh_session
 from gearbench.geometry.mesh.quality import areas, determinants
 from gearbench.rig import Gear
 
@@ -243,3 +245,14 @@ def test_missing_system_libraries_are_named(gear: MakeGear, monkeypatch: pytest.
     one = gear()
     with pytest.raises(MeshingUnavailable, match=r"libGLU\.so\.1.*libgl1 libegl1 libglu1-mesa .* libgomp1$"):
         sector_mesh(profile(one), one)
+
+
+def test_a_closed_pipe_stays_an_error_after_meshing() -> None:
+    """gmsh lets the system kill whoever writes to a closed pipe: a study would go with the first of its processes."""
+    with gmsh_session():
+        pass
+    reading, writing = os.pipe()
+    os.close(reading)
+    with pytest.raises(BrokenPipeError):
+        os.write(writing, b"to nobody")
+    os.close(writing)
