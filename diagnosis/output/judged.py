@@ -1,8 +1,9 @@
 """Selection held against the record that had no part in it: what each effect closes there.
 
-Every effect that entered is taken out alone, everything else is fitted again on the records of the search, and both
-rigs answer the judged record. An effect is kept if the record is more likely with it, and if its gap grows by a tenth
-or more without it in some part that can be told apart: a channel in one band, or in one kind of line.
+Every effect that entered is taken out alone, the rig, its structure and the other effects that entered are fitted
+again on the records of the search, and both rigs answer the judged record. An effect is kept if the record is more
+likely with it, and if its gap grows by a tenth or more without it in some part that can be told apart: a channel in one
+band, or in one kind of line.
 """
 
 from __future__ import annotations

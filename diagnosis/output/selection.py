@@ -234,11 +234,19 @@ def only(simulator: Simulator, selection: Selection, kept: Sequence[Weighed]) ->
 
 
 def taken_out(simulator: Simulator, selection: Selection, hypothesis: Hypothesis) -> Optimum:
-    """The optimum without any part of one of the effects that entered, all else fitted again."""
-    if len(selection.entered) == 1:
-        return selection.bare
-    chosen = np.ones(simulator.layout.unknowns.size, dtype=bool)
-    return _without(simulator, selection.best, [hypothesis], chosen)
+    """The optimum without any part of one of the effects that entered.
+
+    The rig, its structure and the other effects that entered are fitted again; what a good rig has of all others stays
+    as it is: pitch errors that take the shape of the run-out left out would make it seem to close nothing.
+    """
+    unknowns = simulator.layout.unknowns
+    held = np.zeros(unknowns.size, dtype=bool)
+    for group in unknowns.groups:
+        held[unknowns[group.key]] = (group.wide > group.sd).any()
+    for one in selection.entered:
+        held[one.hypothesis.entries(unknowns)] = False
+    base = replace(selection.best, sd=np.where(held, 0.0, selection.best.sd))
+    return _without(simulator, base, [hypothesis], np.ones(unknowns.size, dtype=bool))
 
 
 def _without(simulator: Simulator, base: Optimum, effects: Sequence[Hypothesis], chosen: NDArray[np.bool_]) -> Optimum:
