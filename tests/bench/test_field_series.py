@@ -9,49 +9,18 @@ from pathlib import Path
 import meshio
 import numpy as np
 import pytest
+from shared.twins import supports, twin_case
 
 from gearbench.bench import BenchError, simulate
 from gearbench.bench.elastic.rig import elastic_rig
 from gearbench.bench.stress.fields import field_dte, fields_at, pair_fields, stress_gears
 from gearbench.bench.stress.series import check_series, record_fields, stand_of, write_series
-from gearbench.rig import Case, read_case
-
-CASE = """
-name = "fields"
-[rig]
-centre_distance_mm = 60.0
-[rig.driver]
-teeth = 20
-module_mm = 3.0
-face_width_mm = 20.0
-hub_radius_mm = 21.0
-thinning_um = 40.0
-[rig.driven]
-teeth = 20
-module_mm = 3.0
-face_width_mm = 20.0
-hub_radius_mm = 21.0
-thinning_um = 40.0
-[rig.support]
-stiffness_n_per_m = 1e11
-damping_n_s_per_m = 1e5
-[experiment]
-mesh_frequency_hz = 4.0
-torque_mean_nm = 50.0
-sampling_rate_hz = 2048.0
-samples_per_period = 512
-[simulation]
-model = "reduced"
-outputs = "teeth"
-element_size_um = 600.0
-"""
+from gearbench.rig import Case
 
 
 @pytest.fixture(scope="module")
 def case(tmp_path_factory: pytest.TempPathFactory) -> Case:
-    path = tmp_path_factory.mktemp("case") / "fields.toml"
-    path.write_text(CASE, encoding="utf-8")
-    return read_case(path)
+    return twin_case(tmp_path_factory.mktemp("case"), *supports("1e11", "1e5"), "simulation.outputs=teeth")
 
 
 @pytest.mark.validation

@@ -7,40 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from shared.twins import HEAVY, supports, twin_case
 
 from gearbench.bench.experiment import simulate
-from gearbench.rig import Case, read_case
+from gearbench.rig import Case
 
-CASE = """
-name = "run-up"
-[rig]
-centre_distance_mm = 60.0
-[rig.driver]
-teeth = 20
-module_mm = 3.0
-face_width_mm = 20.0
-hub_radius_mm = 21.0
-thinning_um = 40.0
-inertia_kg_m2 = 2e-3
-[rig.driven]
-teeth = 20
-module_mm = 3.0
-face_width_mm = 20.0
-hub_radius_mm = 21.0
-thinning_um = 40.0
-inertia_kg_m2 = 2e-3
-[rig.support]
-stiffness_n_per_m = 2e8
-damping_n_s_per_m = 2e4
-[experiment]
-speed_table = { time_s = [0.05, 0.2], driver_rpm = [60.0, 600.0] }
-torque_mean_nm = 50.0
+RUN_UP = """speed_table = { time_s = [0.05, 0.2], driver_rpm = [60.0, 600.0] }
 sampling_rate_hz = 4096.0
 samples_per_period = 1024
-[simulation]
-model = "reduced"
-mesh_stiffness = "finite-element"
-element_size_um = 600.0
 """
 SHAFT = "{inertia_kg_m2=2e-3, stiffness_nm_per_rad=2e4, damping_nm_s_per_rad=20.0}"
 FREE = "rig.load.boundary=torque"
@@ -55,8 +29,7 @@ FIRST, LAST = 60 * pi / 30, 600 * pi / 30
 
 
 def make_case(tmp_path: Path, *settings: str) -> Case:
-    (tmp_path / "one.toml").write_text(CASE, encoding="utf-8")
-    return read_case(tmp_path / "one.toml", list(settings))
+    return twin_case(tmp_path, *HEAVY, *supports("2e8", "2e4"), *settings, experiment=RUN_UP)
 
 
 @pytest.mark.parametrize("rig", sorted(RIGS))

@@ -10,40 +10,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from shared.twins import supports, twin_case
 
 from gearbench.bench.experiment import simulate
-from gearbench.rig import read_case
 
-CASE = """
-[rig]
-centre_distance_mm = 60.0
-[rig.driver]
-teeth = 20
-module_mm = 3.0
-face_width_mm = 20.0
-hub_radius_mm = 21.0
-thinning_um = 40.0
-[rig.driven]
-teeth = 20
-module_mm = 3.0
-face_width_mm = 20.0
-hub_radius_mm = 21.0
-thinning_um = 40.0
-[rig.support]
-stiffness_n_per_m = 2e8
-damping_n_s_per_m = 2e4
-[experiment]
-mesh_frequency_hz = 4.0
-torque_mean_nm = 50.0
-sampling_rate_hz = 2048.0
-samples_per_period = 512
-periods = 1
-realisations = 1
-[simulation]
-model = "reduced"
-mesh_stiffness = "finite-element"
-element_size_um = 600.0
-"""
+SUPPORTS = supports("2e8", "2e4")
 SHAFT = "{inertia_kg_m2=0.01, stiffness_nm_per_rad=2e4, damping_nm_s_per_rad=20.0}"
 RIPPLE = "rig.drive.ripple={orders=[20], amplitude_nm=[5.0], phase_deg=[20.0]}"
 SIDE = "{stiffness_n_per_m=1e8, damping_n_s_per_m=1e4, coupling_n_per_m=2e7}"
@@ -63,16 +34,14 @@ EFFECTS: dict[str, tuple[list[str], float, float]] = {
 
 
 @pytest.fixture(scope="module")
-def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("case") / "like.toml"
-    path.write_text('name = "like"\n' + CASE, encoding="utf-8")
-    return path
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("case")
 
 
 @pytest.mark.parametrize("effect", sorted(EFFECTS))
-def test_both_models_have_the_same_effect(file: Path, effect: str) -> None:
+def test_both_models_have_the_same_effect(folder: Path, effect: str) -> None:
     settings, mean, swing = EFFECTS[effect]
-    case = read_case(file, settings)
+    case = twin_case(folder, *SUPPORTS, *settings)
     found, lumped = simulate(case), simulate(case, "lumped")
     channels = {"dte", "y_driver", "y_driven", "torque_driven", "torque_driver", "x_driver"} & set(lumped.data_vars)
     for name in sorted(channels):
@@ -86,10 +55,10 @@ def test_both_models_have_the_same_effect(file: Path, effect: str) -> None:
     assert found.attrs["divided_steps"] == 0 and "friction acts on the hubs" in found.attrs["limits"]
 
 
-def test_free_gears_keep_their_mean_speed(file: Path) -> None:
+def test_free_gears_keep_their_mean_speed(folder: Path) -> None:
     """The load takes up what friction and contact off the line of action take: both gears turn on at their speeds."""
     shaft = f"rig.load.coupling={SHAFT}"
-    case = read_case(file, ["rig.load.boundary=torque", "rig.friction.coefficient=0.08", shaft])
+    case = twin_case(folder, *SUPPORTS, "rig.load.boundary=torque", "rig.friction.coefficient=0.08", shaft)
     record = simulate(case)
     angle, time = record["angle_driven"].values[0], record["time"].values
     speed = np.polyfit(time, angle, 1)[0]

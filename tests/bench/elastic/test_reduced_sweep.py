@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from shared.twins import HEAVY, supports, twin_case
 
 from gearbench.bench.elastic.run import Elastic, prepare
 from gearbench.bench.models import model_for
@@ -11,50 +12,18 @@ from gearbench.bench.plan.excitation import Torque
 from gearbench.bench.plan.schedule import schedule
 from gearbench.bench.statics import static
 from gearbench.bench.sweep import SAMPLES, sweep
-from gearbench.rig import Case, read_case
+from gearbench.rig import Case
 
-CASE = """
-name = "swept"
-[rig]
-centre_distance_mm = 60.0
-[rig.driver]
-teeth = 20
-module_mm = 3.0
-face_width_mm = 20.0
-hub_radius_mm = 21.0
-thinning_um = 40.0
-inertia_kg_m2 = 2e-3
-[rig.driven]
-teeth = 20
-module_mm = 3.0
-face_width_mm = 20.0
-hub_radius_mm = 21.0
-thinning_um = 40.0
-inertia_kg_m2 = 2e-3
-[rig.support]
-stiffness_n_per_m = 1e10
-damping_n_s_per_m = 1e4
-[rig.damping]
-mesh_ratio = 0.05
-material_ratio = 0.05
-material_frequency_hz = 2000.0
-[experiment]
-mesh_frequency_hz = 100.0
-torque_mean_nm = 50.0
+FAST = """mesh_frequency_hz = 100.0
 sampling_rate_hz = 12800.0
 samples_per_period = 128
-[simulation]
-model = "reduced"
-mesh_stiffness = "finite-element"
-element_size_um = 600.0
 """
+DAMPED = ("rig.damping={mesh_ratio=0.05, material_ratio=0.05, material_frequency_hz=2000.0}",)
 
 
 @pytest.fixture(scope="module")
 def case(tmp_path_factory: pytest.TempPathFactory) -> Case:
-    path = tmp_path_factory.mktemp("case") / "swept.toml"
-    path.write_text(CASE, encoding="utf-8")
-    return read_case(path)
+    return twin_case(tmp_path_factory.mktemp("case"), *HEAVY, *supports("1e10", "1e4"), *DAMPED, experiment=FAST)
 
 
 def test_a_slow_rig_follows_its_static_transmission_error(case: Case) -> None:

@@ -4,50 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from shared.twins import supports, twin_case
 
 from gearbench.bench import BenchError, simulate
 from gearbench.bench.elastic.rig import elastic_rig
 from gearbench.bench.models import model_for
 from gearbench.fem.contact.static import static_cycle
-from gearbench.rig import Case, read_case
+from gearbench.rig import Case
 
-CASE = """
-name = "teeth"
-[rig]
-centre_distance_mm = 60.0
-[rig.driver]
-teeth = 20
-module_mm = 3.0
-face_width_mm = 20.0
-hub_radius_mm = 21.0
-thinning_um = 40.0
-[rig.driven]
-teeth = 20
-module_mm = 3.0
-face_width_mm = 20.0
-hub_radius_mm = 21.0
-thinning_um = 40.0
-[rig.support]
-stiffness_n_per_m = 1e11
-damping_n_s_per_m = 1e5
-[experiment]
-mesh_frequency_hz = 4.0
-torque_mean_nm = 50.0
-sampling_rate_hz = 2048.0
-samples_per_period = 512
-[simulation]
-model = "reduced"
-outputs = "teeth"
-element_size_um = 600.0
-"""
 PAIRS = ("leaving", "middle", "entering")
 
 
 @pytest.fixture(scope="module")
 def case(tmp_path_factory: pytest.TempPathFactory) -> Case:
-    path = tmp_path_factory.mktemp("case") / "teeth.toml"
-    path.write_text(CASE, encoding="utf-8")
-    return read_case(path)
+    return twin_case(tmp_path_factory.mktemp("case"), *supports("1e11", "1e5"), "simulation.outputs=teeth")
 
 
 def test_teeth_carry_what_they_carry_at_rest(case: Case) -> None:
