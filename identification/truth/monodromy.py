@@ -23,6 +23,8 @@ from gearbench.identification.truth.periodic import Complexes, Floats, PeriodicS
 SMOOTH_STEP = 2.0
 # States kept at once (pieces x states x frequencies): 64 MB of complex numbers.
 STATES_AT_ONCE = 4_000_000
+# Change of phase and size within a piece below which the series of the exponentials is taken.
+SHORT = 1e-4
 # Above this condition number of its eigenvectors a piece is solved instead of diagonalised.
 DEFECTIVE = 1e6
 
@@ -36,6 +38,16 @@ class _Pieces:
     b: Floats
 
 
+@dataclass(frozen=True)
+class _Modal:
+    """Of each piece: eigenvalues (K, n), eigenvectors (K, n, n), b in them (K, n), whether they can be used (K,)."""
+
+    values: Complexes
+    vectors: Complexes
+    source: Complexes
+    good: np.ndarray
+
+
 def exact_itf(system: PeriodicSystem, frequency: ArrayLike, phase: ArrayLike, *, steps: int | None = None) -> Complexes:
     """Exact ITF (frequency, phase) [output/input] at the frequencies [Hz] and phases [cycles].
 
@@ -47,8 +59,12 @@ def exact_itf(system: PeriodicSystem, frequency: ArrayLike, phase: ArrayLike, *,
     frequencies = np.atleast_1d(np.asarray(frequency, dtype=float))
     phases = np.atleast_1d(np.asarray(phase, dtype=float)) % 1.0
     balanced = system.balanced()
-    edges, wanted = _edges(_step_count(balanced, steps), phases)
+    count = _step_count(balanced, steps)
+    if system.interpolation != "piecewise":
+        count = _with_phases(count, phases)
+    edges, wanted = _edges(count, phases)
     pieces, every = _pieces(balanced, edges)
+    modal = _modal(pieces)
     transition = expm(pieces.a * pieces.length[:, None, None])
     _require_stable(transition)
     _, _, output = balanced.at(phases)
@@ -57,7 +73,7 @@ def exact_itf(system: PeriodicSystem, frequency: ArrayLike, phase: ArrayLike, *,
     for start in range(0, frequencies.size, stride):
         part = slice(start, start + stride)
         omega = 2 * np.pi * frequencies[part]
-        states = _periodic_states(pieces, transition, omega)[wanted * every]
+        states = _periodic_states(pieces, modal, transition, omega)[wanted * every]
         turn = np.exp(-1j * np.outer(omega, phases * system.period))
         itf[part] = np.einsum("pi,pif->fp", output, states) * turn + system.d
     return itf
@@ -80,6 +96,12 @@ def _step_count(system: PeriodicSystem, steps: int | None) -> int:
     fastest = np.abs(np.linalg.eigvals(system.a[:: max(1, system.phases // 64)])).max()
     # Neither the fastest mode nor the coefficients may be strode over.
     return max(system.phases, int(np.ceil(fastest * system.period / SMOOTH_STEP)))
+
+
+def _with_phases(steps: int, phases: Floats) -> int:
+    """Steps rounded up until phases k/P lie on their grid: pieces of one length, coefficients by FFT."""
+    uniform = phases.size > 1 and np.abs(phases - np.arange(phases.size) / phases.size).max() < 1e-13
+    return -(-steps // phases.size) * phases.size if uniform else steps
 
 
 def _edges(steps: int, phases: Floats) -> tuple[Floats, np.ndarray]:
@@ -126,9 +148,9 @@ def _require_stable(transition: Floats) -> None:
         )
 
 
-def _periodic_states(pieces: _Pieces, transition: Floats, omega: Floats) -> Complexes:
+def _periodic_states(pieces: _Pieces, modal: _Modal, transition: Floats, omega: Floats) -> Complexes:
     """States (K, n, F) at the beginning of each piece in the periodic response to exp(j w t)."""
-    forcing = _forcing(pieces, transition, omega)
+    forcing = _forcing(pieces, modal, transition, omega)
     particular, homogeneous = _propagate(transition, forcing)
     closing = np.exp(1j * omega * pieces.length.sum())[:, None, None] * np.eye(pieces.b.shape[1])
     initial = np.linalg.solve(closing - homogeneous[-1], particular[-1].T[:, :, None])[:, :, 0].T
@@ -164,22 +186,42 @@ def _propagate(transition: Floats, forcing: Complexes) -> tuple[Complexes, Float
     return np.ascontiguousarray(x).view(complex), phi
 
 
-def _forcing(pieces: _Pieces, transition: Floats, omega: Floats) -> Complexes:
+def _modal(pieces: _Pieces) -> _Modal:
+    values, vectors = np.linalg.eig(pieces.a)
+    good = np.linalg.cond(vectors) < DEFECTIVE
+    source = np.zeros(pieces.b.shape, dtype=complex)
+    source[good] = np.linalg.solve(vectors[good], pieces.b[good][:, :, None].astype(complex))[:, :, 0]
+    return _Modal(values, vectors, source, good)
+
+
+def _forcing(pieces: _Pieces, modal: _Modal, transition: Floats, omega: Floats) -> Complexes:
     """Contribution (K, n, F) of the input within each piece to the state at its end."""
     start = np.concatenate([[0.0], np.cumsum(pieces.length)[:-1]])
     carrier = np.exp(1j * np.outer(start, omega))
-    values, vectors = np.linalg.eig(pieces.a)
-    good = np.linalg.cond(vectors) < DEFECTIVE
-    modal = np.zeros(pieces.b.shape, dtype=complex)
-    modal[good] = np.linalg.solve(vectors[good], pieces.b[good][:, :, None].astype(complex))[:, :, 0]
-    # (exp(jw h) - exp(lambda h)) / (jw - lambda), free of cancellation for short pieces.
-    gap = 1j * omega[None, None, :] - values[:, :, None]
-    length = pieces.length[:, None, None]
-    growth = np.exp(values[:, :, None] * length) * np.expm1(gap * length) / gap
-    forcing = vectors @ (modal[:, :, None] * growth)
-    for index in map(int, np.flatnonzero(~good)):
+    growth = _growth(modal.values, pieces.length, omega)
+    growth *= modal.source[:, :, None]
+    forcing = modal.vectors @ growth
+    for index in map(int, np.flatnonzero(~modal.good)):
         forcing[index] = _forcing_by_solving(pieces, transition[index], index, omega)
-    return forcing * carrier[:, None, :]
+    forcing *= carrier[:, None, :]
+    return forcing
+
+
+def _growth(values: Complexes, length: Floats, omega: Floats) -> Complexes:
+    """(exp(jw h) - exp(lambda h)) / (jw - lambda), (K, n, F), for the eigenvalues (K, n) of pieces of length h (K,)."""
+    gap = 1j * omega - values[:, :, None]
+    # Most pieces are equally long: each length's carrier is computed once, which an exponential of the gap is not.
+    lengths, which = np.unique(length, return_inverse=True)
+    end = np.exp(values * length[:, None])
+    growth = np.exp(1j * np.outer(lengths, omega))[which][:, None, :] - end[:, :, None]
+    growth /= gap
+    # The difference loses the digits that a short piece's exponentials share: there by the series.
+    short = np.abs(gap) * length[:, None, None] < SHORT
+    if short.any():
+        piece, mode, _ = np.nonzero(short)
+        change = gap[short] * length[piece]
+        growth[short] = length[piece] * end[piece, mode] * (1 + change / 2 * (1 + change / 3 * (1 + change / 4)))
+    return growth
 
 
 def _forcing_by_solving(pieces: _Pieces, transition: Floats, index: int, omega: Floats) -> Complexes:
