@@ -161,13 +161,14 @@ def _compliances(rig: Rig, meshing: Pair, travel: Array) -> tuple[Array, Array, 
     wanted = meshing.rho_pitch[0] + travel
     rho = np.clip(wanted, start, stop)
     width = meshing.face_width
-    flat = rho.ravel()
-    one = tooth_compliance(meshing.driver, rig.driver.hub_radius, width, rig.material, flat)
-    two = tooth_compliance(meshing.driven, rig.driven.hub_radius, width, rig.material, meshing.line_of_action - flat)
+    # Most pairs are held at an end of the path of contact.
+    places, which = np.unique(rho, return_inverse=True)
+    one = tooth_compliance(meshing.driver, rig.driver.hub_radius, width, rig.material, places)
+    two = tooth_compliance(meshing.driven, rig.driven.hub_radius, width, rig.material, meshing.line_of_action - places)
     inside = (wanted >= start) & (wanted <= stop)
     return (
-        one.total.reshape(rho.shape),
-        two.total.reshape(rho.shape),
+        one.total[which].reshape(rho.shape),
+        two.total[which].reshape(rho.shape),
         hertz_compliance(rig.material, width),
         inside,
     )

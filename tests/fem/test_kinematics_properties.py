@@ -115,7 +115,7 @@ def test_gap_is_the_least_distance(place: tuple[Pair, int, float, tuple[float, f
         assert abs(k.gap - least) < 2e-10, (tooth, k, least)
 
 
-@settings(max_examples=100, **SETTLED)
+@settings(max_examples=40, **SETTLED)
 @given(positions())
 def test_levers_do_the_gap_s_virtual_work(place: tuple[Pair, int, float, tuple[float, float, float]]) -> None:
     meshing, side, phase, moved = place

@@ -47,7 +47,7 @@ def relieved(draw: st.DrawFn) -> tuple[Gear, Profile, float, float]:
     return gear, shape, tip, root
 
 
-@settings(max_examples=150, **SETTLED)
+@settings(max_examples=50, **SETTLED)
 @given(relieved())
 def test_relief_only_takes_off_and_is_continuous(case: tuple[Gear, Profile, float, float]) -> None:
     gear, shape, tip, root = case
@@ -69,7 +69,7 @@ def test_relief_only_takes_off_and_is_continuous(case: tuple[Gear, Profile, floa
         assert np.allclose(off[[0, -1]], [-gear.root_relief, -gear.tip_relief], rtol=1e-9, atol=tiny)
 
 
-@settings(max_examples=60, **SETTLED)
+@settings(max_examples=25, **SETTLED)
 @given(relieved())
 def test_a_parabola_lies_inside_the_straight_line(case: tuple[Gear, Profile, float, float]) -> None:
     gear, shape, *_ = case
@@ -80,7 +80,7 @@ def test_a_parabola_lies_inside_the_straight_line(case: tuple[Gear, Profile, flo
     assert np.all(parabola >= line - 1e-15)
 
 
-@settings(max_examples=60, **SETTLED)
+@settings(max_examples=25, **SETTLED)
 @given(relieved(), st.integers(-2000, 2000), st.floats(-0.1, 0.1), st.floats(0.0, 0.05))
 def test_every_tooth_is_alike_unless_errors_are_given_for_it(
     case: tuple[Gear, Profile, float, float], tooth: int, slope: float, wear: float
@@ -103,7 +103,7 @@ def test_every_tooth_is_alike_unless_errors_are_given_for_it(
     np.testing.assert_allclose(change, np.linspace(-1e-6, 1e-6, 41), rtol=0, atol=1e-14)
 
 
-@settings(max_examples=60, **SETTLED)
+@settings(max_examples=25, **SETTLED)
 @given(relieved(), st.lists(st.floats(-0.05, 0.05), min_size=2, max_size=9), st.floats(0.0, 0.3))
 def test_a_measured_table_is_followed_and_held_beyond_its_ends(
     case: tuple[Gear, Profile, float, float], heights: list[float], missing: float

@@ -55,7 +55,7 @@ def is_a_sentence(text: str) -> bool:
     return bool(named and limited) and "\n" not in text and "nan" not in text and len(text) < 320
 
 
-@settings(max_examples=400, **SETTLED)
+@settings(max_examples=120, **SETTLED)
 @given(any_gear())
 def test_any_gear_is_made_or_refused_in_a_sentence(gear: Gear) -> None:
     try:
@@ -68,7 +68,7 @@ def test_any_gear_is_made_or_refused_in_a_sentence(gear: Gear) -> None:
     assert gear.bore_radius <= gear.hub_radius < tooth.root_radius
 
 
-@settings(max_examples=150, **SETTLED)
+@settings(max_examples=50, **SETTLED)
 @given(likely_pair())
 def test_any_pair_is_made_or_refused_in_a_sentence(rig: Rig) -> None:
     try:
@@ -84,7 +84,7 @@ def test_any_pair_is_made_or_refused_in_a_sentence(rig: Rig) -> None:
         assert not np.isinf(row.value) or "sliding" in row.name
 
 
-@settings(max_examples=25, **SETTLED)
+@settings(max_examples=12, **SETTLED)
 @given(likely_pair())
 def test_no_pair_that_is_made_overlaps(rig: Rig) -> None:
     try:
@@ -98,7 +98,7 @@ def test_no_pair_that_is_made_overlaps(rig: Rig) -> None:
         assert overlap(side, outline(side.driven)[40::4], outline(side.driver), turns) < 1e-3 * rig.driver.module
 
 
-@settings(max_examples=40, **SETTLED)
+@settings(max_examples=15, **SETTLED)
 @given(likely_gear(), st.floats(0.02, 0.98), st.floats(0.0, 1.0))
 def test_every_profile_is_the_envelope_of_its_rack(gear: Gear, low: float, high: float) -> None:
     tooth = made(gear)

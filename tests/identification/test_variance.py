@@ -38,7 +38,7 @@ def repeated(
     ("experiments", "period", "transient"),
     [
         pytest.param(4, 16, False, marks=pytest.mark.validation),  # d = 64 > 2n+1
-        (4, 128, False),  # d = 8, overlapping windows
+        pytest.param(4, 128, False, marks=pytest.mark.validation),  # d = 8, overlapping windows
         pytest.param(1, 64, True, marks=pytest.mark.validation),  # one record
     ],
 )

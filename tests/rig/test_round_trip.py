@@ -189,7 +189,7 @@ def again(case: Case, folder: Path) -> Case:
     return read_case(path)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(case=CASES)
 def test_random_cases_survive_unchanged(case: Case, folder: Path) -> None:
     assert again(case, folder) == case

@@ -59,7 +59,7 @@ def test_what_is_no_axis_is_refused_in_a_sentence(text: str, sentence: str) -> N
 
 
 @given(st.text(max_size=40))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 def test_any_text_is_an_axis_or_a_sentence(text: str) -> None:
     try:
         axis = parse_axis(text)

@@ -36,6 +36,7 @@ SAMPLES, RATE = 1024, 10240.0
 
 
 ACROSS = Across(stiffness=7e7, damping=2e3, coupling=1e7)
+LONG = pytest.mark.validation
 HOUSING = Housing(mass=12.0, stiffness=4e8, damping=5e3)
 SHAFT = OutputShaft(inertia=4e-3, stiffness=3e4, damping=1.0)
 
@@ -77,11 +78,11 @@ def make_case(
     ("boundary", "stiffness", "structure", "states"),
     [
         ("speed", None, {}, 6),
-        ("speed", 2e4, {}, 8),
-        ("torque", 2e4, {}, 8),
+        pytest.param("speed", 2e4, {}, 8, marks=LONG),
+        pytest.param("torque", 2e4, {}, 8, marks=LONG),
         ("speed", 2e4, {"shaft": SHAFT, "housing": HOUSING, "across": ACROSS}, 16),
-        ("torque", 2e4, {"shaft": SHAFT, "housing": HOUSING}, 12),
-        ("inertia", None, {"across": ACROSS}, 10),
+        pytest.param("torque", 2e4, {"shaft": SHAFT, "housing": HOUSING}, 12, marks=LONG),
+        pytest.param("inertia", None, {"across": ACROSS}, 10, marks=LONG),
         ("inertia", 2e4, {"shaft": SHAFT, "across": ACROSS}, 14),
     ],
 )

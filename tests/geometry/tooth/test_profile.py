@@ -92,7 +92,7 @@ def test_tip_edge_is_tangent_to_flank_and_tip_circle(edge: float) -> None:
         assert np.allclose(tooth.normals(tooth.s_tip), centre / np.hypot(*centre), atol=1e-12)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=50, deadline=None)
 @given(
     teeth=st.integers(8, 200),
     shift=st.floats(-1.4, 1.9),

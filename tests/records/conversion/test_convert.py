@@ -8,6 +8,7 @@ from math import pi
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 import scipy.io
@@ -53,11 +54,17 @@ def signals(t: np.ndarray) -> dict[str, np.ndarray]:
 TIME = np.arange(SAMPLES * PERIODS) / RATE
 
 
+def write_columns(path: Path, data: Mapping[str, np.ndarray]) -> None:
+    with h5py.File(path, "w") as file:
+        for name, values in data.items():
+            file[name] = values
+
+
 def convert(
     tmp_path: Path, data: Mapping[str, np.ndarray], about: Mapping[str, Any] | None = None, **specs: dict[str, Any]
 ) -> xr.Dataset:
-    """The record of columns in a MAT-file; a channel is the column of its name unless `specs` says more."""
-    scipy.io.savemat(tmp_path / "m.mat", dict(data))
+    """The record of columns in an HDF5 file; a channel is the column of its name unless `specs` says more."""
+    write_columns(tmp_path / "m.h5", data)
     unit = {"torque": "N m", "angle": "rad", "y": "m"}
     channels = {}
     for name in signals(TIME[:1]):
@@ -65,7 +72,7 @@ def convert(
         if all(column in data for column in spec["column"]):
             channels[name] = ChannelSpec(**spec)
     attributes = {key: value for key, value in {**ABOUT, "time": "t", **(about or {})}.items() if value is not None}
-    return gb.convert(tmp_path / "m.mat", ChannelMap(channels, attributes))
+    return gb.convert(tmp_path / "m.h5", ChannelMap(channels, attributes))
 
 
 def error(record: xr.Dataset, name: str, start: float = 0.0, run: int = 0) -> float:
@@ -272,12 +279,12 @@ def test_refusals_name_channel_index_and_limit(tmp_path: Path, name: str) -> Non
     data, about, specs, words = REFUSALS[name]
     if name == "no column":
         with pytest.raises(RecordError, match=words):
-            scipy.io.savemat(tmp_path / "n.mat", whole())
+            write_columns(tmp_path / "n.h5", whole())
             spec = {
                 n: ChannelSpec(("t[2]",) if n == "y_driver" else (n,), "m" if n == "y_driver" else None)
                 for n in ["y_driver"]
             }
-            gb.convert(tmp_path / "n.mat", ChannelMap(spec, {**ABOUT, "time": "t"}))
+            gb.convert(tmp_path / "n.h5", ChannelMap(spec, {**ABOUT, "time": "t"}))
         return
     with pytest.raises(RecordError, match=words) as caught:
         convert(tmp_path, whole(**data), about, **specs)
@@ -307,9 +314,9 @@ def test_several_files_are_runs_or_parts(tmp_path: Path) -> None:
     data = whole()
     spoken = {n: ChannelSpec((n,), u) for n, u in {"torque_driver": "N m", "angle_driver": "rad",
                                                    "angle_driven": "rad"}.items()}  # fmt: skip
-    paths = [tmp_path / f"{n}.mat" for n in range(2)]
+    paths = [tmp_path / f"{n}.h5" for n in range(2)]
     for path in paths:
-        scipy.io.savemat(path, data)
+        write_columns(path, data)
     made = gb.convert(paths, ChannelMap(spoken, {**ABOUT, "time": "t"}))
     assert made.sizes["realisation"] == 2
     for name in spoken:
@@ -331,6 +338,6 @@ def test_provenance_names_the_file_and_the_map(tmp_path: Path) -> None:
 
     record = convert(tmp_path, whole())
     settings = json.loads(record.attrs["provenance"])["settings"]
-    digest = hashlib.sha256((tmp_path / "m.mat").read_bytes()).hexdigest()
-    assert settings["converted"] == [{"name": "m.mat", "sha256": digest}]
+    digest = hashlib.sha256((tmp_path / "m.h5").read_bytes()).hexdigest()
+    assert settings["converted"] == [{"name": "m.h5", "sha256": digest}]
     assert "[channel.y_driver]" in settings["channel_map"]

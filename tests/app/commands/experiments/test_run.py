@@ -23,7 +23,7 @@ SMALL = {
     "experiment.samples_per_period": "2048",
     "experiment.sampling_rate_hz": "8192",
     "experiment.multisine.band_hz": "[4, 2500]",
-    "identification.band_hz": "[4, 1400]",
+    "identification.band_hz": "[1000, 1500]",
     "identification.harmonics": "12",
     "identification.order": "1",
     "identification.window": "6",
@@ -116,7 +116,7 @@ def test_the_report_holds_the_answers_and_is_made_again_from_the_products(done: 
 
 def test_identify_gives_what_the_run_gave(done: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "frf.nc"
-    arguments = ["identify", str(done / "record.nc"), "--out", str(out), "--band-hz", "4", "1400", "--json"]
+    arguments = ["identify", str(done / "record.nc"), "--out", str(out), "--band-hz", "1000", "1500", "--json"]
     arguments += ["--harmonics", "12", "--order", "1", "--window", "6"]
     assert run_command_line(arguments) == 0
     assert json.loads(capsys.readouterr().out)["unknowns"] == 50  # (2 x 12 + 1) branches x 2 coefficients
