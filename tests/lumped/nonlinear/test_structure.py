@@ -110,7 +110,7 @@ EVERY = set(UNKNOWNS)
     [
         ({}, EVERY - {"load"}),
         ({"load": Load(boundary="torque", coupling=SHAFT), "support": supports(direction="line-of-action")}, EVERY),
-        ({"load": Load(boundary="inertia", coupling=SHAFT)}, EVERY),
+        pytest.param({"load": Load(boundary="inertia", coupling=SHAFT)}, EVERY, marks=pytest.mark.validation),
         ({"load": Load(boundary="inertia", coupling=SHAFT), "housing": None}, EVERY - {"housing"}),
         (
             {"drive": Drive(), "load": Load(boundary="inertia", coupling=OutputShaft(inertia=6e-3))},

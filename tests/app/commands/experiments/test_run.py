@@ -183,6 +183,7 @@ def test_an_impossible_pair_leaves_no_folder(tmp_path: Path, capsys: pytest.Capt
     assert not out.exists()
 
 
+@pytest.mark.validation
 def test_termination_leaves_whole_files_and_exit_130(tmp_path: Path) -> None:
     out = tmp_path / "out"
     command = [sys.executable, "-m", "gearbench", "run", "quick_lumped", "--out", str(out)]

@@ -193,7 +193,7 @@ def test_the_place_and_the_probability_are_told_without_an_effect(
     records: list[Path], tmp_path: Path, asked: dict, capsys: pytest.CaptureFixture[str]
 ) -> None:
     for find, sentence in (
-        (nothing_found, "No effect is needed"),
+        (nothing_found, "No known effect is called for"),
         (unknown_found, "None of the known effects explains the gap. It arises at the drive."),
     ):
         asked["find"] = find
@@ -215,12 +215,20 @@ def test_a_second_run_resumes_and_another_one_is_refused(
     before = {path.name: path.stat().st_mtime_ns for path in out.iterdir()}
     assert run(records, out) == 0 and asked["calls"] == 0
     assert {path.name: path.stat().st_mtime_ns for path in out.iterdir()} == before
-    (out / "report.html").unlink()
-    assert run(records, out) == 0 and asked["calls"] == 0
-    assert (out / "report.html").read_text() == (done[0] / "report.html").read_text()
     capsys.readouterr()
     assert run(records, out, "--without", "friction") == 2 and asked["calls"] == 0
     assert "other options" in capsys.readouterr().err
+
+
+@pytest.mark.validation
+def test_a_lost_report_is_made_again_and_force_searches_anew(
+    records: list[Path], done: tuple[Path, dict, str, str], tmp_path: Path, asked: dict
+) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(done[0], out)
+    (out / "report.html").unlink()
+    assert run(records, out) == 0 and asked["calls"] == 0
+    assert (out / "report.html").read_text() == (done[0] / "report.html").read_text()
     assert run(records, out, "--without", "friction", "--force") == 0
     assert (asked["without"], asked["calls"]) == (("friction",), 1)
     assert "friction" in page_of(out)[0].split("left out of the library")[1][:60]
