@@ -6,18 +6,16 @@ The lumped model hands over its periodic matrices, identification solves them: h
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from gearbench.bench.plan.schedule import schedule
 from gearbench.bench.refusals.effects import is_nonlinear
 from gearbench.geometry import pair
-from gearbench.identification.truth.monodromy import exact_itf
-from gearbench.identification.truth.periodic import PeriodicSystem, frozen_itf
+from gearbench.identification.truth.periodic import PeriodicSystem
 from gearbench.lumped import Lumped, lumped_model, periodic_matrices
 from gearbench.rig import Case
 
 Array = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 # Phase grid of the periodic matrices, and steps of the exact solution: the switches of k(t) decide. With
 # 80 points a switch the lumped case at the paper's settings is exact to 1e-5.
@@ -50,16 +48,3 @@ def periodic_system(model: Lumped, mesh_period: float) -> PeriodicSystem:
     phases = MOST_PHASES if edge == 0.0 else int(np.clip(POINTS_PER_EDGE / edge, FEWEST_PHASES, MOST_PHASES))
     a, b, c = periodic_matrices(model, phases)
     return PeriodicSystem(mesh_period, a, b, c, interpolation="trigonometric" if edge else "piecewise")
-
-
-def exact_and_frozen(case: Case, frequency: ArrayLike, phase: ArrayLike) -> tuple[Complexes, Complexes]:
-    """Exact and frozen ITF (frequency, phase) [m/N] of a lumped case at frequencies [Hz], phases [cycles].
-
-    The exact one is the periodic response of the periodic system; the frozen one holds k at each phase and
-    is what the exact one tends to for a mesh that turns infinitely slowly. Report both, score against the
-    exact one only. Raises PeriodicSystemError if the mesh makes the rig unstable.
-    """
-    system = lumped_periodic_system(case)
-    # The default step follows the fastest mode alone; a fast mesh would have it stride over the switches.
-    exact = exact_itf(system, frequency, phase, steps=system.phases)
-    return exact, frozen_itf(system, frequency, phase)

@@ -49,11 +49,6 @@ class Drawn:
 Draw = Callable[[Levels, float, np.random.Generator], Drawn]
 
 
-def draw_severity(rng: np.random.Generator) -> float:
-    """A severity, log-uniform."""
-    return float(np.exp(rng.uniform(np.log(SEVERITY[0]), np.log(SEVERITY[1]))))
-
-
 def _value(value: float, unit: str) -> dict[str, Any]:
     return {"value": float(value), "unit": unit}
 
