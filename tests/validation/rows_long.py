@@ -27,7 +27,8 @@ def failing() -> Got:
     count = {key: int(suite.attrib[key]) for key in ("tests", "failures", "errors", "skipped")}
     if count["tests"] == count["skipped"]:
         raise NotRun("no such test was found")
-    return Got(count["failures"] + count["errors"], f"of {count['tests']}")
+    spoilt = [one.attrib["name"] for one in suite.iter("testcase") if {"failure", "error"} & {part.tag for part in one}]
+    return Got(count["failures"] + count["errors"], f"of {count['tests']}" + "".join(f"; {name}" for name in spoilt))
 
 
 CHECKS = [Check("long-tests", "tests marked `validation` that fail", 0.0, "tests", failing)]
