@@ -11,7 +11,7 @@ import typer.main
 from shared import code_blocks as runner
 from shared.code_blocks import LANGUAGES, ROOT, Block, blocks, pages, run_page
 
-from gearbench.cli import _LISTS, app
+from gearbench.cli import _LISTS, application
 from gearbench.shell.options import expand_lists
 
 QUICK = ("how-to/swap-a-gear",)
@@ -20,7 +20,7 @@ BLOCKS = [block for page in pages() for block in blocks(page)]
 
 def options_of(words: list[str]) -> dict[str, Any]:
     """What the command line understands of these words; raises where it does not."""
-    command: Any = typer.main.get_command(app)
+    command: Any = typer.main.get_command(application())
     context = command.make_context("gearbench", expand_lists(words, _LISTS))
     while hasattr(command, "resolve_command"):
         name, command, rest = command.resolve_command(context, [*context._protected_args, *context.args])
