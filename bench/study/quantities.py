@@ -243,7 +243,6 @@ def _iso(case: Case, ask: Ask) -> dict[str, float]:
     from gearbench.bench.refusals.stated import check_stated
     from gearbench.bench.sweep import iso_factors
     from gearbench.geometry import pair
-    from gearbench.geometry.tooth.iso1328 import drawn_gear
     from gearbench.lumped.stiffness.iso6336 import iso_stiffness
 
     check_gears(case.rig)
@@ -257,10 +256,7 @@ def _iso(case: Case, ask: Ask) -> dict[str, float]:
         found["c_gamma"] = iso_stiffness(case.rig, meshing, force).mesh
     if "iso-kv" in ask.of:
         check_stated(case, "iso-kv")
-        # The errors that a grade draws count as those that are given.
-        drawn = {side: drawn_gear(getattr(case.rig, side), f"rig.{side}") for side in ("driver", "driven")}
-        real = under_load.model_copy(update={"rig": case.rig.model_copy(update=drawn)})
-        found["kv"] = float(iso_factors(real, np.array([_speed(case)]))[0][0])
+        found["kv"] = float(iso_factors(under_load, np.array([_speed(case)]))[0][0])
     return found
 
 
