@@ -36,7 +36,8 @@ FUNCTIONS: dict[str, tuple[str, ...]] = {
     "itf": ("dataset",),
     "make_record": ("channels", "attributes", "channel_attributes", "start"),
     "optimise": (
-        "case", "vary", "quantity", "torques", "over", "settings", "positions", "cycles", "out", "force", "progress",
+        "case", "vary", "quantity", "torques", "over", "settings", "positions", "cycles", "out", "workers", "force",
+        "progress",
     ),
     "read_case": ("source", "overrides"),
     "read_frf": ("path",),
