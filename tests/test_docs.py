@@ -69,3 +69,18 @@ def test_what_fails_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     assert "none.toml" in failed[0] and failed[1].endswith("no")
     assert (tmp_path / "page" / "a.toml").read_text(encoding="utf-8") == "x = 1\n"
     assert [block.language for block in blocks(page)] == ["sh", "python", "sh", "toml", "matlab", "text"]
+
+
+def test_variables_of_a_page_hold_to_its_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "pages").mkdir()
+    (tmp_path / "page").mkdir()
+    page = tmp_path / "pages" / "page.md"
+    text = '    A="no such"\n    ./gearbench check $A.toml\n\nWords.\n\n    ./gearbench check $A\n'
+    page.write_text(text, encoding="utf-8")
+    monkeypatch.setattr(runner, "ROOT", tmp_path)
+    first, second = blocks(page)
+    assert (first.language, second.commands) == ("sh", [["check", "$A"]])
+    variables: dict[str, str] = {}
+    assert first.commands_with(variables) == [["check", "no", "such.toml"]]
+    assert second.commands_with(variables) == [["check", "no", "such"]]
+    assert len(run_page(page, tmp_path / "page")) == 2
