@@ -18,6 +18,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from gearbench.animation import animate
     from gearbench.bench import Comparison, compare, convert, simulate, static
     from gearbench.cases import read_case
     from gearbench.diagnosis import diagnose
@@ -44,6 +45,7 @@ _HOMES = {
     "Case": "gearbench.rig",
     "Comparison": "gearbench.bench",
     "IdentificationSettings": "gearbench.identification",
+    "animate": "gearbench.animation",
     "campaign": "gearbench.studies",
     "compare": "gearbench.bench",
     "convert": "gearbench.bench",
@@ -83,6 +85,7 @@ __all__ = [
     "Case",
     "Comparison",
     "IdentificationSettings",
+    "animate",
     "campaign",
     "compare",
     "convert",

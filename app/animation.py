@@ -34,44 +34,39 @@ def check_animation(out: Path, frames: int, cycles: float) -> None:
 
 
 def animate(
-    case: Case, out: Path, *, torque: float | None = None, record: Path | None = None, frames: int = 24,
-    cycles: float = 1.0, progress: Steps | None = None,
+    case: str | Path | Case, out: str | Path, *, torque: float | None = None, record: str | Path | None = None,
+    frames: int = 24, cycles: float = 1.0, progress: Steps | None = None,
 ) -> None:  # fmt: skip
-    """Write an animation of a case: static positions under a driver torque [N m] (absent: the case's mean), or the
-    instants of a record with tooth forces; `frames` pictures over `cycles` mesh cycles.
+    """Write an animation of a case, as `out` ends: a page (.html), a picture (.gif) or a film (.mp4, by ffmpeg).
 
-    Raises InputError, BenchError and what the solver raises.
+    `case`: a file, the name of a shipped case, or a Case. It shows static positions at a driver torque [N m] (absent:
+    the case's mean), or the instants of the record in the file `record`, which has tooth forces; `frames` pictures over
+    `cycles` mesh cycles. Contact and stress are by finite elements, whatever the model of the case. Raises InputError,
+    CaseError, BenchError and what the solver raises, one sentence.
+
+    >>> import gearbench as gb
+    >>> gb.animate("quick_fe", "moving.jpg")
+    Traceback (most recent call last):
+    gearbench.shell.failure.InputError: --out moving.jpg must end in .html, .gif or .mp4
+    >>> gb.animate("quick_fe", "moving.gif", torque=100.0, frames=24)  # doctest: +SKIP
     """
-    import numpy as np
-
     from gearbench.bench.elastic.rig import elastic_rig
     from gearbench.bench.refusals.gears import check_gears
-    from gearbench.bench.refusals.stated import mean_torque
     from gearbench.bench.stress.fields import refuse_cracks
-    from gearbench.bench.stress.motion import moving_frames, recorded_instants, static_instants
+    from gearbench.bench.stress.motion import moving_frames
+    from gearbench.cases import read_case
     from gearbench.figures.gears.motion import film, pictures
-    from gearbench.records import read_record
 
     steps = progress or Silent()
+    out, record = Path(out), Path(record) if record is not None else None
     check_animation(out, frames, cycles)
+    case = read_case(case) if isinstance(case, str | Path) else case
     check_gears(case.rig)
     refuse_cracks(case.rig)
-    curve: tuple[Any, Any] | None
-    load = mean_torque(case) if torque is None and record is None else torque
-    if load is not None and not 0.0 < load < float("inf"):
-        raise InputError(f"--torque-nm {load:g} must be finite and greater than 0")
+    load = _load(case, torque, record)
     steps.step("positions")
     elastic = elastic_rig(case.rig, case.simulation)
-    if record is not None:
-        held = read_record(record)
-        instants = recorded_instants(held, frames, cycles, elastic.pair.driver.base_radius)
-        curve, words = _recorded_curve(held, instants[0].phase, cycles), "DTE"
-    else:
-        assert load is not None
-        instants = static_instants(elastic, load, cycles * np.arange(frames) / frames)
-        phases = np.linspace(0.0, cycles, 1 + round(CURVE * max(cycles, 1.0)))
-        errors = np.array([one.dte for one in static_instants(elastic, load, phases)])
-        curve, words = (phases, errors), "TE"
+    instants, curve, words = _instants(elastic, load, record, frames, cycles)
     steps.step("stress fields")
     found = moving_frames(elastic, instants, case.simulation.element_size, steps)
     steps.step("pictures")
@@ -90,6 +85,37 @@ def animate(
         f"The {words} below runs from {shared.errors.min():.4g} to {shared.errors.max():.4g} um.",
     )
     _write(out, images, case, sentences)
+
+
+def _load(case: Case, torque: float | None, record: Path | None) -> float:
+    """Driver torque [N m] of static positions; 0 where a record says it. Raises InputError or BenchError."""
+    from gearbench.bench.refusals.stated import mean_torque
+
+    if record is not None:
+        if torque is not None:
+            raise InputError("--torque-nm and --record cannot both be given: a record says what its mesh carries")
+        return 0.0
+    load = mean_torque(case) if torque is None else torque
+    if not 0.0 < load < float("inf"):
+        raise InputError(f"--torque-nm {load:g} must be finite and greater than 0")
+    return load
+
+
+def _instants(elastic: Any, load: float, record: Path | None, frames: int, cycles: float) -> tuple[Any, Any, str]:
+    """What is shown, the curve below it (phases, values), and what the curve is called."""
+    import numpy as np
+
+    from gearbench.bench.stress.motion import recorded_instants, static_instants
+    from gearbench.records import read_record
+
+    if record is not None:
+        held = read_record(record)
+        instants = recorded_instants(held, frames, cycles, elastic.pair.driver.base_radius)
+        return instants, _recorded_curve(held, instants[0].phase, cycles), "DTE"
+    instants = static_instants(elastic, load, cycles * np.arange(frames) / frames)
+    phases = np.linspace(0.0, cycles, 1 + round(CURVE * max(cycles, 1.0)))
+    errors = np.array([one.dte for one in static_instants(elastic, load, phases)])
+    return instants, (phases, errors), "TE"
 
 
 def _recorded_curve(record: Any, first: float, cycles: float) -> tuple[Any, Any]:

@@ -5,70 +5,41 @@ from __future__ import annotations
 import os
 import sys
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from importlib import import_module
 from typing import Annotated
 
 import typer
 
 from gearbench import __version__
-from gearbench.commands.experiments.campaign import campaign
-from gearbench.commands.experiments.multisine import multisine
-from gearbench.commands.experiments.optimise import optimise
-from gearbench.commands.experiments.run import run
-from gearbench.commands.experiments.simulate import simulate
-from gearbench.commands.experiments.sweep import sweep
-from gearbench.commands.gears.animate import animate
-from gearbench.commands.gears.check import check
-from gearbench.commands.gears.mesh import mesh
-from gearbench.commands.gears.static import static
-from gearbench.commands.house.cases import cases
-from gearbench.commands.house.completion import COMPLETE, completion, prepare
-from gearbench.commands.house.doctor import doctor
-from gearbench.commands.house.open import open_report
-from gearbench.commands.house.schema import schema
-from gearbench.commands.house.validate import validate
-from gearbench.commands.measured.challenge import challenge
-from gearbench.commands.measured.compare import compare
-from gearbench.commands.measured.convert import convert
-from gearbench.commands.measured.diagnose import diagnose
-from gearbench.commands.measured.identify import identify
+from gearbench.commands.house.completion import COMPLETE, prepare
 from gearbench.shell.failure import INTERRUPTED, guarded, show_warning
 from gearbench.shell.options import expand_lists
 
-app = typer.Typer(
-    name="gearbench",
-    help="A virtual gear test rig: from a case file to the record and its time-varying frequency response.",
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
-
-COMMANDS = (
-    run,
-    simulate,
-    static,
-    animate,
-    sweep,
-    campaign,
-    optimise,
-    multisine,
-    convert,
-    identify,
-    compare,
-    diagnose,
-    check,
-    mesh,
-    cases,
-    schema,
-    validate,
-    doctor,
-    completion,
-)
-for command in COMMANDS:
-    app.command()(command)
-app.command("open")(open_report)
-app.add_typer(challenge)
+# Every command in the order of --help: where it is, and the function's name where that is another than the command's.
+_COMMANDS = {
+    "run": "experiments.run",
+    "simulate": "experiments.simulate",
+    "static": "gears.static",
+    "animate": "gears.animate",
+    "sweep": "experiments.sweep",
+    "campaign": "experiments.campaign",
+    "optimise": "experiments.optimise",
+    "multisine": "experiments.multisine",
+    "convert": "measured.convert",
+    "identify": "measured.identify",
+    "compare": "measured.compare",
+    "diagnose": "measured.diagnose",
+    "check": "gears.check",
+    "mesh": "gears.mesh",
+    "cases": "house.cases",
+    "schema": "house.schema",
+    "validate": "house.validate",
+    "doctor": "house.doctor",
+    "completion": "house.completion",
+    "open": "house.open:open_report",
+    "challenge": "measured.challenge",
+}
 
 # Options that take several numbers in a row.
 _LISTS = ("--torque-nm", "--dte-um", "--fields")
@@ -80,7 +51,6 @@ def _print_version(wanted: bool) -> None:
         raise typer.Exit
 
 
-@app.callback()
 def _common(
     version: Annotated[
         bool, typer.Option("--version", callback=_print_version, is_eager=True, help="print the version")
@@ -89,12 +59,40 @@ def _common(
     """A virtual gear test rig: from a case file to the record and its time-varying frequency response."""
 
 
+def application(names: Iterable[str] = _COMMANDS) -> typer.Typer:
+    """The command line with these commands; to read the options of all of them takes a tenth of a second."""
+    made = typer.Typer(
+        name="gearbench",
+        help="A virtual gear test rig: from a case file to the record and its time-varying frequency response.",
+        no_args_is_help=True,
+        add_completion=False,
+        pretty_exceptions_enable=False,
+        context_settings={"help_option_names": ["-h", "--help"]},
+    )
+    made.callback()(_common)
+    for name in names:
+        place, _, function = _COMMANDS[name].partition(":")
+        command = getattr(import_module(f"gearbench.commands.{place}"), function or name)
+        if isinstance(command, typer.Typer):
+            made.add_typer(command)
+        else:
+            made.command(name)(command)
+    return made
+
+
+def _wanted(arguments: Sequence[str]) -> Iterable[str]:
+    """The command that is asked for; all of them for help, for a shell that completes, and to suggest another name."""
+    known = arguments and arguments[0] in _COMMANDS and COMPLETE not in os.environ
+    return (arguments[0],) if known else _COMMANDS
+
+
 def run_command_line(arguments: Sequence[str]) -> int:
     """Run one command; its exit code."""
 
     def job() -> int | None:
         try:
-            result = app(expand_lists(arguments, _LISTS), prog_name="gearbench", standalone_mode=False)
+            words = expand_lists(arguments, _LISTS)
+            result = application(_wanted(words))(words, prog_name="gearbench", standalone_mode=False)
         except typer.Abort:
             result = INTERRUPTED
         if result == INTERRUPTED:  # the library turns the exception into this code
@@ -110,6 +108,8 @@ def main() -> None:
     # one needs on a busy machine. Takes effect because NumPy is not imported yet.
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
         os.environ.setdefault(name, "1")
+    # Pydantic looks through every installed package for plugins of its own, of which cases make no use.
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     warnings.showwarning = show_warning
     if COMPLETE in os.environ:
         prepare()

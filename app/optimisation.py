@@ -12,16 +12,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gearbench.files import fingerprint
-from gearbench.shell.failure import InputError
+from gearbench.shell.failure import InputError, say
 from gearbench.shell.output import Output, claimed
 from gearbench.shell.progress import Silent, Steps
-from gearbench.studies import reader
+from gearbench.studies import member_text, reader
 
 if TYPE_CHECKING:
     from gearbench.bench.study.design import Factor
     from gearbench.bench.study.minimise import Over, Valley
     from gearbench.bench.study.quantities import Ask, Column
     from gearbench.rig import Case
+
+
+KEPT = "points.json"
 
 
 @dataclass(frozen=True)
@@ -57,6 +60,7 @@ def optimise(
     positions: int = 64,
     cycles: int = 1,
     out: str | Path | None = None,
+    workers: int | None = None,
     force: bool = False,
     progress: Steps | None = None,
 ) -> Optimum:
@@ -64,70 +68,122 @@ def optimise(
 
     `vary`: "KEY=LOW:HIGH", or "KEY1+KEY2=LOW:HIGH" for keys that move together; at most six. `quantity`: a result of
     docs/campaigns.md, or one of its columns. `torques` [N m]: the loads; absent: the experiment's mean. With `out` the
-    folder gets valley.csv, valley.png, optimum.json and best.toml. Derivative-free and the same every time. Raises
-    CaseError, BenchError or InputError, one sentence.
+    folder gets valley.csv, valley.png, optimum.json and best.toml, and points.json while it searches: one that was
+    interrupted goes on in the folder of the same question and sources; another's is refused unless `force`. What can
+    be computed side by side runs on `workers` processes (absent: as many as there are processors, where it pays).
+    Derivative-free and the same every time. Raises CaseError, BenchError or InputError, one sentence.
 
     >>> import gearbench as gb
     >>> found = gb.optimise("quick_lumped", ["rig.driver.face_width_mm=10:20"], "te-mean", [100.0, 200.0])
     >>> found.best, f"{found.value:.1f} {found.column.unit}"
     ((20.0,), '8.3 um')
     """
-    from gearbench.bench.errors import BenchError
-    from gearbench.bench.study.minimise import minimise
-    from gearbench.bench.study.quantities import Ask, at_loads, single_column
+    from gearbench.bench.study.quantities import Ask, single_column
 
     if over not in ("worst", "mean"):
         raise InputError(f"over = {over!r} must be worst or mean")
+    if workers is not None and workers < 1:
+        raise InputError(f"--workers {workers} must be at least 1")
     name, column = single_column(quantity)
     factors = _factors(vary)
-    ask = Ask((name,), None, positions, cycles)
-    teller = progress or Silent()
     with reader(case) as read:
         base = read(settings)
         loads = tuple(float(one) for one in torques) or _own_load(base)
         for load in loads:
             if not (np.isfinite(load) and load > 0):
                 raise InputError(f"--at-nm {load:g} must be a torque greater than 0 N m")
-        bounds = tuple((factor.axis.low, factor.axis.high) for factor in factors)
-        last: dict[str, str] = {}
+        ask = Ask((name,), None, positions, cycles, loads)
+        search = _Search(base, partial(_case_at, read, settings, factors), factors, ask, column, over, workers)
+        if out is None:
+            return search.found(progress or Silent())
+        with claimed(Path(out), "optimise", search.identity(quantity, vary), force) as output:
+            return search.found(progress or Silent(), output)
 
-        def case_at(point: Sequence[float]) -> Case:
-            pairs = zip(factors, point, strict=True)
-            made: Case = read([*settings, *(f"{key}={value!r}" for f, value in pairs for key in f.axis.keys)])
-            return made
 
-        def evaluate(point: Sequence[float]) -> Any:
-            try:
-                return at_loads(case_at(point), loads, name, column.name, ask)
-            except (ValueError, ArithmeticError) as error:  # a sentence of ours: such a point is none
-                last["said"] = str(error)
-                return np.full(len(loads), np.nan)
+def _case_at(read: Any, settings: Sequence[str], factors: Sequence[Factor], point: Sequence[float]) -> Case:
+    """The case with the keys at a point. Raises CaseError."""
+    pairs = zip(factors, point, strict=True)
+    made: Case = read([*settings, *(f"{key}={value!r}" for factor, value in pairs for key in factor.axis.keys)])
+    return made
 
-        asked = [quantity, over, json.dumps([loads, bounds, positions, cycles, list(vary)])]
-        teller.step("search")
 
-        def report(count: int, about: int) -> None:
-            teller(min(count / about, 0.99), f"{count} points")
+@dataclass(frozen=True)
+class _Search:
+    """A question: the case as it stands and at a point, what moves, what is asked for, how."""
 
-        try:
-            valley = minimise(evaluate, bounds, over, report)
-        except BenchError as error:
-            raise BenchError(f"{error}{': ' if last else ''}{last.get('said', '')}") from error
-        before = _before(base, loads, name, column, ask)
-        best = tuple(float(one) for one in valley.points[valley.best])
-        found = Optimum(
-            case_at(best).model_copy(update={"study": None}), tuple(factor.name for factor in factors), column, over,
-            loads, best, float(valley.aim[valley.best]), tuple(map(float, valley.values[valley.best])), before,
-            valley.flat, bounds, textbook_relief(base, factors, loads), valley,
-        )  # fmt: skip
-    if out is not None:
+    base: Case
+    case_at: Any
+    factors: tuple[Factor, ...]
+    ask: Ask
+    column: Column
+    over: Over
+    workers: int | None
+
+    @property
+    def bounds(self) -> tuple[tuple[float, float], ...]:
+        return tuple((factor.axis.low, factor.axis.high) for factor in self.factors)
+
+    def identity(self, quantity: str, vary: Sequence[str]) -> str:
+        """What tells it from another question."""
         from gearbench.records.provenance import source_digest
         from gearbench.rig import dump_case
 
-        with claimed(Path(out), "optimise", fingerprint(dump_case(base), source_digest(), *asked), force) as output:
+        asked = json.dumps([self.ask.loads, self.bounds, self.ask.positions, self.ask.cycles, list(vary)])
+        return fingerprint(dump_case(self.base), source_digest(), quantity, self.over, asked)
+
+    def found(self, teller: Steps, output: Output | None = None) -> Optimum:
+        """The answer, in the folder too where there is one. Raises BenchError."""
+        from gearbench.bench.errors import BenchError
+        from gearbench.bench.study.minimise import minimise
+        from gearbench.bench.study.points import Points
+
+        teller.step("search")
+        points = Points(self.case_at, lambda point: member_text(self.case_at(point)), self.ask, self.column.name,
+                        self.workers, tell=partial(_told, teller, len(self.factors)))  # fmt: skip
+        if output is not None:
+            points.known.update(_kept(output))
+            points.keep = partial(output.write_text, KEPT)
+        try:
+            valley = minimise(points.at, self.bounds, self.over, points.ahead)
+        except BenchError as error:
+            raise BenchError(f"{error}{': ' if points.said else ''}{points.said}") from error
+        except KeyboardInterrupt:
+            if output is not None:
+                say(f"what is done is kept in {output.folder}: the same command goes on from there")
+            raise
+        finally:
+            points.finish()
+        name, loads = self.ask.of[0], self.ask.loads
+        before = _before(self.base, loads, name, self.column, self.ask)
+        best = tuple(float(one) for one in valley.points[valley.best])
+        found = Optimum(
+            self.case_at(best).model_copy(update={"study": None}), tuple(factor.name for factor in self.factors),
+            self.column, self.over, loads, best, float(valley.aim[valley.best]),
+            tuple(map(float, valley.values[valley.best])), before, valley.flat, self.bounds,
+            textbook_relief(self.base, self.factors, loads), valley,
+        )  # fmt: skip
+        if output is not None:
             teller.step("files")
             write_optimum(found, output)
-    return found
+        return found
+
+
+def _told(teller: Steps, keys: int, count: int) -> None:
+    from gearbench.bench.study.minimise import about_points
+
+    teller(min(count / about_points(keys), 0.99), f"{count} points")
+
+
+def _kept(output: Output) -> dict[tuple[float, ...], Any]:
+    """Points that the same search has computed before."""
+    from gearbench.bench.study.points import read_points
+
+    if not output.has(KEPT):
+        return {}
+    try:
+        return read_points(output.path(KEPT).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
 
 
 def _before(base: Case, loads: Sequence[float], name: str, column: Column, ask: Ask) -> tuple[float, ...]:

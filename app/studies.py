@@ -122,7 +122,7 @@ def plan_of(source: str | Path | Case, settings: Sequence[str], given: dict[str,
             teller(number / len(design.members))
             text = ""
             try:
-                text = _text(read([*settings, *design.settings(number)]))
+                text = member_text(read([*settings, *design.settings(number)]))
             except CaseError as reason:
                 refused[number] = str(reason)
             tasks.append(Task(number, text, ask))
@@ -193,7 +193,7 @@ def _table(plan: Plan, found: Sequence[Found]) -> xr.Dataset:
 
     ask = {"of": list(plan.ask.of), "torque": plan.ask.torque, "positions": plan.ask.positions}
     asked = {**ask, "cycles": plan.ask.cycles, "vary": list(plan.study.vary), "sample": plan.study.sample}
-    about = {"case": plan.base.name, "provenance": provenance(_text(plan.base), plan.study.seed, asked)}
+    about = {"case": plan.base.name, "provenance": provenance(member_text(plan.base), plan.study.seed, asked)}
     return study_dataset(
         plan.design,
         columns_of(plan.ask.of),
@@ -278,8 +278,8 @@ def _study(base: Case, given: dict[str, Any]) -> Study:
         raise CaseError(one_sentence(error)) from error
 
 
-def _text(case: Case) -> str:
-    """A member's whole case: one experiment, no study."""
+def member_text(case: Case) -> str:
+    """A member's whole case as TOML: one experiment, no study."""
     from gearbench.rig import dump_case
 
     return dump_case(case.model_copy(update={"study": None, "conditions": ()}))

@@ -22,6 +22,7 @@ from gearbench.bench.protocol import Model, Prepared
 from gearbench.bench.record.attributes import turning_inertias
 from gearbench.bench.refusals.gears import check_gears
 from gearbench.geometry import pair
+from gearbench.geometry.tooth.iso1328 import drawn_gear
 from gearbench.lumped.stiffness.dynamic_factor import deviations, dynamic_factor, resonance_speed
 from gearbench.lumped.stiffness.iso6336 import iso_stiffness
 from gearbench.rig import Case, Rig
@@ -156,8 +157,10 @@ def _measured(prepared: Prepared[Any], mesh: Sweepable, outputs: Array, residual
 
 
 def iso_factors(case: Case, speeds: Array) -> tuple[Array, float]:
-    """K_v by ISO 6336-1 Method B at driver speeds (n,) [rad/s], and the resonance speed of the driver [rad/s]."""
-    rig, meshing = case.rig, pair(case.rig)
+    """K_v by ISO 6336-1 Method B at driver speeds (n,) [rad/s], and the resonance speed of the driver [rad/s]. Errors
+    that a grade draws count as those that are given."""
+    drawn = {side: drawn_gear(getattr(case.rig, side), f"rig.{side}") for side in ("driver", "driven")}
+    rig, meshing = case.rig.model_copy(update=drawn), pair(case.rig)
     width = 1e3 * meshing.face_width
     force = case.experiment.torque_mean / meshing.driver.base_radius
     found = iso_stiffness(rig, meshing, force)

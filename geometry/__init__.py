@@ -4,18 +4,25 @@
 zones of contact. `mesh`: finite-element meshes of tooth sectors and gears. `export`: files for other programs.
 """
 
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
 from gearbench.geometry.error import GeometryError
-from gearbench.geometry.export.meshes import write_mesh
-from gearbench.geometry.mesh.assembly import full_mesh
-from gearbench.geometry.mesh.filling import MeshingUnavailable
-from gearbench.geometry.mesh.gears import mesh_pair
-from gearbench.geometry.mesh.quality import Quality, quality
-from gearbench.geometry.mesh.sector_mesh import sector_mesh
-from gearbench.geometry.mesh.values import GearMesh, Mesh, PairMesh, SectorMesh
 from gearbench.geometry.pair.datasheet import Datum, data_sheet
 from gearbench.geometry.pair.kinematics import Pair, inverse_involute, pair
 from gearbench.geometry.tooth.body import Body, body, gear_area, sector_area
 from gearbench.geometry.tooth.profile import Profile, profile
+
+if TYPE_CHECKING:
+    from gearbench.geometry.export.meshes import write_mesh
+    from gearbench.geometry.mesh.assembly import full_mesh
+    from gearbench.geometry.mesh.filling import MeshingUnavailable
+    from gearbench.geometry.mesh.gears import mesh_pair
+    from gearbench.geometry.mesh.quality import Quality, quality
+    from gearbench.geometry.mesh.sector_mesh import sector_mesh
+    from gearbench.geometry.mesh.values import GearMesh, Mesh, PairMesh, SectorMesh
 
 __all__ = [
     "Body",
@@ -42,3 +49,26 @@ __all__ = [
     "sector_mesh",
     "write_mesh",
 ]
+
+_HOMES = {
+    "GearMesh": "gearbench.geometry.mesh.values",
+    "Mesh": "gearbench.geometry.mesh.values",
+    "MeshingUnavailable": "gearbench.geometry.mesh.filling",
+    "PairMesh": "gearbench.geometry.mesh.values",
+    "Quality": "gearbench.geometry.mesh.quality",
+    "SectorMesh": "gearbench.geometry.mesh.values",
+    "full_mesh": "gearbench.geometry.mesh.assembly",
+    "mesh_pair": "gearbench.geometry.mesh.gears",
+    "quality": "gearbench.geometry.mesh.quality",
+    "sector_mesh": "gearbench.geometry.mesh.sector_mesh",
+    "write_mesh": "gearbench.geometry.export.meshes",
+}
+
+
+def __getattr__(name: str) -> Any:
+    # Imported on use: a data sheet needs no meshes.
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(_HOMES[name]), name)
+    globals()[name] = value
+    return value

@@ -11,7 +11,7 @@ import typer.main
 from shared import code_blocks as runner
 from shared.code_blocks import LANGUAGES, ROOT, Block, blocks, pages, run_page
 
-from gearbench.cli import _LISTS, app
+from gearbench.cli import _LISTS, application
 from gearbench.shell.options import expand_lists
 
 QUICK = ("how-to/swap-a-gear",)
@@ -20,7 +20,7 @@ BLOCKS = [block for page in pages() for block in blocks(page)]
 
 def options_of(words: list[str]) -> dict[str, Any]:
     """What the command line understands of these words; raises where it does not."""
-    command: Any = typer.main.get_command(app)
+    command: Any = typer.main.get_command(application())
     context = command.make_context("gearbench", expand_lists(words, _LISTS))
     while hasattr(command, "resolve_command"):
         name, command, rest = command.resolve_command(context, [*context._protected_args, *context.args])
@@ -69,3 +69,18 @@ def test_what_fails_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     assert "none.toml" in failed[0] and failed[1].endswith("no")
     assert (tmp_path / "page" / "a.toml").read_text(encoding="utf-8") == "x = 1\n"
     assert [block.language for block in blocks(page)] == ["sh", "python", "sh", "toml", "matlab", "text"]
+
+
+def test_variables_of_a_page_hold_to_its_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "pages").mkdir()
+    (tmp_path / "page").mkdir()
+    page = tmp_path / "pages" / "page.md"
+    text = '    A="no such"\n    ./gearbench check $A.toml\n\nWords.\n\n    ./gearbench check $A\n'
+    page.write_text(text, encoding="utf-8")
+    monkeypatch.setattr(runner, "ROOT", tmp_path)
+    first, second = blocks(page)
+    assert (first.language, second.commands) == ("sh", [["check", "$A"]])
+    variables: dict[str, str] = {}
+    assert first.commands_with(variables) == [["check", "no", "such.toml"]]
+    assert second.commands_with(variables) == [["check", "no", "such"]]
+    assert len(run_page(page, tmp_path / "page")) == 2

@@ -20,6 +20,7 @@ ROOT = Path(__file__).resolve().parent.parent
 
 # What users may rely on: every public name; of functions the parameters. A change here is a change of the interface.
 FUNCTIONS: dict[str, tuple[str, ...]] = {
+    "animate": ("case", "out", "torque", "record", "frames", "cycles", "progress"),
     "campaign": (
         "case", "out", "vary", "of", "sample", "size", "seed", "torque", "positions", "cycles", "settings", "workers",
         "cluster", "force", "progress",
@@ -35,7 +36,8 @@ FUNCTIONS: dict[str, tuple[str, ...]] = {
     "itf": ("dataset",),
     "make_record": ("channels", "attributes", "channel_attributes", "start"),
     "optimise": (
-        "case", "vary", "quantity", "torques", "over", "settings", "positions", "cycles", "out", "force", "progress",
+        "case", "vary", "quantity", "torques", "over", "settings", "positions", "cycles", "out", "workers", "force",
+        "progress",
     ),
     "read_case": ("source", "overrides"),
     "read_frf": ("path",),

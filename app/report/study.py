@@ -8,7 +8,9 @@ from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gearbench.report.html import folded, items, page, picture, table, text
+from gearbench.report.html import drawing, folded, items, table, text
+from gearbench.report.live import live_page
+from gearbench.report.study_live import live_scatter, live_tornado
 from gearbench.words.study import SAMPLES, best, between, decider, failures, percent, shown, span_line, span_title
 
 if TYPE_CHECKING:
@@ -19,8 +21,9 @@ if TYPE_CHECKING:
 
 MOST_ROWS = 500
 CAPTIONS = {
-    "tornado": "What each factor moves: the mean result over the factor's range, all other factors as they vary.",
-    "scatter": "Every member: each result over each factor, and how the members spread (right).",
+    "tornado": "What each factor moves: the range of the mean result over the factor, all other factors as they vary;"
+    " the mean at its lowest values (blue, to the left) and at its highest (orange, to the right).",
+    "scatter": "Every member: each result over each factor, and the mean of each level where members share levels.",
 }
 
 
@@ -44,7 +47,7 @@ def study_page(
         text(f"gearbench study · {title}", style="mark"),
         text(span_title(members, results[0]), "h1"),
         text(answer, style="lead"),
-        *(picture(pictures[name], name, CAPTIONS[name]) for name in ("tornado", "scatter") if name in pictures),
+        *_figures(members, effects, factors, results, pictures),
         *_others(members, results, deciders),
         *_effects(effects),
         *_failures(members),
@@ -53,7 +56,22 @@ def study_page(
         *_provenance(members),
         text(kept, style="small"),
     ]
-    return page(f"{title}: study", body)
+    return live_page(f"{title}: study", body)
+
+
+def _figures(
+    members: xr.Dataset,
+    effects: Sequence[Effects],
+    factors: Sequence[str],
+    results: Sequence[str],
+    pictures: Mapping[str, Callable[[Path], None]],
+) -> list[str]:
+    """Tornado, where there are factors to compare, and scatter, live."""
+    stills = {name: drawing(draw, name) for name, draw in pictures.items()}
+    found = []
+    if "tornado" in stills:
+        found.append(live_tornado(effects, stills["tornado"], CAPTIONS["tornado"]))
+    return [*found, live_scatter(members, factors, results, stills["scatter"], CAPTIONS["scatter"])]
 
 
 def _others(members: xr.Dataset, results: Sequence[str], deciders: Sequence[str]) -> list[str]:

@@ -70,8 +70,8 @@ def task_data(task: Task) -> dict[str, Any]:
 
 def task_from(data: dict[str, Any]) -> Task:
     """The task in plain data."""
-    of, torque, positions, cycles = data["ask"]
-    return Task(data["number"], data["case"], Ask(tuple(of), torque, positions, cycles))
+    of, torque, positions, cycles, loads = data["ask"]
+    return Task(data["number"], data["case"], Ask(tuple(of), torque, positions, cycles, tuple(loads)))
 
 
 def found_data(found: Found) -> dict[str, Any]:

@@ -57,17 +57,25 @@ class _Trail:
     low: Array
     high: Array
     over: Over
-    report: Callable[[int], None]
+    ahead: Callable[[Sequence[tuple[float, ...]]], None]
     seen: dict[tuple[float, ...], Array] = field(default_factory=dict)
 
-    def at(self, part: Sequence[float] | Array) -> float:
-        """The aim at a point given by its parts (0..1) of the ranges; infinite where there is no result."""
+    def point(self, part: Sequence[float] | Array) -> tuple[float, ...]:
+        """A point given by its parts (0..1) of the ranges."""
         place = self.low + np.clip(np.asarray(part, dtype=float), 0.0, 1.0) * (self.high - self.low)
-        key = tuple(float(f"{one:.10g}") for one in place)
+        return tuple(float(f"{one:.10g}") for one in place)
+
+    def at(self, part: Sequence[float] | Array) -> float:
+        """The aim at a point given by its parts of the ranges; infinite where there is no result."""
+        key = self.point(part)
         if key not in self.seen:
             self.seen[key] = self.evaluate(key)
-            self.report(len(self.seen))
         return aim_of(self.seen[key], self.over)
+
+    def all(self, parts: Sequence[Array] | Array) -> list[float]:
+        """The aims at several points, which may be computed side by side."""
+        self.ahead([key for key in map(self.point, parts) if key not in self.seen])
+        return [self.at(part) for part in parts]
 
 
 def aim_of(values: Array, over: Over) -> float:
@@ -81,10 +89,10 @@ def minimise(
     evaluate: Evaluate,
     bounds: Sequence[tuple[float, float]],
     over: Over = "worst",
-    report: Callable[[int, int], None] | None = None,
+    ahead: Callable[[Sequence[tuple[float, ...]]], None] | None = None,
 ) -> Valley:
     """The lowest aim within bounds (keys,) of `evaluate(point) -> (loads,)`, which gives NaN where it cannot.
-    `report(points, about_how_many)` hears of every point.
+    `ahead(points)` is told of several that will be asked for next, whatever their results.
 
     Raises BenchError when the first look finds no point with a result.
     """
@@ -92,10 +100,8 @@ def minimise(
         raise BenchError(f"{len(bounds)} keys vary: at least 1 and at most {MOST_KEYS} can be searched together")
     low, high = (np.array(ends) for ends in zip(*bounds, strict=True))
     look = _look(len(bounds))
-    about = len(look) + 12 + 40 * (len(bounds) - 1)
-    tell = report or (lambda count, total: None)
-    trail = _Trail(evaluate, low, high, over, lambda count: tell(count, about))
-    aims = [trail.at(part) for part in look]
+    trail = _Trail(evaluate, low, high, over, ahead or (lambda points: None))
+    aims = trail.all(look)
     if not np.isfinite(aims).any():
         raise BenchError("no point of the first look at the range has a result")
     scanned = len(trail.seen)
@@ -110,6 +116,11 @@ def minimise(
     points, values = np.array(list(trail.seen)), np.array(list(trail.seen.values()))
     aim = np.array([aim_of(one, over) for one in values])
     return Valley(points, values, aim, int(np.argmin(aim)), scanned, flat)
+
+
+def about_points(keys: int) -> int:
+    """How many points a search over so many keys takes, roughly."""
+    return len(_look(keys)) + 12 + 40 * (keys - 1)
 
 
 def _look(keys: int) -> Array:
@@ -141,17 +152,17 @@ def _flat(trail: _Trail, keys: int) -> tuple[tuple[float, float], ...]:
     limit = (1 + FLAT) * aim_of(trail.seen[best], trail.over)
     found: list[tuple[float, ...]] = []
     for key in range(keys):
-        for place in np.linspace(0.0, 1.0, SLICE if keys > 1 else SCAN[0]):
-            trail.at(np.where(np.arange(keys) == key, place, part))
+        places = np.linspace(0.0, 1.0, SLICE if keys > 1 else SCAN[0])
+        trail.all([np.where(np.arange(keys) == key, place, part) for place in places])
         others = [other for other in range(keys) if other != key]
         line = sorted(
             (point[key], aim_of(values, trail.over))
             for point, values in trail.seen.items()
             if all(abs(point[other] - best[other]) <= 1e-9 * abs(best[other]) for other in others)
         )
-        places, aims = np.array(line).T
-        at = int(np.argmin(np.abs(places - best[key])))
-        found.append(tuple(_edge(_Cut(trail, part, key), places, aims, at, limit, step) for step in (-1, 1)))
+        where, aims = np.array(line).T
+        at = int(np.argmin(np.abs(where - best[key])))
+        found.append(tuple(_edge(_Cut(trail, part, key), where, aims, at, limit, step) for step in (-1, 1)))
     return tuple((low, high) for low, high in found)
 
 

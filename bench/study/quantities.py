@@ -38,12 +38,14 @@ class Quantity(NamedTuple):
 
 class Ask(NamedTuple):
     """What is wanted of every member: names of quantities, load of the static and ISO results [N m] (None: the
-    experiment's mean), mesh phases of a cycle, mesh cycles."""
+    experiment's mean), mesh phases of a cycle, mesh cycles; `loads` [N m]: every number at each of these in its place,
+    as COLUMN@0, COLUMN@1, .."""
 
     of: tuple[str, ...]
     torque: float | None = None
     positions: int = 64
     cycles: int = 1
+    loads: tuple[float, ...] = ()
 
 
 def _te(result: Any) -> Array:
@@ -195,6 +197,10 @@ def single_column(name: str) -> tuple[str, Column]:
 
 def measure(case: Case, ask: Ask) -> tuple[dict[str, float], list[str]]:
     """The numbers of a case by their columns, and warnings. Raises what the solvers raise."""
+    if ask.loads:
+        pairs = [(name, one.name) for name in ask.of for one in columns_of([name])]
+        rows = {column: at_loads(case, ask.loads, name, column, ask) for name, column in pairs}
+        return {f"{column}@{n}": float(value) for column, row in rows.items() for n, value in enumerate(row)}, []
     solved: dict[str, Any] = {}
     numbers: dict[str, float] = {}
     for name in ask.of:
@@ -212,7 +218,7 @@ def at_loads(case: Case, torques: Sequence[float], name: str, column: str, ask: 
     """One column of a quantity (loads,) at driver torques [N m]; static results are solved for all of them at once."""
     quantity = QUANTITIES[name]
     if quantity.stage != "static":
-        asks = [ask._replace(of=(name,), torque=torque) for torque in torques]
+        asks = [ask._replace(of=(name,), torque=torque, loads=()) for torque in torques]
         return np.array([measure(loaded(case, one.torque), one)[0][column] for one in asks])
     from gearbench.bench.statics import static
 
@@ -243,7 +249,6 @@ def _iso(case: Case, ask: Ask) -> dict[str, float]:
     from gearbench.bench.refusals.stated import check_stated
     from gearbench.bench.sweep import iso_factors
     from gearbench.geometry import pair
-    from gearbench.geometry.tooth.iso1328 import drawn_gear
     from gearbench.lumped.stiffness.iso6336 import iso_stiffness
 
     check_gears(case.rig)
@@ -257,10 +262,7 @@ def _iso(case: Case, ask: Ask) -> dict[str, float]:
         found["c_gamma"] = iso_stiffness(case.rig, meshing, force).mesh
     if "iso-kv" in ask.of:
         check_stated(case, "iso-kv")
-        # The errors that a grade draws count as those that are given.
-        drawn = {side: drawn_gear(getattr(case.rig, side), f"rig.{side}") for side in ("driver", "driven")}
-        real = under_load.model_copy(update={"rig": case.rig.model_copy(update=drawn)})
-        found["kv"] = float(iso_factors(real, np.array([_speed(case)]))[0][0])
+        found["kv"] = float(iso_factors(under_load, np.array([_speed(case)]))[0][0])
     return found
 
 

@@ -18,7 +18,7 @@ import typer
 from rich.markup import render
 
 from gearbench.cases import case_files, case_path
-from gearbench.cli import app, run_command_line
+from gearbench.cli import application, run_command_line
 from gearbench.rig import read_case
 from gearbench.shell.options import expand_lists
 
@@ -149,7 +149,7 @@ def help_texts(command: typer.core.TyperCommand | typer.core.TyperGroup) -> Iter
 
 
 def test_help_shows_every_word_of_it() -> None:
-    texts = list(help_texts(typer.main.get_command(app)))
+    texts = list(help_texts(typer.main.get_command(application())))
     assert len(texts) > 50
     for text in texts:
         assert render(text).plain == text  # [um] would be a style, and vanish

@@ -1,8 +1,9 @@
 """Code blocks of Markdown pages, and the running of them, page by page, each page in a folder of its own.
 
-Fenced blocks say what they are: `sh` holds gearbench commands, `python` a script, `toml title="mine.toml"` what is put
-at the end of that file; any other language is not run. Indented blocks are known by their first word. The comment
-`<!-- not run: REASON -->` above a block keeps it from running.
+Fenced blocks say what they are: `sh` holds gearbench commands and variables (R="text"), which hold to the end of the
+page, `python` a script, `toml title="mine.toml"` what is put at the end of that file; any other language is not run. An
+indented block is `sh` if a line of it is a command. The comment `<!-- not run: REASON -->` above a block keeps it from
+running.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 LANGUAGES = {"sh", "python", "toml", "matlab", "text"}
 COMMAND = re.compile(r"(\./)?gearbench\s")
+VARIABLE = re.compile(r"(\w+)=(\"[^\"]*\"|\S+)")
 # Commands of these run what runs them, or for hours.
 ELSEWHERE = {"test", "validate"}
 
@@ -42,8 +44,19 @@ class Block:
     @property
     def commands(self) -> list[list[str]]:
         """Words of each gearbench command of a shell block, without the program's name."""
-        lines = self.text.replace("\\\n", " ").splitlines()
-        return [shlex.split(line, comments=True)[1:] for line in lines if COMMAND.match(line)]
+        return self.commands_with({})
+
+    def commands_with(self, variables: dict[str, str]) -> list[list[str]]:
+        """The same with variables in place, to which those that the block sets are added."""
+        found = []
+        for line in self.text.replace("\\\n", " ").splitlines():
+            set_here = VARIABLE.fullmatch(line.strip())
+            if set_here:
+                variables[set_here[1]] = shlex.split(set_here[2])[0]
+            elif COMMAND.match(line):
+                known = re.sub(r"\$(\w+)", lambda name: variables.get(name[1], name[0]), line)
+                found.append(shlex.split(known, comments=True)[1:])
+        return found
 
 
 def pages() -> list[Path]:
@@ -88,7 +101,7 @@ def _in_list(lines: list[str], at: int) -> bool:
 
 
 def _guessed(text: str) -> str:
-    if COMMAND.match(text):
+    if any(COMMAND.match(line) for line in text.splitlines()):
         return "sh"
     return "python" if text.startswith("import gearbench") else "text"
 
@@ -98,6 +111,7 @@ def run_page(page: Path, folder: Path) -> list[str]:
     for name in ("cases", "tests"):
         (folder / name).symlink_to(ROOT / name)
     failed = []
+    variables: dict[str, str] = {}
     for block in blocks(page):
         if block.title and block.language == "toml":
             with (folder / block.title).open("a", encoding="utf-8") as file:
@@ -105,7 +119,7 @@ def run_page(page: Path, folder: Path) -> list[str]:
         elif block.run and block.language == "python":
             failed += _failure(block, ["-c", block.text], folder)
         elif block.run and block.language == "sh":
-            for words in block.commands:
+            for words in block.commands_with(variables):
                 if words[0] not in ELSEWHERE:
                     failed += _failure(block, ["-m", "gearbench", *words], folder)
     return failed

@@ -30,6 +30,9 @@ def optimise(
     out: Annotated[Path | None, typer.Option("--out", help="output folder; absent: optimum_NAME")] = None,
     positions: Annotated[int, typer.Option("--positions", min=8, help="mesh phases of a mesh cycle")] = 64,
     cycles: Annotated[int, typer.Option("--cycles", min=1, help="mesh cycles, where teeth differ")] = 1,
+    workers: Annotated[
+        int | None, typer.Option("--workers", help="processes of this machine; absent: as it has processors")
+    ] = None,
     force: Annotated[bool, typer.Option("--force", help="replace what another search left in the folder")] = False,
     settings: SetOption = None,
     as_json: JsonOption = False,
@@ -43,7 +46,7 @@ def optimise(
     with Progress(f"optimise {loaded.name}") as progress:
         found = gb.optimise(
             case, vary or (), quantity, torques(at_nm), over=over, settings=settings or (), positions=positions,
-            cycles=cycles, out=folder, force=force, progress=progress,
+            cycles=cycles, out=folder, workers=workers, force=force, progress=progress,
         )  # fmt: skip
     if as_json:
         print_json(optimum_data(found))

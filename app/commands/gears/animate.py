@@ -36,8 +36,6 @@ def animate(
     from gearbench.shell.failure import InputError
 
     check_animation(out, frames, cycles)
-    if record is not None and torque_nm is not None:
-        raise InputError("--torque-nm and --record cannot both be given: a record says what its mesh carries")
     if any(out.resolve() == Path(one).resolve() for one in (case, record) if one is not None):
         raise InputError(f"--out {out} is one of the inputs, which it would replace: choose another name")
     with Progress(f"animate {loaded.name}") as progress:

@@ -46,7 +46,11 @@ def test_all_reports_are_drawn_at_both_widths(tmp_path: Path) -> None:
     assert run_command_line(arguments) == 0
     arguments = ["sweep", "rig_62", "--points", "4", "--from-rpm", "1000", "--to-rpm", "4000", "--out", str(sweep)]
     assert run_command_line(arguments) == 0
-    names = {"run": run / "report.html", "compared": compared / "report.html"}
+    study = tmp_path / "study"
+    arguments = ["campaign", "quick_lumped", "--vary", "rig.driver.face_width_mm=10:20:3", "--out", str(study)]
+    arguments += ["--vary", "rig.driver.hub_radius_mm=30,40", "--of", "te-mean,te-orders", "--workers", "1"]
+    assert run_command_line(arguments) == 0
+    names = {"run": run / "report.html", "compared": compared / "report.html", "study": study / "report.html"}
     pages = []
     for name, path in names.items():
         pages.append(path.rename(tmp_path / f"{name}.html"))

@@ -95,6 +95,20 @@ def test_errors_that_a_grade_draws_raise_kv() -> None:
     assert coarse["iso_dynamic_factor"] > exact["iso_dynamic_factor"] + 0.02
 
 
+def test_a_sweep_draws_the_same_errors() -> None:
+    """What a grade draws, written into the case key by key, gives the same K_v."""
+    from gearbench.bench.sweep import iso_factors
+    from gearbench.geometry.tooth.iso1328 import drawn_gear
+
+    graded = case("rig.driver.iso_grade=9")
+    driver = drawn_gear(graded.rig.driver)
+    assert driver.iso_grade is None and driver.profile_form
+    given = graded.model_copy(update={"rig": graded.rig.model_copy(update={"driver": driver})})
+    speeds = np.array([100.0, 200.0])
+    assert iso_factors(graded, speeds)[0] == pytest.approx(iso_factors(given, speeds)[0], rel=1e-12)
+    assert iso_factors(graded, speeds)[0][1] > iso_factors(case(), speeds)[0][1] + 1e-4
+
+
 def test_static_loads_are_solved_together_and_alike() -> None:
     loads = (50.0, 100.0, 200.0)
     together = at_loads(case(), loads, "te-mean", "te_mean_um", Ask(()))
