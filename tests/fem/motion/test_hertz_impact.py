@@ -74,8 +74,9 @@ class Hertz(NamedTuple):
 
 
 def unyielding(tooth: Tooth, sense: int) -> Kernel:
-    """A kernel of nothing: what is left is the half-plane."""
-    table, modes = np.zeros((1, POINTS, POINTS)), np.zeros((0, 20, POINTS))
+    """A kernel of nothing, with a mode that no flank moves: what is left is the half-plane."""
+    # Laid out as those of gears, or the loops would be compiled for these arrays too.
+    table, modes = np.zeros((1, POINTS, POINTS)), np.zeros((1, 20, 2 * POINTS))[..., ::2]
     coupling = np.zeros((0, 0, 2, 2, 0, 0))
     return Kernel(table, table, tooth.s_end, tooth.s_tip, 6.0, 0, 0.02, modes, modes, coupling, sense)
 
@@ -96,7 +97,7 @@ def build(twins: Any, law: Any, load: str, inertias: tuple[float, float]) -> Mac
     held = Supports(driver=Support(), driven=Support(), direction="tangential")
     changes = {"support": held, "load": Load(boundary=load), "damping": Damping(material_ratio=0.0)}
     rig = twins.rig.model_copy(update=changes)
-    gear = SimpleNamespace(teeth=20, omega=np.zeros(0), mode_hub=np.zeros((0, 3)))
+    gear = SimpleNamespace(teeth=20, omega=np.array([1e6]), mode_hub=np.zeros((1, 3)))
     shape = body(twins.pair.driver, rig.driver, rig.material.density)
     bodies = tuple(replace(shape, inertia=inertia) for inertia in inertias)
     gears: Any = (gear, gear)
@@ -105,7 +106,7 @@ def build(twins: Any, law: Any, load: str, inertias: tuple[float, float]) -> Mac
 
 def strike(machine: Machine, speed: float, step: float, steps: int) -> list[State]:
     """From GAP before the flanks touch, the driver coming at that speed [m/s] along the line of action."""
-    d, v, still = np.zeros(machine.hubs), np.zeros(machine.hubs), np.zeros(machine.hubs)
+    d, v, still = (np.zeros(len(machine.mass)) for _ in range(3))
     d[machine.at.driver], v[machine.at.driver] = -GAP / machine.law.driver.rb, speed / machine.law.driver.rb
     none = np.zeros(0)
     state = State(0.0, d, v, still, still, np.zeros(0, MEETING), none, none, none, none, lately=0.0, torque=0.0)
