@@ -27,7 +27,7 @@ TORQUE, RATE, STEPS, FREQUENCY = 100.0, 65536.0, 110, 40.0
 BEGIN = 2 * np.pi * FREQUENCY / 20
 # Steady, up, and less steeply further: kinks lie between steps.
 TIME = np.array([0.0, 20.3, 70.6, 400.0]) / RATE
-SPEED = BEGIN + np.array([0.0, 0.0, 9.0, 24.0])
+SPEED = BEGIN + np.array([0.0, 0.0, 60.0, 90.0])
 ANGLE = np.concatenate([[0.0], np.cumsum(np.diff(TIME) * (SPEED[1:] + SPEED[:-1]) / 2)])
 COURSE = small.STEADY._replace(time=TIME, speed=SPEED, angle=ANGLE)
 
@@ -71,7 +71,7 @@ def test_run_up_moves_as_the_reduced_one_and_gains_its_momentum(
     for t in (-1e-3, 1e-4, TIME[1], TIME[2], 5e-3, 1.0):
         assert nominal(machine, float(t)) == pytest.approx(tuple(small.pace(other, float(t))), rel=1e-12)
     mine, reference = dte(machine, out), dte(machine, theirs)
-    assert np.std(mine - reference) < 0.01 * np.std(reference)
+    assert np.std(mine - reference) < 6e-3 * np.std(reference)
     assert mine.mean() == pytest.approx(reference.mean(), rel=5e-3)
     assert out.torque_driven.mean() == pytest.approx(theirs.torque_driven.mean(), rel=2e-3)
 
