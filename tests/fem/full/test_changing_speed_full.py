@@ -75,8 +75,8 @@ def test_run_up_moves_as_the_reduced_one_and_gains_its_momentum(
     assert mine.mean() == pytest.approx(reference.mean(), rel=5e-3)
     assert out.torque_driven.mean() == pytest.approx(theirs.torque_driven.mean(), rel=2e-3)
 
-    # What the torques leave of one another speeds up both gears, with the hubs' departures from the nominal rotation; of
-    # the teeth's own motion relative to them nothing is counted.
+    # What the torques leave of one another speeds up both gears, with the hubs' departures from the nominal rotation;
+    # of the teeth's own motion relative to them nothing is counted.
     time = np.arange(1, STEPS + 1) / RATE
     gained = 2 * (np.interp(time[-1], TIME, SPEED) - BEGIN) + run.state.v.hub[: machine.rotations].sum()
     lost = np.sum(TORQUE - out.torque_driven) / RATE
