@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -121,11 +122,32 @@ def run(
             Job(one, output, progress or Silent(), f"-{name}" if name else "", workers)
             for name, one in case.experiments()
         ]
+        _simulate_together(jobs, workers)
         done = [run_experiment(job) for job in jobs]
         if not output.has(REPORT):
             jobs[0].progress.step(REPORT)
             _write_report(case, output, [part for _, part in done if part is not None])
         return [numbers for numbers, _ in done]
+
+
+def _simulate_together(jobs: list[Job], workers: int | None) -> None:
+    """Records of several conditions side by side, those that an earlier run has not left."""
+    from gearbench.bench.conditions import simulate_all
+    from gearbench.records import write_record
+
+    missing = [job for job in jobs if not job.output.has(job.name("record.nc"))]
+    if len(missing) < 2:
+        return
+
+    def take(number: int, record: xr.Dataset) -> None:
+        job = missing[number]
+        job.output.write(job.name("record.nc"), lambda path: write_record(record, path))
+
+    progress = missing[0].progress
+    progress.step(f"records of {len(missing)} conditions")
+    with ExitStack() as folders:
+        kept = [folders.enter_context(checkpoints_of(job.output.path(job.name("record.nc")))) for job in missing]
+        simulate_all([job.case for job in missing], take, progress=progress, checkpoints=kept, workers=workers)
 
 
 def run_experiment(job: Job) -> tuple[dict[str, Any], RunPart | None]:

@@ -17,7 +17,7 @@ from gearbench.bench.errors import BenchError
 from gearbench.bench.models import model_for
 from gearbench.bench.plan.excitation import torque_realisation
 from gearbench.bench.plan.schedule import ProgressReport, Schedule, schedule
-from gearbench.bench.plan.settling import Course, Steady, kept_samples, samples_to_run, steady_state
+from gearbench.bench.plan.settling import Course, Steady, kept_samples, samples_to_run, steady_state, waiting
 from gearbench.bench.plan.workers import realisations
 from gearbench.bench.protocol import Drive, Prepared
 from gearbench.bench.record.attributes import (
@@ -28,6 +28,7 @@ from gearbench.bench.record.attributes import (
     rig_attributes,
     shown_mean,
     unlike_periods,
+    unsettled,
 )
 from gearbench.bench.record.channels import mesh_phases, sensed, tooth_channels, with_rotation
 from gearbench.bench.record.sensors import check_delays, repeated, sensor_attributes
@@ -42,6 +43,9 @@ from gearbench.rig import Case, dump_case
 from gearbench.rig.neutral import has_sensors
 
 Array = NDArray[np.float64]
+
+# The mesher knows one model at a time: cases that are simulated side by side are made ready one after the other.
+_READY = threading.Lock()
 
 
 @dataclass(frozen=True)
@@ -90,7 +94,8 @@ def simulate(
         raise BenchError(f"workers = {workers} must be at least 1")
     plan = schedule(case.experiment, case.rig)
     check_delays(case.rig, plan.wraps, plan.repeat_time, case.experiment.changes_speed)
-    prepared = solver.prepare(case, plan, lambda note: report(0.0, note))
+    with _READY:
+        prepared = solver.prepare(case, plan, lambda note: report(0.0, note))
     report(0.0, f"integrating with {prepared.substeps} steps a sample")
     shape = (case.experiment.realisations, kept_samples(plan, prepared.keep))
     # Filled row by row as realisations end: a hundred long ones are large, and must not be in memory twice.
@@ -115,6 +120,7 @@ def _realise(
     done = np.zeros(total)
     lock, stop = threading.Lock(), threading.Event()
     decay = None if plan.repeats else prepared.decay
+    wait = waiting(plan, case.experiment, None if case.experiment.settling_periods_max else prepared.slowest)
     expected = samples_to_run(plan, prepared.keep)
 
     def run(number: int) -> Realisation:
@@ -131,7 +137,7 @@ def _realise(
             # A realisation that takes longer to settle than expected stays close to its end.
             tape = partial(_tape, shelf, number) if shelf else None
             course = course_of(prepared, drive, lambda samples: tell(min(samples / expected, 0.99)), tape)
-            steady = steady_state(course, plan, case.experiment, prepared.dte, prepared.keep, decay)
+            steady = steady_state(course, plan, case.experiment, prepared.dte, prepared.keep, decay, wait)
             if shelf:
                 shelf.end(number, steady)
         torque = repeated(drive.torque, len(steady.outputs))
@@ -244,6 +250,7 @@ def _record(
         lost_contact(lost or 0, len(runs) * samples),
         divided_steps(divided or 0, len(runs) * samples * prepared.substeps),
         unlike_periods(plan),
+        unsettled(max(run.residual for run in runs), case.experiment.settling_tolerance),
     )
     periods = samples // plan.samples_per_period
     attributes = {

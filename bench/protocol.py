@@ -79,7 +79,11 @@ class Prepared(Protocol[State]):
     def warnings(self) -> tuple[str, ...]: ...
     @property
     def decay(self) -> float | None:
-        """Slowest rate [1/s] at which free vibrations die out, where the model knows it."""
+        """Slowest rate [1/s] at which free vibrations die out, where records that do not repeat wait for it."""
+
+    @property
+    def slowest(self) -> float | None:
+        """That rate, where the model knows it."""
 
     def drive(self, torque: Torque) -> Drive:
         """One period of a torque on the model's grid."""

@@ -86,7 +86,10 @@ class Experiment(Value):
         doc="largest period-to-period change of the DTE, relative to its standard deviation",
     )
     settling_periods_max: int = quantity(
-        4, ge=1, le=10_000, doc="excitation periods after which failing to settle is an error"
+        0,
+        ge=0,
+        le=10_000,
+        doc="excitation periods after which failing to settle is an error; 0: free vibrations are waited for",
     )
     multisine: Multisine | None = quantity(None, doc="absent: constant torque")
     speed_table: SpeedTable | None = quantity(None, doc="absent: constant, or linear to speed_end")

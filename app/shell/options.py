@@ -52,7 +52,7 @@ ModelOption = Annotated[
 ]
 WorkersOption = Annotated[
     int | None,
-    typer.Option("--workers", min=1, metavar="N", help="realisations side by side; absent: as many as processors"),
+    typer.Option("--workers", min=1, metavar="N", help="what runs side by side; absent: as many as processors"),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="print the summary as JSON")]
 ReportOption = Annotated[

@@ -44,9 +44,14 @@ def begun_with(here: Array, outputs: Array) -> Array:
     return np.vstack([here[None], outputs[:-1]])
 
 
+def reach_of(meshing: Pair) -> float:
+    """DTE [m] up to which tip edges are followed."""
+    return EDGE_SEPARATION * meshing.driver.module
+
+
 def check_reach(dte: Array, meshing: Pair) -> None:
     """Raises BenchError where the flanks overlap further than tip edges are followed; dte [m]."""
-    most = EDGE_SEPARATION * meshing.driver.module
+    most = reach_of(meshing)
     if dte.max() > most:
         raise BenchError(
             f"the DTE reaches {1e6 * dte.max():.4g} um, beyond the {1e6 * most:.4g} um to which contact off the"

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import inf
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.bench.elastic.course import begun_with, check_course, check_reach, drive_of, torque_of
+from gearbench.bench.elastic.course import begun_with, check_course, check_reach, drive_of, reach_of, torque_of
+from gearbench.bench.elastic.rest import check_rest
 from gearbench.bench.elastic.rig import ElasticRig, choose_substeps, elastic_rig, machine_for, slowest_decay
 from gearbench.bench.elastic.together import under_excitation, under_ripple
 from gearbench.bench.plan.excitation import Torque
@@ -75,6 +77,11 @@ class Elastic:
     def decay(self) -> float | None:
         # A record whose speed changes has no periods that could be compared.
         return self.settling if self.changes else None
+
+    @property
+    def slowest(self) -> float:
+        """Slowest rate [1/s] at which free vibrations die out, about rest, whether samples show them or not."""
+        return min(slowest_decay(self.machine, self.mean_torque, phase, inf) for phase in (0.0, 0.5))
 
     @property
     def settings(self) -> dict[str, Any]:
@@ -172,7 +179,7 @@ def prepare(case: Case, plan: Schedule, note: Note) -> Elastic:
     duration = (plan.record_samples - 1) / plan.sampling_rate
     machine = machine_for(elastic, plan.mesh_frequency, case.experiment.torque_mean, duration, plan.rotation)
     substeps = choose_substeps(machine, case, plan)
-    return Elastic(
+    prepared = Elastic(
         elastic=elastic,
         machine=machine,
         scheme=make_scheme(1.0 / (plan.sampling_rate * substeps), case.simulation.spectral_radius),
@@ -183,3 +190,6 @@ def prepare(case: Case, plan: Schedule, note: Note) -> Elastic:
         teeth=case.simulation.outputs == "teeth",
         changes=plan.rotation is not None,
     )
+    note("looking at rest")
+    check_rest(machine, prepared.dte, case.experiment.torque_mean, plan, reach_of(elastic.pair))
+    return prepared

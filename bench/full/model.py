@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.bench.errors import BenchError
 from gearbench.bench.plan.schedule import ProgressReport, Schedule
 from gearbench.bench.protocol import Model, Note
 from gearbench.bench.record.static import Loads
@@ -35,11 +34,6 @@ class Unreduced(Model):
         if case.simulation.contact == "penalty":
             refuse_effects(case.rig, f'{self.title} with simulation.contact = "penalty"')
         refuse_effects(case.rig, self.title, represented=FLANK_KEYS)
-        if case.experiment.changes_speed:
-            raise BenchError(
-                f"the {self.title} turns at a constant speed, without experiment.speed_end_rpm and speed_table: leave"
-                ' them out, or set simulation.model = "reduced"'
-            )
         check_mean_torque(case)
 
     def prepare(self, case: Case, plan: Schedule, note: Note) -> Full:

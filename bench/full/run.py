@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.bench.elastic.course import begun_with, check_course, check_reach, drive_of, torque_of
-from gearbench.bench.elastic.rig import ElasticRig, choose_substeps, elastic_rig, machine_for
+from gearbench.bench.elastic.rig import ElasticRig, choose_substeps, elastic_rig, machine_for, slowest_decay
 from gearbench.bench.plan.excitation import Torque
+from gearbench.bench.plan.rotation import Rotation
 from gearbench.bench.plan.schedule import Schedule
 from gearbench.bench.plan.settling import Keep
 from gearbench.bench.protocol import Channels, Drive, Note
@@ -21,6 +22,7 @@ from gearbench.fem.full.record import CHANNELS, advance, columns
 from gearbench.fem.full.start import initial_state
 from gearbench.fem.full.transient import Integrator, make_integrator
 from gearbench.fem.full.transient import State as Step
+from gearbench.fem.motion.machine import STEADY
 from gearbench.fem.motion.scheme import make_scheme
 from gearbench.rig import Case, Rig, Simulation
 
@@ -47,11 +49,12 @@ class Full:
     sampling_rate: float
     samples_per_period: int
     teeth: bool = False  # whether a record holds tooth forces
+    decay: float | None = None  # where the speed changes: no periods could be compared
 
     keep: ClassVar[Keep] = "every"
     piece: ClassVar[int] = 8
     absolute: ClassVar[bool] = True
-    decay: ClassVar[float | None] = None
+    slowest: ClassVar[float | None] = None
     warnings: ClassVar[tuple[str, ...]] = ()
 
     @property
@@ -122,19 +125,33 @@ def full_gears(rig: Rig, simulation: Simulation, note: Note) -> tuple[FullGear, 
 
 
 def full_machine(
-    elastic: ElasticRig, gears: tuple[FullGear, FullGear], mesh_frequency: float, surfaces: bool = False
+    elastic: ElasticRig,
+    gears: tuple[FullGear, FullGear],
+    mesh_frequency: float,
+    surfaces: bool = False,
+    rotation: Rotation | None = None,
 ) -> Machine:
-    """Equations of motion at a mesh frequency [Hz]; surfaces: whether the meshes' own surfaces touch."""
-    return make_machine(elastic.rig, elastic.pair, elastic.law, gears, elastic.bodies, mesh_frequency, surfaces)
+    """Equations of motion at a mesh frequency [Hz]; surfaces: whether the meshes' own surfaces touch; `rotation`: where
+    the speed changes."""
+    e, course = elastic, STEADY
+    if rotation is not None:
+        course = course._replace(time=rotation.time, speed=rotation.speed, angle=rotation.angle)
+    return make_machine(e.rig, e.pair, e.law, gears, e.bodies, mesh_frequency, surfaces, course)
 
 
 def prepare(case: Case, plan: Schedule, note: Note) -> Full:
     """Contact tabulated, gears assembled, step chosen, effective matrices factorised. Raises GeometryError,
     ContactError or BenchError."""
     elastic = elastic_rig(case.rig, case.simulation, note)
-    substeps = choose_substeps(machine_for(elastic, plan.mesh_frequency), case, plan)
+    small, decay = machine_for(elastic, plan.mesh_frequency), None
+    substeps = choose_substeps(small, case, plan)
+    if plan.rotation is not None:
+        highest = plan.sampling_rate / 4
+        decay = min(slowest_decay(small, case.experiment.torque_mean, phase, highest) for phase in (0.0, 0.5))
     gears = full_gears(case.rig, case.simulation, note)
-    machine = full_machine(elastic, gears, plan.mesh_frequency, case.simulation.contact == "penalty")
+    machine = full_machine(
+        elastic, gears, plan.mesh_frequency, case.simulation.contact == "penalty", plan.rotation
+    )
     note("factorising the effective matrices")
     scheme = make_scheme(1.0 / (plan.sampling_rate * substeps), case.simulation.spectral_radius)
     return Full(
@@ -145,4 +162,5 @@ def prepare(case: Case, plan: Schedule, note: Note) -> Full:
         sampling_rate=plan.sampling_rate,
         samples_per_period=plan.samples_per_period,
         teeth=case.simulation.outputs == "teeth",
+        decay=decay,
     )

@@ -48,6 +48,7 @@ class LinearRig:
     piece: ClassVar[int] = 0
     absolute: ClassVar[bool] = False
     decay: ClassVar[float | None] = None
+    slowest: ClassVar[float | None] = None
 
     @property
     def force_per_torque(self) -> float:

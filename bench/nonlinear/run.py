@@ -89,6 +89,11 @@ class Setup:
         return self.model.slowest_decay(self.mean_force)
 
     @property
+    def slowest(self) -> float:
+        """That rate."""
+        return self.decay
+
+    @property
     def settling(self) -> float:
         """That rate as a sweep asks for it."""
         return self.decay

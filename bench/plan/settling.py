@@ -28,13 +28,20 @@ Dte = Callable[[Array], Array]
 # which stands for them all. A mean and a block that stands for others have no time of their own: they begin at 0.
 Keep = Literal["every", "mean", "one"]
 
+# Excitation periods that are waited for: at least, where a case leaves it open how many, and at most; how many times as
+# long as free vibrations need.
+FEW = 4
+MOST = 10_000
+PATIENCE = 2
+
 
 @dataclass(frozen=True)
 class Steady:
     """What is kept: outputs (samples, n) from sample `first` of the record's clock on.
 
-    residual: change of the DTE to the block before, largest value over its standard deviation; settling_periods:
-    excitation periods before what is kept; scatter (n,): rms departure of single blocks from their mean.
+    residual: change of the DTE to the block before, largest value over its standard deviation, beyond the tolerance
+    where free vibrations have died out and the motion yet does not repeat; settling_periods: excitation periods before
+    what is kept; scatter (n,): rms departure of single blocks from their mean.
     """
 
     outputs: Array
@@ -42,6 +49,14 @@ class Steady:
     settling_periods: int
     first: int = 0
     scatter: Array | None = None
+
+
+class Wait(NamedTuple):
+    """How many excitation periods a motion may take to settle, and whether free vibrations have died out by then: what
+    still changes is then the answer itself."""
+
+    most: int
+    ends: bool
 
 
 class Settled(NamedTuple):
@@ -59,22 +74,42 @@ def change(before: Array, after: Array) -> float:
     return float(np.abs(after - before).max()) / scale
 
 
+def waiting(plan: Schedule, experiment: Experiment, slowest: float | None) -> Wait:
+    """How long a motion is waited for whose free vibrations die out at that slowest rate [1/s] (None: unknown)."""
+    if experiment.settling_periods_max:
+        return Wait(experiment.settling_periods_max, False)
+    if slowest is None or not slowest > 0.0:
+        return Wait(FEW, False)
+    period = plan.samples_per_period / plan.sampling_rate
+    needed = log(1 / experiment.settling_tolerance) / slowest / period
+    if needed > MOST:
+        return Wait(FEW, False)
+    return Wait(min(max(FEW, ceil(PATIENCE * needed)), MOST), True)
+
+
 def steady_state(
-    course: Course, plan: Schedule, experiment: Experiment, dte: Dte, keep: Keep, decay: float | None
+    course: Course,
+    plan: Schedule,
+    experiment: Experiment,
+    dte: Dte,
+    keep: Keep,
+    decay: float | None,
+    wait: Wait | None = None,
 ) -> Steady:
     """Run one realisation until it is steady, and on to the end of the record.
 
-    decay: slowest rate [1/s] of free vibrations, where known. Raises BenchError if that takes more than
-    experiment.settling_periods_max.
+    decay: slowest rate [1/s] of free vibrations, where a record that does not repeat is to wait for it; wait: how long
+    (absent: as where that rate is unknown). Raises BenchError if that takes longer.
     """
+    wait = wait or waiting(plan, experiment, None)
     if not plan.repeats:
         if decay is None:
-            return _from_two_starts(course, plan, experiment, dte)
+            return _from_two_starts(course, plan, experiment, dte, wait)
         return _after_decay(course, plan, experiment, decay)
     if keep == "every":
-        return _every_block(course, plan, experiment, dte)
+        return _every_block(course, plan, experiment, dte, wait)
     blocks = course(0, repeat(plan.block_samples))
-    settled = _settle(blocks, plan, experiment, dte)
+    settled = _settle(blocks, plan, experiment, dte, wait)
     periods = (settled.earlier + 1) * plan.block_periods
     if keep == "one":
         return Steady(settled.after, settled.residual, periods)
@@ -94,8 +129,10 @@ def kept_samples(plan: Schedule, keep: Keep) -> int:
     return plan.block_samples if plan.repeats and keep != "every" else plan.record_samples
 
 
-def _settle(blocks: Iterator[Array], plan: Schedule, experiment: Experiment, dte: Dte, earlier: int = 0) -> Settled:
-    """The first two blocks that are alike, `earlier` blocks having been run."""
+def _settle(
+    blocks: Iterator[Array], plan: Schedule, experiment: Experiment, dte: Dte, wait: Wait, earlier: int = 0
+) -> Settled:
+    """The first two blocks that are alike, `earlier` blocks having been run; the last two of a wait that ends."""
     before = next(blocks)
     while True:
         after = next(blocks)
@@ -104,21 +141,24 @@ def _settle(blocks: Iterator[Array], plan: Schedule, experiment: Experiment, dte
             return Settled(before, after, residual, earlier)
         earlier += 1
         periods = (earlier + 1) * plan.block_periods
-        if periods > experiment.settling_periods_max:
+        if periods > wait.most and wait.ends:
+            return Settled(before, after, residual, earlier - 1)
+        if periods > wait.most:
             raise _no_steady_state(
                 f"after {periods} excitation periods the DTE still changes by {residual:.3g} of its standard deviation"
                 " from one repetition to the next",
                 experiment,
+                wait.most,
             )
         before = after
 
 
-def _every_block(course: Course, plan: Schedule, experiment: Experiment, dte: Dte) -> Steady:
+def _every_block(course: Course, plan: Schedule, experiment: Experiment, dte: Dte, wait: Wait) -> Steady:
     """Settle for one block, then keep those that follow one another without change."""
     blocks = course(-plan.block_samples, repeat(plan.block_samples))
     next(blocks)
     # One block more than recorded shows the change from block to block where only one is wanted.
-    settled = _settle(blocks, plan, experiment, dte, earlier=1)
+    settled = _settle(blocks, plan, experiment, dte, wait, earlier=1)
     kept, earlier = [settled.before, settled.after], settled.earlier
     if plan.blocks == 1:
         kept, earlier = [settled.after], earlier + 1
@@ -150,15 +190,16 @@ def _after_decay(course: Course, plan: Schedule, experiment: Experiment, decay: 
     """A record shorter than what repeats: it begins when free vibrations have died out by their slowest rate."""
     period = plan.samples_per_period / plan.sampling_rate
     wanted = log(1 / experiment.settling_tolerance) * plan.sampling_rate / plan.samples_per_period
-    most = experiment.settling_periods_max
+    most = experiment.settling_periods_max or MOST
     if not decay > 0:
-        raise _no_steady_state("free vibrations do not die out: they grow or keep their size", experiment)
+        raise _no_steady_state("free vibrations do not die out: they grow or keep their size", experiment, most)
     periods = ceil(wanted / decay)
     if periods > most:
         raise _no_steady_state(
             f"free vibrations take {periods} excitation periods to die out: after {most} they still have"
             f" {exp(-decay * most * period):.3g} of their size",
             experiment,
+            most,
         )
     settling = periods * plan.samples_per_period
     if plan.rotation:  # an excitation period may be the whole record: the part of it that is needed is enough
@@ -167,11 +208,11 @@ def _after_decay(course: Course, plan: Schedule, experiment: Experiment, decay: 
     return Steady(outputs, experiment.settling_tolerance, periods)
 
 
-def _from_two_starts(course: Course, plan: Schedule, experiment: Experiment, dte: Dte) -> Steady:
+def _from_two_starts(course: Course, plan: Schedule, experiment: Experiment, dte: Dte, wait: Wait) -> Steady:
     """A record shorter than what repeats, of a model that does not know how fast its vibrations die out.
 
     No period is like the one before, so the steady state shows in another way: two histories, one begun an excitation
-    period before the other, must agree over the first recorded period.
+    period before the other, later twice as long before, must agree over the first recorded period.
     """
 
     def history(settling: int) -> tuple[Iterator[Array], Array]:
@@ -185,21 +226,23 @@ def _from_two_starts(course: Course, plan: Schedule, experiment: Experiment, dte
     while True:
         periods, first = history(settling)
         residual = change(dte(before), dte(first))
-        if residual <= experiment.settling_tolerance:
+        if residual <= experiment.settling_tolerance or (wait.ends and settling >= wait.most):
             break
-        if settling >= experiment.settling_periods_max:
+        if settling >= wait.most:
             raise _no_steady_state(
                 f"after {settling} excitation periods the DTE still depends by {residual:.3g} of its standard deviation"
                 " on when the simulation began",
                 experiment,
+                wait.most,
             )
-        before, settling = first, settling + 1
+        further = settling + 1 if settling < FEW or experiment.settling_periods_max else 2 * settling
+        before, settling = first, min(further, wait.most)
     kept = [first, *(next(periods) for _ in range(plan.periods - 1))]
     return Steady(np.vstack(kept), residual, settling)
 
 
-def _no_steady_state(found: str, experiment: Experiment) -> BenchError:
+def _no_steady_state(found: str, experiment: Experiment, most: int) -> BenchError:
     return BenchError(
         f"no steady state: {found}, which experiment.settling_tolerance limits to {experiment.settling_tolerance:g};"
-        f" raise settling_periods_max = {experiment.settling_periods_max} or the damping"
+        f" raise settling_periods_max = {most} or the damping"
     )

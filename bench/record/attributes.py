@@ -93,6 +93,16 @@ def unlike_periods(plan: Schedule) -> str | None:
     return after if plan.wraps else f"{after}, longer than the record: none of its excitation periods is like another"
 
 
+def unsettled(residual: float, tolerance: float) -> str | None:
+    """A sentence for a motion that still changes from period to period when free vibrations have died out."""
+    if residual <= tolerance:
+        return None
+    return (
+        f"the motion does not repeat: free vibrations have died out, and the DTE still changes by {residual:.2g} of its"
+        f" standard deviation (settling_tolerance: {tolerance:g}), as where teeth part and strike"
+    )
+
+
 def joined(*warnings: str | None) -> str | None:
     """The sentences as an attribute; None without any."""
     return "; ".join(filter(None, warnings)) or None

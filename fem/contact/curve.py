@@ -48,7 +48,8 @@ class Curves(NamedTuple):
 
 def edge_reach(slave: Tooth, master: Tooth, a: float, separation: float) -> float:
     """Roll length to which the slave's tip edge is followed: there it has left the master's involute by `separation`,
-    has turned over, or its foot passes the beginning of the master's flank."""
+    has turned over, or its foot passes the beginning of the master's flank; of a master that undercut ends, the corner
+    touches there, and beyond it the foot of the edge rises again."""
     xi = slave.rho_end
     step = separation / 4
     while step > separation / 1000:
@@ -67,6 +68,8 @@ def _follows(slave: Tooth, master: Tooth, a: float, xi: float, separation: float
     left = touch.reference - (rho_m - master.rb * alpha)
     _, foot = gap_to_master(slave, master, touch.angle, a, touch.s)
     turned = touch.s >= slave.s_tip - 1e-12 and slave.edge_radius > 0
+    if master.corner >= 0.0:
+        return not (left > separation or turned)
     return not (left > separation or turned or foot**2 / (2 * master.rb) < master.s_form or rho_m <= separation / 4)
 
 
@@ -74,7 +77,7 @@ def tabulate(slave: Tooth, master: Tooth, ks: Kernel, km: Kernel, half_plane: fl
     """The line's approach at every node of load and roll length.
 
     Where undercut limits the flanks, contact starts and ends on corners instead of tip edges. The gear with the corner
-    is then the slave as far as the line reaches; a mate without one never is, and its curve stays empty.
+    is then the slave as far as the line reaches; a mate without one is so on its tip edge only.
     """
     width = min(ks.width, km.width)
     logs = np.linspace(log(LOAD_RANGE[0] * width), log(LOAD_RANGE[1] * width), LOADS)
@@ -87,8 +90,7 @@ def tabulate(slave: Tooth, master: Tooth, ks: Kernel, km: Kernel, half_plane: fl
         if master.corner < 0.0:
             xi = np.unique(np.concatenate([xi[xi < middle], _curve_nodes(slave, middle, reach)]))
     elif master.corner >= 0.0:
-        none = np.zeros((LOADS, 4))
-        return Curve(np.arange(4.0), none, none.copy(), float(logs[0]), float(logs[1] - logs[0]), -1.0)
+        xi = _edge_nodes(slave, max(reach, slave.rho_end + 4e-6))
     else:
         xi = _curve_nodes(slave, middle, reach)
     value = np.array(
@@ -121,19 +123,29 @@ def _corner_nodes(slave: Tooth, master: Tooth, a: float, last: float) -> Array:
 def _curve_nodes(slave: Tooth, middle: float, reach: float) -> Array:
     """Roll lengths, dense around the beginning of the tip edge."""
     end = slave.rho_end
-    fine = 0.15 * slave.edge_radius * slave.rb / slave.rho_end
-    fine = min(max(0.1 * fine, 1e-6), 2e-5)
     below = [end]
-    step = fine
+    step = _finest(slave)
     while below[-1] - step > middle:
         below.append(below[-1] - step)
         step = min(step * 1.25, (end - middle) / 12)
+    return np.unique(np.concatenate([[middle], below, _edge_nodes(slave, reach)]))
+
+
+def _edge_nodes(slave: Tooth, reach: float) -> Array:
+    """Roll lengths on the tip edge, dense around its beginning."""
+    end = slave.rho_end
     above = [end]
-    step = fine
+    step = _finest(slave)
     while above[-1] + step < reach:
         above.append(above[-1] + step)
         step = min(step * 1.25, (reach - end) / 6)
-    return np.unique(np.concatenate([[middle], below, above, [reach]]))
+    return np.unique(np.concatenate([above, [reach]]))
+
+
+def _finest(slave: Tooth) -> float:
+    """Distance of roll lengths at the beginning of the tip edge [m]."""
+    fine = 0.15 * slave.edge_radius * slave.rb / slave.rho_end
+    return min(max(0.1 * fine, 1e-6), 2e-5)
 
 
 @compiled(forceinline=True)
@@ -232,9 +244,9 @@ def curve_at(curve: Curve, xi: float, force: float):
 def pair_cut(curves: Curves, k: Contact, node: int) -> Cut:
     """The curve of a lone pair where it touches, four loads from number `node` on.
 
-    The gear nearer its tip is the slave; with undercut corners the gear that has one, or is nearer to its own. Either
-    choice gives the same to about 2e-5 in mid-path, where one passes smoothly into the other, so that not even that
-    much of a step is left.
+    The gear nearer its tip is the slave; with undercut corners the gear that has one, or is nearer to its own, but for
+    its mate's tip edge. Either choice gives the same to about 2e-5 in mid-path, where one passes smoothly into the
+    other, so that not even that much of a step is left.
     """
     left1, left2 = curves.end1 - k.xi1, curves.end2 - k.xi2
     corner1, corner2 = curves.driver.corner, curves.driven.corner
@@ -246,21 +258,18 @@ def pair_cut(curves: Curves, k: Contact, node: int) -> Cut:
     elif k.slave == EDGE2 or k.slave == CORNER2:
         t = 0.0
     if corner1 >= 0.0 and corner2 < 0.0:
-        t = 1.0
+        t = 0.0 if k.slave == EDGE2 else 1.0
     elif corner2 >= 0.0 and corner1 < 0.0:
-        t = 0.0
+        t = 1.0 if k.slave == EDGE1 else 0.0
     t = min(max(t, 0.0), 1.0)
     w = t * t * t * (10 - 15 * t + 6 * t * t)
     v = 1 - w
-    # A tip edge on its way to the mate's corner is felt as in that corner.
-    xi1 = curves.driver.xi[0] if k.slave == EDGE2 and corner1 >= 0.0 else k.xi1
-    xi2 = curves.driven.xi[0] if k.slave == EDGE1 and corner2 >= 0.0 else k.xi2
     if v == 0.0:
-        return curve_cut(curves.driver, xi1, node)
-    two = curve_cut(curves.driven, xi2, node)
+        return curve_cut(curves.driver, k.xi1, node)
+    two = curve_cut(curves.driven, k.xi2, node)
     if w == 0.0:
         return two
-    one = curve_cut(curves.driver, xi1, node)
+    one = curve_cut(curves.driver, k.xi1, node)
     c0, c1, c2, c3 = w * one.c0 + v * two.c0, w * one.c1 + v * two.c1, w * one.c2 + v * two.c2, w * one.c3 + v * two.c3
     return Cut(node, c0, c1, c2, c3)
 

@@ -77,11 +77,6 @@ def make_law(
     reach1, reach2 = (edge_reach(t1, t2, a, approach_max), edge_reach(t2, t1, a, approach_max))
     if curves is None:
         curves = (tabulate(t1, t2, k1, k2, half_plane, a, reach1), tabulate(t2, t1, k2, k1, half_plane, a, reach2))
-    # Before it passes the mate's undercut corner a tip edge lies on the mate's flank, felt as in that corner.
-    if t2.corner >= 0.0:
-        reach1 = max(reach1, t1.rho_end + approach_max)
-    if t1.corner >= 0.0:
-        reach2 = max(reach2, t2.rho_end + approach_max)
     f1, f2 = _deviations(meshing, gears, reach1, reach2)
     every = Curves(*curves, t1.rho_end, t2.rho_end)
     return Law(t1, t2, k1, k2, a, half_plane, every, reach1, reach2, f1, f2, f1.largest + f2.largest)

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from gearbench.fem.contact.law import Law
 from gearbench.fem.full.gear import FullGear
+from gearbench.fem.motion.machine import STEADY, Course, Pace
 from gearbench.geometry.pair.kinematics import Pair
 from gearbench.geometry.tooth.body import Body
 from gearbench.rig import Rig
@@ -31,8 +32,8 @@ class Machine:
 
     gears: driver, driven gear; rotations: 1 where the driven speed is prescribed, 2 where both gears turn freely; axis
     (2,): direction of the support motion; mass, damping, stiffness (h,): of the hubs' unknowns, the gears' whole mass
-    included; speeds: nominal [rad/s]; beta [s]: stiffness-proportional damping; surfaces: whether the meshes' own
-    surfaces touch, not the contact law's flanks.
+    included; speeds: nominal [rad/s], up to time 0 where `course` changes them; beta [s]: stiffness-proportional
+    damping; surfaces: whether the meshes' own surfaces touch, not the contact law's flanks.
     """
 
     law: Law
@@ -45,6 +46,7 @@ class Machine:
     speeds: tuple[float, float]
     beta: float
     surfaces: bool = False
+    course: Course = STEADY
 
     @property
     def hubs(self) -> int:
@@ -65,8 +67,10 @@ def make_machine(
     bodies: tuple[Body, Body],
     mesh_frequency: float,
     surfaces: bool = False,
+    course: Course = STEADY,
 ) -> Machine:
-    """The model of a rig at a mesh frequency [Hz]; gears and bodies: driver first; surfaces: as in `Machine`."""
+    """The model of a rig at a mesh frequency [Hz]; gears and bodies: driver first; surfaces: as in `Machine`; `course`
+    changes the speed from time 0 on (its inertias are those of the rig)."""
     rotations = 1 if rig.load.boundary == "speed" else 2
     supports = rig.support.driver.holding(bodies[0].mass), rig.support.driven.holding(bodies[1].mass)
     alpha = pair.working_pressure_angle if rig.support.direction == "line-of-action" else 0.0
@@ -82,7 +86,14 @@ def make_machine(
         speeds=(2 * pi * mesh_frequency / gears[0].teeth, 2 * pi * mesh_frequency / gears[1].teeth),
         beta=rig.damping.beta,
         surfaces=surfaces,
+        course=course._replace(inertia2=_sped_up(rig, bodies, rotations == 2)),
     )
+
+
+def _sped_up(rig: Rig, bodies: tuple[Body, Body], free: bool) -> float:
+    """Inertia [kg m^2] that the load's torque speeds up: the driven gear's, or all that turns, seen from there."""
+    ratio = rig.driven.teeth / rig.driver.teeth
+    return bodies[1].inertia + (bodies[0].inertia * ratio**2 if free else 0.0)
 
 
 class Angles(NamedTuple):
@@ -92,10 +103,24 @@ class Angles(NamedTuple):
     driven: float
 
 
+def nominal(machine: Machine, t: float) -> Pace:
+    """The nominal rotation at time t [s], as `motion.machine.pace` has it."""
+    course, (one, two) = machine.course, machine.speeds
+    if not len(course.time) or t <= 0.0:
+        return Pace(one * t, two * t, one, two, 0.0, 0.0)
+    low, slope = int(np.searchsorted(course.time, t, side="left")) - 1, 0.0
+    if low < len(course.time) - 1:
+        slope = float((course.speed[low + 1] - course.speed[low]) / (course.time[low + 1] - course.time[low]))
+    since, ratio = t - float(course.time[low]), two / one
+    speed = float(course.speed[low]) + slope * since
+    angle = float(course.angle[low]) + 0.5 * (float(course.speed[low]) + speed) * since
+    return Pace(angle, ratio * angle, speed, ratio * speed, slope, ratio * slope)
+
+
 def angles(machine: Machine, hub: Array, t: float) -> Angles:
     """Angles at the hub unknowns (h,) and the time t [s]."""
-    theta2 = machine.speeds[1] * t
-    return Angles(machine.speeds[0] * t + hub[0], theta2 + hub[1] if machine.rotations == 2 else theta2)
+    at = nominal(machine, t)
+    return Angles(at.angle1 + hub[0], at.angle2 + hub[1] if machine.rotations == 2 else at.angle2)
 
 
 def hub_motions(machine: Machine, at: Angles) -> tuple[Array, Array]:

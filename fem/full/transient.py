@@ -18,7 +18,7 @@ from gearbench.fem.contact.law import Meetings, contact_in
 from gearbench.fem.contact.sharing import share_load
 from gearbench.fem.full.contact import Met, meet
 from gearbench.fem.full.gear import Effective, effective
-from gearbench.fem.full.machine import Machine, angles, hub_motions
+from gearbench.fem.full.machine import Machine, angles, hub_motions, nominal
 from gearbench.fem.full.penalty import TOLERANCE, closed_points, near_surfaces, softness
 from gearbench.fem.motion.scheme import Scheme
 
@@ -92,6 +92,20 @@ def outer_load(machine: Machine, torque: float) -> Array:
     return out
 
 
+def lag(machine: Machine, t: float) -> Motion | None:
+    """Forces by which all that turns lags behind the nominal rotation at time t [s], whose departures are the unknowns;
+    None while it is steady. Where neither speed is prescribed the load's torque makes up for them."""
+    at = nominal(machine, t)
+    if at.pull1 == 0.0:
+        return None
+    hub = np.zeros(machine.hubs)
+    hub[0] = -machine.mass[0] * at.pull1
+    if machine.rotations == 2:
+        hub[1] = (machine.course.inertia2 - machine.mass[1]) * at.pull2
+    one, two = machine.gears
+    return Motion(hub, -at.pull1 * one.rigid[..., 2], at.pull2 * two.rigid[..., 2])
+
+
 def onto_hub(rigid: Array, field: Array) -> Array:
     """Product (3,) of a field (u, teeth) with the three of `rigid` (u, teeth, 3)."""
     return np.asarray(field.ravel() @ rigid.reshape(-1, 3))
@@ -116,8 +130,15 @@ class Ahead(NamedTuple):
     rest: Motion
 
 
-def predict(machine: Machine, scheme: Scheme, state: State, hubs: tuple[Array, Array], outer: Array) -> Ahead:
-    """What the next step would bring without new accelerations."""
+def predict(
+    machine: Machine,
+    scheme: Scheme,
+    state: State,
+    hubs: tuple[Array, Array],
+    outer: Array,
+    lags: tuple[Motion | None, Motion | None] = (None, None),
+) -> Ahead:
+    """What the next step would bring without new accelerations; lags: at its beginning and its end."""
     h, am, af, gamma, beta = scheme.step, scheme.alpha_m, scheme.alpha_f, scheme.gamma, scheme.beta
     late = 1.0 - af
     d = Motion(*(x + h * v + h * h * (0.5 - beta) * a for x, v, a in zip(state.d, state.v, state.a, strict=True)))
@@ -132,6 +153,9 @@ def predict(machine: Machine, scheme: Scheme, state: State, hubs: tuple[Array, A
         strain += machine.beta * (late * v.gears[i] + af * state.v.gears[i])
         field = -am * old.gears[i] - gear.stiffness @ strain
         field[gear.loaded] += af * state.push[i]
+        for part, force in zip((af, late), lags, strict=True):
+            if force is not None:
+                field += part * force.gears[i]
         fields.append(field)
     return Ahead(d, v, Motion(on_hub, *fields))
 
@@ -295,9 +319,12 @@ def take_step(integrator: Integrator, state: State, torque: float) -> Stepped:
     machine, scheme = integrator.machine, integrator.scheme
     h, late = scheme.step, 1.0 - scheme.alpha_f
     t, square = state.t + h, scheme.beta * h * h
-    outer = outer_load(machine, torque)
+    outer = load = outer_load(machine, torque)
+    lags = lag(machine, state.t), lag(machine, t)
+    if lags[1] is not None:
+        outer = load + lags[1].hub
     rigid = hub_motions(machine, angles(machine, state.d.hub, state.t))
-    ahead = predict(machine, scheme, state, rigid, outer)
+    ahead = predict(machine, scheme, state, rigid, outer, lags)
     hubs = eliminated(integrator, rigid)
     free = hub_acceleration(integrator, hubs, ahead.rest)
 
@@ -317,7 +344,8 @@ def take_step(integrator: Integrator, state: State, torque: float) -> Stepped:
     v = Motion(*(x + h * scheme.gamma * y for x, y in zip(ahead.v, a, strict=True)))
     pushes = push[0], push[1]
     new = State(t, d, v, a, outer, on_hub, pushes, met.pairs, force, pressing.residual, pressing.older)
-    return Stepped(new, driven_torque(machine, met, force, a, outer), pressing.converged)
+    pulled = machine.course.inertia2 * nominal(machine, t).pull2
+    return Stepped(new, driven_torque(machine, met, force, a, load) - pulled, pressing.converged)
 
 
 def accelerations(integrator: Integrator, hubs: Hubs, rest: Motion) -> Motion:
@@ -331,7 +359,7 @@ def accelerations(integrator: Integrator, hubs: Hubs, rest: Motion) -> Motion:
 
 
 def driven_torque(machine: Machine, met: Met, force: Array, a: Motion, outer: Array) -> float:
-    """Torque [N m] on the driven gear against its rotation: the load's, or what holds its speed."""
+    """Torque [N m] on the driven gear against its rotation, while it is steady: the load's, or what holds its speed."""
     if machine.rotations == 2:
         return float(-outer[1])
     spun = onto_hub(machine.gears[1].rigid, a.driven)[2]

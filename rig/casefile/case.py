@@ -11,6 +11,7 @@ from pydantic import ValidationError, model_validator
 
 from gearbench.rig.casefile.defaults import Completed, complete
 from gearbench.rig.casefile.reader import Reader, show, table_type
+from gearbench.rig.casefile.speed_file import include_speeds
 from gearbench.rig.casefile.toml import Table, apply_settings, include_gear, load_table
 from gearbench.rig.casefile.writer import write_conditions, write_tables
 from gearbench.rig.errors import CaseError
@@ -79,13 +80,14 @@ class Case(Value):
 def read_case(path: str | Path, overrides: Sequence[str] = ()) -> Case:
     """Read a case file; `overrides` are `dotted.key=value` settings that replace keys before validation.
 
-    Gears given as files are looked up relative to the case file. Raises CaseError (one sentence).
+    Gears and speed tables given as files are looked up relative to the case file. Raises CaseError (one sentence).
     """
     path = Path(path)
     document = load_table(path, "case file")
     apply_settings(document, overrides, path.parent)
     for side in ("driver", "driven"):
         include_gear(document, side, path.parent)
+    include_speeds(document, path.parent)
     return _case_of(document, complete(document, path))
 
 

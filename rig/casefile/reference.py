@@ -18,7 +18,8 @@ _HEAD = """\
 # stands behind a "#" with a value that it could have, and so does a table. The keys of [rig.support.driver] and
 # [rig.support.driven] may stand in [rig.support] for both gears. Any number may also be written
 # { value = 6e6, sd = 1e6 } (sd: standard deviation). A gear may be a file: driver = "gears/z62.toml" in
-# [rig]. [[condition]] tables (name + the keys of [experiment] that differ) give one record each.
+# [rig], and a speed table one of the columns time_s and driver_rpm: speed_table = { file = "course.csv" } in
+# [experiment]. [[condition]] tables (name + the keys of [experiment] that differ) give one record each.
 # [study] is for `gearbench campaign`, whose options stand above it: docs/campaigns.md.
 #
 # Values without default: gears of ROSS's spur-gear example (62/62 teeth, m 2, b 20, bore radius 17.5);

@@ -24,6 +24,8 @@ def case_schema() -> dict[str, Any]:
             "oneOf": [{"type": "string", "description": "gear file, relative to the case file"}, gears[side]],
         }
     variation = _table(Experiment, full=False)
+    for experiment in (schema["properties"]["experiment"], variation):
+        experiment["properties"]["speed_table"] = _or_file(experiment["properties"]["speed_table"])
     variation["properties"] = {"name": {"type": "string", "description": "names the record"}} | variation["properties"]
     schema["properties"]["condition"] = {
         "type": "array",
@@ -31,6 +33,13 @@ def case_schema() -> dict[str, Any]:
         "items": variation | {"required": ["name"]},
     }
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "gearbench case"} | schema
+
+
+def _or_file(table: dict[str, Any]) -> dict[str, Any]:
+    """A table that may name a file in place of its columns."""
+    name = {"type": "string", "minLength": 1, "description": "CSV file of the columns, relative to the case file"}
+    other = {"type": "object", "properties": {"file": name}, "required": ["file"], "additionalProperties": False}
+    return {"description": table["description"], "oneOf": [table, other]}
 
 
 def _table(model: type[Value], full: bool) -> dict[str, Any]:

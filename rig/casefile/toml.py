@@ -17,19 +17,7 @@ _LARGEST_FILE = 4_000_000  # bytes; the largest sensible case (pitch errors of a
 
 def load_table(path: Path, what: str) -> Table:
     """Parse one TOML file (`what` names its role in the error). Raises CaseError."""
-    if not path.exists():
-        raise CaseError(f"{what} {path} does not exist")
-    if path.is_dir():
-        raise CaseError(f"{what} {path} is a folder, not a TOML file")
-    if not path.is_file():  # a device or a pipe may never end
-        raise CaseError(f"{what} {path} is not a plain file, which a TOML file is")
-    try:
-        with path.open("rb") as file:
-            raw = file.read(_LARGEST_FILE + 1)
-    except OSError as error:
-        raise CaseError(f"{what} {path} cannot be read: {error.strerror or error}") from error
-    if len(raw) > _LARGEST_FILE:
-        raise CaseError(f"{what} {path} is larger than {_LARGEST_FILE // 1_000_000} MB, which no case needs")
+    raw = read_bytes(path, what, "TOML")
     try:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -41,6 +29,24 @@ def load_table(path: Path, what: str) -> Table:
         raise CaseError(f"{what} {path} is not valid TOML: {reason}") from error
     except RecursionError as error:
         raise CaseError(f"{what} {path} is nested too deeply") from error
+
+
+def read_bytes(path: Path, what: str, kind: str) -> bytes:
+    """The bytes of a text file of a kind ("TOML") that a case needs. Raises CaseError for what is none."""
+    if not path.exists():
+        raise CaseError(f"{what} {path} does not exist")
+    if path.is_dir():
+        raise CaseError(f"{what} {path} is a folder, not a {kind} file")
+    if not path.is_file():  # a device or a pipe may never end
+        raise CaseError(f"{what} {path} is not a plain file, which a {kind} file is")
+    try:
+        with path.open("rb") as file:
+            raw = file.read(_LARGEST_FILE + 1)
+    except OSError as error:
+        raise CaseError(f"{what} {path} cannot be read: {error.strerror or error}") from error
+    if len(raw) > _LARGEST_FILE:
+        raise CaseError(f"{what} {path} is larger than {_LARGEST_FILE // 1_000_000} MB, which no case needs")
+    return raw
 
 
 def parse_setting(setting: str) -> tuple[list[str], Any]:
@@ -84,6 +90,8 @@ def apply_settings(document: Table, settings: Sequence[str], folder: Path) -> No
             table = _enter(table, key, ".".join(keys[: depth + 1]), setting)
         if keys[0] == "rig" and len(keys) == 2 and keys[1] in ("driver", "driven") and isinstance(value, str):
             value = _from_the_callers_folder(value, folder)
+        if keys[-2:] == ["speed_table", "file"] and isinstance(value, str):
+            value = _from_the_callers_folder(value, folder)
         if isinstance(table, list):
             table[_position(table, keys[-1], ".".join(keys), setting)] = value
         else:
@@ -97,7 +105,7 @@ def apply_settings(document: Table, settings: Sequence[str], folder: Path) -> No
 
 
 def _from_the_callers_folder(name: str, folder: Path) -> str:
-    """A gear file that a setting names: beside the case file or, where there is none, as the caller would find it."""
+    """A file that a setting names: beside the case file or, where there is none, as the caller would find it."""
     return str(Path(name).resolve()) if name and not (folder / name).exists() and Path(name).exists() else name
 
 

@@ -19,7 +19,8 @@ FRICTIONLESS = 0.02  # relative difference of mean torque and moment of the teet
 
 
 class Outcome(NamedTuple):
-    """How a rig ended: "ran", "refused" before work starts, "refused late" or "wrong", and what was said."""
+    """How a rig ended: "ran", "refused" by its case alone, "refused at rest" when its gears are known and before a step
+    is taken, "refused late" or "wrong", and what was said."""
 
     kind: str
     said: str
@@ -124,10 +125,12 @@ def outcome(text: str, folder: Path) -> Outcome:
         check_case(case)
     except REFUSALS as error:
         return _refused("refused", error)
+    steps: list[str] = []
     try:
-        record = simulate(case)
+        record = simulate(case, progress=lambda _, note: steps.append(note))
     except REFUSALS as error:
-        return _refused("refused late", error)
+        integrating = any(note.startswith("integrating") for note in steps)
+        return _refused("refused late" if integrating else "refused at rest", error)
     unsound = [str(name) for name, values in record.data_vars.items() if not np.isfinite(values.values).all()]
     if unsound:
         return Outcome("wrong", f"{unsound[0]} is not finite")

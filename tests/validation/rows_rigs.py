@@ -33,7 +33,7 @@ def random_rigs() -> Got:
         endings = [ending(number, Path(made)) for number in range(count)]
     wrong = [f"{number}: {end.said}" for number, end in enumerate(endings) if end.kind == "wrong"]
     kinds = [end.kind for end in endings]
-    told = ", ".join(f"{kinds.count(kind)} {kind}" for kind in ("ran", "refused", "refused late"))
+    told = ", ".join(f"{kinds.count(kind)} {kind}" for kind in ("ran", "refused", "refused at rest", "refused late"))
     return Got(float(len(wrong)), "; ".join([told, *wrong]))
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -55,23 +56,14 @@ def simulate(
     """
     loaded = load_case(case, settings)
     check_out(out, [case])
-    import gearbench as gb
     from gearbench.bench.readiness import check_timing
 
     check_timing(loaded)
     if fields or every is not None:
         loaded = with_teeth(loaded)
     times = {path: field_times(one, model, fields or [], every) for one, path in experiments(loaded, out)}
-    summaries = []
     with Progress(f"simulate {loaded.name}") as progress:
-        for experiment, path in experiments(loaded, out):
-            progress.step(path.name)
-            with checkpoints_of(path) as checkpoints:
-                record = gb.simulate(experiment, model, progress, checkpoints=checkpoints, workers=workers)
-                gb.write_record(record, path)
-            if times[path]:
-                write_fields(experiment, record, times[path], path, progress)
-            summaries.append(record_summary(record, path))
+        summaries = write_records(loaded, out, model, times, workers, progress)
     if as_json:
         print_json(summaries if loaded.conditions else summaries[0])
         return
@@ -80,6 +72,40 @@ def simulate(
             f"{summary['file']}: {summary['realisations']} x {summary['duration_s']:g} s at"
             f" {summary['sampling_rate_hz']:g} Hz, DTE {summary['dte_peak_to_peak_um']:.4g} um peak to peak"
         )
+
+
+def write_records(
+    case: Case,
+    out: Path,
+    model: str | None,
+    times: Mapping[Path, list[float]],
+    workers: int | None,
+    progress: Progress,
+) -> list[dict[str, Any]]:
+    """Records of a case's experiments, side by side, each written when it has ended, with the fields at its times; what
+    there is to say of each."""
+    from gearbench.bench.conditions import simulate_all
+    from gearbench.records import write_record
+
+    found = experiments(case, out)
+    paths = [path for _, path in found]
+    summaries: dict[int, dict[str, Any]] = {}
+    kept: dict[int, Any] = {}
+
+    def take(number: int, record: Any) -> None:
+        write_record(record, paths[number])
+        summaries[number] = record_summary(record, paths[number])
+        if times[paths[number]]:
+            kept[number] = record
+
+    progress.step(paths[0].name if len(paths) == 1 else f"{len(paths)} conditions")
+    with ExitStack() as folders:
+        checkpoints = [folders.enter_context(checkpoints_of(path)) for path in paths]
+        cases = [one for one, _ in found]
+        simulate_all(cases, take, model, progress, checkpoints=checkpoints, workers=workers)
+    for number, record in sorted(kept.items()):
+        write_fields(cases[number], record, times[paths[number]], paths[number], progress)
+    return [summaries[number] for number in range(len(paths))]
 
 
 def with_teeth(case: Case) -> Case:
