@@ -18,6 +18,7 @@ import sys
 import tempfile
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,7 +40,7 @@ PHASES, STEP = 128, 8
 def reference() -> tuple[Spectra, NDArray[np.int64], Complexes]:
     """Spectra, output lines, and the exact ITF on every STEP-th of them."""
     sys.path.insert(0, str(ROOT / "tests"))
-    from shared.reference_rig import ReferenceRig, reference_record  # noqa: PLC0415 - on the path only now
+    from shared.reference_rig import ReferenceRig, reference_record
 
     rig = ReferenceRig(mesh_frequency=50.0)
     given = {"duration": 4.0, "sampling_rate": 16000.0, "band": (1.0, 5000.0), "noise": 0.01}
@@ -83,42 +84,50 @@ def peer_run(python: str, given: Path, ratio: float) -> tuple[float, Complexes]:
     return float(told["seconds"]), np.load(told["found"])
 
 
+def side_by_side(python: str | None, repeats: int) -> dict[str, Any]:
+    """Medians of processor times [s] and errors of the ITF: "ours", and "sdynpy" by export_ratio where it can run."""
+    spectra, lines, truth = reference()
+    rows = needed_rows(lines, WINDOW.harmonics, spectra.mesh_lines)
+    around = np.arange(rows[0] - 4 * WINDOW.half_width, rows[-1] + 4 * WINDOW.half_width + 1)
+    own: list[float] = []
+    theirs: dict[float, list[tuple[float, float]]] = {ratio: [] for ratio in RATIOS if python}
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "spectra.npz"
+        references, responses = shifted(spectra, around)
+        np.savez(path, references=references, responses=responses, rows=around, first=rows[0], last=rows[-1])
+        result = local_polynomial(spectra, lines, WINDOW)
+        for _ in range(repeats):
+            before = time.process_time()
+            result = local_polynomial(spectra, lines, WINDOW)
+            own.append(time.process_time() - before)
+            for ratio, runs in theirs.items():
+                seconds, found = peer_run(str(python), path, ratio)
+                runs.append((seconds, error(branches(rows, found, lines, spectra.mesh_lines), truth)))
+    peer = {ratio: [float(x) for x in np.median(runs, axis=0)] for ratio, runs in theirs.items()}
+    return {"ours": [float(np.median(own)), error(result.htf, truth)], "windows": result.windows, "sdynpy": peer}
+
+
 def main() -> None:
     """Print medians, ratios and errors."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--peer", metavar="PYTHON", help="interpreter that has sdynpy")
     parser.add_argument("--repeats", type=int, default=5)
+    parser.add_argument("--json", action="store_true", help="print numbers only")
     given = parser.parse_args()
-    spectra, lines, truth = reference()
-    own, theirs = [], {ratio: [] for ratio in RATIOS}
-    rows = needed_rows(lines, WINDOW.harmonics, spectra.mesh_lines)
-    around = np.arange(rows[0] - 4 * WINDOW.half_width, rows[-1] + 4 * WINDOW.half_width + 1)
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "spectra.npz"
-        references, responses = shifted(spectra, around)
-        np.savez(path, references=references, responses=responses, rows=around, first=rows[0], last=rows[-1])
-        local_polynomial(spectra, lines, WINDOW)
-        errors: dict[float, float] = {}
-        for _ in range(given.repeats):
-            before = time.process_time()
-            result = local_polynomial(spectra, lines, WINDOW)
-            own.append(time.process_time() - before)
-            for ratio in RATIOS if given.peer else ():
-                try:
-                    seconds, found = peer_run(given.peer, path, ratio)
-                except (RuntimeError, OSError) as trouble:
-                    print(f"sdynpy left out: {given.peer} cannot run it: {trouble}")
-                    given.peer = None
-                    break
-                theirs[ratio].append(seconds)
-                errors[ratio] = error(branches(rows, found, lines, spectra.mesh_lines), truth)
-    mine = float(np.median(own))
-    print(f"ours: {mine:.3f} s with variances, {result.windows} windows, error {error(result.htf, truth):.2%}")
-    if not errors:
-        print("without sdynpy (--peer PYTHON of an environment that has it) there is nothing to hold it against")
-    for ratio in errors:
-        spent = float(np.median(theirs[ratio]))
-        print(f"sdynpy, export_ratio {ratio:.2g}: {spent:.2f} s, error {errors[ratio]:.2%}; {spent / mine:.1f} times ours")
+    if given.peer is None:
+        print("sdynpy left out: --peer names the interpreter of an environment that has it", file=sys.stderr)
+    try:
+        found: dict[str, Any] = side_by_side(given.peer, given.repeats)
+    except (RuntimeError, OSError) as trouble:
+        print(f"sdynpy left out: {given.peer} cannot run it: {trouble}", file=sys.stderr)
+        found = side_by_side(None, given.repeats)
+    if given.json:
+        print(json.dumps(found))
+        return
+    mine, ours = found["ours"]
+    print(f"ours: {mine:.3f} s with variances, {found['windows']} windows, error {ours:.2%}")
+    for ratio, (spent, theirs) in found["sdynpy"].items():
+        print(f"sdynpy, export_ratio {ratio:.2g}: {spent:.2f} s, error {theirs:.2%}; {spent / mine:.1f} times ours")
 
 
 if __name__ == "__main__":

@@ -18,11 +18,12 @@ from gearbench.identification.spectra.joint import Complexes, Floats
 def diagonal_variance(roots: Complexes, window: Window) -> Floats:
     """Real parts (B, R+1, R+1, 2L+1) of the unit-noise covariances of one branch's own coefficients, from `roots`
     (B, unknowns, unknowns) of LocalFits."""
-    parts = np.ascontiguousarray(roots).view(float).reshape(len(roots), -1, window.order + 1, window.branches, 2)
+    shape = (len(roots), -1, window.order + 1, window.branches)
+    parts = [np.ascontiguousarray(part).reshape(shape) for part in (roots.real, roots.imag)]
     result = np.empty((len(roots), window.order + 1, window.order + 1, window.branches))
     for p in range(window.order + 1):
         for s in range(p + 1):
-            value = np.einsum("btjc,btjc->bj", parts[:, :, p], parts[:, :, s])
+            value = sum(np.einsum("btj,btj->bj", part[:, :, p], part[:, :, s]) for part in parts)
             result[:, p, s] = result[:, s, p] = value
     return result
 

@@ -183,7 +183,8 @@ class _Sweep:
         self.cross_terms = "none" if not shifts else "omitted"
         if shifts and self.sampled == 1 and cross_work <= CROSS_WORK:
             self.cross_terms = "exact"
-            self.cross = CrossCovariance(regression, window, self.column[self.offset : self.offset + int(lines[-1]) + 1], shifts)
+            place = self.column[self.offset : self.offset + int(lines[-1]) + 1]
+            self.cross = CrossCovariance(regression, window, place, shifts)
         self.residual = self.power = 0.0
         self.coherence = np.zeros(lines.size)
         self.missing = MissingPower(regression, lines, window.harmonics)

@@ -82,13 +82,20 @@ class WindowRows:
 
     def apply(self, coefficients: Complexes) -> Complexes:
         """Model output (B, E, 2n+1) of the coefficients (B, R+1, 2L+1), transients projected out."""
-        local = self.window.basis() @ coefficients
-        return self.project((self.inputs @ local[..., None])[..., 0].transpose(0, 2, 1))
+        local = self._flat @ coefficients.transpose(0, 2, 1)
+        local = local.reshape(self.centres.size, self.window.width, -1, self.window.order + 1)
+        return self.project(np.einsum("brep,rp->ber", local, self.window.basis()))
 
     def adjoint(self, data: Complexes) -> Complexes:
         """Product (B, R+1, 2L+1) of the regression's conjugate transpose with (projected) data (B, E, 2n+1)."""
-        local = (data.transpose(0, 2, 1).conj()[:, :, None, :] @ self.inputs)[:, :, 0]
-        return np.asarray(self.window.basis().T @ local.conj(), dtype=complex)
+        weights = self.window.basis().T[:, :, None] * data.conj().transpose(0, 2, 1)[:, None]
+        weights = weights.reshape(self.centres.size, self.window.order + 1, -1)
+        return np.asarray((weights @ self._flat).conj())
+
+    @property
+    def _flat(self) -> Complexes:
+        """Regressors (B, (2n+1) E, 2L+1)."""
+        return self.inputs.reshape(self.centres.size, -1, self.window.branches)
 
     def matrix(self, *, projected: bool = True) -> Complexes:
         """The regression written down: (B, E, 2n+1, R+1, 2L+1); transients projected out unless told otherwise."""

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import json
+import os
+import subprocess
+import sys
 from functools import lru_cache, partial
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -11,7 +16,7 @@ from numpy.typing import NDArray
 from shared.reference_rig import ReferenceRig, reference_record
 from shared.varying_rig import ramp, truth_at, varying_record, wandering
 
-from gearbench.commands.house.checks import Check, NotRun
+from gearbench.commands.house.checks import Check, Got, NotRun
 from gearbench.identification import (
     IdentificationSettings,
     exact_itf,
@@ -37,6 +42,8 @@ COURSES: tuple[tuple[Literal["wander", "ramp"], str], ...] = (
     ("ramp", "a mesh frequency that rises from 16 to 24 Hz"),
 )
 METHODS: tuple[tuple[Literal["lpm", "mesh-feedback"], float], ...] = (("lpm", 0.025), ("mesh-feedback", 0.01))
+# Part of a window that sdynpy's local model reads unless told otherwise, and errors that count as equal.
+DEFAULT_RATIO, MORE_ERROR = 0.1, 1.05
 
 
 @lru_cache(maxsize=1)
@@ -145,9 +152,22 @@ def frozen() -> float:
     return abs(relative(found, truth()) - 0.16)
 
 
-def peer() -> float:
-    """sdynpy's LPM fed with shifted spectra."""
-    raise NotRun("sdynpy lives in an environment of its own")
+def peer() -> Got:
+    """Processor time of sdynpy's LPM, fed with shifted spectra and otherwise as it comes, over ours."""
+    python = os.environ.get("GEARBENCH_SDYNPY")
+    if python is None:
+        raise NotRun("GEARBENCH_SDYNPY names no Python of an environment that has sdynpy, psutil and joblib")
+    script = Path(__file__).resolve().parents[2] / "benchmarks" / "local_polynomials.py"
+    command = [sys.executable, "-P", str(script), "--peer", python, "--repeats", "3", "--json"]
+    environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    done = subprocess.run(command, env=environment, stdout=subprocess.PIPE, text=True, check=True)
+    told = json.loads(done.stdout)
+    if not told["sdynpy"]:
+        raise NotRun(f"{python} cannot run sdynpy")
+    (ours, error), (theirs, other) = told["ours"], told["sdynpy"][str(DEFAULT_RATIO)]
+    if error > MORE_ERROR * other:
+        raise RuntimeError(f"the errors are not equal: {error:.3g} and sdynpy's {other:.3g}")
+    return Got(theirs / ours, f"(errors {error:.2%} and {other:.2%})")
 
 
 CHECKS = [

@@ -172,7 +172,9 @@ def test_shared_gram_matrices_solve_the_written_down_regression(transient: bool)
     regression = prepare(spectra, transient=transient, reach=32)
     centres = [37 + 16 * index for index in range(4)]
     table = gram_table(regression, centres[0], centres[-1], window)
-    found = {index: gram for own, _, many in grams(regression, centres, window) for index, gram in zip(own, many, strict=True)}
+    found: dict[int, np.ndarray] = {}
+    for indices, _, many in grams(regression, centres, window):
+        found |= dict(zip(indices, many, strict=True))
     for index in range(4):
         centre = centres[index]
         rows = WindowRows(regression, np.array([centre]), window)
