@@ -62,7 +62,7 @@ class WindowRows:
         residue, position = self._place
         data = self.regression.dte[residue, :, position].transpose(0, 2, 1)
         if not self.window.transient:
-            data = data * self.excited.any(axis=2)[:, None]
+            data = data * np.asarray(self.excited.any(axis=2))[:, None]
         return self.project(data)
 
     @cached_property
