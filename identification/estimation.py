@@ -89,7 +89,7 @@ def identify_spectra(
     lines = output_lines(spectra, settings.band or excited, excited, settings.step)
     task = Task(spectra, lines, settings, excited, tuple(notes), record_error, report)
     if settings.method == "mesh-feedback":
-        frf = _by_feedback(task)
+        frf = by_feedback(task)
         if frf.attrs["expected_error"] > SECOND_OPINION:
             alone = replace(task, settings=_as_polynomials(settings))
             frf = _second_opinion(frf, partial(by_polynomials, alone))
@@ -99,7 +99,8 @@ def identify_spectra(
     return frf
 
 
-def _by_feedback(task: Task) -> xr.Dataset:
+def by_feedback(task: Task) -> xr.Dataset:
+    """Dataset of kind "identified" by mesh feedback alone. Raises LpmError for what the record does not support."""
     highest, realisations = round(task.excited[1] / task.spectra.spacing), task.spectra.realisations
     kept = min(realisations, max(1, -(-ENOUGH // highest)))
     if kept < realisations:

@@ -81,8 +81,8 @@ def solve_windows(
     condition = np.full(len(keep), np.nan)
     for index, matrix in zip(want_condition, kept, strict=True):
         condition[index] = _condition(matrix.conj(), triangles[index])
-    for index in np.flatnonzero(~sound):
-        coefficients[index], left[index], root, condition[index] = _by_singular_values(rows.part(int(index)))
+    for index in np.flatnonzero(~sound).tolist():
+        coefficients[index], left[index], root, condition[index] = _by_singular_values(rows.part(index))
         if index in want_roots:
             roots[list(want_roots).index(index)] = root
     return LocalFits(coefficients, left, _power(left), rows.equations - rows.unknowns, roots, condition)
