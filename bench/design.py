@@ -22,10 +22,11 @@ from gearbench.bench.plan.excitation import torque_realisation
 from gearbench.bench.plan.schedule import ProgressReport, schedule
 from gearbench.bench.results.exact import lumped_periodic_system
 from gearbench.geometry import pair
-from gearbench.identification.estimation import IdentificationSettings, identify_spectra
+from gearbench.identification.estimation import identify_spectra
 from gearbench.identification.lpm.accuracy import BANDWIDTHS, RULE
 from gearbench.identification.response.frf import itf
 from gearbench.identification.spectra.joint import Spectra, joint_periods
+from gearbench.identification.task import IdentificationSettings
 from gearbench.identification.truth.monodromy import exact_itf
 from gearbench.identification.truth.periodic import PeriodicSystem, frozen_itf, htf_from_itf, itf_from_htf
 from gearbench.rig import Case

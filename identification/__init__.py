@@ -12,7 +12,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from gearbench.identification.estimation import IdentificationSettings, identify
+    from gearbench.identification.estimation import identify
     from gearbench.identification.excitation.multisine import MultisineError, MultisineSignal, random_phase_multisine
     from gearbench.identification.lpm.local_solve import LpmError
     from gearbench.identification.nonlinear.split import DistortionError, distortion, is_coset
@@ -78,7 +78,7 @@ _HOMES = {
     "is_coset": "gearbench.identification.nonlinear.split",
     "AngleOnlyWarning": "gearbench.identification.spectra.transmission_error",
     "FrfError": "gearbench.identification.response.frf",
-    "IdentificationSettings": "gearbench.identification.estimation",
+    "IdentificationSettings": "gearbench.identification.task",
     "LpmError": "gearbench.identification.lpm.local_solve",
     "MultisineError": "gearbench.identification.excitation.multisine",
     "MultisineSignal": "gearbench.identification.excitation.multisine",

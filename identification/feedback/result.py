@@ -19,6 +19,8 @@ FOLLOWED = 40
 COMPARED = 80
 # Sidebands beyond the record's lines that a rational D is trusted with.
 BEYOND = 24
+# A part of the response that no mesh force explains, beyond this and twice what chance makes, speaks against it.
+UNEXPLAINED = 0.03
 
 
 def htf_on(model: Model, data: ClassData, lines: NDArray[np.int64], harmonics: int, ratio: float = 1.0) -> Complexes:
@@ -146,3 +148,13 @@ def unexplained(found: Feedback, band: tuple[int, int]) -> float:
         share = np.sum((np.abs(product[good]) ** 2 / power[good] - noise) / power[good])
         total += width * float(share)
     return total / data.stiffness_unit**2
+
+
+def doubt_of(apart: float, chance: float) -> list[str]:
+    """The warning, if any, of a part of the response that no mesh force explains, beside what chance makes of it."""
+    if apart <= max(UNEXPLAINED, 2 * chance):
+        return []
+    return [
+        f"{apart:.1%} of the response is in the residual and follows the force: a varying mesh force alone does not"
+        " explain this record"
+    ]

@@ -38,6 +38,8 @@ CHUNK = 800
 LEVEL = 101
 FLOOR = 0.1
 RIDGE = 1e-9
+# Equations of a window in which residuals are compared with the inputs; least part of the strongest window's input.
+COMPARED, REACHED = 80, 1e-2
 # Relative residual at which the model's response counts as solved, and GMRES' rounds.
 SOLVED, KRYLOV, RESTARTS = 1e-4, 60, 4
 
@@ -87,11 +89,13 @@ class Signals:
 
 @dataclass(frozen=True)
 class Varying:
-    """Model in units of the signals, `covariance` of its parameters (as `Model.vector`), `residual`: rms of what the
-    model's own response leaves of the measured one, relative, `equations` (complex) and `unknowns`."""
+    """Model in units of the signals, `covariance` of its parameters (as `Model.vector`), `left` (E, S): lines of what
+    the model's own response leaves of the measured one, `residual`: its rms, relative, `equations` (complex) and
+    `unknowns`."""
 
     model: Model
     covariance: Floats
+    left: Complexes
     residual: float
     equations: int
     unknowns: int
@@ -114,16 +118,50 @@ def varying_feedback(
         )
     measured = [fit.regressors(row, signals.dte[row]) for row in range(signals.dte.shape[0])]
     vector, covariance = fit.solve(measured, measured, fit.first_weights())
-    residual = np.inf
+    residual, left = np.inf, np.zeros((signals.dte.shape[0], signals.top), dtype=complex)
     for turn in range(ROUNDS):
         report((turn + 0.5) / ROUNDS, f"mesh feedback at varying speed: round {turn + 1}")
         own = [fit.response(vector, row) for row in range(signals.dte.shape[0])]
         swing = np.sqrt(sum(float(np.var(row)) for row in signals.dte))
         residual = float(np.sqrt(sum(np.mean((a - b) ** 2) for a, b in zip(own, signals.dte, strict=True))) / swing)
+        left = np.array([signals.lines(b - a) for a, b in zip(own, signals.dte, strict=True)])
         instruments = [fit.regressors(row, values) for row, values in enumerate(own)]
         vector, covariance = fit.solve(measured, instruments, 1.0 / np.abs(fit.spline @ vector[: fit.width]))
     kept = np.concatenate([np.arange(2 * fit.width), np.arange(fit.mesh, fit.mesh + 4 * count)])
-    return Varying(fit.model(vector), covariance[np.ix_(kept, kept)], residual, equations, fit.size)
+    return Varying(fit.model(vector), covariance[np.ix_(kept, kept)], left, residual, equations, fit.size)
+
+
+def unexplained_at(
+    signals: Signals, left: Complexes, mesh_lines: float, band: tuple[int, int]
+) -> tuple[float, float]:
+    """Estimated sum over the lines of the `band` and all branches of |error of G_l|^2 in units of the signals, as
+    `unexplained` of `result.py`: what `left` (E, S) shares with the force times exp(j l theta), less what noise would;
+    and the standard deviation of that number from noise alone.
+
+    `mesh_lines`: lines to the mean mesh frequency.
+    """
+    runs, size = left.shape
+    width = max(3, COMPARED // runs)
+    starts = np.arange(0, size - width + 1, width)
+    kept = starts.size * width
+    noise = np.mean(np.abs(left[:, :kept].reshape(runs, -1, width)) ** 2, axis=(0, 2))
+    middle = 1 + starts + width // 2
+    reach = int((band[1] + size) / mesh_lines) + 1
+    turn = np.exp(2j * np.pi * signals.cycles)
+    swing = signals.force - signals.force.mean(axis=1, keepdims=True)
+    total = scatter = 0.0
+    for branch in range(-reach, reach + 1):
+        source = np.abs(middle - branch * mesh_lines)
+        read = (source >= band[0]) & (source <= band[1])
+        if not read.any():
+            continue
+        inputs = np.array([signals.lines(row) for row in turn**branch * swing])[:, :kept].reshape(runs, -1, width)
+        power = np.sum(np.abs(inputs) ** 2, axis=(0, 2))
+        product = np.sum(inputs.conj() * left[:, :kept].reshape(runs, -1, width), axis=(0, 2))
+        read &= power > REACHED * power.max()
+        total += width * float(np.sum((np.abs(product[read]) ** 2 / power[read] - noise[read]) / power[read]))
+        scatter += float(np.sum((width * noise[read] / power[read]) ** 2))
+    return total, float(np.sqrt(scatter))
 
 
 @dataclass(frozen=True)

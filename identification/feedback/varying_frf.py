@@ -11,10 +11,11 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from gearbench.identification.feedback.data import ClassData
+from gearbench.identification.feedback.draws import add_mesh_curves, response_variances
 from gearbench.identification.feedback.model import Model
-from gearbench.identification.feedback.result import DRAWS, along_phase, followed, htf_on
+from gearbench.identification.feedback.result import DRAWS, doubt_of, htf_on
 from gearbench.identification.feedback.start import gauged
-from gearbench.identification.feedback.varying import Signals, Varying, varying_feedback
+from gearbench.identification.feedback.varying import Signals, Varying, unexplained_at, varying_feedback
 from gearbench.identification.response.frf import make_frf
 from gearbench.identification.response.modes import itf_modes
 from gearbench.identification.spectra.joint import Floats, Spectra, SpectraError
@@ -108,10 +109,12 @@ def varying_frf(
     response = htf_on(model, about, lines, branches)
     itf = itf_from_htf(response, phases)
     draws = _draws(found, about)
-    htf_variance, itf_variance = _variances(model, draws, about, lines, branches, phases)
-    variance = float(np.sqrt(htf_variance.sum() / np.sum(np.abs(response) ** 2)))
-    curves = np.array([along_phase(one, about, phases) for one in (model, *draws)])
-    spread = np.mean((curves[1:] - curves[0]) ** 2, axis=0)
+    htf_variance, itf_variance = response_variances(model, draws, about, lines, branches, phases)
+    power = float(np.sum(np.abs(response) ** 2))
+    variance = float(np.sqrt(htf_variance.sum() / power))
+    density = lines.size / (lines[-1] - lines[0] + 1) / about.stiffness_unit**2
+    shared = unexplained_at(signals, found.left, spectra.mesh_lines, (int(lines[0]), int(lines[-1])))
+    apart, chance = (float(np.sqrt(max(density * value, 0.0) / power)) for value in shared)
     frf = make_frf(
         "identified",
         frequency=frequency,
@@ -129,14 +132,13 @@ def varying_frf(
             "equations": found.equations,
             "residual": found.residual,
             "variance_error": variance,
+            "unexplained_error": apart,
             "record_error": record,
-            "expected_error": hypot(variance, record),
-            "warnings": "\n".join(notes),
+            "expected_error": hypot(variance, apart, record),
+            "warnings": "\n".join([*notes, *doubt_of(apart, chance)]),
         },
     )
-    for number, (name, unit) in enumerate((("mesh_stiffness", "N/m"), ("mesh_damping", "N s/m"))):
-        frf[name] = ("phase", curves[0, number], {"units": unit})
-        frf[f"{name}_var"] = ("phase", spread[number], {"units": f"({unit})^2"})
+    add_mesh_curves(frf, model, draws, about)
     return frf
 
 
@@ -146,21 +148,6 @@ def _draws(found: Varying, about: ClassData) -> list[Model]:
     root, rng = vectors * np.sqrt(np.maximum(values, 0.0)), np.random.default_rng(0)
     steps = (root @ rng.standard_normal(values.size) for _ in range(DRAWS))
     return [gauged(found.model.moved(found.model.vector() + step), about) for step in steps]
-
-
-def _variances(
-    model: Model, draws: list[Model], about: ClassData, lines: NDArray[np.int64], branches: int, phases: int
-) -> tuple[Floats, Floats]:
-    """Variances of HTF (2L+1, F) and ITF (F, phases), from the drawn models on some of the lines."""
-    chosen = followed(lines)
-    centre = htf_on(model, about, chosen, branches)
-    errors = [htf_on(one, about, chosen, branches) - centre for one in draws]
-    of_htf = np.mean([np.abs(error) ** 2 for error in errors], axis=0)
-    of_itf = np.mean([np.abs(itf_from_htf(error, phases)) ** 2 for error in errors], axis=0)
-    return (
-        np.stack([np.interp(lines, chosen, row) for row in of_htf]),
-        np.stack([np.interp(lines, chosen, column) for column in of_itf.T], axis=1),
-    )
 
 
 def _as_data(signals: Signals, spectra: Spectra) -> ClassData:

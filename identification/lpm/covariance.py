@@ -10,22 +10,21 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.identification.lpm.local_solve import LocalFit
 from gearbench.identification.lpm.regression import Regression, Window
 from gearbench.identification.lpm.rows import WindowRows
 from gearbench.identification.spectra.joint import Complexes, Floats
 
 
-def diagonal_variance(fit: LocalFit, window: Window) -> Floats:
-    """Real parts (R+1, R+1, 2L+1) of the unit-noise covariances of one branch's own coefficients."""
-    assert fit.factor is not None
-    factor = fit.factor.reshape(window.order + 1, window.branches, -1)
-    result = np.empty((window.order + 1, window.order + 1, window.branches))
+def diagonal_variance(roots: Complexes, window: Window) -> Floats:
+    """Real parts (B, R+1, R+1, 2L+1) of the unit-noise covariances of one branch's own coefficients, from `roots`
+    (B, unknowns, unknowns) of LocalFits."""
+    shape = (len(roots), -1, window.order + 1, window.branches)
+    parts = [np.ascontiguousarray(part).reshape(shape) for part in (roots.real, roots.imag)]
+    result = np.empty((len(roots), window.order + 1, window.order + 1, window.branches))
     for p in range(window.order + 1):
         for s in range(p + 1):
-            value = np.einsum("jt,jt->j", factor[p].real, factor[s].real)
-            value += np.einsum("jt,jt->j", factor[p].imag, factor[s].imag)
-            result[p, s] = result[s, p] = value
+            value = sum(np.einsum("btj,btj->bj", part[:, :, p], part[:, :, s]) for part in parts)
+            result[:, p, s] = result[:, s, p] = value
     return result
 
 
@@ -41,12 +40,12 @@ class CrossCovariance:
         self.sums = np.zeros((shifts, int(place.max()) + 1), dtype=complex)
         self._kept: dict[int, tuple[int, float, Complexes]] = {}
 
-    def add(self, fit: LocalFit, source: WindowRows, rows: NDArray[np.int64], noise: float) -> None:
-        """Take in the estimates on `rows` from the window of `source` with residual variance `noise`."""
-        assert fit.factor is not None
-        window, d, centre = self.window, self.regression.mesh_lines, source.centre
+    def add(self, root: Complexes, source: WindowRows, rows: NDArray[np.int64], noise: float) -> None:
+        """Take in the estimates on `rows` from the one window of `source`, its `root` (LocalFits) and its residual
+        variance `noise`."""
+        window, d, centre = self.window, self.regression.mesh_lines, int(source.centres[0])
         matrix = source.matrix().reshape(-1, window.unknowns)
-        transfer = (matrix @ fit.factor) @ fit.factor.conj().T
+        transfer = (matrix @ root.conj().T) @ root
         transfer = transfer.reshape(self.regression.experiments, window.width, window.order + 1, window.branches)
         for m in rows:
             weight = window.basis()[m - centre + window.half_width]

@@ -13,17 +13,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gearbench.identification.lpm.covariance import CrossCovariance, diagonal_variance
-from gearbench.identification.lpm.gram import grams
-from gearbench.identification.lpm.local_solve import LocalFit, LpmError, solve_window
+from gearbench.identification.lpm.gram import batches, grams
+from gearbench.identification.lpm.local_solve import LocalFits, LpmError, solve_windows
 from gearbench.identification.lpm.missing import MissingPower
 from gearbench.identification.lpm.regression import Regression, Window, prepare
-from gearbench.identification.lpm.rows import WindowRows
+from gearbench.identification.lpm.rows import Lines, WindowRows
 from gearbench.identification.spectra.joint import Complexes, Floats, Spectra
-
-Lines = NDArray[np.int64]
 
 # One window in so many tells its condition number.
 CONDITION_EVERY = 32
@@ -109,22 +106,29 @@ def require_lines(spectra: Spectra, lines: Lines, window: Window) -> None:
 
 def require_equations(regression: Regression, centres: list[int], window: Window) -> None:
     """Raise LpmError with the numbers if a window has no equation to spare over its unknowns."""
-    for centre in centres:
-        rows = WindowRows(regression, centre, window)
-        unknowns, equations = rows.unknowns, rows.equations
-        if equations > unknowns:
-            continue
-        experiments = regression.experiments
-        factor = (unknowns + 1) / max(equations, 1)
-        transient = f" and {experiments * (window.order + 1)} of transients" if window.transient else ""
-        raise LpmError(
-            f"under-determined: L = {window.harmonics} branches a side of order R = {window.order} are"
-            f" {unknowns} unknowns{transient}, but windows of n = {window.half_width} with {experiments}"
-            f" realisation(s) leave {equations} equations (around line {centre}); sufficient would be about"
-            f" window n = {int(np.ceil(window.half_width * factor)) + 1}, or"
-            f" {int(np.ceil(experiments * factor))} realisations, or L ="
-            f" {max(0, int((window.harmonics + 0.5) / factor - 1))}"
-        )
+    for indices in batches(regression, window, list(range(len(centres))), written=False):
+        rows = WindowRows(regression, np.array([centres[index] for index in indices]), window)
+        short = np.flatnonzero(rows.equations <= rows.unknowns)
+        if short.size:
+            first = int(short[0])
+            raise LpmError(
+                _too_few(regression, window, centres[indices[first]], rows.unknowns[first], rows.equations[first])
+            )
+
+
+def _too_few(regression: Regression, window: Window, centre: int, unknowns: int, equations: int) -> str:
+    """The sentence for a window with too few equations."""
+    experiments = regression.experiments
+    factor = (unknowns + 1) / max(equations, 1)
+    transient = f" and {experiments * (window.order + 1)} of transients" if window.transient else ""
+    return (
+        f"under-determined: L = {window.harmonics} branches a side of order R = {window.order} are"
+        f" {unknowns} unknowns{transient}, but windows of n = {window.half_width} with {experiments}"
+        f" realisation(s) leave {equations} equations (around line {centre}); sufficient would be about"
+        f" window n = {int(np.ceil(window.half_width * factor)) + 1}, or"
+        f" {int(np.ceil(experiments * factor))} realisations, or L ="
+        f" {max(0, int((window.harmonics + 0.5) / factor - 1))}"
+    )
 
 
 def needed_rows(lines: Lines, harmonics: int, mesh_lines: int) -> Lines:
@@ -163,8 +167,10 @@ class _Sweep:
     ) -> None:
         self.regression, self.window, self.lines, self.centres = regression, window, lines, centres
         self.noise = noise
-        self.place = np.full(int(lines[-1]) + 1, -1)
-        self.place[lines] = np.arange(lines.size)
+        # Column of each output line at [line + offset], -1 for every other line that a branch of a row may lead to.
+        self.offset = int(max(r[-1] for _, r in centres)) + window.harmonics * regression.mesh_lines
+        self.column = np.full(2 * self.offset + 1, -1)
+        self.column[lines + self.offset] = np.arange(lines.size)
         self.htf = np.zeros((window.branches, lines.size), dtype=complex)
         self.variance = np.zeros((window.branches, lines.size))
         unknowns, rows = window.unknowns, sum(r.size for _, r in centres)
@@ -177,7 +183,8 @@ class _Sweep:
         self.cross_terms = "none" if not shifts else "omitted"
         if shifts and self.sampled == 1 and cross_work <= CROSS_WORK:
             self.cross_terms = "exact"
-            self.cross = CrossCovariance(regression, window, self.place, shifts)
+            place = self.column[self.offset : self.offset + int(lines[-1]) + 1]
+            self.cross = CrossCovariance(regression, window, place, shifts)
         self.residual = self.power = 0.0
         self.coherence = np.zeros(lines.size)
         self.missing = MissingPower(regression, lines, window.harmonics)
@@ -187,59 +194,69 @@ class _Sweep:
         """Solve every window."""
         last: Floats | None = None
         lines = [centre for centre, _ in self.centres]
-        for done, (index, source, gram) in enumerate(grams(self.regression, lines, self.window)):
-            centre, rows = self.centres[index]
-            want = done % self.sampled == 0 or last is None
+        edges = {0, len(lines) - 1}
+        done = 0
+        for indices, source, gram in grams(self.regression, lines, self.window):
+            count = len(indices)
+            want = [i for i in range(count) if (done + i) % self.sampled == 0]
             # Condition numbers: of the edges, where branches fade out, and of some windows in between.
-            judged = index in (0, len(self.centres) - 1) or done % CONDITION_EVERY == 0
-            fit = solve_window(source, gram, want_factor=want, want_condition=judged)
-            if judged:
-                self.condition = max(self.condition, fit.condition)
-            if want:
-                last = diagonal_variance(fit, self.window)
-            assert last is not None
-            noise = self._account(fit, source, rows)
-            self._read(fit, centre, rows, noise * last)
-            self.missing.add(fit, rows, self.window.width)
+            judged = [i for i in range(count) if indices[i] in edges or (done + i) % CONDITION_EVERY == 0]
+            fits = solve_windows(source, gram, want_roots=want, want_condition=judged)
+            self.condition = float(max(self.condition, *fits.condition[judged], 0.0))
+            variance = diagonal_variance(fits.roots, self.window)
+            if last is not None:
+                variance = np.concatenate([last[None], variance])
+            # Of windows whose own variance is not computed the one of the last window before them counts.
+            latest = np.searchsorted(want, np.arange(count), side="right") - (last is None)
+            last = variance[-1]
+            rows = [self.centres[index][1] for index in indices]
+            noise = self._account(fits, source, rows)
+            self._read(fits.coefficients, source.centres, rows, noise[:, None, None, None] * variance[latest])
+            self.missing.add(fits, rows, self.window.width)
             if self.cross is not None:
-                self.cross.add(fit, source, rows, noise)
-            if progress is not None and done % 16 == 0:
-                progress(done / len(self.centres), f"window {done + 1} of {len(self.centres)}")
+                for i, own in enumerate(rows):
+                    self.cross.add(fits.roots[i], source.part(i), own, float(noise[i]))
+            done += count
+            if progress is not None:
+                progress(done / len(lines), f"window {done} of {len(lines)}")
         return self._result()
 
-    def _account(self, fit: LocalFit, source: WindowRows, rows: Lines) -> float:
-        """Residual variance of the window; adds to the overall ratio of residual to response, and to `coherence`."""
-        noise = fit.residual / fit.freedom
+    def _account(self, fits: LocalFits, source: WindowRows, rows: list[Lines]) -> Floats:
+        """Residual variance of each window; adds to the overall ratio of residual to response, and to `coherence`."""
+        noise: Floats = fits.residual / fits.freedom
         data = source.data
-        power = float(np.sum(np.abs(data) ** 2)) / max(int(np.count_nonzero(data)), 1)
-        self.residual += noise
-        self.power += power
-        column = self.place[rows[(rows > 0) & (rows < self.place.size)]]
-        self.coherence[column[column >= 0]] = max(1.0 - noise / power, 0.0) if power else 0.0
+        power = np.sum(data.real**2 + data.imag**2, axis=(1, 2)) / np.maximum(np.count_nonzero(data, axis=(1, 2)), 1)
+        self.residual += float(noise.sum())
+        self.power += float(power.sum())
+        explained = np.maximum(1.0 - noise / np.where(power > 0, power, 1.0), 0.0) * (power > 0)
+        all_rows = np.concatenate(rows)
+        column = self.column[all_rows + self.offset]
+        self.coherence[column[column >= 0]] = np.repeat(explained, [own.size for own in rows])[column >= 0]
         return noise
 
-    def _read(self, fit: LocalFit, centre: int, rows: Lines, variance: Floats) -> None:
+    def _read(self, coefficients: Complexes, centres: Lines, rows: list[Lines], variance: Floats) -> None:
         """Put Gs_j(m) and its mirror Gs_j(-m) = conj Gs_{-j}(m) where they belong: G_l(k), l = -j, k = m + j d."""
         window, d = self.window, self.regression.mesh_lines
         basis = window.basis()
+        values, spreads = [], []
+        for own, centre, found, unit in zip(rows, centres, coefficients, variance, strict=True):
+            weight = basis[own - centre + window.half_width]
+            values.append(weight @ found)
+            pairs = (weight[:, :, None] * weight[:, None, :]).reshape(own.size, -1)
+            spreads.append(pairs @ unit.reshape(-1, window.branches))
+        value, spread, m = np.concatenate(values), np.concatenate(spreads), np.concatenate(rows)
         j = np.arange(-window.harmonics, window.harmonics + 1)
-        for m in rows:
-            weight = basis[m - centre + window.half_width]
-            value = weight @ fit.coefficients
-            spread = np.einsum("p,psj,s->j", weight, variance, weight)
-            for sign in (1, -1):
-                line = sign * (m + j * d)
-                inside = (line > 0) & (line < self.place.size)
-                column = np.where(inside, self.place[np.where(inside, line, 0)], -1)
-                hit = column >= 0
-                branch = window.harmonics - sign * j[hit]
-                self.htf[branch, column[hit]] = value[hit] if sign > 0 else value[hit].conj()
-                self.variance[branch, column[hit]] = spread[hit]
+        for sign in (1, -1):
+            column = self.column[sign * (m[:, None] + j * d) + self.offset]
+            row, branch = np.nonzero(column >= 0)
+            at = window.harmonics - sign * j[branch], column[row, branch]
+            self.htf[at] = value[row, branch] if sign > 0 else value[row, branch].conj()
+            self.variance[at] = spread[row, branch]
 
     def _result(self) -> LpmResult:
         diagonal = self.variance.sum(axis=0)[None, :].astype(complex)
         cross = self.cross.sums if self.cross is not None else diagonal[:0]
-        middle = WindowRows(self.regression, self.centres[len(self.centres) // 2][0], self.window)
+        middle = WindowRows(self.regression, np.array([self.centres[len(self.centres) // 2][0]]), self.window)
         transient = self.regression.experiments * (self.window.order + 1) if self.window.transient else 0
         return LpmResult(
             self.lines,
@@ -250,8 +267,8 @@ class _Sweep:
             self.missing.total(0.0 if self.noise is None else self.noise),
             float(np.sqrt(self.residual / self.power)) if self.power else 0.0,
             self.condition,
-            middle.unknowns + transient,
-            middle.equations + transient,
+            int(middle.unknowns[0]) + transient,
+            int(middle.equations[0]) + transient,
             len(self.centres),
             self.sampled,
             self.cross_terms,

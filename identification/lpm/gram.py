@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+from scipy.linalg import blas
 
 from gearbench.identification.lpm.regression import Regression, Window
 from gearbench.identification.lpm.rows import WindowRows
@@ -22,45 +23,82 @@ from gearbench.identification.spectra.joint import Complexes
 TABLE_SPAN = 200
 # Time of one element of a table, in floating-point operations of a matrix product.
 ELEMENT = 60.0
+# Bytes that the arrays of the windows handled together may take.
+BATCH = 4_000_000
+
+Batch = tuple[list[int], WindowRows, Complexes]
 
 
-def grams(
-    regression: Regression, centres: Sequence[int], window: Window
-) -> Iterator[tuple[int, WindowRows, Complexes]]:
-    """(index of the centre, its rows, Gram matrix (unknowns, unknowns) without the transients' part), class by class.
+def grams(regression: Regression, centres: Sequence[int], window: Window) -> Iterator[Batch]:
+    """(indices of B centres, their rows, their Gram matrices (B, unknowns, unknowns) without the transients' part).
 
-    `centres` must rise.
+    `centres` must rise. They come in batches that BATCH holds, those of one residue class together where they share a
+    table.
     """
     d = regression.mesh_lines
     classes: dict[int, list[int]] = {}
     for index, centre in enumerate(centres):
         classes.setdefault(centre % d, []).append(index)
+    written: list[int] = []
     for _, chosen in sorted(classes.items()):
         while chosen:
             first = centres[chosen[0]]
             span = [index for index in chosen if centres[index] <= first + TABLE_SPAN * d]
             chosen = chosen[len(span) :]
-            yield from _span(regression, centres, span, window)
+            if _worth_a_table(regression, centres, span, window):
+                yield from _from_table(regression, centres, span, window)
+            else:
+                written += span
+    yield from _written(regression, centres, written, window)
 
 
-def _span(
-    regression: Regression, centres: Sequence[int], span: list[int], window: Window
-) -> Iterator[tuple[int, WindowRows, Complexes]]:
-    """Gram matrices of centres of one residue class, the cheaper way."""
-    first, last, d = centres[span[0]], centres[span[-1]], regression.mesh_lines
-    size = (last - first) // d + window.branches
+def batches(regression: Regression, window: Window, indices: list[int], *, written: bool) -> Iterator[list[int]]:
+    """The indices in batches whose arrays fit into BATCH; `written`: with the regression written down."""
+    rows = regression.experiments * window.width
+    elements = rows * (window.branches + (window.unknowns if written else 0)) + 3 * window.unknowns**2
+    if window.transient:
+        elements += rows * (window.order + 1)
+    count = max(1, BATCH // (16 * elements))
+    for start in range(0, len(indices), count):
+        yield indices[start : start + count]
+
+
+def _rows(regression: Regression, centres: Sequence[int], indices: list[int], window: Window) -> WindowRows:
+    return WindowRows(regression, np.array([centres[index] for index in indices], dtype=np.int64), window)
+
+
+def _worth_a_table(regression: Regression, centres: Sequence[int], span: list[int], window: Window) -> bool:
+    """Whether centres of one residue class cost less with a table than written down."""
+    size = (centres[span[-1]] - centres[span[0]]) // regression.mesh_lines + window.branches
     shared = ELEMENT * len(_pairs(window.order)) * window.width * size**2
-    written = len(span) * 8.0 * regression.experiments * window.width * window.unknowns**2
-    if written < shared:
-        for index in span:
-            rows = WindowRows(regression, centres[index], window)
-            matrix = rows.matrix(projected=False).reshape(-1, window.unknowns)
-            yield index, rows, matrix.conj().T @ matrix
-        return
+    return len(span) * 8.0 * regression.experiments * window.width * window.unknowns**2 >= shared
+
+
+def _from_table(
+    regression: Regression, centres: Sequence[int], span: list[int], window: Window
+) -> Iterator[Batch]:
+    first, last, d = centres[span[0]], centres[span[-1]], regression.mesh_lines
     table = gram_table(regression, first, last, window)
-    for index in span:
-        gram = gram_of(table, (centres[index] - first) // d, window)
-        yield index, WindowRows(regression, centres[index], window), gram
+    for indices in batches(regression, window, span, written=False):
+        found = np.stack([gram_of(table, (centres[index] - first) // d, window) for index in indices])
+        yield indices, _rows(regression, centres, indices, window), found
+
+
+def _written(
+    regression: Regression, centres: Sequence[int], chosen: list[int], window: Window
+) -> Iterator[Batch]:
+    """Gram matrices of the regression written down: one triangle of each, mirrored."""
+    for indices in batches(regression, window, chosen, written=True):
+        rows = _rows(regression, centres, indices, window)
+        matrix = rows.matrix(projected=False).reshape(len(indices), -1, window.unknowns)
+        found: Complexes = np.zeros((len(indices), window.unknowns, window.unknowns), dtype=complex)
+        for own, a in zip(found, matrix, strict=True):
+            # BLAS reads both transposed: A^T (A^T)^H is the conjugate, in one triangle.
+            blas.zherk(1.0, a.T, c=own.T, overwrite_c=1)
+        diagonal = np.diagonal(found, axis1=1, axis2=2).copy()
+        found += found.conj().transpose(0, 2, 1)
+        found[:, np.arange(window.unknowns), np.arange(window.unknowns)] = diagonal
+        yield indices, rows, found
 
 
 def gram_table(regression: Regression, first: int, last: int, window: Window) -> Complexes:

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
-from gearbench.identification.lpm.local_solve import LocalFit
+from gearbench.identification.lpm.local_solve import LocalFits
 from gearbench.identification.lpm.regression import Regression
 from gearbench.identification.spectra.joint import Floats
 
@@ -42,6 +42,8 @@ AVERAGED = 0.004
 VARIATION = 0.03
 # Groups of rows with windows that rows without are held against.
 NEAR = 8
+# Sources that are looked at together, over all rows.
+TOGETHER = 500_000
 
 
 class MissingPower:
@@ -67,12 +69,14 @@ class MissingPower:
         self.freedom = np.zeros(self.rows.size + 1)
         self.step = int(np.min(np.diff(lines))) if lines.size > 1 else 1
 
-    def add(self, fit: LocalFit, rows: Lines, width: int) -> None:
-        """Take in the residual of a window of `width` lines for the `rows` that are read from it."""
-        served = slice(int(rows[0]), int(rows[-1]) + self.step)
-        self.level[served] = fit.residual / fit.freedom
-        self.covered[served] = True
-        self.freedom[served] = fit.freedom / width
+    def add(self, fits: LocalFits, rows: list[Lines], width: int) -> None:
+        """Take in the residuals of windows of `width` lines for the `rows` that are read from each."""
+        level, freedom = fits.residual / fits.freedom, fits.freedom / width
+        for index, own in enumerate(rows):
+            served = slice(int(own[0]), int(own[-1]) + self.step)
+            self.level[served] = level[index]
+            self.covered[served] = True
+            self.freedom[served] = freedom[index]
 
     def quietest(self) -> float:
         """Noise [m^2] of a line and experiment from the quietest part of the excited band."""
@@ -97,40 +101,48 @@ class MissingPower:
         above = self.level - noise
         above[0] = 0.0
         above[1:][self.operating & ~self.covered[1:]] = 0.0
-        found = [(rows, float(above[rows].mean()) * share) for rows, share in self._shares]
-        served = [(int(rows[0]), mean) for rows, mean in found if self.covered[rows[0]]]
-        total = 0.0
-        for rows, mean in found:
-            if served and not self.covered[rows[0]]:
-                near = sorted(served, key=lambda one: abs(one[0] - int(rows[0])))[:NEAR]
-                mean = min(mean, float(np.mean([one[1] for one in near])))
-            total += rows.size * mean
+        groups, share = self._shares
+        first, size = np.array([rows[0] for rows in groups]), np.array([rows.size for rows in groups])
+        mean = np.array([above[rows].mean() for rows in groups]) * share
+        served = self.covered[first]
+        if served.any() and not served.all():
+            distance = np.abs(first[~served, None] - first[served])
+            near = np.argsort(distance, axis=1, kind="stable")[:, :NEAR]
+            mean[~served] = np.minimum(mean[~served], mean[served][near].mean(axis=1))
         density = self.lines.size / (self.lines[-1] - self.lines[0] + self.step)
-        return max(total, 0.0) * density / self.regression.input_power()
+        return max(float(size @ mean), 0.0) * density / self.regression.input_power()
 
     @cached_property
-    def _shares(self) -> list[tuple[Lines, float]]:
-        """Groups of rows, those with a window apart from the others, and their share of output lines."""
-        found = []
-        for part in np.array_split(self.rows, min(COUNTED, self.rows.size)):
-            for own in (part[self.covered[part]], part[~self.covered[part]]):
-                if own.size:
-                    fewest = self.harmonics + 1 if self.covered[own[0]] else 0
-                    found.append((own, self._share(int(own[own.size // 2]), fewest)))
-        return found
+    def _shares(self) -> tuple[list[Lines], Floats]:
+        """Groups of rows, those with a window apart from the others, and the shares of output lines in them."""
+        parts = np.array_split(self.rows, min(COUNTED, self.rows.size))
+        groups = [
+            own for part in parts for own in (part[self.covered[part]], part[~self.covered[part]]) if own.size
+        ]
+        middle = np.array([own[own.size // 2] for own in groups])
+        fewest = np.where(self.covered[[own[0] for own in groups]], self.harmonics + 1, 0)
+        count = max(1, TOGETHER * self.regression.mesh_lines // (2 * self.excited.size))
+        cuts = range(count, middle.size, count)
+        found = [self._share(*both) for both in zip(np.split(middle, cuts), np.split(fewest, cuts), strict=True)]
+        return groups, np.concatenate(found)
 
-    def _share(self, row: int, fewest: int) -> float:
-        """Part of the missing response in a row whose sources lie between the output lines; branches from `fewest`."""
-        d = self.regression.mesh_lines
-        reach = (row + self.excited.size) // d + 1
+    def _share(self, row: Lines, fewest: Lines) -> Floats:
+        """Part (rows,) of the missing response in each row whose sources lie between the output lines; branches from
+        `fewest` (rows,)."""
+        d, count = self.regression.mesh_lines, self.excited.size
+        reach = (int(row.max()) + count) // d + 1
         branch = np.arange(-reach, reach + 1)
-        source = np.abs(row + branch * d)
-        branch, source = branch[source < self.excited.size], source[source < self.excited.size]
-        response = VARIATION * self.response[source] / np.maximum(np.abs(branch), 1) ** 2
-        response[branch == 0] = self.static * self.excited[row]
-        inside = (source >= self.lines[0]) & (source <= self.lines[-1])
+        source = np.abs(row[:, None] + branch * d)
+        known = source < count
+        source = np.where(known, source, 0)
+        response = VARIATION * self.response[source] / np.maximum(np.abs(branch), 1) ** 2 * known
+        response[:, reach] = self.static * self.excited[row]
+        inside = known & (source >= self.lines[0]) & (source <= self.lines[-1])
         # What is missing may be the branches from `fewest` on, or what the polynomials of the others do not follow:
         # without knowledge of which, half of each.
-        later = response * (np.abs(branch) >= fewest)
-        shares = [float(w[inside].sum() / w.sum()) for w in (response, later) if w.any()]
-        return float(np.mean(shares)) if shares else 0.0
+        later = response * (np.abs(branch) >= fewest[:, None])
+        sums = np.array([response.sum(axis=1), later.sum(axis=1)])
+        parts = np.array([(response * inside).sum(axis=1), (later * inside).sum(axis=1)])
+        some = np.array([response.any(axis=1), later.any(axis=1)])
+        shares = np.where(some, parts / np.where(some, sums, 1.0), 0.0)
+        return np.asarray(shares.sum(axis=0) / np.maximum(some.sum(axis=0), 1))

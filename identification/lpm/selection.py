@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from gearbench.identification.lpm.covariance import diagonal_variance
 from gearbench.identification.lpm.estimate import needed_rows, plan_centres
 from gearbench.identification.lpm.gram import grams
-from gearbench.identification.lpm.local_solve import LpmError, solve_window
+from gearbench.identification.lpm.local_solve import LpmError, solve_windows
 from gearbench.identification.lpm.regression import EXCITATION_FLOOR, Regression, Window, prepare
 from gearbench.identification.lpm.rows import WindowRows
 from gearbench.identification.spectra.joint import Floats, Spectra
@@ -159,8 +159,8 @@ class _Search:
             middle = int(self.lines[self.lines.size // 2])
             if middle + width > self.regression.highest:
                 return False
-            rows = WindowRows(self.regression, middle, window)
-            return rows.equations >= MARGIN * rows.unknowns + 1
+            rows = WindowRows(self.regression, np.array([middle]), window)
+            return bool(rows.equations[0] >= MARGIN * rows.unknowns[0] + 1)
 
         width = _least(supports, order + 1, widest)
         found = []
@@ -189,33 +189,34 @@ class _Search:
         at_centre = window.basis()[window.half_width]
         centres = self.trial_centres(window)
         for _, rows, gram in grams(self.regression, centres, window):
-            row = rows.centre - 1
-            sampled += 1.0 / self.density[row]
-            if not rows.unknowns:  # no branch reaches so far: all is missing
-                total += self.relevance[row] / self.density[row] * rows.power
-                continue
-            if rows.equations <= rows.unknowns:
+            known, row = rows.unknowns > 0, rows.centres - 1
+            if (known & (rows.equations <= rows.unknowns)).any():
                 return Choice(window, np.inf)
             try:
-                fit = solve_window(rows, gram, want_factor=True)
+                fits = solve_windows(rows, gram, want_roots=range(row.size))
             except LpmError:
                 return Choice(window, np.inf)
-            spread = diagonal_variance(fit, window)[:, :, self.read(rows)]
-            spread = self.input_power * np.einsum("p,psj,s->", at_centre, spread, at_centre)
-            total += fit.residual / fit.freedom * (self.relevance[row] + spread) / self.density[row]
-            freedom += fit.freedom
+            units = diagonal_variance(fits.roots, window)
+            spread = np.einsum("p,bpsj,bj,s->b", at_centre, units, self.read(rows), at_centre, optimize=True)
+            error = fits.residual / np.maximum(fits.freedom, 1) * (self.relevance[row] + self.input_power * spread)
+            # Where no branch reaches, all is missing.
+            error = np.where(known, error, self.relevance[row] * rows.power)
+            total += float(np.sum(error / self.density[row]))
+            sampled += float(np.sum(1.0 / self.density[row]))
+            freedom += int(fits.freedom[known].sum())
         return Choice(window, total / sampled * (1.0 + 1.0 / np.sqrt(max(freedom, 1))))
 
     def read(self, rows: WindowRows) -> NDArray[np.bool_]:
-        """Which branches (2L+1,) of a window's middle row belong to an output line: the others are never read."""
+        """Which branches (B, 2L+1) of the windows' middle rows belong to an output line: the others are never read."""
         branch = np.arange(-rows.window.harmonics, rows.window.harmonics + 1)
-        source = np.abs(rows.centre + branch * self.regression.mesh_lines)
-        return (source >= self.lines[0]) & (source <= self.lines[-1])
+        source = np.abs(rows.centres[:, None] + branch * self.regression.mesh_lines)
+        return np.asarray((source >= self.lines[0]) & (source <= self.lines[-1]), dtype=bool)
 
     def trial_centres(self, window: Window) -> list[int]:
         """Rows drawn evenly from their density, as many as the window needs."""
-        middle = WindowRows(self.regression, int(self.lines[self.lines.size // 2]), window)
-        count = int(np.clip(FREEDOM / max(middle.equations - middle.unknowns, 1), TRIALS, TRIALS_MAX))
+        middle = WindowRows(self.regression, self.lines[self.lines.size // 2][None], window)
+        free = int(middle.equations[0] - middle.unknowns[0])
+        count = int(np.clip(FREEDOM / max(free, 1), TRIALS, TRIALS_MAX))
         sums = np.cumsum(self.density)
         centres = 1 + np.searchsorted(sums, (np.arange(count) + 0.5) / count * sums[-1])
         return sorted({min(int(row), self.regression.highest - window.half_width) for row in centres})

@@ -60,6 +60,8 @@ _WORDS: dict[str, tuple[str, ...]] = {
     "run": (),
 }
 _SAME = (("mesh_period", "mesh_frequency", "speed_driver"), ("samples_per_period", "excitation_period"))
+# Orders of a turn that an encoder may repeat.
+MOST_ORDERS = 32
 # Where a torque may be measured.
 LOCATIONS = ("gear", "outermost", "shaft", "motor")
 
@@ -70,7 +72,9 @@ class ChannelSpec:
 
     `column`: one, or the two tracks of a quadrature encoder. `delay` [s] by which the channel lags; `time`: its own
     column of times; `sampling_rate` [Hz] where the file knows none; `lowest` [Hz]: integration leaves out what lies
-    below. `location`: of the sensor.
+    below. `location`: of the sensor. `runout_orders`: what an angle repeats with each turn is taken off up to that
+    order. `clock` "teeth": the channel comes from a device whose clock runs at a rate of its own, known by the teeth
+    that both gears pass.
     """
 
     column: tuple[str, ...]
@@ -84,6 +88,8 @@ class ChannelSpec:
     time: str | None = None
     sampling_rate: float | None = None
     lowest: float | None = None
+    runout_orders: float | None = None
+    clock: str | None = None
 
 
 @dataclass(frozen=True)
@@ -106,6 +112,8 @@ _SPEC_KEYS: dict[str, str] = {
     "time": "time",
     "sampling_rate_hz": "sampling_rate",
     "lowest_hz": "lowest",
+    "runout_orders": "runout_orders",
+    "clock": "clock",
 }
 
 
@@ -208,7 +216,7 @@ def _spec(name: str, table: Mapping[str, Any]) -> ChannelSpec:
         raise RecordError(f"{where}column = {column!r} must name a column, or the two tracks of an encoder")
     found: dict[str, Any] = {"column": tuple(columns)}
     for key, value in table.items():
-        if key in ("unit", "location", "time"):
+        if key in ("unit", "location", "time", "clock"):
             if not isinstance(value, str) or not value:
                 raise RecordError(f"{where}{key} = {value!r} must be a text")
             found[_SPEC_KEYS[key]] = value
@@ -223,6 +231,11 @@ def _spec(name: str, table: Mapping[str, Any]) -> ChannelSpec:
         value = getattr(spec, key)
         if value is not None and not value > 0:
             raise RecordError(f"{where}{key} = {value:g} must be positive")
+    if spec.clock not in (None, "teeth"):
+        raise RecordError(f"{where}clock = {spec.clock!r} must be 'teeth'")
+    orders = spec.runout_orders
+    if orders is not None and (orders != round(orders) or not 1 <= orders <= MOST_ORDERS):
+        raise RecordError(f"{where}runout_orders = {orders:g} must be a whole number from 1 to {MOST_ORDERS}")
     if name.startswith("torque_") and spec.location is not None and spec.location not in LOCATIONS:
         raise RecordError(f"{where}location = {spec.location!r} must be one of {', '.join(LOCATIONS)}")
     return spec

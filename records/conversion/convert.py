@@ -30,6 +30,8 @@ from gearbench.records.conversion.derive import (
     put_on_clock,
     say_locations,
 )
+from gearbench.records.conversion.devices import clocks_by_teeth, reference_rate
+from gearbench.records.conversion.runout import taken_off
 from gearbench.records.conversion.signals import find_column, shortened, signal_of
 from gearbench.records.errors import RecordError
 from gearbench.records.formats.importers import read_source
@@ -91,8 +93,10 @@ def convert_sources(
     runs = {signal.name: signal.values.shape[0] for signal in signals}
     if len(set(runs.values())) > 1:
         raise RecordError(f"channels differ in their number of runs: {runs}")
-    common = common_clock(signals, attributes, notes)
-    work = Assembly(tuple(signals), common, channel_map, attributes, notes)
+    signals, details = taken_off(signals, channel_map.channels, notes)
+    signals = clocks_by_teeth(signals, channel_map.channels, attributes, notes)
+    common = common_clock(signals, reference_rate(signals, channel_map.channels) | attributes, notes)
+    work = Assembly(tuple(signals), common, channel_map, attributes, notes, details=details)
     period = declared_mesh_period(attributes)
     for number, signal in enumerate(signals):
         report(number / len(signals), signal.name)

@@ -9,7 +9,7 @@ from shared.ptv import periodic_filter, spectra_of
 from gearbench.identification.lpm.covariance import CrossCovariance, diagonal_variance
 from gearbench.identification.lpm.estimate import LpmResult, local_polynomial, needed_rows, plan_centres
 from gearbench.identification.lpm.gram import grams
-from gearbench.identification.lpm.local_solve import solve_window
+from gearbench.identification.lpm.local_solve import solve_windows
 from gearbench.identification.lpm.regression import Window, prepare
 from gearbench.identification.truth.periodic import itf_from_htf
 
@@ -73,16 +73,16 @@ def test_itf_variance_of_overlapping_windows_by_brute_force() -> None:
     cross = CrossCovariance(regression, window, place, shifts=6)
     plan = plan_centres(needed_rows(lines, 3, 2), window, spectra.highest)
     diagonal = np.zeros(4)
-    for index, rows_of_window, gram in grams(regression, [centre for centre, _ in plan], window):
-        centre, rows = plan[index]
-        fit = solve_window(rows_of_window, gram, want_factor=True)
-        cross.add(fit, rows_of_window, rows, 1.0)
-        unit = diagonal_variance(fit, window)
-        for m in rows:
-            weight = window.basis()[m - centre + 12]
-            for j in range(-3, 4):
-                if 40 <= m + 2 * j < 44:
-                    diagonal[m + 2 * j - 40] += weight @ unit[:, :, j + 3] @ weight
+    for indices, source, gram in grams(regression, [centre for centre, _ in plan], window):
+        fits = solve_windows(source, gram, want_roots=range(len(indices)))
+        for i, unit in enumerate(diagonal_variance(fits.roots, window)):
+            centre, rows = plan[indices[i]]
+            cross.add(fits.roots[i], source.part(i), rows, 1.0)
+            for m in rows:
+                weight = window.basis()[m - centre + 12]
+                for j in range(-3, 4):
+                    if 40 <= m + 2 * j < 44:
+                        diagonal[m + 2 * j - 40] += weight @ unit[:, :, j + 3] @ weight
     sums = np.concatenate([diagonal[None, :], cross.sums])
     predicted = replace(local_polynomial(spectra, lines, window), itf_covariance=sums).itf_variance(phases)
 

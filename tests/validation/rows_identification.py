@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
+import json
+import os
+import subprocess
+import sys
+import time
 from functools import lru_cache, partial
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -11,7 +17,7 @@ from numpy.typing import NDArray
 from shared.reference_rig import ReferenceRig, reference_record
 from shared.varying_rig import ramp, truth_at, varying_record, wandering
 
-from gearbench.commands.house.checks import Check, NotRun
+from gearbench.commands.house.checks import Check, Got, NotRun
 from gearbench.identification import (
     IdentificationSettings,
     exact_itf,
@@ -37,6 +43,8 @@ COURSES: tuple[tuple[Literal["wander", "ramp"], str], ...] = (
     ("ramp", "a mesh frequency that rises from 16 to 24 Hz"),
 )
 METHODS: tuple[tuple[Literal["lpm", "mesh-feedback"], float], ...] = (("lpm", 0.025), ("mesh-feedback", 0.01))
+# Part of a window that sdynpy's local model reads unless told otherwise, and errors that count as equal.
+DEFAULT_RATIO, MORE_ERROR = 0.1, 1.05
 
 
 @lru_cache(maxsize=1)
@@ -64,12 +72,15 @@ def sparse_truth() -> NDArray[np.complex128]:
     return truth()[::8]
 
 
-def feedback_error(noise: float) -> float:
-    """Mesh feedback from one second of one realisation at 2 Hz; `noise` over the response."""
+@lru_cache(maxsize=2)
+def feedback(noise: float) -> tuple[float, float]:
+    """Mesh feedback from one second of one realisation at 2 Hz and `noise`: error, processor time [s]."""
     record = reference_record(ReferenceRig(), realisations=1, duration=1.0, noise=noise)
     settings = IdentificationSettings(method="mesh-feedback", band=BAND, step=4, phases=PHASES, modes=0)
-    found = itf(identify([record], settings))
-    return relative(found.sel(frequency=FREQUENCIES[::8]).values, sparse_truth())
+    before = time.process_time()
+    frf = identify([record], settings)
+    spent = time.process_time() - before
+    return relative(itf(frf).sel(frequency=FREQUENCIES[::8]).values, sparse_truth()), spent
 
 
 @lru_cache(maxsize=6)
@@ -145,16 +156,30 @@ def frozen() -> float:
     return abs(relative(found, truth()) - 0.16)
 
 
-def peer() -> float:
-    """sdynpy's LPM fed with shifted spectra."""
-    raise NotRun("sdynpy lives in an environment of its own")
+def peer() -> Got:
+    """Processor time of sdynpy's LPM, fed with shifted spectra and otherwise as it comes, over ours."""
+    python = os.environ.get("GEARBENCH_SDYNPY")
+    if python is None:
+        raise NotRun("GEARBENCH_SDYNPY names no Python of an environment that has sdynpy, psutil and joblib")
+    script = Path(__file__).resolve().parents[2] / "benchmarks" / "local_polynomials.py"
+    command = [sys.executable, "-P", str(script), "--peer", python, "--repeats", "3", "--json"]
+    environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    done = subprocess.run(command, env=environment, stdout=subprocess.PIPE, text=True, check=True)
+    told = json.loads(done.stdout)
+    if not told["sdynpy"]:
+        raise NotRun(f"{python} cannot run sdynpy")
+    (ours, error), (theirs, other) = told["ours"], told["sdynpy"][str(DEFAULT_RATIO)]
+    if error > MORE_ERROR * other:
+        raise RuntimeError(f"the errors are not equal: {error:.3g} and sdynpy's {other:.3g}")
+    return Got(theirs / ours, f"(errors {error:.2%} and {other:.2%})")
 
 
 CHECKS = [
     Check("lpm-100", "LPM, reference system, 100 x 1 s, noise-free: L = 100", 0.04, "", lambda: lpm_error(100)),
     Check("lpm-150", "LPM, reference system, 100 x 1 s, noise-free: L = 150", 0.006, "", lambda: lpm_error(150)),
-    Check("mesh-feedback-40db", "mesh-feedback ITF, 1 s, 2 Hz, 40 dB", 0.01, "", lambda: feedback_error(0.01)),
-    Check("mesh-feedback-30db", "mesh-feedback ITF, 1 s, 2 Hz, 30 dB", 0.04, "", lambda: feedback_error(10**-1.5)),
+    Check("mesh-feedback-40db", "mesh-feedback ITF, 1 s, 2 Hz, 40 dB", 0.01, "", lambda: feedback(0.01)[0]),
+    Check("mesh-feedback-30db", "mesh-feedback ITF, 1 s, 2 Hz, 30 dB", 0.04, "", lambda: feedback(10**-1.5)[0]),
+    Check("mesh-feedback-time", "the same at 40 dB: processor time", 15.0, "s", lambda: feedback(0.01)[1]),
     *(
         Check(f"{method}-{mesh}hz", f"{method}, {mesh} Hz mesh, 4 s, 40 dB", reach, "", partial(at_speed, mesh, method))
         for method, reach in METHODS

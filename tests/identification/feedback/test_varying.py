@@ -40,6 +40,25 @@ def test_a_wander_of_a_fifth_costs_no_accuracy(identified: xr.Dataset) -> None:
     assert 1000 < frozen < 1250
 
 
+def test_what_no_mesh_force_explains_is_told(record: xr.Dataset, identified: xr.Dataset) -> None:
+    """A response beside the mesh's, a resonance of 1300 Hz read through a gain that turns with the mesh: its size."""
+    assert identified.attrs["unexplained_error"] < 0.01
+    assert "explain" not in identified.attrs["warnings"]
+    frequency = np.fft.rfftfreq(record.sizes["time"], 1 / 6000.0)
+    resonance = 1.0 / (1.0 - (frequency / 1300.0) ** 2 + 0.1j * frequency / 1300.0)
+    force = record["force"].values[0] - record["force"].values.mean()
+    beside = np.fft.irfft(resonance * np.fft.rfft(force), force.size) * np.cos(2 * np.pi * record["mesh_phase"].values)
+    size = 3e-9  # m/N
+    found = identify([record.assign(dte=record["dte"] + size * beside)], SETTINGS)
+    # Of branches +-1 half of it each; the response is that of the undisturbed record.
+    left = size * np.abs(np.interp(found.frequency, frequency, np.abs(resonance))) / np.sqrt(2)
+    share = np.sqrt(np.sum(left**2) / np.mean(np.sum(np.abs(itf(identified).values) ** 2, axis=0)))
+    assert share > 0.05
+    assert found.attrs["unexplained_error"] == pytest.approx(share, rel=0.4)
+    assert "does not explain this record" in found.attrs["warnings"]
+    assert found.attrs["expected_error"] > share / 2
+
+
 def test_phase_comes_from_the_angle_where_it_is_not_measured(record: xr.Dataset) -> None:
     angle = record["mesh_phase"] * 2 * np.pi / 31
     by_angle = record.drop_vars("mesh_phase").assign(angle_driver=angle).assign_attrs(teeth_driver=31)
