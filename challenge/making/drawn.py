@@ -75,6 +75,8 @@ def drawn_nominal(base: Case, family: str, rng: np.random.Generator) -> Case:
         for side, spring, mass in zip(("driver", "driven"), springs, (driver.mass, driven.mass), strict=True)
     }
     rotor = float(f"{spread(*ROTOR) * driver.inertia:.3g}")
+    coupling = base.rig.drive.coupling
+    assert coupling is not None
     supports = {
         side: getattr(base.rig.support, side).model_copy(update={"stiffness": k, "damping": c})
         for side, (k, c) in ((key.split(".")[-1], both) for key, both in held.items())
@@ -84,7 +86,7 @@ def drawn_nominal(base: Case, family: str, rng: np.random.Generator) -> Case:
         "driven": driven,
         "support": base.rig.support.model_copy(update=supports),
         "drive": base.rig.drive.model_copy(
-            update={"coupling": base.rig.drive.coupling.model_copy(update={"inertia": rotor})}),
+            update={"coupling": coupling.model_copy(update={"inertia": rotor})}),
     })  # fmt: skip
     radius = pair(rig).driver.base_radius
     torque = float(f"{spread(*LOAD) * width * module * radius:.3g}")
