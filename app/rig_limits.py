@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 SEED = 1  # of the truth rigs: the same rig and experiment have the same limits
 FAMILY = "calibration"
+MAKING = 0.1  # part of the time that making them takes
 NOISES = {"angle": "angle_", "displacement": "y_", "torque": "torque_"}
 Diagnose = Callable[[Sequence[Path], Path, Path, Sequence[str]], "str | None"]
 
@@ -55,8 +56,17 @@ def limits_of(
     home.mkdir(parents=True, exist_ok=True)
     cases, answers = home / "cases", home / "answers.json"
     torques = {one.name: one.torque for one in records}
-    make_challenge(nominal, mix_of(rigs, SEED), SEED, cases, answers, FAMILY, progress, torques=torques)
-    outcomes, _ = score_folder(cases, answers, read, diagnose, resume=True, workers=workers, progress=progress)
+
+    def making(part: float, note: str) -> None:
+        if progress:
+            progress(MAKING * part, f"truth rigs, {note}")
+
+    def diagnosing(part: float, note: str) -> None:
+        if progress:
+            progress(MAKING + (1.0 - MAKING) * part, f"diagnosing, {note}")
+
+    make_challenge(nominal, mix_of(rigs, SEED), SEED, cases, answers, FAMILY, making, torques=torques)
+    outcomes, _ = score_folder(cases, answers, read, diagnose, resume=True, workers=workers, progress=diagnosing)
     known = [
         Known(parse_verdict(json.dumps(one.verdict)), one.answer.kind, one.answer.effects)
         for one in outcomes
