@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.diagnosis.account import places_of, sentence_of_effect
+from gearbench.diagnosis.chances import Chances, chances_of
 from gearbench.diagnosis.effects.effect import Effect as Library
 from gearbench.diagnosis.effects.effect import Estimate, Fitted, Hypothesis, added
 from gearbench.diagnosis.effects.recalibrated import recalibrated
@@ -23,12 +24,14 @@ from gearbench.diagnosis.forces.equations import PLACES
 from gearbench.diagnosis.forces.steadiness import changing_parts, unsteadiness
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.intake.signals import UNITS, measured_channels
+from gearbench.diagnosis.odds import Calibration, effect_signs
 from gearbench.diagnosis.output.judged import Closing, Judged, itself, judged_on, rms_closed
 from gearbench.diagnosis.output.missing import Missing, missing_forces, nothing_missing
 from gearbench.diagnosis.output.selection import only, with_entered
 from gearbench.diagnosis.output.simulated import Simulated, simulated
 from gearbench.diagnosis.output.structure import structure_found
 from gearbench.diagnosis.output.verdict_of import Decided, decide_simulated, relative_size, size_needed
+from gearbench.diagnosis.population import POPULATION
 from gearbench.diagnosis.replay.replays import replays
 from gearbench.diagnosis.verdict import NINE_OF_TEN, Candidate, Effect, Found, Outcome, Parameter, Range, Share
 from gearbench.diagnosis.words import SHOWN_UNITS
@@ -45,6 +48,7 @@ class Finding:
 
     verdict: Outcome
     probability: dict[str, float]
+    signs: dict[str, float]
     effects: tuple[Effect, ...]
     candidates: tuple[Candidate, ...]
     place: Place
@@ -68,10 +72,12 @@ def find_cause(
     held_out: Measurement | None = None,
     without: Sequence[str] = (),
     report: Report = lambda step: None,
+    known: Calibration = POPULATION,
 ) -> Finding:
     """The cause of the gap between the measurements and the nominal case.
 
-    `without` leaves effects out of the library. Raises DiagnosisError for measurements that cannot be used.
+    `without` leaves effects out of the library; `known` is what the decision rests on. Raises DiagnosisError for
+    measurements that cannot be used.
     """
     problem = problem_of(measurements, nominal)
     result = search(problem, without, report)
@@ -90,40 +96,57 @@ def find_cause(
         silent = missing_by_equation(problem, fit)
         common["where"] = _places(problem, result.base)
         common["audits"] = {"silent": tuple(silent), "unsteady": tuple(unsteady)}
-        return _by_forces_alone(problem, nominal, result, decide(result, silent, unsteady), common)
+        return _by_forces_alone(problem, nominal, result, decide(result, silent, unsteady), known, common)
     report("judging")
-    found = seconded(sized(found), result)
-    judged = judgement(problem, found, held_out)
+    searched = Searched(problem, nominal, tuple(measurements), result, fit, unsteady)
+    return _by_simulation(searched, found, held_out, known, common)
+
+
+@dataclass(frozen=True)
+class Searched:
+    """What the search by forces had and found: `fit` is the best effect's, else the background's; `unsteady`
+    (equations + 1,) the excess scatter between repetitions."""
+
+    problem: Problem
+    nominal: Case
+    measurements: tuple[Measurement, ...]
+    result: Search
+    fit: Fit
+    unsteady: Array
+
+
+def _by_simulation(
+    of: Searched, found: Simulated, held_out: Measurement | None, known: Calibration, common: dict[str, Any]
+) -> Finding:
+    """The finding that simulation justifies."""
+    found = seconded(sized(found), of.result)
+    judged = judgement(of.problem, found, held_out)
     found = judged.found
-    best_p, smooth = found.selection.best.p, found.simulator.target.measurements
-    try:
-        missing = missing_forces(
-            problem, nominal, smooth, lambda one: simulate(found.layout.case(best_p, one.name), one.record)
-        )
-    except ValueError:  # an audit that cannot be made costs the place of the remainder, not the verdict
-        missing = nothing_missing()
-    lines = sum(float(blocks.count.sum()) for blocks in problem.blocks)
-    missing = replace(missing, silent=missing_by_equation(problem, fit) / lines)
-    changing = changing_of(judged, changing_parts(measurements, band))
-    decided = decide_simulated(judged, result, missing, unsteady, changing)
+    missing = _missing(of, found)
+    signs = {f"over {place}": float(over) for place, over in zip(PLACES, missing.over, strict=True)}
+    missing = replace(missing, factors=np.array([known.outstanding.get(place, 1.0) for place in PLACES]))
+    changing = changing_of(judged, changing_parts(of.measurements, of.problem.conditions[0].band))
+    decided = decide_simulated(judged, of.result, missing, of.unsteady, changing, known=known)
+    signs |= {"lines": float(found.simulator.target.counts.sum()), "unknown": decided.sign, "left": judged.left,
+              "remains": judged.remains, "changing": changing}  # fmt: skip
+    chances = chances_of(judged, decided, known, signs["lines"])
     kept = [one.hypothesis for one in decided.named]
     return Finding(
         verdict=decided.verdict,
-        probability=decided.probability,
-        effects=_effects(judged, decided),
+        probability=known.probabilities(chances.best, decided.sign),
+        signs=signs,
+        effects=_effects(judged, decided, chances),
         candidates=_candidates(found, held_out if held_out is not None and held_out.phase_known else None),
         place=decided.place,
         where=places_of(judged, kept, missing),
         recalibrated=found.recalibrated if kept else found.layout.case(found.selection.base.p),
         with_effect=found.with_effects if decided.named else None,
         because=(*decided.because, *_why(judged, kept)),
-        structure=structure_found(
-            found.layout.unknowns, found.selection.best.p, found.std
-        ),
+        structure=structure_found(found.layout.unknowns, found.selection.best.p, found.std),
         missing=missing,
         places=tuple(one.place for one in kept),
         audits={
-            "unsteady": tuple(unsteady),
+            "unsteady": tuple(of.unsteady),
             "missing": tuple(missing.excess),
             "silent": tuple(missing.silent),
             "changing": (changing,),
@@ -131,6 +154,22 @@ def find_cause(
         },
         **common,
     )
+
+
+def _missing(of: Searched, found: Simulated) -> Missing:
+    """The forces that the rig found lacks, with what the force residuals' fit leaves, a line."""
+    best_p, smooth = found.selection.best.p, found.simulator.target.measurements
+    try:
+        missing = missing_forces(
+            of.problem,
+            of.nominal,
+            smooth,
+            lambda one: found.simulator.simulate(found.layout.case(best_p, one.name), one.record),
+        )
+    except ValueError:  # an audit that cannot be made costs the place of the remainder, not the verdict
+        missing = nothing_missing()
+    lines = sum(float(blocks.count.sum()) for blocks in of.problem.blocks)
+    return replace(missing, silent=missing_by_equation(of.problem, of.fit) / lines)
 
 
 def sized(found: Simulated, limits: Limits = LIMITS) -> Simulated:
@@ -184,10 +223,19 @@ def _why(judged: Judged, kept: Sequence[Hypothesis]) -> tuple[str, ...]:
 
 
 def _by_forces_alone(
-    problem: Problem, nominal: Case, result: Search, decision: Decision, common: dict[str, Any]
+    problem: Problem,
+    nominal: Case,
+    result: Search,
+    decision: Decision,
+    known: Calibration,
+    common: dict[str, Any],
 ) -> Finding:
     """The finding where records cannot be simulated, as they do not tell the mesh phase."""
     plain, updated = recalibrated(nominal, fitted(problem, result.base)), None
+    lines = sum(float(blocks.count.sum()) for blocks in problem.blocks)
+    ahead = max((one.log_bayes_factor for one in result.tried if one.hypothesis.effect), default=0.0)
+    best = effect_signs(ahead, lines, decision.winner is not None, 0.0)
+    probability = known.probabilities(best, decision.sign)
     effects: tuple[Effect, ...] = ()
     if decision.winner is not None and decision.winner.fit is not None:
         values, effect = fitted(problem, decision.winner.fit), decision.winner.hypothesis.effect
@@ -196,7 +244,7 @@ def _by_forces_alone(
         effects = (
             Effect(
                 name=effect.name,
-                probability=decision.probability["effect"],
+                probability=probability["effect"],
                 parameters=_parameters(effect, estimates),
             ),
         )
@@ -207,7 +255,8 @@ def _by_forces_alone(
     listed = [Candidate(effects=names, log_evidence=value) for names, value in tried.items()]
     return Finding(
         verdict=decision.verdict,
-        probability=decision.probability,
+        probability=probability,
+        signs={"lines": lines, "unknown": decision.sign},
         effects=effects,
         candidates=tuple(sorted(listed, key=lambda candidate: -candidate.log_evidence)),
         place=decision.place,
@@ -234,7 +283,7 @@ def _parameters(effect: Library, estimates: Sequence[Estimate]) -> dict[str, Par
     return out
 
 
-def _effects(judged: Judged, decided: Decided) -> tuple[Effect, ...]:
+def _effects(judged: Judged, decided: Decided, chances: Chances) -> tuple[Effect, ...]:
     """The named effects with their parameters and what they close; one at work in two places counts once."""
     found = judged.found
     values = found.layout.fitted(found.selection.best.p, found.std)
@@ -247,7 +296,7 @@ def _effects(judged: Judged, decided: Decided) -> tuple[Effect, ...]:
         closing = judged.closings[one.hypothesis.name]
         out[effect.name] = Effect(
             name=effect.name,
-            probability=decided.probability["effect"],
+            probability=chances.named[one.hypothesis.name],
             due=closing.due,
             parameters={**before, **_parameters(effect, estimates)},
             share=judged.share(closing.without),

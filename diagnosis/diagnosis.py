@@ -16,6 +16,8 @@ from gearbench.diagnosis.effects.library import LIBRARY
 from gearbench.diagnosis.errors import DiagnosisError
 from gearbench.diagnosis.intake.measurements import Measurement, held_out_of, intake
 from gearbench.diagnosis.intake.signals import simulated_channels
+from gearbench.diagnosis.odds import Calibration
+from gearbench.diagnosis.population import POPULATION
 from gearbench.diagnosis.replay.adjustable import Simulate, uncertain, variants
 from gearbench.diagnosis.replay.budget import budget
 from gearbench.diagnosis.replay.gap import gaps
@@ -30,12 +32,14 @@ Progress = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Inputs:
-    """Records taken in: those to diagnose from, the one that is held out, and what is asked."""
+    """Records taken in: those to diagnose from, the one that is held out, what is asked, and what the decision rests
+    on."""
 
     nominal: Case
     measurements: tuple[Measurement, ...]
     held_out: Measurement | None
     without: tuple[str, ...] = ()
+    known: Calibration = POPULATION
 
     @property
     def all(self) -> tuple[Measurement, ...]:
@@ -118,7 +122,8 @@ def diagnosed(inputs: Inputs, progress: Progress | None = None, *, quick: bool =
     said = progress or (lambda step: None)
     simulate = replays_of(inputs.nominal, inputs.all)
     said("cause")
-    finding = find_cause(inputs.measurements, inputs.nominal, held_out=inputs.held_out, without=inputs.without)
+    finding = find_cause(inputs.measurements, inputs.nominal, held_out=inputs.held_out, without=inputs.without,
+                         known=inputs.known)  # fmt: skip
     said("how far the gap shrinks")
     plain, improved = finding.recalibrated, finding.with_effect
     shrunk = gaps(inputs.nominal, plain, improved, inputs.judged, simulate=simulate)
@@ -149,7 +154,9 @@ def _verdict(inputs: Inputs, finding: Finding, where: tuple[Share, ...], shrunk:
         explained=explained,
         remainder=remaining,
         structure=finding.structure,
-        limits="population",
+        limits=inputs.known.source,
+        calibrated_on=inputs.known.rigs,
+        signs=finding.signs,
         where=where,
         gap=shrunk,
         held_out=inputs.held_out.name if inputs.held_out else None,

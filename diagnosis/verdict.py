@@ -225,7 +225,11 @@ class Found(_Value):
 
 
 class Verdict(_Value):
-    """What a diagnosis hands back; the fields are those of verdict.json."""
+    """What a diagnosis hands back; the fields are those of verdict.json. `signs`: what its probabilities were read
+    from, all without dimension: independent "lines", the largest sign of something "unknown" over its limit, parts of
+    the gap and of a channel's fluctuation that remain ("left", "remains"), what changes between repetitions over the
+    gap ("changing"), and how far places stand out over what the population's sound rigs leave ("over mesh", ...).
+    `calibrated_on`: number of rigs behind probabilities and limits."""
 
     schema_: Literal["gearbench-verdict/2"] = Field(SCHEMA, alias="schema")
     verdict: Outcome
@@ -243,6 +247,8 @@ class Verdict(_Value):
     held_out: Name | None = None
     indistinguishable: tuple[tuple[Name, ...], ...] = ()
     advice: tuple[str, ...] = ()
+    signs: dict[Name, float] = {}
+    calibrated_on: Annotated[int, Field(ge=0)] | None = None
 
     @model_validator(mode="after")
     def _agrees_with_itself(self) -> Verdict:

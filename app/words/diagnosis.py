@@ -17,6 +17,7 @@ __all__ = [
     "PLACES",
     "SHOWN_UNITS",
     "band_in_words",
+    "basis",
     "confidence",
     "effects_in_words",
     "explained",
@@ -102,11 +103,19 @@ def confidence(verdict: Verdict) -> str:
     """How sure, where, and how far the gap shrinks, in a sentence or two."""
     sure = getattr(verdict.probability, verdict.verdict.removesuffix("s"))
     words = {"effects": "one of the known effects", "none": "no effect", "unknown": "a cause that is not known"}
-    parts = [f"Probability of {words[verdict.verdict]}: {percent(sure)}."]
+    seen = f" (by {basis(verdict.limits, verdict.calibrated_on)})" if verdict.calibrated_on else ""
+    parts = [f"Probability of {words[verdict.verdict]}: {percent(sure)}{seen}."]
     if verdict.verdict == "effects" and verdict.place != "none":
         parts.append(f"It acts {PLACES[verdict.place]}.")
     shrunk = shrinkage(verdict)
     return " ".join([*parts, shrunk] if shrunk else parts)
+
+
+def basis(source: str | None, rigs: int | None) -> str:
+    """From what limits and probabilities are: `12 truth rigs around this one`, `19 truth rigs of other sizes`."""
+    if source is None:
+        return "not said"
+    return f"{rigs} truth rigs {'around this one' if source == 'this rig' else 'of other sizes and structures'}"
 
 
 def shrinkage(verdict: Verdict) -> str:

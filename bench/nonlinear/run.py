@@ -168,6 +168,11 @@ class Setup:
         if self.table is not None and start == 0 and samples == self.block_samples:
             values, outputs = self._integrate(self.table, drive.fine, values, 0)
             return State(after, values), outputs
+        if self.table is not None and -self.block_samples <= start < 0 and stop == 0:
+            # What comes before sample 0 is the end of the repetition before.
+            table = Table(*(column[2 * self.substeps * start - 1 :] for column in self.table))
+            values, outputs = self._integrate(table, drive.fine, values, 2 * self.substeps * start % drive.fine.size)
+            return State(after, values), outputs
         parts = []
         most = max(MOST_ENTRIES // (2 * self.substeps), 1)
         for at in range(start, stop, most):

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from threading import Event
 from typing import TypeVar
 
+Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 
@@ -16,6 +17,14 @@ def processors() -> int:
     here = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     told = os.environ.get("GEARBENCH_PROCESSORS", "")
     return min(int(told), here) if told.isdecimal() and int(told) else here
+
+
+def side_by_side(run: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
+    """Results of run(item) of all items, in order, on as many threads as there are processors."""
+    if not items:
+        return []
+    with ThreadPoolExecutor(min(len(items), processors())) as pool:
+        return list(pool.map(run, items))
 
 
 def realisations(

@@ -12,27 +12,34 @@ import shutil
 import threading
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor, as_completed
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
+from gearbench.bench.nonlinear.law_table import mesh_law
 from gearbench.bench.plan.workers import processors
 from gearbench.bench.statics import static
 from gearbench.challenge.answers import Answer, read_answers, write_answers
 from gearbench.challenge.errors import ChallengeError
+from gearbench.challenge.making.drawn import drawn_nominal
 from gearbench.challenge.making.nominal import nominal_text
 from gearbench.challenge.making.plan import MOST_CASES, Mix, Plan, make_plan
 from gearbench.challenge.truth.effects import EFFECTS, FOREIGN, Drawn
 from gearbench.challenge.truth.levels import background
 from gearbench.challenge.truth.measure import measure
 from gearbench.challenge.truth.rigs import Bench, check_nominal, conditions_of, make_bench
+from gearbench.challenge.truth.scale import Scale, scale_of
 from gearbench.challenge.truth.structure import FAMILIES, Structure, draw_structure, family_named
+from gearbench.geometry import pair
 from gearbench.records import write_record
 from gearbench.rig import Case
 
 STAMP = 946684800  # 2000-01-01: of every file and folder
-POSITIONS = 64  # mesh phases of the nominal stiffness
+Array = NDArray[np.float64]
+
+POSITIONS, DEPTHS = 64, 512  # mesh phases and deflections of the nominal stiffness
 NAME_BYTES = 6
 
 Progress = Callable[[float, str], None]
@@ -47,8 +54,11 @@ class Truth:
     answer: Answer
 
 
-def draw_truth(nominal: Case, family: str, seed: int, number: int, plan: Plan) -> tuple[Truth, np.random.Generator]:
-    """The truth rig of case `number` of a challenge, and the stream that its noise comes from."""
+def draw_truth(
+    nominal: Case, family: str, seed: int, number: int, plan: Plan, scale: Scale | None = None
+) -> tuple[Truth, np.random.Generator]:
+    """The truth rig of case `number` of a challenge, and the stream that its noise comes from; `scale`: of a rig that
+    is not of the demonstration's size."""
     stream = np.random.SeedSequence([seed, list(FAMILIES).index(family), number])
     rngs = [np.random.default_rng(child) for child in stream.spawn(4)]
     structure = draw_structure(nominal, family, rngs[0])
@@ -59,6 +69,9 @@ def draw_truth(nominal: Case, family: str, seed: int, number: int, plan: Plan) -
         places.append(drawn.place)
         parameters[name] = drawn.parameters
         severity[name] = drawn.severity
+    if scale is not None:
+        structure, drawn = scale.structure(structure), replace(drawn, levels=scale.levels(drawn.levels))
+        parameters = scale.parameters(parameters)
     answer = Answer(
         plan.kind, plan.effects, places[0] if places else "none", parameters, severity, family, seed, number
     )
@@ -66,10 +79,23 @@ def draw_truth(nominal: Case, family: str, seed: int, number: int, plan: Plan) -
 
 
 def nominal_stiffness(nominal: Case) -> float:
-    """Mean tangent stiffness [N/m] of the nominal mesh, finite elements, at the first condition's mean torque."""
+    """Mean tangent stiffness [N/m] of the nominal mesh, finite elements or the analytic law that the case asks for, at
+    the first condition's mean torque."""
     condition = conditions_of(nominal)[0]
+    if nominal.simulation.mesh_stiffness == "potential-energy":
+        return _of_law(nominal, condition.experiment.torque_mean)
     result = static(nominal.under(condition), "reduced", positions=POSITIONS)
     return float(result["stiffness_tangent"].mean())
+
+
+def _of_law(nominal: Case, torque: float) -> float:
+    """Mean tangent stiffness [N/m] of the case's own mesh law under a torque [N m]."""
+    law = mesh_law(nominal.rig, nominal.simulation, 2.0 * torque)
+    # The tangent jumps at the first touch: no node lies there.
+    depth = law.approach[-1] * np.arange(1, DEPTHS + 1)[:, None] / DEPTHS
+    force, tangent = law.evaluate(depth, np.arange(POSITIONS) / POSITIONS)
+    load = torque / pair(nominal.rig).driver.base_radius
+    return float(np.interp(load, force.mean(axis=1), tangent.mean(axis=1)))
 
 
 def make_challenge(
@@ -80,8 +106,13 @@ def make_challenge(
     answers_file: Path,
     family: str = "test",
     progress: Progress | None = None,
+    *,
+    drawn: bool = False,
+    torques: Mapping[str, Array] | None = None,
 ) -> Mapping[str, Answer]:
-    """Make all cases that are not there yet; their answers by name.
+    """Make all cases that are not there yet; their answers by name. `drawn`: every case has a nominal rig of its own,
+    of any size (`making.drawn`), as uncertain as `nominal`. `torques`: what was measured in the conditions named, one
+    excitation period (N,) [N m] each, in place of a multisine; effects then have the nominal rig's size.
 
     Raises ChallengeError for an unknown family, bad numbers, answers inside `out`, or files of another challenge.
     """
@@ -91,17 +122,23 @@ def make_challenge(
         raise ChallengeError(f"a challenge of {mix.cases} cases cannot be made: at least 1, at most {MOST_CASES}")
     plans = make_plan(mix, np.random.default_rng(np.random.SeedSequence([seed, list(FAMILIES).index(family)])))
     check_apart(out, answers_file)
-    truths = [draw_truth(nominal, family, seed, i, plan)[0].answer for i, plan in enumerate(plans)]
+    rigs = [_rig_of(nominal, family, seed, number, drawn, bool(torques)) for number in range(len(plans))]
+    truths = [draw_truth(rig, family, seed, i, plan, scale)[0].answer for i, (plan, (rig, scale)) in
+              enumerate(zip(plans, rigs, strict=True))]  # fmt: skip
     answers = _claim(out, answers_file, truths)
-    bench = make_bench(nominal, nominal_stiffness(nominal))
-    text = nominal_text(nominal)
+    shared = None
+    if not drawn:
+        scale = scale_of(nominal) if torques else None
+        shared = make_bench(nominal, nominal_stiffness(nominal), scale, torques), nominal_text(nominal)
     missing = [name for name in sorted(answers) if not (out / name).is_dir()]
     stop = threading.Event()
 
     def run(name: str) -> None:
         if not stop.is_set():
             number = answers[name].number
-            truth, rng = draw_truth(nominal, family, seed, number, plans[number])
+            rig, scale = rigs[number]
+            truth, rng = draw_truth(rig, family, seed, number, plans[number], scale)
+            bench, text = shared or (make_bench(rig, nominal_stiffness(rig), scale), nominal_text(rig))
             _write_case(bench, truth, name, text, out, rng)
 
     with ThreadPoolExecutor(processors()) as pool:
@@ -116,6 +153,18 @@ def make_challenge(
             pool.shutdown(wait=True, cancel_futures=True)
     os.utime(out, (STAMP, STAMP))
     return answers
+
+
+def _rig_of(
+    nominal: Case, family: str, seed: int, number: int, drawn: bool, scaled: bool
+) -> tuple[Case, Scale | None]:
+    """The nominal rig of case `number`, and its scale where effects go with the rig's size."""
+    if not drawn:
+        return nominal, scale_of(nominal) if scaled else None
+    rng = np.random.default_rng(np.random.SeedSequence([seed, list(FAMILIES).index(family), number, 1]))
+    rig = drawn_nominal(nominal, family, rng)
+    check_nominal(rig)
+    return rig, scale_of(rig)
 
 
 def check_apart(out: Path, answers_file: Path) -> None:

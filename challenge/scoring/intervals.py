@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -91,3 +91,11 @@ def reliability(stated: Sequence[float], right: Sequence[bool]) -> list[dict[str
             rate = Rate(int(hit[inside].sum()), int(inside.sum()))
             rows.append({"from": low, "to": high, "stated": float(p[inside].mean()), **rate.plain()})
     return rows
+
+
+def calibration_error(rows: Sequence[Mapping[str, object]]) -> float | None:
+    """Mean over cases of how far the rate in their bin lies from the mean stated there (rows of `reliability`)."""
+    total = sum(int(str(row["total"])) for row in rows)
+    if not total:
+        return None
+    return sum(int(str(r["total"])) * abs(float(str(r["stated"])) - float(str(r["share"]))) for r in rows) / total

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from gearbench.challenge.scoring.intervals import COVERAGE, Rate, brier, middle, reliability
+from gearbench.challenge.scoring.intervals import COVERAGE, Rate, brier, calibration_error, middle, reliability
 from gearbench.challenge.scoring.outcomes import TRUE_VERDICT, VERDICTS, Outcome, named_effects, said
 from gearbench.challenge.scoring.reach import reach_table
 from gearbench.challenge.truth.effects import EFFECTS, SEVERITY
@@ -119,10 +119,13 @@ def _calibration(outcomes: Sequence[Outcome]) -> Table:
             true = outcome.answer.kind == "effect" and effect["name"] in outcome.answer.effects
             named.append((float(effect["probability"]), true))
     chosen = [p[i] for p, i in zip(stated, told, strict=True)]
+    verdict = reliability(chosen, [a == b for a, b in zip(told, truth, strict=True)])
+    effect = reliability([p for p, _ in named], [hit for _, hit in named])
     return {
         "brier": brier(stated, truth),
-        "verdict": reliability(chosen, [a == b for a, b in zip(told, truth, strict=True)]),
-        "effect": reliability([p for p, _ in named], [hit for _, hit in named]),
+        "verdict": verdict,
+        "effect": effect,
+        "error": {"verdict": calibration_error(verdict), "effect": calibration_error(effect)},
     }
 
 

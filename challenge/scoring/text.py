@@ -98,6 +98,9 @@ def _calibration(score: Table) -> str:
             f"  {title}: stated {row['from']:.2f}-{row['to']:.2f}, mean {row['stated']:.2f}: true {rate_text(row)}"
             for row in calibration[key]
         ]
+        error = calibration.get("error", {}).get(key)
+        if error is not None:
+            lines.append(f"  {title}: calibration error {error:.2f}")
     return "\n".join(lines)
 
 

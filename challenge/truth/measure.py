@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.fft import irfft, rfft, rfftfreq
 from scipy.interpolate import CubicSpline
 
+from gearbench.bench.nonlinear.replay import resampled
 from gearbench.bench.plan.excitation import torque_realisation
 from gearbench.bench.plan.schedule import Schedule, schedule
 from gearbench.bench.record.attributes import experiment_attributes, rig_attributes
@@ -132,7 +133,11 @@ def run_condition(bench: Bench, rig: Structure, levels: Levels, condition: Condi
     substeps = finer * steps_per_sample(plant, plan.sampling_rate)
     step = 1.0 / (plan.sampling_rate * substeps)
     period = plan.samples_per_period / plan.sampling_rate
-    torque = torque_realisation(experiment, 0, bench.nominal.rig).sample(2 * substeps * plan.samples_per_period)
+    points = 2 * substeps * plan.samples_per_period
+    if condition.name in bench.torques:
+        torque = resampled(bench.torques[condition.name], points)
+    else:
+        torque = torque_realisation(experiment, 0, bench.nominal.rig).sample(points)
     command = torque[:: 2 * substeps].copy()
     if levels.foreign.filter_frequency:
         behind = filtered(torque, levels.foreign, period)

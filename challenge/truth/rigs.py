@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from gearbench.bench.refusals.stated import check_springs, check_stated
 from gearbench.challenge.errors import ChallengeError
 from gearbench.challenge.truth.levels import RIPPLE_ORDERS, Levels
 from gearbench.challenge.truth.plant import Coupling, Drift, Gears, Inertias, Plant, Spring, Teeth, Tone
+from gearbench.challenge.truth.scale import Scale
 from gearbench.challenge.truth.structure import Structure
 from gearbench.challenge.truth.teeth import pair_law, scaled
 from gearbench.geometry import Pair, pair
@@ -33,6 +35,8 @@ class Bench:
     nominal: Case
     meshing: Pair
     stiffness: float  # mean tangent stiffness [N/m] of the nominal mesh at the first condition's mean torque
+    scale: Scale = field(default_factory=Scale)
+    torques: Mapping[str, Array] = field(default_factory=dict)  # of conditions that were measured: one period [N m]
 
 
 def conditions_of(nominal: Case) -> tuple[Condition, ...]:
@@ -74,11 +78,13 @@ def check_nominal(nominal: Case) -> None:
         schedule(experiment, rig)
 
 
-def make_bench(nominal: Case, stiffness: float) -> Bench:
+def make_bench(
+    nominal: Case, stiffness: float, scale: Scale | None = None, torques: Mapping[str, Array] | None = None
+) -> Bench:
     """The nominal case made ready; `stiffness` [N/m] is the mean tangent stiffness of its mesh. Raises ChallengeError
     or GeometryError."""
     check_nominal(nominal)
-    return Bench(nominal, pair(nominal.rig), stiffness)
+    return Bench(nominal, pair(nominal.rig), stiffness, scale or Scale(), torques or {})
 
 
 def build_plant(bench: Bench, rig: Structure, levels: Levels, experiment: Experiment) -> Plant:
@@ -143,7 +149,8 @@ def _teeth(bench: Bench, rig: Structure, levels: Levels) -> Teeth:
     first = conditions_of(bench.nominal)[0].experiment
     wanted = bench.stiffness * rig.stiffness_factor
     law = pair_law(nominal, meshing, rig.shape, rig.bow)
-    law = scaled(law, rig.exponent, REFERENCE, first.torque_mean / meshing.driver.base_radius, wanted)
+    reference = REFERENCE * bench.scale.length
+    law = scaled(law, rig.exponent, reference, first.torque_mean / meshing.driver.base_radius, wanted)
     low, high = law.inside
     away = np.clip((law.place - 0.5 * (low + high)) / (0.5 * (high - low)), -1.0, 1.0)
     slope, bow, wave_cos, wave_sin = rig.profile
@@ -154,6 +161,7 @@ def _teeth(bench: Bench, rig: Structure, levels: Levels) -> Teeth:
     damping = 2 * rig.damping_ratio * np.sqrt(mesh_mass / wanted)
     crack = [loss / (1.0 - loss) for loss in levels.crack]
     more = levels.backlash_more * meshing.driver.base_radius / meshing.driver.reference_radius
+    rate = RATE * bench.scale.length * bench.scale.frequency
     return Teeth(
         first=law.first,
         pitch=law.pitch,
@@ -166,12 +174,12 @@ def _teeth(bench: Bench, rig: Structure, levels: Levels) -> Teeth:
         crack_driver=crack[0],
         crack_driven=crack[1],
         exponent=rig.exponent,
-        reference=REFERENCE,
+        reference=reference,
         backlash=meshing.backlash_normal + more,
         damping=float(damping),
         damping_load=rig.damping_load,
         damping_onset=rig.damping_onset,
-        damping_quadratic=float(damping) * levels.foreign.damping_quadratic / RATE,
+        damping_quadratic=float(damping) * levels.foreign.damping_quadratic / rate,
         friction=levels.friction,
         friction_speed=rig.friction_speed,
         friction_shape=rig.friction_shape,

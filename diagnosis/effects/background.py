@@ -13,10 +13,10 @@ from gearbench.diagnosis.forces.basis import KNOTS, SHAPE_ORDERS
 from gearbench.diagnosis.forces.nominal import NominalModel
 from gearbench.diagnosis.forces.unknowns import Group, group
 
-OFFSET = 5e-6  # [m] excess material of all pairs: the zero of the angles is known to some um
+OFFSET = 0.8  # excess material of all pairs over the deflection of the mesh: the zero of the angles is not known better
 CURVATURE = 0.05  # exponent of the mesh force over its level: teeth stiffen a little as their contacts widen
 SHAPE = 0.04  # of the stiffness, at each mesh order: tables of finite elements against a meshed rig
-PROFILE = 0.5e-6  # [m] at each mesh order: flanks of a good gear
+PROFILE = 0.08  # at each mesh order, over the deflection of the mesh: flanks of a good gear
 # Compliance of webs and shafts over that of the mesh: little at low frequencies, where it cannot be told from the
 # mesh's own stiffness.
 YIELDING = 0.01 + 0.07 * np.minimum(1.0, (np.array(KNOTS) / 0.4) ** 2)
@@ -36,10 +36,10 @@ def background(model: NominalModel) -> tuple[Group, ...]:
         group("inertia", "1", (*SIDES, "rotor"), inertia, slot="inertia"),
         _bounded("scale", ("mesh",), model.sd_scale, SCALE_BOUND),
         _bounded("mesh-ratio", ("mesh",), model.sd_mesh_ratio, RATIO_BOUND),
-        group("offset", "m", ("excess",), OFFSET, slot="offset"),
+        group("offset", "m", ("excess",), OFFSET * model.deflection, slot="offset"),
         _bounded("curvature", ("mesh",), CURVATURE, CURVATURE_BOUND),
         group("shape", "1", 2 * SHAPE_ORDERS, SHAPE, slot="shape"),
-        group("profile", "m", 2 * SHAPE_ORDERS, PROFILE, slot="profile"),
+        group("profile", "m", 2 * SHAPE_ORDERS, PROFILE * model.deflection, slot="profile"),
         group("compliance", "1", complex_knots, np.tile(YIELDING, 2), slot="yielding"),
         _bounded("radial", ("k1", "k2", "c1", "c2"), RADIAL, RADIAL_BOUND),
     )

@@ -22,14 +22,14 @@ from gearbench.diagnosis.forces.unknowns import Group, group
 from gearbench.rig import Rig
 
 KEY = "backlash"
-# [m] A worn or badly set centre distance: severity 1 of the truth rigs of `challenge`. Sound
-# gears keep to a tenth of it.
-SD, WIDE = 8e-6, 80e-6
+# Over the deflection of the mesh. A worn or badly set centre distance: severity 1 of the truth rigs of `challenge`.
+# Sound gears keep to a tenth of it.
+SD, WIDE = 1.3, 13.0
 
 
 def unknowns(model: NominalModel, conditions: Sequence[Condition]) -> tuple[Group, ...]:
     """Backlash along the line of action beyond the nominal one."""
-    return (group(KEY, "m", ("more",), SD, WIDE, slot="backlash"),)
+    return (group(KEY, "m", ("more",), SD * model.deflection, WIDE * model.deflection, slot="backlash"),)
 
 
 def hypotheses(model: NominalModel) -> tuple[Hypothesis, ...]:

@@ -16,10 +16,10 @@ from gearbench.rig import Rig
 from gearbench.rig.drive import Coupling
 
 KEY = "coupling"
-# [Hz] resonance of the rotor against the driver: a stiff one lies at twice the end of the usual band or above, one
-# worth a diagnosis inside it (truth rigs: 7.5 to 11 kHz and 0.9 to 3 kHz).
-RIGID, ELASTIC = 6e3, 1.3e3
-# Compliances to begin from, as squares of 6 kHz over the resonance: 3000 Hz to a seventh of 6 kHz.
+# Resonance of the rotor against the driver over that of the mesh: a stiff one lies far above, one worth a diagnosis
+# near or below it (truth rigs: 3.9 to 5.8, and 0.5 to 1.6).
+RIGID, ELASTIC = 3.1, 0.67
+# Compliances to begin from, as squares of a stiff one's resonance over the coupling's: a half of it to a seventh.
 RATIOS = (2.0, 2.7, 3.6, 4.8, 6.5)
 
 
@@ -28,7 +28,7 @@ def unknowns(model: NominalModel, conditions: Sequence[Condition]) -> tuple[Grou
     reduced = 1.0 / (1.0 / max(model.rotor, 1e-12) + 1.0 / model.inertia[0])
 
     def compliance(resonance: float) -> float:
-        return 1.0 / (reduced * (2 * np.pi * resonance) ** 2)
+        return 1.0 / (reduced * (2 * np.pi * resonance * model.resonance) ** 2)
 
     return (
         group(KEY, "rad/(N m)", ("compliance",), compliance(RIGID), compliance(ELASTIC), slot="coupling", low=0.0),

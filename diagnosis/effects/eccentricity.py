@@ -27,8 +27,9 @@ from gearbench.rig import Rig
 
 # Groups by gear.
 KEYS = {side: f"eccentricity-{side}" for side in SIDES}
-# [m] Half of the run-out: truth rigs of severity 1 have 5 um, of which either part is some 3 um; sound gears a tenth.
-SD, WIDE = 0.3e-6, 3e-6
+# Half of the run-out over the deflection of the mesh: truth rigs of severity 1 have 0.8, of which either part is some
+# 0.5; sound gears a tenth.
+SD, WIDE = 0.05, 0.5
 
 
 def _turning(side: int, condition: Condition) -> NDArray[np.float64]:
@@ -38,8 +39,9 @@ def _turning(side: int, condition: Condition) -> NDArray[np.float64]:
 
 def unknowns(model: NominalModel, conditions: Sequence[Condition]) -> tuple[Group, ...]:
     """Cosine and sine part of the excess material along the line of action, for either gear."""
+    sound, large = SD * model.deflection, WIDE * model.deflection
     return tuple(
-        group(key, "m", ("cos", "sin"), SD, WIDE, slot="excess", basis=partial(_turning, number))
+        group(key, "m", ("cos", "sin"), sound, large, slot="excess", basis=partial(_turning, number))
         for number, key in enumerate(KEYS.values())
     )
 

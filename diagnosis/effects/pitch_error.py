@@ -24,16 +24,18 @@ from gearbench.rig import Rig
 
 # Groups by gear.
 KEYS = {side: f"pitch-{side}" for side in SIDES}
-# [m] of each tooth: 3 um rms is severity 1 of the truth rigs of `challenge`; sound gears have a tenth.
-SD, WIDE = 0.25e-6, 2.5e-6
+# Of each tooth over the deflection of the mesh: an rms of 0.5 is severity 1 of the truth rigs of `challenge`; sound
+# gears have a tenth.
+SD, WIDE = 0.04, 0.4
 
 
 def unknowns(model: NominalModel, conditions: Sequence[Condition]) -> tuple[Group, ...]:
     """Excess material of every tooth."""
     first = dict(zip(SIDES, (0, model.teeth[0]), strict=True))
     counts = dict(zip(SIDES, model.teeth, strict=True))
+    sound, large = SD * model.deflection, WIDE * model.deflection
     return tuple(
-        group(key, "m", counts[side], SD, WIDE, slot="pitch", first=first[side]) for side, key in KEYS.items()
+        group(key, "m", counts[side], sound, large, slot="pitch", first=first[side]) for side, key in KEYS.items()
     )
 
 

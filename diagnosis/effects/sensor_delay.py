@@ -13,16 +13,19 @@ from gearbench.rig import Rig
 
 # Groups by channel.
 KEYS = {channel: f"delay-{channel}" for channel in DELAYED}
-# [s] Half a sample at 10 kHz is 50 us, severity 1 of the truth rigs; sound channels share a clock to a tenth of it.
-SD, WIDE = 4e-6, 60e-6
-# [s] Phases turn by many radians at the end of the band: the search begins on either side.
-STARTS = (-60e-6, -30e-6, 30e-6, 60e-6)
+# In periods of the mesh's resonance: a tenth (half a sample at five samples a period) is severity 1 of the truth rigs;
+# sound channels share a clock to a tenth of it.
+SD, WIDE = 0.0075, 0.11
+# Over the former: phases turn by many radians at the end of the band, and the search begins on either side.
+STARTS = (-15.0, -7.5, 7.5, 15.0)
 
 
 def unknowns(model: NominalModel, conditions: Sequence[Condition]) -> tuple[Group, ...]:
     """The lag of every channel."""
+    sound, large = SD / model.resonance, WIDE / model.resonance
     return tuple(
-        group(key, "s", ("delay",), SD, WIDE, slot="delay", first=number) for number, key in enumerate(KEYS.values())
+        group(key, "s", ("delay",), sound, large, slot="delay", first=number)
+        for number, key in enumerate(KEYS.values())
     )
 
 
@@ -36,7 +39,7 @@ def hypotheses(model: NominalModel) -> tuple[Hypothesis, ...]:
 
 def starts(group: Group) -> tuple[float, ...]:
     """Lags to begin from."""
-    return STARTS
+    return tuple(float(group.sd[0]) * start for start in STARTS)
 
 
 def add(rig: Rig, hypothesis: Hypothesis, fitted: Fitted) -> Added:

@@ -16,18 +16,16 @@ from gearbench.rig.contract import Place
 
 Array = NDArray[np.float64]
 
-SHARPNESS = 3.0  # nats over which a probability goes from 1/2 to 3/4 or so
-
 
 @dataclass(frozen=True)
 class Decision:
-    """`verdict` effects, none or unknown; `place`; the winner (effect only); probabilities of the three; `because` says
-    in one sentence what decided."""
+    """`verdict` effects, none or unknown; `place`; the winner (effect only); the largest `sign` of something unknown
+    over its limit; `because` says in one sentence what decided."""
 
     verdict: Outcome
     place: Place
     winner: Tried | None
-    probability: dict[str, float]
+    sign: float
     because: str
 
 
@@ -37,30 +35,25 @@ def decide(search: Search, silent: Array, unsteady: Array, limits: Limits = LIMI
     best, free = named(search, limits), search.best_free
     place, over = worst(unsteady, limits.unsteady)
     if over > 1.0:
-        return _unknown(place, f"the force missing {at_place(place)} changes from one repetition to the next", over)
+        because = f"the force missing {at_place(place)} changes from one repetition to the next"
+        return Decision("unknown", place, None, over, because)
     needed = limits.free
     if best:
         needed = limits.competitor_factor * best.log_bayes_factor + limits.competitor_offset
     if free and free.log_bayes_factor > needed:
         found = free.hypothesis.place
         because = f"a force {at_place(found)} without any given form explains the records clearly better"
-        return _unknown(found, because, free.log_bayes_factor / needed)
+        return Decision("unknown", found, None, free.log_bayes_factor / needed, because)
     place, over = worst(silent, limits.silent)
     left = float(silent[PLACES.index(place)])
     if over > 1.0 and not (best and best.log_bayes_factor > left):
-        return _unknown(place, f"a force {at_place(place)} remains that no effect of the library explains", over)
+        because = f"a force {at_place(place)} remains that no effect of the library explains"
+        return Decision("unknown", place, None, over, because)
     if best:
-        assert best.hypothesis.effect is not None
-        margin = best.log_bayes_factor - limits.of(best.hypothesis.effect)
         because = "its evidence exceeds what rigs without an effect reach"
-        return Decision("effects", best.hypothesis.place, best, _probabilities(margin), because)
-    margins = [
-        one.log_bayes_factor - limits.of(one.hypothesis.effect)
-        for one in search.tried
-        if one.hypothesis.effect and one.fit
-    ]
+        return Decision("effects", best.hypothesis.place, best, min(over, 1.0), because)
     because = "no effect has more evidence than rigs without an effect give it"
-    return Decision("none", "none", None, _probabilities(max(margins, default=-limits.effect)), because)
+    return Decision("none", "none", None, over, because)
 
 
 def named(search: Search, limits: Limits = LIMITS) -> Tried | None:
@@ -93,20 +86,3 @@ def worst(values: Array, limits: Mapping[str, float]) -> tuple[Place, float]:
 def at_place(place: str) -> str:
     """`in the mesh`, `at the drive`."""
     return f"{'in' if place == 'mesh' else 'at'} the {place.replace('-', ' ')}"
-
-
-def unknown_by(over: float) -> dict[str, float]:
-    """Probabilities where something unknown shows: by how far its sign lies beyond its limit."""
-    unknown = 1.0 - 0.5 / max(over, 1.0)
-    rest = 0.5 * (1.0 - unknown)
-    return {"effect": rest, "none": rest, "unknown": unknown}
-
-
-def _unknown(place: Place, because: str, over: float) -> Decision:
-    return Decision("unknown", place, None, unknown_by(over), because)
-
-
-def _probabilities(ahead: float) -> dict[str, float]:
-    """Probabilities by how far the evidence lies beyond the limit."""
-    effect = 1.0 / (1.0 + np.exp(-np.clip(ahead / SHARPNESS, -40, 40)))
-    return {"effect": 0.95 * effect, "none": 0.95 * (1 - effect), "unknown": 1.0 - 0.95}

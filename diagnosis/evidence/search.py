@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gearbench.bench.plan.workers import side_by_side
 from gearbench.diagnosis.effects.effect import Hypothesis, widened
 from gearbench.diagnosis.effects.free_forms import free_forms
 from gearbench.diagnosis.effects.library import hypotheses
@@ -57,12 +58,13 @@ def search(problem: Problem, without: Sequence[str] = (), report: Report = lambd
     unknowns = problem.unknowns
     report("background")
     begin = begin_of(problem)
-    base = refit(problem, unknowns.prior(), begin, most=STEPS_BASE, coarse=COARSE)
-    report("everything at once")
     effects = hypotheses(problem.model, without)
     # Groups that are wide as a whole; single entries are alternatives to one another, or numbers of the background.
     sd = widened(unknowns, [wide for one in effects for wide in one.wide if wide.at is None])
-    free = refit(problem, sd, begin, most=STEPS, coarse=COARSE)
+    alone, everything = (unknowns.prior(), STEPS_BASE), (sd, STEPS)
+    base, free = side_by_side(
+        lambda one: refit(problem, one[0], begin, most=one[1], coarse=COARSE), [alone, everything]
+    )
     again = refit(problem, unknowns.prior(), free.p, free.factors, most=STEPS_BASE)
     base = again if again.cost < base.cost else base
     listed = effects + free_forms()
@@ -74,11 +76,11 @@ def search(problem: Problem, without: Sequence[str] = (), report: Report = lambd
             begun[number] = _start(problem, (base, free), hypothesis)
             promised[number] = max(promised[number], begun[number][1])
     chosen = _promising(listed, promised)
-    tried = []
-    for number, (hypothesis, factor) in enumerate(zip(listed, promised, strict=True)):
+
+    def tried_one(number: int) -> Tried:
+        hypothesis, factor = listed[number], float(promised[number])
         if number not in chosen:
-            tried.append(Tried(hypothesis, min(float(factor), 0.0), None))
-            continue
+            return Tried(hypothesis, min(factor, 0.0), None)
         report(hypothesis.name)
         sd = hypothesis.prior(unknowns)
         try:
@@ -87,10 +89,11 @@ def search(problem: Problem, without: Sequence[str] = (), report: Report = lambd
             else:
                 fit = refit(problem, sd, begin, most=STEPS, coarse=COARSE)
         except ValueError:  # a fit that leads nowhere costs its hypothesis, not the verdict
-            tried.append(Tried(hypothesis, 0.0, None))
-            continue
+            return Tried(hypothesis, 0.0, None)
         evidence = fit.log_evidence - float(np.log(hypothesis.choices))
-        tried.append(Tried(hypothesis, evidence, fit, relative_size(unknowns, hypothesis, fit)))
+        return Tried(hypothesis, evidence, fit, relative_size(unknowns, hypothesis, fit))
+
+    tried = side_by_side(tried_one, range(len(listed)))
     base, tried = _level(problem, base, tried)
     return Search(base, tuple(sorted(tried, key=lambda one: -one.log_bayes_factor)))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import cos, lcm, sin, tan
+from math import cos, lcm, pi, sin, sqrt, tan
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,11 +63,28 @@ class NominalModel:
     sd_scale: float
     sd_mesh_ratio: float
     noise: tuple[float, float, float]  # rms per sample of angle [rad], displacement [m], torque [N m]
+    torque_mean: float  # typical, on the driver [N m]
 
     @property
     def hunting(self) -> int:
         """Teeth that pass until the same two meet again."""
         return lcm(*self.teeth)
+
+    @property
+    def mesh_stiffness(self) -> float:
+        """Mean stiffness [N/m] of the mesh at the largest load of its table."""
+        _, tangent = self.law.evaluate(self.law.approach[-1], np.arange(self.law.phases) / self.law.phases)
+        return self.scale * float(tangent.mean())
+
+    @property
+    def deflection(self) -> float:
+        """Of the mesh under the mean torque [m]: what lengths count as large by."""
+        return abs(self.torque_mean) / self.base_radius[0] / self.mesh_stiffness
+
+    @property
+    def resonance(self) -> float:
+        """Of the turning parts on the mesh [Hz]: what frequencies count as high by."""
+        return sqrt(self.mesh_stiffness / self.mesh_mass) / (2 * pi)
 
 
 def nominal_model(nominal: Case, load: float, mean: float) -> NominalModel:
@@ -125,6 +142,7 @@ def nominal_model(nominal: Case, load: float, mean: float) -> NominalModel:
         sd_scale=known.one("rig.mesh.stiffness_scale", rig.mesh.stiffness_scale, "mesh_scale"),
         sd_mesh_ratio=known.one("rig.damping.mesh_ratio", rig.damping.mesh_ratio, "mesh_ratio"),
         noise=(rig.sensors.noise_angle, rig.sensors.noise_displacement, rig.sensors.noise_torque),
+        torque_mean=mean,
     )
 
 

@@ -29,8 +29,8 @@ Integers = NDArray[np.int64]
 # In the order of reading: what makes noise first, then where it goes.
 CHANNELS = ("dte", "angle_driver", "angle_driven", "y_driver", "y_driven", "torque_driven")
 UNITS = {**dict.fromkeys(CHANNELS, "m"), "torque_driven": "N m"}
-# Upper ends [Hz] of the bands that a gap is told in, below the end of the excited band.
-BAND_ENDS = (200.0, 1000.0)
+# Upper ends of the bands that a gap is told in, below the end of the excitation, over it.
+BAND_ENDS = (1 / 15, 1 / 3)
 # A line is excited when its torque exceeds this part of the strongest line's (the mean apart).
 EXCITED = 0.1
 
@@ -105,15 +105,16 @@ def excited(measurement: Measurement) -> Integers:
 
 
 def bands(measurement: Measurement) -> tuple[tuple[float, float], ...]:
-    """Bands [Hz] of a gap: cut at 200 and 1000 Hz, up to the end of the excitation (without any: of the spectrum).
+    """Bands [Hz] of a gap: cut at a fifteenth and a third of the end of the excitation (without any: of the spectrum).
 
     A line belongs to the band whose lower edge it exceeds and whose upper edge it does not.
     """
     frequency = frequencies(measurement)
     lines = excited(measurement)
-    # Up to the next 50 Hz, so that the records of one campaign share their edges.
+    # Up to the next 50 Hz, as `compare` does, so that the records of one campaign share their edges.
     top = min(float(np.ceil(frequency[lines[-1]] / 50 - 1e-9) * 50), frequency[-1]) if lines.size else frequency[-1]
-    edges = [0.0, *(end for end in BAND_ENDS if end < top), float(top)]
+    top = float(top)
+    edges = [0.0, *(float(f"{part * top:.2g}") for part in BAND_ENDS), top]
     return tuple(pairwise(edges))
 
 

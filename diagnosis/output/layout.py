@@ -64,9 +64,7 @@ class Layout:
     @cached_property
     def mesh_stiffness(self) -> float:
         """Mean stiffness [N/m] of the nominal mesh at the largest load of its table."""
-        law = self.model.law
-        _, tangent = law.evaluate(law.approach[-1], np.arange(law.phases) / law.phases)
-        return self.model.scale * float(tangent.mean())
+        return self.model.mesh_stiffness
 
     def law_of(self, case: Case) -> MeshLaw:
         """The force law of the mesh of a rig of these unknowns."""
@@ -100,7 +98,7 @@ def layout_of(
     groups: list[Group] = [one for one in background(model) if one.key not in FORCES_ONLY]
     for effect in LIBRARY:
         groups += effect.unknowns(model, conditions)
-    groups += structure_groups(nominal.rig)
+    groups += structure_groups(nominal.rig, model)
     # Bases belong to force residuals: here unknowns are moved one by one.
     plain = [replace(one, basis=None) for one in groups]
     means = {condition.name: condition.torque_mean for condition in conditions}

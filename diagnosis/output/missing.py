@@ -43,18 +43,19 @@ class Missing:
     """What is missing at each place, in the order of `PLACES`: `excess` (places,), the mean over lines of the logarithm
     of what is missing over the floor of a sound rig [nats]; `bands` [Hz] with `force` (bands, places) rms [N]; `silent`
     (places,) the same mean after the fit of the force residuals, which have a filter of their own in each equation but
-    know no structure (infinite: not known)."""
+    know no structure (infinite: not known); `factors` (places,): what sound rigs of this kind leave over that."""
 
     excess: Array
     bands: tuple[tuple[float, float], ...]
     force: Array
     silent: Array = field(default_factory=lambda: np.full(len(PLACES), np.inf))
+    factors: Array = field(default_factory=lambda: np.ones(len(PLACES)))
 
     @property
     def over(self) -> Array:
         """How far each place (places,) stands out over what sound rigs leave there: only as far as both say so, the
         simulated rig, which has structure, and the force residuals, which have filters."""
-        return np.minimum(self.excess / _of(OUTSTANDING), self.silent / _of(SILENT))
+        return np.minimum(self.excess / _of(OUTSTANDING), self.silent / _of(SILENT)) / self.factors
 
     @property
     def shares(self) -> Array:

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gearbench.bench.plan.workers import side_by_side
 from gearbench.diagnosis.effects.effect import Hypothesis
 from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.output.fit import Optimum, Sensitivity, cost_of, fit, sensitivity_of
@@ -135,18 +136,19 @@ def weigh(
     by_force = sorted((s for s in starts.values() if s.hypothesis.name in ranked), key=lambda s: -s.log_bayes_factor)
     names = [s.hypothesis.name for s in by_force[:BY_FORCES] if s.log_bayes_factor > WORTH]
     names = list(dict.fromkeys([*names, *(one.name for value, one, _ in promised[:TRIED] if value > WORTH)]))[:TRIED]
-    out = []
-    for value, one, step in promised:
+
+    def weighed(item: tuple[float, Hypothesis, Array]) -> Weighed:
+        value, one, step = item
         if one.name not in names:
-            out.append(Weighed(one, min(value, 0.0), None))
-            continue
+            return Weighed(one, min(value, 0.0), None)
         report(f"simulating: {one.name}")
         optimum = _refit(simulator, base, one, step, starts.get(one.name))
         if optimum is None:
-            out.append(Weighed(one, min(value, 0.0), None))
-            continue
+            return Weighed(one, min(value, 0.0), None)
         factor = optimum.evidence - base.evidence - float(np.log(one.choices))
-        out.append(Weighed(one, min(factor, relief(unknowns, base.sd, one, optimum)), optimum))
+        return Weighed(one, min(factor, relief(unknowns, base.sd, one, optimum)), optimum)
+
+    out = side_by_side(weighed, promised)
     return sorted(out, key=lambda one: -one.log_bayes_factor)
 
 

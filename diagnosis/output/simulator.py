@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TypeVar
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from gearbench.bench.plan.workers import processors
+from gearbench.bench.plan.workers import side_by_side
 from gearbench.diagnosis.effects.sensor_delay import KEYS as DELAYS
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.intake.signals import simulated_channels
@@ -31,7 +29,6 @@ from gearbench.rig import Case
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Flags = NDArray[np.bool_]
-Result = TypeVar("Result")
 Simulate = Callable[[Case, xr.Dataset], xr.Dataset]
 
 
@@ -48,14 +45,15 @@ class Simulator:
     def lines(self, p: Array) -> Complex | None:
         """Simulated lines (K,) of unknowns (size,); None where no rig has them or it does not settle."""
         key = p.tobytes()
-        if key not in self._kept:
+        found = self._kept.get(key)
+        if found is None:
             found = self._lines(p)
             if found is None:
                 return None
             if len(self._kept) > 64:
                 self._kept.clear()
             self._kept[key] = found
-        return self._kept[key]
+        return found
 
     def _lines(self, p: Array) -> Complex | None:
         def one(measured: Measurement) -> dict[str, Array]:
@@ -63,7 +61,7 @@ class Simulator:
 
         self.replays += len(self.target.measurements)
         try:
-            lines = self.target.gathered(_side_by_side(one, self.target.measurements))
+            lines = self.target.gathered(side_by_side(one, self.target.measurements))
         except ValueError:
             return None
         return lines if np.isfinite(lines).all() else None
@@ -96,6 +94,7 @@ class Simulator:
             return None
         unknowns = self.layout.unknowns
         low, high = unknowns.bounds()
+        unmoved = self.layout.case(p)
         for key in (*MOVED, "inertia"):
             if key not in unknowns.slices:
                 continue
@@ -108,6 +107,8 @@ class Simulator:
                     moved[index] += signed
                     if not low[index] <= moved[index] <= high[index]:
                         continue
+                    if self.layout.case(moved) == unmoved:
+                        break  # frequency of a housing that is not there
                     answer = self._lines(moved)
                     if answer is not None:
                         out[index] = (answer - here) / signed
@@ -141,7 +142,7 @@ class Simulator:
                     found.append((np.array([index]), {name: values[None] for name, values in parts.items()}))
             return number, found
 
-        for number, found in _side_by_side(one, list(enumerate(self.target.measurements))):
+        for number, found in side_by_side(one, list(enumerate(self.target.measurements))):
             for at, answers in found:
                 self._put(out, number, at, answers)
 
@@ -154,8 +155,3 @@ class Simulator:
                 out[at, start:stop] += spectrum
             start = stop
 
-
-def _side_by_side(run: Callable[..., Result], items: Sequence[object]) -> list[Result]:
-    """Results of all items, in order, on as many threads as there are processors."""
-    with ThreadPoolExecutor(min(len(items), processors())) as pool:
-        return list(pool.map(run, items))

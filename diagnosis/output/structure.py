@@ -33,8 +33,9 @@ MODE, MODE_SD, MODE_LARGEST, HOUSING_RATIO = "housing-mode", 0.7, 2.0, 0.05
 SHAFT, SHAFT_SD, SHAFT_LARGEST, SHAFT_RATIO = "shaft", 0.3, 10.0, 0.03
 # Gain of the reaction's sensor: torque sensors are good to a few tenths of a per cent, their mounting to one.
 GAIN, GAIN_SD = "gain", 0.01
-# Encoder run-out along the base circle [m]: what grating and centring of a good encoder leave.
-ENCODER, ENCODER_SD = "encoder", 0.2e-6
+# Encoder run-out along the base circle over the deflection of the mesh: what grating and centring of a good encoder
+# leave.
+ENCODER, ENCODER_SD = "encoder", 0.03
 # Softer than the former part a rig has it, and then at least the latter: steps stay long.
 FELT, STIFFEST = 0.01, 0.03
 SHAFT_FELT, SHAFT_STIFFEST = 0.03, 0.06
@@ -53,14 +54,14 @@ NAMES = (
 ACROSS_BEGIN, HOUSING_BEGIN, SHAFT_BEGINS = 0.15, 0.04, (0.1, 0.7)
 
 
-def structure_groups(rig: Rig) -> list[Group]:
+def structure_groups(rig: Rig, model: NominalModel) -> list[Group]:
     """The unknowns of what the nominal rig does not say of its structure."""
     groups = [
         group(ACROSS, "1", SIDES, ACROSS_SD, slot="structure", low=0.0, high=ACROSS_LARGEST),
         group(CROSS, "1", SIDES, CROSS_SD, slot="structure", first=4, low=-CROSS_LARGEST, high=CROSS_LARGEST),
         group(GAIN, "1", ("torque_driven",), GAIN_SD, slot="structure", first=2),
-        group(ENCODER, "m", [f"{s}.{part}" for s in SIDES for part in ("cos", "sin")], ENCODER_SD,
-              slot="structure", first=6),
+        group(ENCODER, "m", [f"{s}.{part}" for s in SIDES for part in ("cos", "sin")],
+              ENCODER_SD * model.deflection, slot="structure", first=6),
     ]  # fmt: skip
     if rig.housing is None:
         groups.append(group(HOUSING, "1", ("compliance",), HOUSING_SD, slot="structure", first=10, low=0.0,

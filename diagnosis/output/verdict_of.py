@@ -8,13 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.diagnosis.evidence.calibration import LIMITS, Limits
-from gearbench.diagnosis.evidence.decision import SHARPNESS, at_place, unknown_by, worst
+from gearbench.diagnosis.evidence.decision import at_place, worst
 from gearbench.diagnosis.evidence.search import Search
 from gearbench.diagnosis.forces.equations import PLACES
+from gearbench.diagnosis.odds import Calibration
 from gearbench.diagnosis.output.judged import Judged
 from gearbench.diagnosis.output.missing import Missing
-from gearbench.diagnosis.output.selection import LIMIT, Weighed
+from gearbench.diagnosis.output.selection import Weighed
 from gearbench.diagnosis.output.simulated import Simulated
+from gearbench.diagnosis.population import POPULATION
 from gearbench.diagnosis.verdict import Outcome
 from gearbench.diagnosis.words import percent
 from gearbench.rig.contract import Place
@@ -22,12 +24,10 @@ from gearbench.rig.contract import Place
 Array = NDArray[np.float64]
 
 # Of the nominal gap, rms over rms and all channels in units of their own fluctuation: more than this part left is "the
-# greater part"; content that changes between repetitions counts from the latter part on: a drift of 0.4 % makes 0.0014,
-# sound and slipping rigs of the development family up to 0.006, a support that drifts by 4 % 0.08.
-GREATER, CHANGING = 0.5, 0.03
-# Part of a channel's fluctuation that sound rigs leave at most, whatever their structure beyond the unknowns is; from
-# half of it on a place can stand out.
-STRUCTURE, VISIBLE = 0.1, 0.05
+# greater part".
+GREATER = 0.5
+# Of what sound rigs leave of a channel's fluctuation at most: from there on a place can stand out.
+VISIBLE = 0.5
 # Part of the nominal gap that the named effects must close for content that changes, or a form without a name, not to
 # outbid them.
 CLOSES = 0.5
@@ -35,29 +35,35 @@ CLOSES = 0.5
 
 @dataclass(frozen=True)
 class Decided:
-    """`verdict` effects, none or unknown; `place`; what is named (effects only); probabilities of the three; `because`
-    says in sentences what decided."""
+    """`verdict` effects, none or unknown; `place`; what is named (effects only); the largest `sign` of something
+    unknown over its limit; `because` says in sentences what decided."""
 
     verdict: Outcome
     place: Place
     named: tuple[Weighed, ...]
-    probability: dict[str, float]
+    sign: float
     because: tuple[str, ...]
 
 
 def decide_simulated(
-    judged: Judged, forces: Search, missing: Missing, unsteady: Array, changing: float, limits: Limits = LIMITS
+    judged: Judged,
+    forces: Search,
+    missing: Missing,
+    unsteady: Array,
+    changing: float,
+    limits: Limits = LIMITS,
+    known: Calibration = POPULATION,
 ) -> Decided:
     """The decision on what was kept on the judged record. `missing` are the forces that the final rig lacks; `unsteady`
     (equations + 1,) the excess scatter between repetitions, by place, and `changing` the largest rms of what changes
-    over that of the nominal gap."""
+    over that of the nominal gap; `known`: what sound rigs leave."""
     selection = judged.found.selection
     named = selection.entered
     share = max((judged.share(judged.closings[one.hypothesis.name].without) for one in named), default=0.0)
     place, over = worst(unsteady, limits.unsteady)
-    if over > 1.0 and changing > CHANGING and share < CLOSES:
+    if over > 1.0 and changing > known.changing and share < CLOSES:
         because = f"the force missing {at_place(place)} changes from one repetition to the next"
-        return _unknown(place, because, changing / CHANGING)
+        return Decided("unknown", place, (), changing / known.changing, (because,))
     free = forces.best_free
     worth = max((one.log_bayes_factor for one in named), default=0.0)
     if named and free and share < CLOSES:
@@ -65,28 +71,27 @@ def decide_simulated(
         if free.log_bayes_factor > needed:
             place = free.hypothesis.place
             because = f"a force {at_place(place)} without any given form explains the records clearly better"
-            return _unknown(place, because, free.log_bayes_factor / needed)
+            return Decided("unknown", place, (), free.log_bayes_factor / needed, (because,))
     place, over = outstanding(missing)
-    size = judged.remains / STRUCTURE
+    size = judged.remains / known.structure
+    seen = min(over, size / VISIBLE)
+    sign = max(min(judged.left / GREATER, size), seen)
     if named:
         because = "simulated with it, the rig comes closer to the records than any rig without an effect"
-        said = _probabilities(worth - LIMIT, min(judged.left / GREATER, size))
-        return Decided("effects", named[0].hypothesis.place, named, said, (because,))
+        return Decided("effects", named[0].hypothesis.place, named, sign, (because,))
     if size > 1.0 and judged.left > GREATER:
         because = "no effect of the library closes the gap, and the greater part of it stays"
-        return _unknown(place if over > 1.0 else "none", because, min(judged.left / GREATER, size))
-    if judged.remains > VISIBLE and over > 1.0:
+        return Decided("unknown", place if over > 1.0 else "none", (), sign, (because,))
+    if seen > 1.0:
         because = f"a force {at_place(place)} remains that no effect of the library explains"
-        return _unknown(place, because, min(over, judged.remains / VISIBLE))
-    ahead = max((one.log_bayes_factor for one in selection.weighed), default=-LIMIT)
+        return Decided("unknown", place, (), sign, (because,))
+    sound = f"within the {percent(known.structure)} that sound rigs leave"
     because = (
         "no effect brings the simulation closer to the records than a good rig's share of it; what remains, at most"
         f" {percent(judged.remains)} of any channel's fluctuation, is"
-        + (f" within the {percent(STRUCTURE)} that sound rigs leave" if size <= 1.0 else " the smaller part of the gap")
+        f" {sound if size <= 1.0 else 'the smaller part of the gap'}"
     )
-    seen = min(over, judged.remains / VISIBLE)
-    said = _probabilities(min(ahead, LIMIT) - LIMIT, max(min(judged.left / GREATER, size), seen))
-    return Decided("none", "none", (), said, (because,))
+    return Decided("none", "none", (), sign, (because,))
 
 
 def outstanding(missing: Missing) -> tuple[Place, float]:
@@ -116,14 +121,3 @@ def _by_force(forces: Search, named: tuple[Weighed, ...]) -> float:
         one.log_bayes_factor for one in forces.tried if one.hypothesis.effect and one.hypothesis.effect.name in names
     ]
     return max(found, default=0.0)
-
-
-def _unknown(place: Place, because: str, over: float) -> Decided:
-    return Decided("unknown", place, (), unknown_by(over), (because,))
-
-
-def _probabilities(ahead: float, over: float) -> dict[str, float]:
-    """Of the three, by how far the evidence lies beyond the limit and how near a sign of the unknown comes to its."""
-    effect = 1.0 / (1.0 + float(np.exp(-np.clip(ahead / SHARPNESS, -40, 40))))
-    unknown = (0.5 - 0.4 * effect) * over**2 / (1.0 + over**2)
-    return {"effect": (1 - unknown) * effect, "none": (1 - unknown) * (1 - effect), "unknown": unknown}

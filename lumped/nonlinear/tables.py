@@ -41,20 +41,23 @@ class Series(NamedTuple):
 
 
 class Runout(NamedTuple):
-    """Of driver and driven gear (2,): eccentricity [m], and the rotations [rad] at which working and back flanks stand
-    proud most."""
+    """Of driver and driven gear (2,): what working and back flanks stand proud by [m], as factors of cosine and sine of
+    the gear's nominal rotation."""
 
-    eccentricity: Array
-    phase: Array
-    phase_back: Array
+    cosine: Array
+    sine: Array
+    cosine_back: Array
+    sine_back: Array
 
 
 class Waves(NamedTuple):
-    """Torque ripple (waves,): orders in mesh cycles, force on the driver's base circle [N], phase [rad]."""
+    """Torque ripple (waves,): orders in mesh cycles, force on the driver's base circle [N] as factors of cosine and
+    sine; `in_turn`: whether the orders are 1, 2, 3, ... times the first."""
 
     order: Array
-    force: Array
-    phase: Array
+    cosine: Array
+    sine: Array
+    in_turn: bool
 
 
 class Correction(NamedTuple):
@@ -149,16 +152,20 @@ def _runout(model: NonLinear) -> Runout:
     """Run-out moves whole gears, and the normals of working and back flanks are pi - 2 alpha_w apart: by so much of its
     rotation the driver's back flanks are earlier, those of the driven gear, which turns the other way, later."""
     gears, turn = (model.rig.driver, model.rig.driven), pi - 2 * model.working_pressure_angle
+    size = np.array([gear.runout / 2 for gear in gears])
     phase = np.array([gear.runout_phase for gear in gears])
-    return Runout(np.array([gear.runout / 2 for gear in gears]), phase, phase - np.array([turn, -turn]))
+    back = phase - np.array([turn, -turn])
+    return Runout(size * np.cos(phase), size * np.sin(phase), size * np.cos(back), size * np.sin(back))
 
 
 def _waves(model: NonLinear) -> Waves:
     ripple = model.rig.drive.ripple
     if ripple is None:
-        return Waves(np.zeros(0), np.zeros(0), np.zeros(0))
+        return Waves(np.zeros(0), np.zeros(0), np.zeros(0), True)
+    in_turn = all(order == (n + 1) * ripple.orders[0] for n, order in enumerate(ripple.orders))
+    force, phase = np.array(ripple.amplitude) / model.base_radii[0], np.array(ripple.phase, dtype=float)
     order = np.array(ripple.orders) / model.rig.driver.teeth
-    return Waves(order, np.array(ripple.amplitude) / model.base_radii[0], np.array(ripple.phase, dtype=float))
+    return Waves(order, force * np.cos(phase), -force * np.sin(phase), in_turn)
 
 
 def _series(cosines: tuple[float, ...], sines: tuple[float, ...]) -> Series:
@@ -166,12 +173,31 @@ def _series(cosines: tuple[float, ...], sines: tuple[float, ...]) -> Series:
 
 
 @compiled(inline="always")  # a call would count references to the arrays
-def _wave(series: Series, phase: float) -> float:
-    """Sum of a series in mesh orders at a phase [cycles]."""
-    total = 0.0
+def _wave(series: Series, cosine: float, sine: float) -> float:
+    """Sum of a series in mesh orders where the first has that cosine and sine; the next ones follow by turning on."""
+    total, real, imaginary = 0.0, 1.0, 0.0
     for n in range(len(series.cosine)):
-        angle = 2 * pi * (n + 1) * phase
-        total += series.cosine[n] * cos(angle) + series.sine[n] * sin(angle)
+        real, imaginary = real * cosine - imaginary * sine, real * sine + imaginary * cosine
+        total += series.cosine[n] * real + series.sine[n] * imaginary
+    return total
+
+
+@compiled(inline="always")
+def _rippled(waves: Waves, phase: float) -> float:
+    """Force [N] of the torque's ripple at a phase [cycles]."""
+    total = 0.0
+    if len(waves.order) == 0:
+        return total
+    angle = 2 * pi * waves.order[0] * phase
+    cosine, sine = cos(angle), sin(angle)
+    real, imaginary = cosine, sine
+    for i in range(len(waves.order)):
+        if i > 0 and waves.in_turn:
+            real, imaginary = real * cosine - imaginary * sine, real * sine + imaginary * cosine
+        elif i > 0:
+            angle = 2 * pi * waves.order[i] * phase
+            real, imaginary = cos(angle), sin(angle)
+        total += waves.cosine[i] * real + waves.sine[i] * imaginary
     return total
 
 
@@ -205,16 +231,17 @@ def _fill(
                 softness += part * grown / (1.0 + grown)
         turned, turned_back = 0.0, 0.0
         for i in range(2):
-            if runout.eccentricity[i] != 0.0:
+            if runout.cosine[i] != 0.0 or runout.sine[i] != 0.0:
                 angle = 2 * pi * phase / (z1 if i == 0 else z2)
-                turned += runout.eccentricity[i] * cos(angle - runout.phase[i])
-                turned_back += runout.eccentricity[i] * cos(angle - runout.phase_back[i])
-        every = correction.mean_error + _wave(correction.error, cycle) + turned
-        ripple = 0.0
-        for i in range(len(waves.force)):
-            ripple += waves.force[i] * cos(2 * pi * waves.order[i] * phase + waves.phase[i])
+                along, across = cos(angle), sin(angle)
+                turned += runout.cosine[i] * along + runout.sine[i] * across
+                turned_back += runout.cosine_back[i] * along + runout.sine_back[i] * across
+        first, second = 1.0, 0.0
+        if len(correction.error.cosine) or len(correction.stiffness.cosine):
+            first, second = cos(2 * pi * cycle), sin(2 * pi * cycle)
+        every = correction.mean_error + _wave(correction.error, first, second) + turned
         out.position[n] = position
         out.excess[n] = excess + every
-        out.gain[n] = correction.scale * (1.0 + _wave(correction.stiffness, cycle)) * (1.0 - softness)
-        out.ripple[n] = ripple
+        out.gain[n] = correction.scale * (1.0 + _wave(correction.stiffness, first, second)) * (1.0 - softness)
+        out.ripple[n] = _rippled(waves, phase)
         out.back[n] = turned_back

@@ -128,6 +128,7 @@ VERDICT = Verdict(
     indistinguishable=(("pitch-error", "eccentricity"),),
     advice=("measure at 320 N m",),
 )
+TOLD = VERDICT.model_copy(update={"signs": {"lines": 400.0}, "calibrated_on": 12})
 
 
 def test_a_foreign_file_reads_as_the_same_values() -> None:
@@ -136,13 +137,15 @@ def test_a_foreign_file_reads_as_the_same_values() -> None:
 
 def test_what_is_written_is_the_specified_file(tmp_path: Path) -> None:
     path = tmp_path / "verdict.json"
-    write_verdict(VERDICT, path)
+    write_verdict(TOLD, path)
     tree = json.loads(path.read_text(encoding="utf-8"))
     # Two further keys tell the floors apart.
     assert tree["where"][0].pop("floor_noise") is None and tree["where"][0].pop("floor_nominal") is None
+    # And two what probabilities were read from.
+    assert tree.pop("signs") == {"lines": 400.0} and tree.pop("calibrated_on") == 12
     assert tree == TREE
     assert list(tree) == list(TREE)
-    assert read_verdict(path) == VERDICT
+    assert read_verdict(path) == TOLD
     assert [entry.name for entry in tmp_path.iterdir()] == ["verdict.json"]
 
 

@@ -35,6 +35,10 @@ def make(
         str | None,
         typer.Option("--mix", help="numbers instead of --cases: controls=12,per-effect=4,foreign=12,pairs=0"),
     ] = None,
+    draw_rigs: Annotated[
+        bool,
+        typer.Option("--draw-rigs", help="draw the nominal rig of each case too: teeth, module, torque, speeds, noise"),
+    ] = False,
     settings: SetOption = None,
 ) -> None:
     """Make DIR/ID/{nominal.toml, record-*.nc} from truth rigs, and their answers. Goes on where it was stopped."""
@@ -45,7 +49,7 @@ def make(
     wanted = parse_mix(mix) if mix is not None else default_mix(cases)
     with Progress("challenge make") as progress:
         progress.step("measuring truth rigs")
-        made = make_challenge(nominal, wanted, seed, out, answers, family, progress)
+        made = make_challenge(nominal, wanted, seed, out, answers, family, progress, drawn=draw_rigs)
     typer.echo(f"{out}: {len(made)} cases; answers in {answers}")
 
 

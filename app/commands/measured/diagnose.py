@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -46,6 +47,16 @@ def diagnose(
     without: Annotated[
         list[str] | None, typer.Option("--without", metavar="EFFECT", help="leave this effect out of the library")
     ] = None,
+    calibrate: Annotated[
+        int,
+        typer.Option(
+            "--calibrate",
+            metavar="RIGS",
+            min=0,
+            help="limits and probabilities from so many truth rigs around this one, under its conditions and noise (a"
+            " dozen: some minutes, once for a rig and experiment); 0: from the population's",
+        ),
+    ] = 0,
     force: Annotated[
         bool, typer.Option("--force", help="replace what another diagnosis left in the folder")
     ] = False,
@@ -54,12 +65,17 @@ def diagnose(
 ) -> None:
     """Diagnose the gap between records and the nominal rig: where it is, what causes it, how far it shrinks."""
     nominal = load_case(rig, settings)
+    from gearbench.commands.measured.challenge import diagnose_case
     from gearbench.diagnosis.diagnosis import take_in
+    from gearbench.rig_limits import limits_of
     from gearbench.words.diagnosis import confidence, headline, sentences
 
     with Progress(f"diagnose {nominal.name}") as progress:
         progress.step("reading")
         inputs = take_in(records, nominal, held_out=held_out, without=without or ())
+        if calibrate:
+            progress.step("calibrating on truth rigs around this one")
+            inputs = replace(inputs, known=limits_of(inputs, calibrate, diagnose_case, progress))
         with claimed(out, "diagnose", _identity(inputs), force) as output:
             diagnosis = diagnosis_in(output, inputs, progress.step)
             progress.step("report")
@@ -145,6 +161,7 @@ def _sources(inputs: Inputs) -> tuple[Source, ...]:
 def _about(inputs: Inputs) -> tuple[tuple[str, str], ...]:
     from gearbench.records.provenance import package_version, source_digest
     from gearbench.rig import dump_case
+    from gearbench.words.diagnosis import basis
 
     case = fingerprint(dump_case(inputs.nominal))
     return (
@@ -153,6 +170,7 @@ def _about(inputs: Inputs) -> tuple[tuple[str, str], ...]:
         ("nominal rig", inputs.nominal.name),
         ("its case (SHA-256)", case[:16]),
         ("left out of the library", ", ".join(inputs.without) or "nothing"),
+        ("limits and probabilities", basis(inputs.known.source, inputs.known.rigs)),
     )
 
 
@@ -162,6 +180,7 @@ def _identity(inputs: Inputs) -> str:
 
     held_out = inputs.held_out.name if inputs.held_out else ""
     parts = [dump_case(inputs.nominal), source_digest(), held_out, ",".join(sorted(inputs.without))]
+    parts.append(repr(inputs.known))
     return fingerprint(*parts, *(f"{one.path.name} {digest_of(one.path)}" for one in inputs.all if one.path))
 
 

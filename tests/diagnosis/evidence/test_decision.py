@@ -48,8 +48,7 @@ def decided(
 ) -> Decision:
     found = Search(FIT, tuple(sorted(tried, key=lambda one: -one.log_bayes_factor)))
     decision = decide(found, silent, unsteady, limits)
-    assert sum(decision.probability.values()) == pytest.approx(1.0)
-    assert min(decision.probability.values()) >= 0.0
+    assert decision.sign >= 0.0 and (decision.sign > 1.0) == (decision.verdict == "unknown")
     assert (decision.winner is not None) == (decision.verdict == "effects")
     return decision
 
@@ -63,7 +62,6 @@ def test_the_effect_with_most_evidence_is_named_at_its_place() -> None:
     found = decided(weak, strong, free("mesh", 3.0))
     assert (found.verdict, found.place) == ("effects", "drive")
     assert found.winner is strong
-    assert found.probability["effect"] > 0.8
 
 
 @pytest.mark.parametrize(
@@ -80,13 +78,11 @@ def test_the_effect_with_most_evidence_is_named_at_its_place() -> None:
 def test_no_effect_without_enough_of_it(tried: tuple[Tried, ...]) -> None:
     found = decided(*tried)
     assert (found.verdict, found.place) == ("none", "none")
-    assert found.probability["none"] + found.probability["unknown"] >= 0.05
 
 
 def test_an_effect_below_its_own_limit_gives_way_to_one_above() -> None:
     found = decided(effect("pitch-error", 29.0), effect("friction", 15.0))
     assert found.winner is not None and found.winner.hypothesis.effect is EFFECTS["friction"]
-    assert decided(effect("pitch-error", 29.0)).probability["none"] > 0.5
     found = decided(effect("pitch-error", 31.0), effect("friction", 6.0))
     assert found.winner is not None and found.winner.hypothesis.effect is EFFECTS["pitch-error"]
 
@@ -95,13 +91,6 @@ def test_a_large_rival_without_clearance_silences_a_weak_effect() -> None:
     assert decided(effect("pitch-error", 29.0), effect("friction", 14.0)).verdict == "none"
     small = effect("pitch-error", 29.0, size=1.9)
     assert decided(small, effect("friction", 14.0)).verdict == "effects"
-
-
-def test_more_evidence_makes_an_effect_more_probable_and_none_less() -> None:
-    gains = (1.0, 4.0, 6.0, 12.0, 1e6)
-    found = [decided(effect("friction", gain)).probability for gain in gains]
-    assert np.all(np.diff([p["effect"] for p in found]) > 0)
-    assert np.all(np.diff([p["none"] for p in found]) < 0)
 
 
 def test_a_free_form_that_explains_clearly_more_refutes_an_effect() -> None:

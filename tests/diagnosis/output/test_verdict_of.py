@@ -13,11 +13,13 @@ from gearbench.diagnosis.effects.effect import Hypothesis, Wide
 from gearbench.diagnosis.effects.library import LIBRARY
 from gearbench.diagnosis.evidence.calibration import LIMITS
 from gearbench.diagnosis.output.missing import OUTSTANDING, Missing
-from gearbench.diagnosis.output.verdict_of import GREATER, STRUCTURE, VISIBLE, Decided, decide_simulated
+from gearbench.diagnosis.output.verdict_of import GREATER, VISIBLE, Decided, decide_simulated
+from gearbench.diagnosis.population import POPULATION
 
 EFFECT = next(one for one in LIBRARY if one.name == "friction")
 FRICTION = Hypothesis("friction", "mesh", (Wide("friction"),), effect=EFFECT)
 QUIET = np.zeros(5)
+STRUCTURE = POPULATION.structure
 HAND = replace(LIMITS, competitor_factor=1.5, competitor_offset=20.0, free=10.0)
 
 
@@ -47,9 +49,7 @@ def decided(
     form = SimpleNamespace(hypothesis=Hypothesis("free drive", "drive", ()), log_bayes_factor=free)
     forces: Any = SimpleNamespace(best_free=form if free else None, tried=())
     missing = Missing(excess, ((0.0, 100.0),), np.ones((1, 5)))
-    made = decide_simulated(judged, forces, missing, unsteady, changing, HAND)
-    assert sum(made.probability.values()) == pytest.approx(1.0) and min(made.probability.values()) >= 0.0
-    return made
+    return decide_simulated(judged, forces, missing, unsteady, changing, HAND, replace(POPULATION, changing=0.03))
 
 
 def at(number: int, value: float) -> np.ndarray:
@@ -58,9 +58,9 @@ def at(number: int, value: float) -> np.ndarray:
 
 def test_what_was_kept_is_named_at_its_place_even_if_a_remainder_stays() -> None:
     made = decided(40.0)
-    assert (made.verdict, made.place) == ("effects", "mesh") and made.probability["effect"] > 0.9
+    assert (made.verdict, made.place) == ("effects", "mesh")
     made = decided(40.0, left=0.9, remains=5 * STRUCTURE, excess=at(0, 50.0))
-    assert made.verdict == "effects" and made.probability["effect"] < 0.95
+    assert made.verdict == "effects" and made.sign > 1.0
     assert decided(None).verdict == "none"
 
 
@@ -74,18 +74,16 @@ def test_the_greater_part_unexplained_is_unknown_unless_any_rig_leaves_as_much()
 
 def test_a_place_that_stands_out_is_unknown_only_over_a_visible_remainder() -> None:
     out = at(0, 1.1 * OUTSTANDING["drive"])
-    made = decided(None, remains=1.1 * VISIBLE, excess=out)
+    made = decided(None, remains=1.1 * VISIBLE * STRUCTURE, excess=out)
     assert (made.verdict, made.place) == ("unknown", "drive")
-    assert decided(None, remains=0.9 * VISIBLE, excess=out).verdict == "none"
+    assert decided(None, remains=0.9 * VISIBLE * STRUCTURE, excess=out).verdict == "none"
     assert decided(None, remains=1.1 * STRUCTURE, excess=at(0, 0.9 * OUTSTANDING["drive"])).verdict == "none"
 
 
-def test_probabilities_follow_the_evidence_and_the_remainder() -> None:
-    sure = [decided(worth).probability["effect"] for worth in (8.5, 12.0, 30.0)]
-    assert sure[0] < sure[1] < sure[2] and sure[0] < 0.7
-    stands = [at(0, factor * OUTSTANDING["drive"]) for factor in (1.1, 8.0)]
-    near, far = (decided(None, remains=9 * STRUCTURE, excess=one).probability["unknown"] for one in stands)
-    assert 0.5 < near < far < 1.0
+def test_the_sign_of_something_unknown_follows_the_remainder() -> None:
+    stands = [at(0, factor * OUTSTANDING["drive"]) for factor in (0.5, 1.1, 8.0)]
+    signs = [decided(None, remains=9 * STRUCTURE, excess=one).sign for one in stands]
+    assert signs == pytest.approx([0.5, 1.1, 8.0])
 
 
 def test_a_form_without_a_name_outbids_only_an_effect_that_leaves_the_gap() -> None:

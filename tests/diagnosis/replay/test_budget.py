@@ -65,13 +65,13 @@ def test_every_kind_adds_up_to_one(seed: int) -> None:
 @pytest.mark.parametrize(
     ("line", "band", "kind"),
     [
-        (31, "0-200 Hz", "excited"),
-        (60, "0-200 Hz", "operating"),
-        (600, "200-1000 Hz", "operating"),
-        (240, "0-200 Hz", "operating"),  # 200 Hz: the edge belongs to the lower band
-        (2 * 31 + 600, "200-1000 Hz", "even"),
-        (9 * 60 + 3, "200-1000 Hz", "driver-shaft"),
-        (9 * 60 + 4, "200-1000 Hz", "driven-shaft"),
+        (31, "0-100 Hz", "excited"),
+        (60, "0-100 Hz", "operating"),
+        (480, "100-500 Hz", "operating"),
+        (120, "0-100 Hz", "operating"),  # 100 Hz: the edge belongs to the lower band
+        (2 * 31 + 600, "500-1500 Hz", "even"),
+        (9 * 60 + 3, "100-500 Hz", "driver-shaft"),
+        (9 * 60 + 4, "100-500 Hz", "driven-shaft"),
         (2400, "above 1500 Hz", "operating"),
         (2417, "above 1500 Hz", "other"),
     ],

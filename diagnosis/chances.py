@@ -1,0 +1,34 @@
+"""How likely what was found is at work."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from gearbench.diagnosis.odds import Calibration, effect_signs
+from gearbench.diagnosis.output.judged import Judged
+from gearbench.diagnosis.output.verdict_of import Decided
+
+
+class Chances(NamedTuple):
+    """How likely each named effect is at work, by its hypothesis' name, and the signs of the likeliest candidate."""
+
+    named: dict[str, float]
+    best: tuple[float, ...]
+
+
+def chances_of(judged: Judged, decided: Decided, known: Calibration, lines: float) -> Chances:
+    """The chances of what was named, and of the best candidate, named or not. Evidence is that over the background
+    alone, as the candidates have it."""
+    alone: dict[str, float] = {}
+    for one in judged.found.selection.weighed:
+        assert one.hypothesis.effect is not None
+        alone.setdefault(one.hypothesis.effect.name, one.log_bayes_factor)
+    named, all_signs = {}, [effect_signs(max(alone.values(), default=0.0), lines, False, 0.0)]
+    for one in decided.named:
+        assert one.hypothesis.effect is not None
+        share = judged.share(judged.closings[one.hypothesis.name].without)
+        evidence = alone.get(one.hypothesis.effect.name, one.log_bayes_factor)
+        all_signs.append(effect_signs(evidence, lines, True, share))
+        named[one.hypothesis.name] = known.effect.of(all_signs[-1]).value
+    best = max(all_signs[1:] or all_signs, key=lambda signs: known.effect.of(signs).value)
+    return Chances(named, best)

@@ -1,0 +1,191 @@
+"""What signs are worth: probabilities read off truth rigs whose answer was known, none of them a constant.
+
+Two logistic curves (Berkson 1944), each fitted to diagnoses of truth rigs. `effect`: is a candidate at work, given its
+log evidence over the number of independent lines, whether it was named, and the part of the gap that it closes? And
+`unknown`: where no effect of the library is at work, is something else, given the largest sign of it over its limit?
+Few rigs make flat curves: the weights have a Gaussian prior, and what they leave open is the interval of a probability.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from math import log, log1p, sqrt
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.diagnosis.verdict import NINE_OF_TEN, Verdict
+
+Array = NDArray[np.float64]
+
+PER_LINES = 100.0  # evidence is told in nats a hundred independent lines
+SMALLEST_SIGN = 1e-2
+ROUNDS = 50
+# Standard deviations of the weights before any rig was seen: logits that a unit of each sign may be worth.
+WIDTHS = {"effect": (4.0, 3.0, 3.0, 3.0), "unknown": (2.0, 2.0)}
+# How far the largest value on sound rigs may be exceeded, and the part of the limit before that remains at least: a few
+# rigs do not show the largest.
+MARGIN, LEAST = 1.25, 0.5
+
+
+class Chance(NamedTuple):
+    """A probability and its 90 % interval."""
+
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Odds:
+    """A logistic curve: weights (n,) of the signs, the first one of 1; their covariance (n, n); number of cases that it
+    was fitted to, and how many of them were true."""
+
+    weights: tuple[float, ...]
+    covariance: tuple[tuple[float, ...], ...]
+    cases: int = 0
+    true: int = 0
+
+    def of(self, signs: Sequence[float]) -> Chance:
+        """The probability at these signs (n,)."""
+        x = np.array(signs)
+        middle = float(x @ np.array(self.weights))
+        reach = NINE_OF_TEN * sqrt(max(float(x @ np.array(self.covariance) @ x), 0.0))
+        return Chance(*(_logistic(value) for value in (middle, middle - reach, middle + reach)))
+
+
+def _logistic(value: float) -> float:
+    return float(1.0 / (1.0 + np.exp(-np.clip(value, -40.0, 40.0))))
+
+
+def nothing_known(widths: Sequence[float]) -> Odds:
+    """The curve before any rig was seen."""
+    covariance = np.diag(np.square(widths))
+    return Odds((0.0,) * len(widths), tuple(map(tuple, covariance.tolist())))
+
+
+def fitted(prior: Odds, signs: Array, true: Sequence[bool]) -> Odds:
+    """The curve after cases with signs (cases, n): the prior's mode moved by Newton's method, and its curvature."""
+    if not len(true):
+        return prior
+    centre, precision = np.array(prior.weights), np.linalg.inv(np.array(prior.covariance))
+    weights, wanted, x = centre.copy(), np.array(true, dtype=float), np.asarray(signs, dtype=float)
+
+    def cost(at: Array) -> float:
+        logits = x @ at
+        away = at - centre
+        return float(np.sum(np.logaddexp(0.0, logits) - wanted * logits) + 0.5 * away @ precision @ away)
+
+    def curvature(at: Array) -> Array:
+        p = 1.0 / (1.0 + np.exp(-np.clip(x @ at, -40.0, 40.0)))
+        return np.asarray((x * (p * (1.0 - p))[:, None]).T @ x + precision)
+
+    for _ in range(ROUNDS):
+        p = 1.0 / (1.0 + np.exp(-np.clip(x @ weights, -40.0, 40.0)))
+        step = np.linalg.solve(curvature(weights), x.T @ (p - wanted) + precision @ (weights - centre))
+        length = 1.0
+        while cost(weights - length * step) > cost(weights) and length > 1e-6:
+            length *= 0.5
+        weights = weights - length * step
+        if np.abs(step).max() < 1e-9:
+            break
+    covariance = np.linalg.inv(curvature(weights))
+    return Odds(
+        tuple(weights.tolist()),
+        tuple(map(tuple, covariance.tolist())),
+        prior.cases + len(true),
+        prior.true + int(wanted.sum()),
+    )
+
+
+def effect_signs(evidence: float, lines: float, named: bool, share: float) -> tuple[float, ...]:
+    """Signs of a candidate: nats of evidence over the background, number of independent lines, whether it was named,
+    and the part of the nominal gap that comes back without it."""
+    scaled = PER_LINES * evidence / max(lines, 1.0)
+    return (1.0, log1p(scaled) if scaled > 0.0 else -log1p(-scaled), float(named), sqrt(share) if named else 0.0)
+
+
+def unknown_signs(sign: float) -> tuple[float, ...]:
+    """Signs of something unknown: the largest sign over its limit."""
+    return (1.0, log(max(sign, SMALLEST_SIGN)))
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """What the decision rests on. `source`: truth rigs around the rig at hand, or a population of other rigs; `rigs`:
+    how many; `structure`, `changing`: what sound rigs leave of a channel's fluctuation, and how much of the nominal
+    gap changes between repetitions; `outstanding`: by place, factors to what sound rigs leave there."""
+
+    source: Literal["this rig", "population"]
+    effect: Odds
+    unknown: Odds
+    rigs: int
+    structure: float
+    changing: float
+    outstanding: Mapping[str, float] = field(default_factory=dict)
+
+    def probabilities(self, effect: tuple[float, ...], sign: float) -> dict[str, float]:
+        """Of effect, none and unknown, with the signs of the best candidate and that of something unknown."""
+        at_work = self.effect.of(effect).value
+        unknown = (1.0 - at_work) * self.unknown.of(unknown_signs(sign)).value
+        return {"effect": at_work, "none": 1.0 - at_work - unknown, "unknown": unknown}
+
+
+class Known(NamedTuple):
+    """A diagnosis of a truth rig: its verdict, and the effects that were at work (kind "effect", "none", "foreign")."""
+
+    verdict: Verdict
+    kind: str
+    effects: tuple[str, ...]
+
+
+def calibrated(
+    prior: Calibration, known: Sequence[Known], source: Literal["this rig", "population"] = "this rig"
+) -> Calibration:
+    """A calibration that has also seen these rigs; limits are what the sound ones among them leave, but at least half
+    of those before. Verdicts without signs are passed over."""
+    told = [one for one in known if one.verdict.signs]
+    rows = [row for one in told for row in candidate_rows(one)]
+    effect = fitted(prior.effect, np.array([signs for signs, _ in rows]), [true for _, true in rows])
+    others = [
+        one
+        for one in told
+        if one.kind != "effect" and one.verdict.verdict != "effects" and "unknown" in one.verdict.signs
+    ]
+    unknown = fitted(
+        prior.unknown,
+        np.array([unknown_signs(one.verdict.signs["unknown"]) for one in others]),
+        [one.kind == "foreign" for one in others],
+    )
+    # Records that could not be simulated say nothing of what remains.
+    sound = [one.verdict.signs for one in told if one.kind == "none" and "remains" in one.verdict.signs]
+    limits = {"structure": prior.structure, "changing": prior.changing}
+    outstanding = dict(prior.outstanding)
+    if sound:
+        limits = {name: _limit(limits[name], [one[key] for one in sound]) for name, key in
+                  (("structure", "remains"), ("changing", "changing"))}  # fmt: skip
+        places = [key.removeprefix("over ") for key in sound[0] if key.startswith("over ")]
+        outstanding = {
+            place: _limit(prior.outstanding.get(place, 1.0), [one[f"over {place}"] for one in sound])
+            for place in places
+        }
+    return Calibration(source, effect, unknown, len(told), **limits, outstanding=outstanding)
+
+
+def _limit(before: float, seen: Sequence[float]) -> float:
+    return max(LEAST * before, MARGIN * max(seen))
+
+
+def candidate_rows(one: Known) -> list[tuple[tuple[float, ...], bool]]:
+    """Signs of every single candidate of a diagnosis, and whether it was at work."""
+    named = {effect.name: effect.share or 0.0 for effect in one.verdict.effects}
+    rows = []
+    for candidate in one.verdict.candidates:
+        if len(candidate.effects) != 1:
+            continue
+        (name,) = candidate.effects
+        signs = effect_signs(candidate.log_evidence, one.verdict.signs["lines"], name in named, named.get(name, 0.0))
+        rows.append((signs, name in one.effects))
+    return rows
