@@ -41,6 +41,7 @@ class PreparedSpring:
     absolute: bool = True
     substeps: int = 1
     decay: float | None = None
+    slowest: float | None = None
     warnings: tuple[str, ...] = ("only a spring",)
 
     @property
