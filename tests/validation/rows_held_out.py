@@ -59,7 +59,7 @@ def held_out(mesh: int, method: Method) -> Got:
             f"; mesh feedback alone {prediction_error(alone, second):.1%}, expects {alone.attrs['expected_error']:.1%},"
             f" unexplained {alone.attrs['unexplained_error']:.1%}"
         )
-    return Got(prediction_error(frf, second), f"({note})")
+    return Got(prediction_error(frf, second), note)
 
 
 CHECKS = [

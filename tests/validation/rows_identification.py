@@ -171,7 +171,7 @@ def peer() -> Got:
     (ours, error), (theirs, other) = told["ours"], told["sdynpy"][str(DEFAULT_RATIO)]
     if error > MORE_ERROR * other:
         raise RuntimeError(f"the errors are not equal: {error:.3g} and sdynpy's {other:.3g}")
-    return Got(theirs / ours, f"(errors {error:.2%} and {other:.2%})")
+    return Got(theirs / ours, f"errors {error:.2%} and {other:.2%}")
 
 
 CHECKS = [
