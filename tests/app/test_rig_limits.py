@@ -49,6 +49,7 @@ def refuse(records: Sequence[Path], nominal: Path, folder: Path, without: Sequen
     raise AssertionError("this has been diagnosed before")
 
 
+@pytest.mark.validation  # six truth rigs are made: 10 s of processor time
 def test_limits_of_a_rig_are_made_once(tmp_path: Path) -> None:
     inputs = inputs_of()
     told: list[float] = []
