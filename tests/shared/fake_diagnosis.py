@@ -33,6 +33,7 @@ class Finding:
     structure: tuple = ()
     missing: None = None
     places: tuple[str, ...] = ()
+    signs: dict[str, float] = field(default_factory=dict)
 
 
 def recalibrated(nominal: Case) -> Case:

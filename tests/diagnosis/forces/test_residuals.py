@@ -80,12 +80,12 @@ def test_backlash_column_where_flanks_separate(prepared: Prepared) -> None:
     entry = where["backlash"].start
     at = linearised(made, condition, where, p, np.arange(condition.bins))
     step = np.zeros(where.size)
-    step[entry] = 1e-10  # no sample may begin or cease to touch
+    step[entry] = 1e-12  # no sample may begin or cease to touch
     departures = where.departures(p, condition)
     state = mesh(made, condition, departures, corrected(condition, departures))
     assert 0.05 < np.mean(state.elastic < 0.0) < 0.95
     above, below = (residuals(made, condition, where.departures(x, condition)) for x in (p + step, p - step))
-    difference = (above.left - below.left) / 2e-10
+    difference = (above.left - below.left) / 2e-12
     assert norm(difference - at.jacobian[:, :, entry]) < 0.1 * norm(difference)
 
 
