@@ -170,12 +170,6 @@ def test_a_slow_run_up_passes_through_the_steady_answers() -> None:
         assert near.std() == pytest.approx(found["dte_rms"].values[:, number].mean(), rel=0.03)
 
 
-def test_full_finite_elements_turn_at_a_constant_speed() -> None:
-    case = make_case("experiment.speed_driver_rpm=600", "experiment.speed_end_rpm=700")
-    with pytest.raises(BenchError, match="constant speed"):
-        simulate(case, "full")
-
-
 def test_the_record_knows_its_noise_and_steps_but_no_delay() -> None:
     bounds = ("experiment.speed_driver_rpm=600", "experiment.speed_end_rpm=700")
     clean = simulate(make_case(*bounds), "lumped")

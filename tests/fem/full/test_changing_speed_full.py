@@ -29,6 +29,9 @@ BEGIN = 2 * np.pi * FREQUENCY / 20
 TIME = np.array([0.0, 20.3, 70.6, 400.0]) / RATE
 SPEED = BEGIN + np.array([0.0, 0.0, 60.0, 90.0])
 ANGLE = np.concatenate([[0.0], np.cumsum(np.diff(TIME) * (SPEED[1:] + SPEED[:-1]) / 2)])
+# Rms of the DTE's difference over that of the swing. These gears keep 4 modes, which the bodies' own inertia excites;
+# with 8 and 16 it falls from 0.41 to 0.32 and 0.25 % where the speed is held, from 0.90 to 0.79 and 0.69 % where not.
+DIFFERENCE = {"speed": 6e-3, "torque": 1.2e-2}
 COURSE = small.STEADY._replace(time=TIME, speed=SPEED, angle=ANGLE)
 
 
@@ -71,7 +74,7 @@ def test_run_up_moves_as_the_reduced_one_and_gains_its_momentum(
     for t in (-1e-3, 1e-4, TIME[1], TIME[2], 5e-3, 1.0):
         assert nominal(machine, float(t)) == pytest.approx(tuple(small.pace(other, float(t))), rel=1e-12)
     mine, reference = dte(machine, out), dte(machine, theirs)
-    assert np.std(mine - reference) < 6e-3 * np.std(reference)
+    assert np.std(mine - reference) < DIFFERENCE[boundary] * np.std(reference)
     assert mine.mean() == pytest.approx(reference.mean(), rel=5e-3)
     assert out.torque_driven.mean() == pytest.approx(theirs.torque_driven.mean(), rel=2e-3)
 

@@ -65,7 +65,7 @@ def test_shipped_cases_round_trip(name: str, tmp_path: Path) -> None:
     assert case.name == name
     copy = tmp_path / "copy.toml"
     copy.write_text(dump_case(case), encoding="utf-8")
-    assert read_case(copy) == case
+    assert read_case(copy) == case.model_copy(update={"assumed": ()})  # what was assumed is written
 
 
 @pytest.mark.parametrize(
