@@ -7,6 +7,7 @@ from math import cos, pi, sin
 from typing import Any
 
 import numpy as np
+import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -115,6 +116,7 @@ def test_gap_is_the_least_distance(place: tuple[Pair, int, float, tuple[float, f
         assert abs(k.gap - least) < 2e-10, (tooth, k, least)
 
 
+@pytest.mark.validation
 @settings(max_examples=40, **SETTLED)
 @given(positions())
 def test_levers_do_the_gap_s_virtual_work(place: tuple[Pair, int, float, tuple[float, float, float]]) -> None:

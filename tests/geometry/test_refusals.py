@@ -219,6 +219,7 @@ def test_totals_below_the_finite_element_body(gear: MakeGear, rig: MakeRig, key:
     body(profile(light), gear(**{key: float(found.group(1)) * (1 + 1e-5)}), 7810.0)
 
 
+@pytest.mark.validation
 def test_fillet_interference_is_real(gear: MakeGear, rig: MakeRig) -> None:
     """The refused tip does lie inside the mate's tooth at some rotation, as deep as the sentence says."""
     # A pair that is allowed, then the driven tip lengthened by hand.

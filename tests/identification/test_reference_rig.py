@@ -19,6 +19,7 @@ def test_stiffness_law() -> None:
     assert rig.stiffness([-0.2, 1.8]) == pytest.approx([0.6e8, 0.6e8])
 
 
+@pytest.mark.validation
 def test_integration_against_dop853_in_second_order_form() -> None:
     """Equations of motion typed in again, adaptive Runge-Kutta, settled from rest."""
     rig = ReferenceRig(mesh_frequency=100.0)

@@ -35,6 +35,7 @@ def test_a_slow_rig_follows_its_static_transmission_error(case: Case) -> None:
     assert found.attrs["model"] == "reduced" and found["settled"].values.all()
 
 
+@pytest.mark.validation
 def test_it_answers_like_the_lumped_model(case: Case) -> None:
     """Below and above resonance, on the same tables."""
     speeds = [290.0, 800.0]

@@ -22,6 +22,7 @@ def small_rig() -> Rig:
     )
 
 
+@pytest.mark.validation
 def test_the_forces_on_the_driver_carry_the_torque() -> None:
     """Moment of the arrows about the driver's axis, against the torque that was asked for."""
     simulation = Simulation(model="reduced", element_size=1e-3, modes=4)

@@ -42,7 +42,7 @@ KINDS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "slope and wear": ({"profile_slope": 12e-6, "wear": 5e-6}, {"profile_slope": -9e-6}),
     "form": (form(2e-6), form(-1e-6)),
 }  # fmt: skip
-PHASES = [-0.93, -0.86, -0.8, -0.72, -0.6, -0.4, 0.0, 0.35, 0.55, 0.7, 0.78, 0.85]
+PHASES = [-0.93, -0.8, -0.6, 0.0, 0.55, 0.78, 0.85]
 
 
 def build(rig: Any, gear: Any, one: dict[str, Any], two: dict[str, Any]) -> tuple[Rig, Pair]:

@@ -32,6 +32,7 @@ def test_it_is_followed_until_it_has_left_the_line_of_action(rig: Any, gear: Any
     assert edge.gap > 0.1 * separation and edge.foot > master.corner
 
 
+@pytest.mark.validation
 def test_it_yields_as_its_contact_line(rig: Any, gear: Any) -> None:
     """Within 0.5 %, at places and loads between those of the table; the corner's curve was 30 % too stiff."""
     case = rig(gear(30, hub_radius=15e-3), gear(10, hub_radius=5e-3))

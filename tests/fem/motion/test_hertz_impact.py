@@ -118,8 +118,18 @@ def strike(machine: Machine, speed: float, step: float, steps: int) -> list[Stat
     return states
 
 
-@pytest.mark.parametrize("load", ["speed", "torque"])
-@pytest.mark.parametrize("speed", [2e-3, 6e-2])
+LONG = pytest.mark.validation
+
+
+@pytest.mark.parametrize(
+    ("speed", "load"),
+    [
+        (6e-2, "torque"),
+        pytest.param(6e-2, "speed", marks=LONG),
+        pytest.param(2e-3, "torque", marks=LONG),
+        pytest.param(2e-3, "speed", marks=LONG),
+    ],
+)
 def test_impact_of_two_discs(twins: Any, discs: Any, load: str, speed: float) -> None:
     """Largest force and half-width within 0.2 %, contact time within 0.5 %, restitution 1 within 0.1 %, and momentum;
     against a held disc and a free one."""

@@ -28,6 +28,7 @@ def relative(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.linalg.norm(a - b) / np.linalg.norm(b))
 
 
+@pytest.mark.validation
 def test_a_wander_of_a_fifth_costs_no_accuracy(identified: xr.Dataset) -> None:
     """Half a second, 40 dB: the error is small and expected."""
     error = relative(itf(identified).values, truth_at(RIG, identified))

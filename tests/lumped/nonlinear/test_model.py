@@ -136,7 +136,7 @@ def plain_equations(rig: Rig, mesh_frequency: float, torque: Callable[[float], f
     return rates
 
 
-@pytest.mark.parametrize("boundary", ["speed", "torque"])
+@pytest.mark.parametrize("boundary", ["speed", pytest.param("torque", marks=pytest.mark.validation)])
 def test_a_rig_with_every_effect_follows_the_plain_equations(boundary: str) -> None:
     rig = rich_rig(boundary)
     model = make_model(rig)

@@ -344,13 +344,14 @@ def measured() -> tuple[xr.Dataset, xr.Dataset]:
     return record, gb.identify([record], SETTINGS)
 
 
+@pytest.mark.validation
 @pytest.mark.parametrize(
     "change",
     [
         clip("torque_driver", 0.8),
         late("torque_driver", 3),
-        pytest.param(clip("torque_driver", 0.5), marks=pytest.mark.validation),
-        pytest.param(late("torque_driver", 1), marks=pytest.mark.validation),
+        clip("torque_driver", 0.5),
+        late("torque_driver", 1),
     ],
     ids=["clipped at 0.8", "three samples late", "clipped at half", "one sample late"],
 )

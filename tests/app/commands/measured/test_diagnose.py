@@ -243,6 +243,7 @@ def test_json_is_the_verdict(
     assert printed["schema"] == "gearbench-verdict/2"
 
 
+@pytest.mark.validation
 def test_one_period_without_y_and_held_out_is_diagnosed_and_the_loss_is_stated(tmp_path: Path, asked: dict) -> None:
     values = {name: value[:12288] for name, value in channels().items() if not name.startswith("y_")}
     record = written(tmp_path, "base", values, periods=1)
