@@ -1,4 +1,4 @@
-"""Rigs from anywhere in the valid space: one that runs (a long test), one that is refused; the row random-rigs has more."""
+"""Rigs from anywhere in the valid space: one that runs, one that is refused; the row random-rigs has more."""
 
 from __future__ import annotations
 
