@@ -18,7 +18,7 @@ from gearbench.identification.spectra.joint import Complexes, Floats
 def diagonal_variance(roots: Complexes, window: Window) -> Floats:
     """Real parts (B, R+1, R+1, 2L+1) of the unit-noise covariances of one branch's own coefficients, from `roots`
     (B, unknowns, unknowns) of LocalFits."""
-    shape = (len(roots), -1, window.order + 1, window.branches)
+    shape = (*roots.shape[:2], window.order + 1, window.branches)  # of no roots too
     parts = [np.ascontiguousarray(part).reshape(shape) for part in (roots.real, roots.imag)]
     result = np.empty((len(roots), window.order + 1, window.order + 1, window.branches))
     for p in range(window.order + 1):
