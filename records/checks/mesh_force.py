@@ -21,6 +21,9 @@ Array = NDArray[np.float64]
 
 # Signs by which the mesh force acts on y (docs/physics.md, "Axes, signs, zeros").
 SIGNS = {"driver": -1.0, "driven": 1.0}
+# Motion of a centre, over that of the flanks, below which it is held: what moves there is the number of a rigid support.
+# A y that is recorded 1e6 times too small is above it.
+STILL = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,13 +106,20 @@ def accounts_of(look: Look) -> Accounts | None:
             continue
         if any(np.any(part) for part in parts.values()):
             gears[gear] = parts
+    turned = [_turned(look, gear) for gear in GEARS]
     centres = {}
     for gear in GEARS:
         y = look.channel(f"y_{gear}")
-        if y is not None and np.ptp(y) > 0.0:
+        if y is not None and np.ptp(y) > STILL * max(turned):
             centres[gear] = look.spectrum(y)
     accounts = Accounts(gears, centres, look.omega)
     return accounts if accounts.relations() else None
+
+
+def _turned(look: Look, gear: str) -> float:
+    """How far the flanks of a gear swing with its rotation [m]; 0 where that is not known."""
+    swing, radius = look.swing(gear), look.number(f"base_radius_{gear}")
+    return 0.0 if swing is None or radius is None else float(np.ptp(swing)) * radius
 
 
 def _orthonormal(columns: Complexes) -> Complexes:
