@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 # Signs by which the mesh force acts on y (docs/physics.md, "Axes, signs, zeros").
 SIGNS = {"driver": -1.0, "driven": 1.0}
-# Motion of a centre, over that of the flanks, below which it is held: what moves there is the number of a rigid support.
+# Motion of a centre, over that of the flanks, below which it is held: what moves there is a rigid support.
 # A y that is recorded 1e6 times too small is above it.
 STILL = 1e-7
 
