@@ -50,6 +50,9 @@ def first_mode(numbers: dict[str, Any]) -> str:
     """The first mode in words, to follow "First mode:"."""
     if not isfinite(numbers["first_mode_hz"][0]):
         return "none in the identified band"
+    expected = numbers.get("identification", {}).get("expected_error", 0.0)
+    if expected >= 1.0:
+        return f"not told by this record, whose response is expected to err by {expected:.0%}; more realisations help"
     low, high = numbers["first_mode_hz"]
     linearised = numbers.get("first_mode_linearised_hz", (float("nan"),) * 2)
     if high < AGREES * linearised[0] or AGREES * low > linearised[1]:
