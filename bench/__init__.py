@@ -10,10 +10,10 @@ stress. `results`: frequency responses of cases, single numbers, comparisons. `e
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from gearbench.bench.errors import BenchError
+from gearbench.files import names_on_use
 
 if TYPE_CHECKING:
     from gearbench.bench.conversion import convert
@@ -34,11 +34,5 @@ _HOMES = {
     "static": "gearbench.bench.statics",
 }
 
-
-def __getattr__(name: str) -> Any:
-    # Imported on use: the list of models alone should cost the command line nothing.
-    if name not in _HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(import_module(_HOMES[name]), name)
-    globals()[name] = value
-    return value
+# Imported on use: the list of models alone should cost the command line nothing.
+__getattr__ = names_on_use(__name__, _HOMES)

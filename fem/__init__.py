@@ -8,8 +8,9 @@ fields inside loaded gears, root stress. `limits`: what may be asked of them. Al
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from gearbench.files import names_on_use
 
 if TYPE_CHECKING:
     from gearbench.fem.contact.law import Law, make_law
@@ -39,11 +40,5 @@ _HOMES = {
     "static_cycle": "gearbench.fem.contact.static",
 }
 
-
-def __getattr__(name: str) -> Any:
-    # Imported on use: `check` asks for limits only, and elements and Numba take seconds to load.
-    if name not in _HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(import_module(_HOMES[name]), name)
-    globals()[name] = value
-    return value
+# Imported on use: `check` asks for limits only, and elements and Numba take seconds to load.
+__getattr__ = names_on_use(__name__, _HOMES)

@@ -6,9 +6,9 @@ zones of contact. `mesh`: finite-element meshes of tooth sectors and gears. `exp
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from gearbench.files import names_on_use
 from gearbench.geometry.error import GeometryError
 from gearbench.geometry.pair.datasheet import Datum, data_sheet
 from gearbench.geometry.pair.kinematics import Pair, inverse_involute, pair
@@ -64,11 +64,5 @@ _HOMES = {
     "write_mesh": "gearbench.geometry.export.meshes",
 }
 
-
-def __getattr__(name: str) -> Any:
-    # Imported on use: a data sheet needs no meshes.
-    if name not in _HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(import_module(_HOMES[name]), name)
-    globals()[name] = value
-    return value
+# Imported on use: a data sheet needs no meshes.
+__getattr__ = names_on_use(__name__, _HOMES)

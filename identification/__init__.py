@@ -8,8 +8,9 @@ noise, even and odd distortion, operating response.
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from gearbench.files import names_on_use
 
 if TYPE_CHECKING:
     from gearbench.identification.estimation import identify
@@ -109,11 +110,5 @@ _HOMES = {
     "write_frf": "gearbench.identification.response.frf",
 }
 
-
-def __getattr__(name: str) -> Any:
-    # Imported on use: a multisine alone needs neither datasets nor estimators, which take a second to load.
-    if name not in _HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(import_module(_HOMES[name]), name)
-    globals()[name] = value
-    return value
+# Imported on use: a multisine alone needs neither datasets nor estimators, which take a second to load.
+__getattr__ = names_on_use(__name__, _HOMES)
