@@ -22,10 +22,11 @@ class Across(Value):
     coupling: float = quantity(0.0, "n_per_m", doc="stiffness that couples both directions; 0: none")
 
 
-# A rigid support is a centre this many times as heavy as its gear, critically damped at this frequency [Hz]: a gear of
-# 1 kg moves by less than 3e-12 m under 10 kN, at any frequency.
+# A rigid support is a centre this many times as heavy as its gear, on a spring that gives this frequency [Hz], damped
+# so much that it does not oscillate: it is no mode of the rig. A gear of 1 kg moves by less than 1e-12 m under 10 kN.
 HELD_MASS = 1e10
-HELD_FREQUENCY = 100.0
+HELD_FREQUENCY = 200.0
+HELD_DAMPING_RATIO = 1.25
 
 
 class Holding(NamedTuple):
@@ -75,7 +76,7 @@ class Support(Value):
         if self.stiffness is not None:
             return Holding(mass, self.stiffness, self.damping)
         held, rate = HELD_MASS * mass, 2 * pi * HELD_FREQUENCY
-        return Holding(held, held * rate**2, 2 * held * rate)
+        return Holding(held, held * rate**2, 2 * HELD_DAMPING_RATIO * held * rate)
 
 
 class Supports(Value):

@@ -148,7 +148,7 @@ def _around(values: Array) -> dict[str, Any]:
         return {}
     low, high = float(values.min()), float(values.max())
     margin = max(0.25 * (high - low), 0.02 * high)
-    return {"range": [low - margin, high + 1.6 * margin]}
+    return {"range": [max(low - margin, 0.0), high + 1.6 * margin]}
 
 
 def itf_map(name: str, results: Mapping[str, xr.Dataset], still: str, caption: str = "") -> str:

@@ -44,6 +44,7 @@ class Progress:
         self._task: Any = None
         self._step = ""
         self._began = self._spoke = time.monotonic()
+        self._paced: tuple[float, float] | None = None  # when and where the step's first piece was done
 
     def __enter__(self) -> Progress:
         if sys.stderr.isatty():
@@ -68,12 +69,15 @@ class Progress:
         self._close_step(done=True)
         self._step = name
         self._began = self._spoke = time.monotonic()
+        self._paced = None
         if self._bar is not None:
             self._task = self._bar.add_task(f"{self.title}: {name}", total=None)
 
     def __call__(self, fraction: float, note: str = "") -> None:
         """The fraction done (0..1) of the present step."""
         now = time.monotonic()
+        if self._paced is None and fraction > 0.0:
+            self._paced = (now, fraction)
         if self._bar is not None:
             text = f"{self.title}: {self._step}" + (f", {note}" if note else "")
             self._bar.update(self._task, completed=fraction, total=1.0, description=text)
@@ -82,10 +86,12 @@ class Progress:
             self._line(f"{self._step}{f', {note}' if note else ''}: {100 * fraction:.0f} %{self._left(now, fraction)}")
 
     def _left(self, now: float, fraction: float) -> str:
-        """How long the step will still take, as far as its pace so far tells."""
-        if fraction < 0.02:
+        """How long the step will still take, at its pace since its first piece: that one compiles loops, or comes from
+        a checkpoint."""
+        began, first = self._paced or (now, fraction)
+        if fraction - first < 0.02:
             return ""
-        seconds = (now - self._began) * (1 - fraction) / fraction
+        seconds = (now - began) * (1 - fraction) / (fraction - first)
         return f", {seconds:.0f} s left" if seconds < 120 else f", {seconds / 60:.0f} min left"
 
     def _close_step(self, done: bool) -> None:

@@ -57,7 +57,7 @@ def record_summary(record: xr.Dataset, files: Sequence[Path]) -> dict[str, Any]:
         "samples_per_period": attrs["samples_per_period"],
         "periods": attrs["periods"],
         "mesh_frequency_hz": 1.0 / attrs["mesh_period"] if "mesh_period" in attrs else None,
-        "warnings": [line for line in str(attrs.get("warnings", "")).split("; ") if line],
+        "warnings": [line for line in str(attrs.get("warnings", "")).splitlines() if line],
     }
 
 

@@ -20,4 +20,4 @@ LUMPED = (
 def left_out(model: str, of_record: str = "") -> list[str]:
     """What the model leaves out, in phrases; `of_record`: the attribute `limits` of a record, which says more."""
     known = LUMPED if model == "lumped" else ELASTIC
-    return [*known, *EVERYWHERE, *(part for part in of_record.split("; ") if part)]
+    return [*known, *EVERYWHERE, *(part for part in of_record.splitlines() if part)]

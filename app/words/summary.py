@@ -48,13 +48,14 @@ def summary_text(numbers: dict[str, Any]) -> str:
 
 def first_mode(numbers: dict[str, Any]) -> str:
     """The first mode in words, to follow "First mode:"."""
+    linearised = numbers.get("first_mode_linearised_hz", (float("nan"),) * 2)
     if not isfinite(numbers["first_mode_hz"][0]):
-        return "none in the identified band"
+        model = f" (the linearised model has it at {_range(linearised)} Hz)" if isfinite(linearised[0]) else ""
+        return f"none in the identified band{model}"
     expected = numbers.get("identification", {}).get("expected_error", 0.0)
     if expected >= 1.0:
         return f"not told by this record, whose response is expected to err by {expected:.0%}; more realisations help"
     low, high = numbers["first_mode_hz"]
-    linearised = numbers.get("first_mode_linearised_hz", (float("nan"),) * 2)
     if high < AGREES * linearised[0] or AGREES * low > linearised[1]:
         return (
             f"none that the model confirms: the record has a hump at {_range((low, high))} Hz, the linearised model its"
@@ -152,7 +153,7 @@ def warnings_of(numbers: dict[str, Any]) -> list[str]:
     """What identification and record warn of, the most important first."""
     found = numbers["identification"]
     said = [honest_warning(numbers), *str(found.get("warnings", "")).splitlines()]
-    return [line for line in (*said, *str(numbers["record_warnings"] or "").split("; ")) if line]
+    return [line for line in (*said, *str(numbers["record_warnings"] or "").splitlines()) if line]
 
 
 def _files(numbers: dict[str, Any]) -> list[str]:

@@ -98,7 +98,7 @@ class Elastic:
     @property
     def attributes(self) -> dict[str, Any]:
         one, two = turning_inertias(self.elastic.rig, self.elastic.pair)
-        return {"limits": "; ".join(LIMITS), "inertia_driver": one, "inertia_driven": two}
+        return {"limits": "\n".join(LIMITS), "inertia_driver": one, "inertia_driven": two}
 
     def drive(self, torque: Torque) -> Drive:
         return drive_of(torque, self.samples_per_period, self.substeps)

@@ -104,7 +104,7 @@ class Setup:
 
     @property
     def attributes(self) -> dict[str, Any]:
-        about = {"mesh": "non-linear", "limits": "; ".join(self.model.limits)}
+        about = {"mesh": "non-linear", "limits": "\n".join(self.model.limits)}
         one, two = turning_inertias(self.model.rig, self.meshing)
         return {**about, "inertia_driver": one, "inertia_driven": two}
 

@@ -104,5 +104,5 @@ def unsettled(residual: float, tolerance: float) -> str | None:
 
 
 def joined(*warnings: str | None) -> str | None:
-    """The sentences as an attribute; None without any."""
-    return "; ".join(filter(None, warnings)) or None
+    """The sentences as an attribute, a line each; None without any."""
+    return "\n".join(filter(None, warnings)) or None

@@ -210,7 +210,7 @@ def measure(case: Case, ask: Ask) -> tuple[dict[str, float], list[str]]:
         found = quantity.find(solved[quantity.stage])
         numbers |= {column.name: value for column, value in zip(quantity.columns, found, strict=True)}
     said = [str(one.attrs.get("warnings") or "") for one in solved.values() if hasattr(one, "attrs")]
-    lines = [line for text in said for line in text.replace("; ", "\n").splitlines() if line]
+    lines = [line for text in said for line in text.splitlines() if line]
     return numbers, list(dict.fromkeys(lines))
 
 

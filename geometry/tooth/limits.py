@@ -150,16 +150,20 @@ def check_tip(gear: Gear, name: str, *, tip: float, base: float, psi_b: float, r
 def check_body(gear: Gear, name: str, root: float) -> None:
     """Refuse a hub circle that is not inside the root circle or not outside the bore."""
     limit = root - RIM_MODULES * gear.module
+    # A case without a hub circle has it at the bore: then the bore is what its writer knows.
+    at_bore = gear.hub_radius == gear.bore_radius
+    key = f"{name}.bore_radius_mm" if at_bore else f"{name}.hub_radius_mm"
     if gear.hub_radius > limit:
         raise GeometryError(
-            f"{name}.hub_radius_mm = {gear.hub_radius * 1e3:g} is too large: at most"
+            f"{key} = {gear.hub_radius * 1e3:g} is too large: at most"
             f" {at_most(limit * 1e3, 4)}, that is the root radius of {root * 1e3:.6g} mm less {RIM_MODULES:g}"
             " modules"
         )
     if gear.hub_radius < HUB_MODULES * gear.module:
+        wider = f"; give a larger {name}.hub_radius_mm, inside which the gear is rigid" if at_bore else ""
         raise GeometryError(
-            f"{name}.hub_radius_mm = {gear.hub_radius * 1e3:g} is too small to be meshed: at least"
-            f" {HUB_MODULES * gear.module * 1e3:g} ({HUB_MODULES:g} modules)"
+            f"{key} = {gear.hub_radius * 1e3:g} is too small to be meshed: at least"
+            f" {HUB_MODULES * gear.module * 1e3:g} ({HUB_MODULES:g} modules){wider}"
         )
     if gear.bore_radius > gear.hub_radius:
         raise GeometryError(

@@ -110,7 +110,7 @@ def convert_sources(
         "samples_per_period": common.samples,
         "periods": common.periods,
         "mesh_phase_origin": attributes.get("mesh_phase_origin", "arbitrary"),
-        "warnings": "; ".join(dict.fromkeys(notes)) or None,
+        "warnings": "\n".join(dict.fromkeys(notes)) or None,
         "provenance": _origin(paths, source, channel_map, attributes),
     }
     if period is not None:

@@ -18,6 +18,10 @@ HUB_PART = Decimal("0.6")
 # Length of an excitation period that is aimed at [s], and samples over twice its highest frequency.
 PERIOD = 1.0
 OVERSAMPLING = 1.28
+# Response is modulated by the mesh: so many branches above the band must lie below half of the sampling rate, or they
+# fold back into it. Their identification wants more than one realisation.
+BRANCHES = 16
+REALISATIONS = 4
 # Samples of a mesh period without excitation.
 SAMPLES_PER_MESH = 256
 # Keys of a changing speed: how long its record is only the case can say.
@@ -80,7 +84,8 @@ def _hub(gear: Any, where: str) -> str | None:
 
 def _sampling(experiment: Table, driver: Any) -> list[str]:
     """Sampling rate and samples of a period: a period of about a second that holds whole mesh periods, sampled a good
-    quarter above twice the highest excited frequency; without excitation, one mesh period."""
+    quarter above twice the highest excited frequency and above twice what the mesh makes of it, with several
+    realisations; without excitation, one mesh period."""
     rate, samples = experiment.get("sampling_rate_hz"), experiment.get("samples_per_period")
     mesh = _mesh_frequency(experiment, driver)
     if (rate is not None and samples is not None) or not mesh or experiment.keys() & CHANGING:
@@ -94,8 +99,7 @@ def _sampling(experiment: Table, driver: Any) -> list[str]:
     cycles = max(1, round(PERIOD * float(mesh))) if top else 1
     period = cycles / mesh
     if rate is None:
-        least = 2 * OVERSAMPLING * float(top) * float(period) if top else cycles * SAMPLES_PER_MESH
-        count = _number(samples) or Decimal(2 ** max(4, ceil(log2(least))))
+        count = _number(samples) or Decimal(2 ** max(4, ceil(log2(_fewest(top, mesh, cycles)))))
         rate = experiment["sampling_rate_hz"] = count / period
         said = [f"experiment.sampling_rate_hz = {float(rate):.10g}"]
     else:
@@ -106,9 +110,27 @@ def _sampling(experiment: Table, driver: Any) -> list[str]:
             return []
         samples = experiment["samples_per_period"] = round(known * period)
         said.append(f"experiment.samples_per_period = {samples}")
-    reason = f"for a band up to {float(top):g} Hz" if top else "without excitation"
     held = f"{cycles} mesh period{'s' if cycles > 1 else ''} a period"
-    return [f"{' and '.join(said)}: {held}, {reason}"]
+    if not top:
+        return [f"{' and '.join(said)}: {held}, without excitation"]
+    reason = f"for a band up to {float(top):g} Hz and what the mesh makes of it"
+    return [f"{' and '.join(said)}: {held}, {reason}", *_realisations(experiment)]
+
+
+def _fewest(top: Decimal | None, mesh: Decimal, cycles: int) -> float:
+    """Fewest samples that a period of so many mesh cycles may have."""
+    if not top:
+        return cycles * SAMPLES_PER_MESH
+    highest = max(OVERSAMPLING * float(top), float(top) + BRANCHES * float(mesh))
+    return 2 * highest * cycles / float(mesh)
+
+
+def _realisations(experiment: Table) -> list[str]:
+    """Number of realisations, of an experiment whose period is left to us as well."""
+    if "realisations" in experiment:
+        return []
+    experiment["realisations"] = REALISATIONS
+    return [f"experiment.realisations = {REALISATIONS}: the branches of the response want more than one"]
 
 
 def _mesh_frequency(experiment: Table, driver: Any) -> Decimal | None:

@@ -1,10 +1,13 @@
-"""Values of a case that smell of another unit: questioned, never refused, since plastics and watches exist."""
+"""Values of a case that smell of another unit, or do not go together: questioned, never refused, since plastics and
+watches exist."""
 
 from __future__ import annotations
 
+from math import cos, pi, sin, sqrt
 from typing import NamedTuple
 
 from gearbench.rig.casefile.case import Case
+from gearbench.rig.rig import Rig
 from gearbench.rig.value import SYMBOLS, Value, format_number, key_of, unit_of
 
 
@@ -38,9 +41,17 @@ _SUPPORT = {"stiffness": Usual(1e4, 1e13, 1e6, "N/um")}
 _EXPERIMENT = {"sampling_rate": Usual(100.0, 1e8, 1e3, "kHz")}
 _RIG = {"centre_distance": Usual(2.0, 20000.0, *_LENGTH)}
 
+# Face width over module: of nearly all gears 5 to 15, of racks and hobs and toys not beyond these.
+_WIDTH = (1.0, 60.0)
+# Nominal root bending stress and Hertz pressure [Pa] that no material of gears bears.
+_BENDING, _PRESSURE = 3e9, 6e9
+# Form and stress factor Y_F Y_S of a tooth, roughly; for a doubt that is enough.
+_FORM = 4.0
+
 
 def smells(case: Case) -> tuple[str, ...]:
-    """A sentence for each value that is unusual as it stands and usual in another unit; zeros and absent ones pass."""
+    """A sentence for each value that is unusual as it stands and usual in another unit (zeros and absent ones pass), and
+    for face widths and loads that do not go with the rest."""
     rig = case.rig
     tables: list[tuple[str, Value, dict[str, Usual]]] = [
         ("rig", rig, _RIG),
@@ -65,4 +76,56 @@ def smells(case: Case) -> tuple[str, ...]:
                     f"{where}.{key_of(type(value), name)} = {number:g} is unusual: was {number:g} {usual.other} meant,"
                     f" which is {read:g} {SYMBOLS[unit]}? It is taken as {number:g} {SYMBOLS[unit]}"
                 )
+    questioned = {line.partition(" = ")[0].rpartition(".")[2] for line in found}
+    if not questioned & {"face_width_mm", "module_mm"}:
+        found += _widths(rig) or _loads(case)
     return tuple(found)
+
+
+def _widths(rig: Rig) -> list[str]:
+    """Face widths that do not go with their modules."""
+    found = []
+    for side, gear in (("driver", rig.driver), ("driven", rig.driven)):
+        ratio = gear.face_width / gear.module
+        if not _WIDTH[0] <= ratio <= _WIDTH[1]:
+            found.append(
+                f"rig.{side}.face_width_mm = {1e3 * gear.face_width:g} is {ratio:.3g} modules"
+                f" (module_mm = {1e3 * gear.module:g}); usual are 5 to 15, and {_WIDTH[0]:g} to {_WIDTH[1]:g} pass"
+                " unasked: are both in mm?"
+            )
+    return found
+
+
+def _loads(case: Case) -> list[str]:
+    """A mean torque that no material bears: one sentence, on bending or on pressure."""
+    if not case.stated:
+        return []
+    torque = max(one.experiment.torque_mean for _, one in case.experiments())
+    bending, pressure = nominal_stresses(case.rig, torque)
+    width = 1e3 * min(case.rig.driver.face_width, case.rig.driven.face_width)
+    for words, stress, most in (
+        ("bends the tooth roots by", bending, _BENDING),
+        ("presses the flanks by", pressure, _PRESSURE),
+    ):
+        if stress > most:
+            return [
+                f"experiment.torque_mean_nm = {torque:g} {words} about {1e-6 * stress:.0f} MPa at face_width_mm ="
+                f" {width:g} (nominal), more than any gear bears ({1e-6 * most:.0f}): are they in N m and mm?"
+            ]
+    return []
+
+
+def nominal_stresses(rig: Rig, torque: float) -> tuple[float, float]:
+    """Nominal root stress and Hertz pressure [Pa] of one tooth pair at the pitch point under a driver torque [N m].
+
+    F_t / (b m) Y_F Y_S with a rough Y_F Y_S = 4, and Hertz's line contact of flanks with the radii of curvature
+    d sin(alpha) / 2 (ISO 6336-2 and -3 without their factors).
+    """
+    one, two, alpha = rig.driver, rig.driven, rig.driver.pressure_angle
+    width = min(one.face_width, two.face_width)
+    diameters = [gear.module * gear.teeth for gear in (one, two)]
+    tangential = 2 * torque / diameters[0]
+    curvature = sum(2 / (d * sin(alpha)) for d in diameters)
+    line = tangential / cos(alpha) / width
+    stiffness = rig.material.youngs_modulus / (2 * (1 - rig.material.poisson**2))
+    return tangential / (width * one.module) * _FORM, sqrt(line * stiffness * curvature / pi)

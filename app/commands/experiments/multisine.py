@@ -83,7 +83,8 @@ def advice(found: Design) -> list[str]:
         )
     if found.natural[1] + found.bandwidth > found.band[1] or found.natural[0] - found.bandwidth < found.band[0]:
         notes.append(
-            f"the band leaves out part of the first mode: excite {found.natural[0] - 2 * found.bandwidth:.0f}-"
+            f"the band leaves out {_left_out(found)} the first mode: excite"
+            f" {max(found.natural[0] - 2 * found.bandwidth, 0.0):.0f}-"
             f"{found.natural[1] + 2 * found.bandwidth:.0f} Hz at least"
         )
     if found.spacing > found.bandwidth / 4:
@@ -93,3 +94,8 @@ def advice(found: Design) -> list[str]:
         )
     return notes
 
+
+def _left_out(found: Design) -> str:
+    """How much of the first mode's range the band leaves out."""
+    inside = found.natural[0] <= found.band[1] and found.natural[1] >= found.band[0]
+    return "part of" if inside else "all of"

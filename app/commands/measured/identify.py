@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -72,8 +73,9 @@ def identify(
         print_json(summary)
         return
     low, high = summary["first_mode_hz"]
+    mode = f"first mode {low:.4g}-{high:.4g} Hz" if isfinite(low) else "no mode in the identified band"
     typer.echo(
-        f"{out}: first mode {low:.4g}-{high:.4g} Hz; {summary['unknowns']} unknowns, {summary['equations']} equations"
+        f"{out}: {mode}; {summary['unknowns']} unknowns, {summary['equations']} equations"
         f" a window; expected error of the ITF {summary['expected_error']:.1%}"
     )
     for line in distortion_lines(summary["distortion"]) if split is not None else []:

@@ -91,10 +91,11 @@ def _draw_circles(axes: Any, rig: Rig, meshing: Pair) -> None:
     turn = np.linspace(0.0, 2 * np.pi, 181)
     circle = np.column_stack((np.cos(turn), np.sin(turn)))
     for _, colour, tooth, _, centre, hub, bore in _gears(rig, meshing):
-        for radius, style in ((tooth.base_radius, ":"), (hub, "--"), (bore, "-")):
-            axes.plot(*placed(radius * circle, 0.0, centre).T, color=colour, lw=0.8, ls=style)
+        # The hub circle may be the bore: dashes over its line.
+        for radius, style, width in ((tooth.base_radius, ":", 0.8), (bore, "-", 0.8), (hub, "--", 2.0)):
+            axes.plot(*placed(radius * circle, 0.0, centre).T, color=colour, lw=width, ls=style)
     axes.plot([], [], color="k", lw=0.8, ls=":", label="base circles")
-    axes.plot([], [], color="k", lw=0.8, ls="--", label="rigid hub circles")
+    axes.plot([], [], color="k", lw=2.0, ls="--", label="rigid inside")
     if rig.driver.bore_radius or rig.driven.bore_radius:
         axes.plot([], [], color="k", lw=0.8, label="bores")
 

@@ -51,6 +51,7 @@ def draw_itf(path: Path, results: Mapping[str, xr.Dataset], warning: str = "") -
             panel.set_title(_TITLES.get(name, name))
             phase_axis(panel, label="mesh phase [cycles]")
             panel.grid(False)
+            whole_cells(panel, frf)
         axes[0, 0].set_ylabel("frequency [Hz]")
         bar = drawing.colorbar(
             image,
@@ -109,7 +110,12 @@ def _zoom_on_found(axes: Any, results: Mapping[str, xr.Dataset]) -> None:
     if found.size:
         low, high = found.min(), found.max()
         margin = max(0.25 * (high - low), 0.02 * high)
-        axes.set_ylim(low - margin, high + 1.6 * margin)
+        axes.set_ylim(max(low - margin, 0.0), high + 1.6 * margin)
+
+
+def whole_cells(axes: Any, frf: xr.Dataset) -> None:
+    """End a map at its lowest and highest frequency: the cells there reach beyond, perhaps below 0 Hz."""
+    axes.set_ylim(float(frf["frequency"].values[0]), float(frf["frequency"].values[-1]))
 
 
 def coarse_map(frf: xr.Dataset, values: Array) -> tuple[Array, Array, Array]:

@@ -11,7 +11,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, PercentF
 from numpy.typing import NDArray
 
 from gearbench.figures.plotting import BLUE, GREEN, GREY, ORANGE, figure, phase_axis, save
-from gearbench.figures.responses.frf import coarse_map, magnitude
+from gearbench.figures.responses.frf import coarse_map, magnitude, whole_cells
 
 Array = NDArray[np.float64]
 
@@ -34,6 +34,7 @@ def draw_uncertainty(path: Path, frf: xr.Dataset) -> None:
             panel.set_title(title)
             phase_axis(panel, label="mesh phase [cycles]")
             panel.grid(False)
+            whole_cells(panel, frf)
             shown, percent = (FuncFormatter(lambda value, _, f=f: f(value)) for f in (_plain, _percent))
             bar = drawing.colorbar(image, ax=panel, label=label, extend="both", ticks=LogLocator(subs=(1, 2, 5)),
                                    format=shown if panel is axes[0] else percent)  # fmt: skip

@@ -20,3 +20,11 @@ def test_a_record_that_says_nothing_names_no_mode(expected: float, told: bool) -
     words = first_mode({**SURE, "identification": {"expected_error": expected}})
     assert ("1236-1355 Hz" in words) == told
     assert ("more realisations" in words) != told
+
+
+def test_a_band_without_the_mode_tells_where_the_model_has_it() -> None:
+    nothing = {"first_mode_hz": [float("nan")] * 2}
+    assert first_mode(nothing) == "none in the identified band"
+    assert "the linearised model has it at 5684-7109 Hz" in first_mode(
+        nothing | {"first_mode_linearised_hz": (5684.0, 7109.0)}
+    )

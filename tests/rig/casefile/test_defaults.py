@@ -84,8 +84,18 @@ def test_sampling_follows_the_band(tmp_path: Path, mesh: float) -> None:
     plan = schedule(case.experiment, case.rig)  # refuses what holds no whole number of mesh periods
     assert plan.mesh_frequency == pytest.approx(mesh, rel=1e-9)
     assert 0.5 < plan.samples_per_period / plan.sampling_rate < 2.8
-    assert 2.56 * 2000 <= plan.sampling_rate < 2 * 2.56 * 2000 * 1.001
+    # A quarter above twice the band, and room for 16 branches of the response above it; at most twice as much.
+    least = max(2.56 * 2000, 2 * (2000 + 16 * mesh))
+    assert 0.999 * least <= plan.sampling_rate < 2 * least * 1.001
     assert any("experiment.sampling_rate_hz" in line for line in case.assumed)
+    assert case.experiment.realisations == 4 and any("experiment.realisations = 4" in line for line in case.assumed)
+
+
+def test_realisations_are_left_alone_where_the_period_or_they_are_given(tmp_path: Path) -> None:
+    text = written(tmp_path, GEARS + EXPERIMENT.format(mesh=20))
+    assert gb.read_case(text, ["experiment.realisations=1"]).experiment.realisations == 1
+    given = ["experiment.sampling_rate_hz=8192", "experiment.samples_per_period=8192"]
+    assert gb.read_case(text, given).experiment.realisations == 1
 
 
 def test_one_of_rate_and_samples_gives_the_other(tmp_path: Path) -> None:
@@ -120,12 +130,13 @@ def test_what_is_wrong_is_still_refused(tmp_path: Path, setting: str, words: str
 
 def test_without_supports_the_centres_are_held(tmp_path: Path) -> None:
     text = GEARS.partition("[rig.support]")[0] + EXPERIMENT.format(mesh=100).replace("2000", "900")
-    case = gb.read_case(written(tmp_path, text), ["simulation.model=lumped"])
+    quick = ["simulation.model=lumped", "experiment.realisations=1"]
+    case = gb.read_case(written(tmp_path, text), quick)
     rigid = gb.simulate(case)
     for name in ("y_driver", "y_driven"):
         assert abs(rigid[name]).max() < 1e-11
     # Springs that are a million times as stiff as teeth do the same, as far as such springs let one see.
-    stiff = gb.read_case(written(tmp_path, text), ["simulation.model=lumped", "rig.support.stiffness_n_per_m=1e12"])
+    stiff = gb.read_case(written(tmp_path, text), [*quick, "rig.support.stiffness_n_per_m=1e12"])
     difference = (gb.simulate(stiff)["dte"] - rigid["dte"]).std() / rigid["dte"].std()
     assert difference < 1e-3
 
