@@ -50,8 +50,8 @@ _FORM = 4.0
 
 
 def smells(case: Case) -> tuple[str, ...]:
-    """A sentence for each value that is unusual as it stands and usual in another unit (zeros and absent ones pass), and
-    for face widths and loads that do not go with the rest."""
+    """A sentence for each value that is unusual as it stands and usual in another unit (zeros and absent ones pass),
+    and for face widths and loads that do not go with the rest."""
     rig = case.rig
     tables: list[tuple[str, Value, dict[str, Usual]]] = [
         ("rig", rig, _RIG),

@@ -27,7 +27,7 @@ def test_a_torque_that_nothing_bears_is_questioned(torque: float, asked: bool) -
 
 
 def test_the_pressure_is_hertz_at_the_pitch_point() -> None:
-    # Two equal cylinders of radius d sin(alpha)/2: p = sqrt(w E' / (2 pi R)), E' = E/(1-nu^2) of equal materials, 1/R = 2/r.
+    # Two equal cylinders of radius r = d sin(alpha)/2: p = sqrt(w E' / (2 pi R)), E' = E/(1-nu^2), 1/R = 2/r.
     rig = gb.read_case("quick_fe").rig
     alpha, radius = 20 * pi / 180, 0.062 * sin(20 * pi / 180)
     load = 100.0 / 0.062 / cos(alpha) / 0.02
