@@ -69,7 +69,11 @@ def identify(
     )
     report(0.05, "what the records say about themselves")
     doubts, cost = _doubts(records)
-    return identify_spectra(spectra, excited, settings, notes=[*doubts, *notes], record_error=cost, progress=report)
+    simulated = all("model" in record.attrs for record in records)
+    said = [*doubts, *notes]
+    return identify_spectra(
+        spectra, excited, settings, notes=said, record_error=cost, progress=report, simulated=simulated
+    )
 
 
 def identify_spectra(
@@ -80,14 +84,15 @@ def identify_spectra(
     notes: Sequence[str] = (),
     record_error: float = 0.0,
     progress: Progress | None = None,
+    simulated: bool = False,
 ) -> xr.Dataset:
     """The response from spectra whose force covers the band `excited` [Hz]; as `identify`, which makes them of records.
 
-    `notes` become warnings; `record_error`: what doubtful channels may cost. Raises LpmError.
+    `notes` become warnings; `record_error`: what doubtful channels may cost; `simulated`: as in Task. Raises LpmError.
     """
     report = progress or (lambda fraction, message: None)
     lines = output_lines(spectra, settings.band or excited, excited, settings.step)
-    task = Task(spectra, lines, settings, excited, tuple(notes), record_error, report)
+    task = Task(spectra, lines, settings, excited, tuple(notes), record_error, report, simulated)
     if settings.method == "mesh-feedback":
         frf = by_feedback(task)
         if frf.attrs["expected_error"] > SECOND_OPINION:

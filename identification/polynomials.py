@@ -59,7 +59,7 @@ def _dataset(task: Task, window: Window, result: LpmResult) -> xr.Dataset:
             "bandwidth": rule.bandwidth,
             "harmonics_needed": rule.harmonics_needed,
         }
-    attributes["warnings"] = "\n".join([*task.notes, *_warnings(accuracy, rule, spectra)])
+    attributes["warnings"] = "\n".join([*task.notes, *_warnings(accuracy, rule, spectra, task.simulated)])
     return make_frf(
         "identified",
         frequency=frequency,
@@ -96,12 +96,13 @@ def _about_fit(window: Window, result: LpmResult, accuracy: Accuracy) -> dict[st
     }
 
 
-def _warnings(accuracy: Accuracy, rule: RecordRule | None, spectra: Spectra) -> list[str]:
+def _warnings(accuracy: Accuracy, rule: RecordRule | None, spectra: Spectra, simulated: bool) -> list[str]:
     notes = []
     if accuracy.expected >= 1.0:
+        period = 1.0 / (spectra.mesh_lines * spectra.spacing)
+        help_ = "more realisations help" if simulated else f"is the mesh period of {period:g} s right?"
         notes.append(
-            f"the expected error of {accuracy.expected:.0%} exceeds the response: this result says nothing; is the"
-            f" mesh period of {1.0 / (spectra.mesh_lines * spectra.spacing):g} s right?"
+            f"the expected error of {accuracy.expected:.0%} exceeds the response: this result says nothing; {help_}"
         )
     if accuracy.expected > DOUBTFUL:
         doubtful = f", doubtful channels {accuracy.record:.0%}" if accuracy.record else ""

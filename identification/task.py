@@ -63,7 +63,8 @@ class IdentificationSettings:
 @dataclass(frozen=True)
 class Task:
     """`spectra` of the records, whose force covers the band `excited` [Hz]; the output `lines`; `settings`; `notes`
-    that become warnings; `record_error`: what doubtful channels may cost; `report(fraction, message)`."""
+    that become warnings; `record_error`: what doubtful channels may cost; `report(fraction, message)`; `simulated`:
+    whether the records are simulated ones, whose attributes are not in doubt."""
 
     spectra: Spectra
     lines: NDArray[np.int64]
@@ -72,6 +73,7 @@ class Task:
     notes: tuple[str, ...]
     record_error: float
     report: Progress
+    simulated: bool = False
 
     def part(self, first: float, share: float) -> Progress:
         """Reports of a step that begins at the fraction `first` and takes a `share`."""

@@ -16,6 +16,7 @@ from gearbench.report.curves import over_phase
 from gearbench.report.html import drawing, items, table, text
 from gearbench.report.live import Quantity, Sheet, axes, curve, live, live_map, live_page
 from gearbench.report.parts import files_table, lead, limits, mark, provenance, versions, warned
+from gearbench.words.te_source import te_source
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -56,6 +57,7 @@ def static_page(
             "Hub centres are held and nothing moves: this is the limit of slow rotation. What finite elements reach"
             " against an outside program is printed by `gearbench validate`."
         ),
+        text(te_source(str(result.attrs["model"]), case.simulation.mesh_stiffness)),
         *limits(str(result.attrs["model"])),
         text("Files beside this page", "h2"),
         files_table(files),

@@ -6,6 +6,7 @@ from math import isfinite
 from typing import Any
 
 from gearbench.words.distortion import distortion_lines
+from gearbench.words.te_source import te_source
 
 AGREES = 0.75  # identified and linearised ranges further apart than this ratio are not the same mode
 ENOUGH = 0.02  # expected rms error of the ITF above which pictures carry a warning
@@ -88,6 +89,7 @@ def findings(numbers: dict[str, Any]) -> list[str]:
         f" {numbers['dte_record_peak_to_peak_um']:.4g} um. The tangent mesh stiffness runs from {stiffness[0]:.4g} to"
         f" {stiffness[1]:.4g} N/um over the mesh period.",
         *_law(numbers),
+        te_source(str(numbers["model"]), str(numbers["mesh_stiffness"])),
     ]
     corner = numbers["support_corner_hz"]
     if corner is not None and corner < 0.1 * numbers["first_mode_hz"][0]:

@@ -38,6 +38,7 @@ def run_numbers(
         "case": case.name,
         "model": record.attrs.get("model", ""),
         "model_title": model_for(case)[1].title,
+        "mesh_stiffness": case.simulation.mesh_stiffness,
         "te_peak_to_peak_um": float(te.max() - te.min()),
         "te_mesh_orders_um": [float(value) for value in mesh_orders(te)],
         "first_mode_hz": mode_range(identified),

@@ -101,6 +101,7 @@ def static(
             plot_static(result, figure)
         written = _stress_files(loaded, result, files, root_figure, progress)
     from gearbench.commands.gears.static_methods import draw_largest, methods_data, methods_lines, stiffness_tables
+    from gearbench.words.te_source import te_source
 
     tables = stiffness_tables(loaded, result)
     if stiffness_figure is not None:
@@ -118,6 +119,7 @@ def static(
     if roots:
         lines += root_lines(max(roots, key=lambda one: float(one["torque_nm"])))
     lines += [f"warning: {warning}" for warning in summary["warnings"]]
+    lines.append(f"note: {te_source(str(summary['model']), loaded.simulation.mesh_stiffness)}")
     for line in [*lines, str(out), *map(str, written)]:
         typer.echo(line)
 
