@@ -18,6 +18,7 @@ from gearbench.shell.progress import Silent, Steps
 if TYPE_CHECKING:
     import xarray as xr
 
+    from gearbench.bench.study.against import Reference
     from gearbench.bench.study.design import Design
     from gearbench.bench.study.indices import Effects
     from gearbench.bench.study.member import Found, Task
@@ -58,6 +59,7 @@ def campaign(
     torque: float | None = None,
     positions: int | None = None,
     cycles: int | None = None,
+    against: str | Path | xr.Dataset | None = None,
     settings: Sequence[str] = (),
     workers: int | None = None,
     cluster: str | None = None,
@@ -68,7 +70,8 @@ def campaign(
 
     `vary`: "KEY=V1,V2,..", "KEY=LOW:HIGH:COUNT" (levels), "KEY=LOW:HIGH", "KEY=normal(MEAN,SD)" (drawn); KEY1+KEY2 move
     together. `of`: results (docs/campaigns.md). `sample`: grid, lhs (`size` members) or sobol (`size` base points, a
-    power of 2). What is not given is the case's [study]. Members run on `workers` processes of this machine (absent:
+    power of 2). `against`: the measured record that the result "gap" is told from. What is not given is the case's
+    [study]. Members run on `workers` processes of this machine (absent:
     as many as it has processors), or on `cluster`: the address of a dask scheduler, or "slurm". `settings` are those of
     `read_case`.
 
@@ -86,7 +89,8 @@ def campaign(
     given |= {"seed": seed, "torque": torque, "positions": positions, "cycles": cycles}
     teller = progress or Silent()
     teller.step("cases")
-    plan = plan_of(case, settings, {name: value for name, value in given.items() if value is not None}, teller)
+    stated = {name: value for name, value in given.items() if value is not None}
+    plan = plan_of(case, settings, stated, teller, against)
     if workers is not None and workers < 1:
         raise InputError(f"--workers {workers} must be at least 1")
     if cluster:
@@ -101,8 +105,12 @@ def campaign(
     return table
 
 
-def plan_of(source: str | Path | Case, settings: Sequence[str], given: dict[str, Any], teller: Steps) -> Plan:
-    """The study that `given` options make of a case. Raises CaseError or BenchError."""
+def plan_of(
+    source: str | Path | Case, settings: Sequence[str], given: dict[str, Any], teller: Steps,
+    against: str | Path | xr.Dataset | None = None,
+) -> Plan:  # fmt: skip
+    """The study that `given` options make of a case, held `against` a record. Raises CaseError, RecordError or
+    BenchError."""
     from gearbench.bench.refusals.stated import mean_torque
     from gearbench.bench.study.design import design_of
     from gearbench.bench.study.quantities import QUANTITIES, Ask, check_quantities
@@ -113,6 +121,7 @@ def plan_of(source: str | Path | Case, settings: Sequence[str], given: dict[str,
         study = _study(base, given)
         design = design_of(study)
         ask = Ask(check_quantities(study.of), study.torque, study.positions, study.cycles)
+        ask = ask._replace(against=_reference(ask, against))
         if ask.torque is None and any(QUANTITIES[name].stage == "static" for name in ask.of):
             mean_torque(base)
         from gearbench.bench.study.member import Task
@@ -127,6 +136,26 @@ def plan_of(source: str | Path | Case, settings: Sequence[str], given: dict[str,
                 refused[number] = str(reason)
             tasks.append(Task(number, text, ask))
     return Plan(base, study, design, ask, tuple(tasks), refused)
+
+
+def _reference(ask: Ask, against: str | Path | xr.Dataset | None) -> Reference | None:
+    """What the study holds its members against. Raises InputError where it is missing or not asked for."""
+    wanted = "gap" in ask.of
+    if against is None:
+        if wanted:
+            raise InputError("the result gap needs the measured record: give it with --against RECORD")
+        return None
+    if not wanted:
+        raise InputError("--against belongs to the result gap: ask for it with --of gap")
+    from gearbench.bench.results.compare import load_results, results_of
+    from gearbench.bench.study.against import reference_of
+
+    given = load_results(Path(against)) if isinstance(against, str | Path) else results_of("against", against)
+    if given.record is None:
+        raise InputError(f"--against {given.name} is not a record")
+    for doubt in given.doubts:
+        say(f"warning: {doubt}")
+    return reference_of(given.record)
 
 
 def members(

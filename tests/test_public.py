@@ -22,8 +22,8 @@ ROOT = Path(__file__).resolve().parent.parent
 FUNCTIONS: dict[str, tuple[str, ...]] = {
     "animate": ("case", "out", "torque", "record", "frames", "cycles", "progress"),
     "campaign": (
-        "case", "out", "vary", "of", "sample", "size", "seed", "torque", "positions", "cycles", "settings", "workers",
-        "cluster", "force", "progress",
+        "case", "out", "vary", "of", "sample", "size", "seed", "torque", "positions", "cycles", "against",
+        "settings", "workers", "cluster", "force", "progress",
     ),
     "compare": ("a", "b"),
     "convert": ("files", "channel_map", "case", "condition", "progress"),

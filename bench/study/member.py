@@ -8,6 +8,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from gearbench.bench.study.against import Reference
 from gearbench.bench.study.quantities import Ask, measure
 
 
@@ -70,8 +71,9 @@ def task_data(task: Task) -> dict[str, Any]:
 
 def task_from(data: dict[str, Any]) -> Task:
     """The task in plain data."""
-    of, torque, positions, cycles, loads = data["ask"]
-    return Task(data["number"], data["case"], Ask(tuple(of), torque, positions, cycles, tuple(loads)))
+    of, torque, positions, cycles, loads, held = data["ask"]
+    against = None if held is None else Reference(tuple(held[0]), *held[1:])
+    return Task(data["number"], data["case"], Ask(tuple(of), torque, positions, cycles, tuple(loads), against))
 
 
 def found_data(found: Found) -> dict[str, Any]:

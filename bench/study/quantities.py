@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.bench.errors import BenchError
+from gearbench.bench.study.against import Reference, gap
 from gearbench.rig import Case
 
 Array = NDArray[np.float64]
@@ -39,13 +40,14 @@ class Quantity(NamedTuple):
 class Ask(NamedTuple):
     """What is wanted of every member: names of quantities, load of the static and ISO results [N m] (None: the
     experiment's mean), mesh phases of a cycle, mesh cycles; `loads` [N m]: every number at each of these in its place,
-    as COLUMN@0, COLUMN@1, .."""
+    as COLUMN@0, COLUMN@1, ..; `against`: the measured record that gaps are told from"""
 
     of: tuple[str, ...]
     torque: float | None = None
     positions: int = 64
     cycles: int = 1
     loads: tuple[float, ...] = ()
+    against: Reference | None = None
 
 
 def _te(result: Any) -> Array:
@@ -77,10 +79,18 @@ def _span(values: Array) -> float:
     return float(values.max() - values.min())
 
 
+def _gap(record: Any) -> tuple[float, ...]:
+    if record.attrs.get(_AGAINST) is None:
+        raise BenchError("gap needs the measured record: campaign --against RECORD")
+    return gap(record, record.attrs[_AGAINST])
+
+
 def _dte(record: Any) -> Array:
     return np.asarray(1e6 * record["dte"].values)
 
 
+# Attribute of a simulated record in memory: the measured one that it is held against.
+_AGAINST = "held_against"
 _STATIC = "static response over the mesh cycle"
 _STEADY = "steady running at the experiment's speed under its mean torque"
 _QUANTITIES = (
@@ -144,6 +154,14 @@ _QUANTITIES = (
         "dte-peak-to-peak", "record",
         (Column("dte_peak_to_peak_um", "um", "peak-to-peak of the simulated DTE"),),
         lambda record: (_span(_dte(record)),),
+    ),
+    Quantity(
+        "gap", "record",
+        (
+            Column("gap_um", "um", "rms difference of simulated and measured DTE, mean over mesh periods"),
+            Column("gap_percent", "%", "that difference over the rms of the measured DTE"),
+        ),
+        _gap,
     ),
     Quantity(
         "dynamic-factor", "steady",
@@ -299,7 +317,7 @@ def _record(case: Case, ask: Ask) -> Any:
     from gearbench.bench.refusals.stated import check_stated
 
     check_stated(case, "a simulated record")
-    return simulate(case)
+    return simulate(case).assign_attrs({_AGAINST: ask.against})
 
 
 def _steady(case: Case, ask: Ask) -> Any:

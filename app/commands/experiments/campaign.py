@@ -48,6 +48,9 @@ def campaign(
     ] = None,
     positions: Annotated[int | None, typer.Option("--positions", help="mesh phases of a mesh cycle")] = None,
     cycles: Annotated[int | None, typer.Option("--cycles", help="mesh cycles, where teeth differ")] = None,
+    against: Annotated[
+        Path | None, typer.Option("--against", metavar="RECORD", help="measured record, for the result gap")
+    ] = None,
     workers: Annotated[
         int | None, typer.Option("--workers", min=1, help="processes (Slurm: jobs); absent: one a processor")
     ] = None,
@@ -73,7 +76,8 @@ def campaign(
     with Progress(f"campaign {loaded.name}") as progress:
         table = gb.campaign(
             case, folder, vary or (), of=split(of), sample=sample, size=size, seed=seed, torque=torque_nm,
-            positions=positions, cycles=cycles, settings=settings or (), workers=workers, cluster=cluster, force=force,
+            positions=positions, cycles=cycles, against=against, settings=settings or (),
+            workers=workers, cluster=cluster, force=force,
             progress=progress,
         )  # fmt: skip
     effects = effects_from((folder / "effects.csv").read_text(encoding="utf-8"))

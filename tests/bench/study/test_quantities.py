@@ -147,5 +147,5 @@ def test_names_are_known_or_refused() -> None:
 def test_every_column_has_one_name_and_carries_its_unit() -> None:
     columns = [column for quantity in QUANTITIES.values() for column in quantity.columns]
     assert len({column.name for column in columns}) == len(columns)
-    suffix = {"um": "_um", "Hz": "_hz", "N/um": "_n_per_um", "N/(mm um)": "_n_per_mm_um", "1": ""}
+    suffix = {"um": "_um", "Hz": "_hz", "N/um": "_n_per_um", "N/(mm um)": "_n_per_mm_um", "1": "", "%": "_percent"}
     assert all(column.name.endswith(suffix[column.unit]) for column in columns)
