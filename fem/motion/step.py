@@ -330,12 +330,13 @@ def try_step(
         lag(machine, nominal, room.outer)
     predict(machine, scheme, old, room)
     n, gain, soft, found = 0, 1.0, 1.0, False
-    if yields(machine):
-        expect(machine, scheme, old, 0, room)
-        linearise(machine, scheme, new, 0, room)
     # The first pass finds the pairs; where forces are not linear others follow until they are linearised where the step
-    # leads.
+    # leads. Each helper is called at one place: every other one would be compiled once more.
     for turn in range(PASSES):
+        if yields(machine):
+            if turn == 0 or (turn == 1 and rubs(machine)):
+                expect(machine, scheme, old, n, room)
+            linearise(machine, scheme, new, n, room)
         let_go(machine, scheme, new, room)
         if turn == 0:
             theta1, theta2 = angles(machine, new.d, t + h)
@@ -343,15 +344,12 @@ def try_step(
             n = seek(machine, new, theta1, theta2, nominal, room)
             gain = recall(old, known, new, n, machine, h, lately, room)
             if rubs(machine):
-                expect(machine, scheme, old, n, room)
-                linearise(machine, scheme, new, n, room)
                 continue
         found = press(machine, scheme, new, n, gain, soft, room)
         conclude(machine, scheme, new, n, gain, room)
         if not found or not yields(machine) or settled(machine, new, n, room):
             break
         found = False
-        linearise(machine, scheme, new, n, room)
         for p in range(n):
             room.desk.known[p] = False
     if yields(machine):

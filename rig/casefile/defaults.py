@@ -20,7 +20,7 @@ PERIOD = 1.0
 OVERSAMPLING = 1.28
 # Response is modulated by the mesh: so many branches above the band must lie below half of the sampling rate, or they
 # fold back into it. Their identification wants more than one realisation.
-BRANCHES = 16
+BRANCHES = 24
 REALISATIONS = 4
 # Samples of a mesh period without excitation.
 SAMPLES_PER_MESH = 256
