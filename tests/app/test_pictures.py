@@ -178,3 +178,15 @@ def test_one_load_is_a_curve_and_several_have_a_swing(monkeypatch: pytest.Monkey
         figures_static.plot_static(result, Path("static.png"))
     assert [len(figure.axes) for figure in figures] == [1, 2]
     assert all(line.get_xdata()[-1] == 1.0 for figure in figures for line in figure.axes[0].lines)
+
+
+def test_a_map_ends_where_its_frequencies_end(drawn: list[Figure]) -> None:
+    draw_itf(Path("itf.png"), {"identified": frf(rows=5)})  # cells of 122 Hz, the first from 10 - 61 Hz on
+    assert drawn[0].axes[0].get_ylim() == (10.0, 500.0)
+
+
+def test_a_record_without_modes_says_so(drawn: list[Figure]) -> None:
+    nothing = frf().isel(mode=slice(0, 0))
+    draw_natural_frequencies(Path("n.png"), {"identified": nothing}, [], "")
+    axes = drawn[0].axes[0]
+    assert [text.get_text() for text in axes.texts] == [figures_frf.NOTHING] and axes.get_legend() is None

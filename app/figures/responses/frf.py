@@ -28,6 +28,7 @@ _TITLES = {
     "linearised": "Linearised model, frozen at each phase",
 }
 NO_MODE = "no mode found here: no peak stands out"
+NOTHING = "the record shows no mode in the identified band"
 _PIXELS = 700  # a map needs no more rows or columns than this
 
 
@@ -90,7 +91,10 @@ def draw_natural_frequencies(
         axes.set_ylabel("natural frequency [Hz]")
         _zoom_on_found(axes, results)
         axes.set_title("Natural frequencies over one mesh period")
-        axes.legend(loc="upper center", ncols=2, frameon=True, framealpha=0.9)
+        if axes.get_legend_handles_labels()[0]:
+            axes.legend(loc="upper center", ncols=2, frameon=True, framealpha=0.9)
+        if "identified" in results and not np.isfinite(results["identified"]["natural_frequency"].values).any():
+            axes.text(0.5, 0.04, NOTHING, transform=axes.transAxes, ha="center", va="bottom")
         if warning:
             _warn(drawing, warning, 100)
         save(drawing, path)
