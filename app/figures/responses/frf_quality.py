@@ -67,6 +67,7 @@ def draw_branches(path: Path, frf: xr.Dataset) -> None:
         axes.set_yscale("log")
         axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         axes.set_ylim(1e-3 * size.max(), 1.5 * (size + _BAND * spread)[strongest].max())
+        axes.set_xlim(float(frf["frequency"].values[0]), float(frf["frequency"].values[-1]))
         axes.set_xlabel("frequency of the force [Hz]")
         axes.set_ylabel("|G_l| [nm/N]")
         axes.set_title(f"Branches of the HTF, the {len(strongest)} strongest; bands: two standard deviations")
