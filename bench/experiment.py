@@ -18,7 +18,7 @@ from gearbench.bench.models import model_for
 from gearbench.bench.plan.excitation import torque_realisation
 from gearbench.bench.plan.schedule import ProgressReport, Schedule, schedule
 from gearbench.bench.plan.settling import Course, Steady, kept_samples, samples_to_run, steady_state, waiting
-from gearbench.bench.plan.workers import realisations
+from gearbench.bench.plan.workers import READY, realisations
 from gearbench.bench.protocol import Drive, Prepared
 from gearbench.bench.record.attributes import (
     divided_steps,
@@ -43,9 +43,6 @@ from gearbench.rig import Case, dump_case
 from gearbench.rig.neutral import has_sensors
 
 Array = NDArray[np.float64]
-
-# The mesher knows one model at a time: cases that are simulated side by side are made ready one after the other.
-_READY = threading.Lock()
 
 
 @dataclass(frozen=True)
@@ -94,7 +91,7 @@ def simulate(
         raise BenchError(f"workers = {workers} must be at least 1")
     plan = schedule(case.experiment, case.rig)
     check_delays(case.rig, plan.wraps, plan.repeat_time, case.experiment.changes_speed)
-    with _READY:
+    with READY:
         prepared = solver.prepare(case, plan, lambda note: report(0.0, note))
     report(0.0, f"integrating with {prepared.substeps} steps a sample")
     shape = (case.experiment.realisations, kept_samples(plan, prepared.keep))
