@@ -299,11 +299,12 @@ class Pace(NamedTuple):
 
 
 @compiled(forceinline=True)
-def pace(machine: Machine, t: float) -> Pace:
-    """The nominal rotation at time t; at an instant of its course the acceleration is that before it."""
-    course, last = machine.course, len(machine.course.time) - 1
+def pace_on(course: Course, speed1: float, speed2: float, t: float) -> Pace:
+    """The nominal rotation at time t [s], of speeds [rad/s] that a course changes; at an instant of the course the
+    acceleration is that before it."""
+    last = len(course.time) - 1
     if last < 0 or t <= 0.0:
-        return Pace(machine.speed1 * t, machine.speed2 * t, machine.speed1, machine.speed2, 0.0, 0.0)
+        return Pace(speed1 * t, speed2 * t, speed1, speed2, 0.0, 0.0)
     low, high = 0, last + 1
     while high - low > 1:
         middle = (low + high) // 2
@@ -316,8 +317,14 @@ def pace(machine: Machine, t: float) -> Pace:
         slope = (course.speed[low + 1] - course.speed[low]) / (course.time[low + 1] - course.time[low])
     speed = course.speed[low] + slope * since
     angle = course.angle[low] + 0.5 * (course.speed[low] + speed) * since
-    ratio = machine.speed2 / machine.speed1
+    ratio = speed2 / speed1
     return Pace(angle, ratio * angle, speed, ratio * speed, slope, ratio * slope)
+
+
+@compiled(forceinline=True)
+def pace(machine: Machine, t: float) -> Pace:
+    """The nominal rotation of a machine at time t [s]."""
+    return pace_on(machine.course, machine.speed1, machine.speed2, t)
 
 
 @compiled(forceinline=True)
