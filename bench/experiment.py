@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from gearbench.bench.errors import BenchError
 from gearbench.bench.models import model_for
+from gearbench.bench.plan.damping import damping_advice
 from gearbench.bench.plan.excitation import torque_realisation
 from gearbench.bench.plan.schedule import ProgressReport, Schedule, schedule
 from gearbench.bench.plan.settling import Course, Steady, kept_samples, samples_to_run, steady_state, waiting
@@ -117,7 +118,11 @@ def _realise(
     done = np.zeros(total)
     lock, stop = threading.Lock(), threading.Event()
     decay = None if plan.repeats else prepared.decay
-    wait = waiting(plan, case.experiment, None if case.experiment.settling_periods_max else prepared.slowest)
+    slowest = None if case.experiment.settling_periods_max else prepared.slowest
+    wait = waiting(plan, case.experiment, slowest, damping_advice(case))
+    if prepared.keep == "mean":
+        # A linear rig answers what repeats by what repeats: what still changes in the end grows for ever.
+        wait = wait._replace(ends=False)
     expected = samples_to_run(plan, prepared.keep)
 
     def run(number: int) -> Realisation:
