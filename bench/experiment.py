@@ -17,9 +17,10 @@ from gearbench.bench.errors import BenchError
 from gearbench.bench.models import model_for
 from gearbench.bench.plan.damping import damping_advice
 from gearbench.bench.plan.excitation import torque_realisation
+from gearbench.bench.plan.memory import check_memory
 from gearbench.bench.plan.schedule import ProgressReport, Schedule, schedule
 from gearbench.bench.plan.settling import Course, Steady, kept_samples, samples_to_run, steady_state, waiting
-from gearbench.bench.plan.workers import READY, realisations
+from gearbench.bench.plan.workers import READY, processors, realisations
 from gearbench.bench.protocol import Drive, Prepared
 from gearbench.bench.record.attributes import (
     divided_steps,
@@ -96,6 +97,8 @@ def simulate(
         prepared = solver.prepare(case, plan, lambda note: report(0.0, note))
     report(0.0, f"integrating with {prepared.substeps} steps a sample")
     shape = (case.experiment.realisations, kept_samples(plan, prepared.keep))
+    at_once = min(workers or processors(), shape[0])
+    check_memory(_recorded(plan, prepared), shape[1], prepared.substeps, shape[0], at_once)
     # Filled row by row as realisations end: a hundred long ones are large, and must not be in memory twice.
     channels = {"torque_driver": np.empty(shape)}
     shelf = None if checkpoints is None else Shelf(Path(checkpoints), fingerprint(dump_case(case), source_digest()))
