@@ -15,10 +15,12 @@ from numpy.typing import NDArray
 
 from gearbench.bench.errors import BenchError
 from gearbench.bench.models import model_for
+from gearbench.bench.plan.damping import damping_advice
 from gearbench.bench.plan.excitation import torque_realisation
+from gearbench.bench.plan.memory import check_memory
 from gearbench.bench.plan.schedule import ProgressReport, Schedule, schedule
 from gearbench.bench.plan.settling import Course, Steady, kept_samples, samples_to_run, steady_state, waiting
-from gearbench.bench.plan.workers import realisations
+from gearbench.bench.plan.workers import READY, processors, realisations
 from gearbench.bench.protocol import Drive, Prepared
 from gearbench.bench.record.attributes import (
     divided_steps,
@@ -43,9 +45,6 @@ from gearbench.rig import Case, dump_case
 from gearbench.rig.neutral import has_sensors
 
 Array = NDArray[np.float64]
-
-# The mesher knows one model at a time: cases that are simulated side by side are made ready one after the other.
-_READY = threading.Lock()
 
 
 @dataclass(frozen=True)
@@ -94,10 +93,12 @@ def simulate(
         raise BenchError(f"workers = {workers} must be at least 1")
     plan = schedule(case.experiment, case.rig)
     check_delays(case.rig, plan.wraps, plan.repeat_time, case.experiment.changes_speed)
-    with _READY:
+    with READY:
         prepared = solver.prepare(case, plan, lambda note: report(0.0, note))
     report(0.0, f"integrating with {prepared.substeps} steps a sample")
     shape = (case.experiment.realisations, kept_samples(plan, prepared.keep))
+    at_once = min(workers or processors(), shape[0])
+    check_memory(_recorded(plan, prepared), shape[1], prepared.substeps, shape[0], at_once)
     # Filled row by row as realisations end: a hundred long ones are large, and must not be in memory twice.
     channels = {"torque_driver": np.empty(shape)}
     shelf = None if checkpoints is None else Shelf(Path(checkpoints), fingerprint(dump_case(case), source_digest()))
@@ -120,7 +121,11 @@ def _realise(
     done = np.zeros(total)
     lock, stop = threading.Lock(), threading.Event()
     decay = None if plan.repeats else prepared.decay
-    wait = waiting(plan, case.experiment, None if case.experiment.settling_periods_max else prepared.slowest)
+    slowest = None if case.experiment.settling_periods_max else prepared.slowest
+    wait = waiting(plan, case.experiment, slowest, damping_advice(case))
+    if prepared.keep == "mean":
+        # A linear rig answers what repeats by what repeats: what still changes in the end grows for ever.
+        wait = wait._replace(ends=False)
     expected = samples_to_run(plan, prepared.keep)
 
     def run(number: int) -> Realisation:

@@ -1,12 +1,14 @@
-"""Speed up and down at constant torque: what the mesh answers at every speed, each begun from the one before.
+"""Speed up and down at constant torque: what the mesh answers at every speed, each begun from the one before, the first
+of either direction at rest.
 
 Whatever the model: it needs to hand a state on to another speed and to tell the force of its mesh (`Sweepable`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from math import ceil, log, pi
+from threading import Event, Lock
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
@@ -18,6 +20,7 @@ from gearbench.bench.models import model_for
 from gearbench.bench.plan.excitation import Torque
 from gearbench.bench.plan.schedule import ProgressReport, schedule
 from gearbench.bench.plan.settling import change
+from gearbench.bench.plan.workers import READY, processors, realisations
 from gearbench.bench.protocol import Model, Prepared
 from gearbench.bench.record.attributes import turning_inertias
 from gearbench.bench.refusals.gears import check_gears
@@ -68,13 +71,20 @@ class Look(NamedTuple):
 
 
 def sweep(
-    case: Case, speeds: Sequence[float], model: str | None = None, progress: ProgressReport | None = None
+    case: Case,
+    speeds: Sequence[float],
+    model: str | None = None,
+    progress: ProgressReport | None = None,
+    *,
+    workers: int | None = None,
 ) -> xr.Dataset:
-    """Steady answer to the mean torque at driver speeds [rad/s], upwards and then downwards.
+    """Steady answer to the mean torque at driver speeds [rad/s], upwards and downwards.
 
     Variables over (direction, speed): dte_rms, dte_mean [m], dynamic_factor, contact_loss, residual, settled; and
     dte_amplitude (direction, speed, order) [m], order in mesh orders. iso_dynamic_factor (speed): K_v by ISO 6336-1
-    Method B. Raises BenchError for a model that cannot be swept.
+    Method B. Both directions run side by side unless `workers` (absent: as many as there are processors) is 1; the
+    result is the same to the last bit. `progress` is called from any of their threads. Raises BenchError for a model
+    that cannot be swept.
     """
     report = progress or (lambda fraction, note: None)
     case, solver = model_for(_still(case), model)
@@ -83,17 +93,40 @@ def sweep(
     rising = sorted(speeds)
     if not rising or not rising[0] > 0:
         raise BenchError("a sweep needs at least one speed above 0")
-    looks: dict[str, list[Look]] = {}
-    last: Any = None
-    for number, direction in enumerate(DIRECTIONS):
+    if workers is not None and workers < 1:
+        raise BenchError(f"workers = {workers} must be at least 1")
+    ways = _both_ways(case, solver, rising, report, processors() if workers is None else workers)
+    return _dataset(case, solver, np.array(rising), dict(zip(DIRECTIONS, ways, strict=True)))
+
+
+def _both_ways(
+    case: Case, solver: Model, rising: Sequence[float], report: ProgressReport, workers: int
+) -> list[list[Look]]:
+    """Looks at rising speeds, upwards and downwards, each direction begun at rest."""
+    done = np.zeros(len(DIRECTIONS))
+    lock, stop = Lock(), Event()
+
+    def run(number: int) -> list[Look]:
+        direction, last, found = DIRECTIONS[number], None, []
         order = rising if direction == "up" else rising[::-1]
-        looks[direction] = []
         for at, speed in enumerate(order):
-            report((number + at / len(order)) / 2, f"{direction}, {speed * 30 / pi:.0f} rpm")
-            look, last = _look(case, solver, speed, last)
-            looks[direction].append(look)
-    looks["down"].reverse()
-    return _dataset(case, solver, np.array(rising), looks)
+
+            def tell(share: float, at: int = at, note: str = f"{direction}, {speed * 30 / pi:.0f} rpm") -> None:
+                if stop.is_set():
+                    raise InterruptedError("the other direction has failed, or the sweep was interrupted")
+                with lock:
+                    done[number] = (at + share) / len(order)
+                    report(float(done.mean()), note)
+
+            look, last = _look(case, solver, speed, last, tell)
+            found.append(look)
+        return found if direction == "up" else found[::-1]
+
+    if len(rising) == 1:
+        return [run(0)] * 2
+    if workers == 1:
+        return [run(number) for number in range(2)]  # here, where an interruption arrives at once
+    return realisations(run, 2, stop, workers)
 
 
 def _still(case: Case) -> Case:
@@ -108,10 +141,14 @@ def _at(case: Case, speed: float) -> Case:
     return case.model_copy(update={"experiment": case.experiment.at_speed(speed).model_copy(update=values)})
 
 
-def _look(case: Case, solver: Model, speed: float, before: Any) -> tuple[Look, Any]:
-    """One speed, from the state `before` that another one ended with (None: from rest), and the state at its end."""
+def _look(
+    case: Case, solver: Model, speed: float, before: Any, tell: Callable[[float], None]
+) -> tuple[Look, Any]:
+    """One speed, from the state `before` that another one ended with (None: from rest), and the state at its end;
+    `tell` hears of the fraction done that is certain."""
     there = _at(case, speed)
-    prepared = solver.prepare(there, schedule(there.experiment, there.rig), lambda note: None)
+    with READY:
+        prepared = solver.prepare(there, schedule(there.experiment, there.rig), lambda note: None)
     if not isinstance(prepared, Sweepable):
         raise BenchError(
             f"the {solver.title} of this case cannot be swept over speed: set simulation.model = \"reduced\", or"
@@ -126,7 +163,8 @@ def _look(case: Case, solver: Model, speed: float, before: Any) -> tuple[Look, A
     outputs: Array | None = None
     residual = np.inf
     for _ in range(LOOKS):
-        for _ in range(wait if outputs is None else max(wait // 4, 1)):
+        for ahead in range(wait if outputs is None else max(wait // 4, 1)):
+            tell(ahead / (wait + 1) if outputs is None else wait / (wait + 1))
             state, earlier = prepared.advance(drive, state, block)
         state, outputs = prepared.advance(drive, state, block)
         residual = change(prepared.dte(earlier), prepared.dte(outputs))

@@ -1,23 +1,37 @@
 """How fast the reduced rig of paper_fe runs: rig time over processor time, and where the time goes; one core.
 
-    python benchmarks/reduced_steps.py
+    python benchmarks/reduced_steps.py [--peers]
 
 Parts are timed alone, in loops of their own, at a position of the run: search of tooth pairs; modes (prediction,
 effective mass, one solution); output of a sample, once in eight steps. Contact is the rest.
+
+--peers: a step of the reduced model beside one of the full model and an increment of CalculiX (`*DYNAMIC`, contact by
+surfaces) on one pair, a step of torque from rest (`tests/validation/calculix/torque_step.py`), all in steps of 20 us.
+Each has the mesh that it needs: CalculiX one that resolves the width of contact, the full model one for inertia and
+bending. It takes minutes, and wants ccx on the path.
 """
 
 from __future__ import annotations
 
+import resource
+import shutil
+import sys
+import tempfile
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from gearbench.bench.elastic.rig import elastic_rig, machine_for
+from gearbench.bench.full.run import full_gears, full_machine
 from gearbench.cases import case_path
 from gearbench.fem.contact.law import MEETING, PAIRS, Law, Meetings, meet, off_flanks
 from gearbench.fem.contact.static import MARGIN
+from gearbench.fem.full import record
+from gearbench.fem.full import start as full_start
+from gearbench.fem.full.transient import make_integrator
 from gearbench.fem.motion.machine import Machine
 from gearbench.fem.motion.scheme import Scheme, make_scheme
 from gearbench.fem.motion.stage import Room, Stage, make_room
@@ -28,8 +42,15 @@ from gearbench.kernels.borrowed import borrowed
 from gearbench.kernels.compiled import compiled
 from gearbench.rig import read_case
 
+sys.path.append(str(Path(__file__).resolve().parents[1] / "tests"))
+from shared.torque_steps import FOLDER, REST, TORQUE, elastic
+from validation.calculix import torque_step
+
 STEPS = 65536
 SUBSTEPS = 8
+INCREMENT = 2e-5  # [s]: a 36th of the course that CalculiX was run over
+INCREMENTS = 2  # that CalculiX solves
+FULL_STEPS = 20
 
 
 @compiled
@@ -71,8 +92,50 @@ def spent(job: Callable[[], Any], repeats: int = 5) -> float:
     return min(times)
 
 
+def step_of_reduced() -> tuple[float, int]:
+    """Processor time [s] of a step of the reduced model after a step of torque, and its unknowns."""
+    machine, scheme = machine_for(elastic(), 0.0), make_scheme(INCREMENT, 0.9)
+    start, torque = initial_state(machine, REST), np.full(4000, TORQUE)
+    return spent(lambda: advance(machine, scheme, start, torque, 1)) / len(torque), len(machine.mass)
+
+
+def step_of_full() -> tuple[float, int]:
+    """Likewise of the full model."""
+    case = read_case(FOLDER / "torque_step.toml")
+    machine = full_machine(elastic(), full_gears(case.rig, case.simulation, lambda note: None), 0.0)
+    integrator, start = make_integrator(machine, make_scheme(INCREMENT, 0.9)), full_start.initial_state(machine, REST)
+    torque = np.full(FULL_STEPS, TORQUE)
+    return spent(lambda: record.advance(integrator, start, torque), 1) / FULL_STEPS, machine.unknowns
+
+
+def increment_of_calculix() -> tuple[float, int]:
+    """Likewise of an increment of CalculiX: the whole process over its increments."""
+    torque_step.DURATION = INCREMENTS * INCREMENT
+    settings = {"across": 3.0, "size": 1.0, "penalty": 1.0, "steps": INCREMENTS, "alpha": -0.05}
+    with tempfile.TemporaryDirectory() as folder:
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        run = torque_step.run(Path(folder), read_case(FOLDER / "torque_step.toml"), settings)
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    seconds = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return seconds / INCREMENTS, 3 * int(run["nodes"])
+
+
+def peers() -> None:
+    """Print a step of each program on the same pair."""
+    ours, unknowns = step_of_reduced()
+    print(f"a step of {1e6 * INCREMENT:.0f} us of a pair of 20 and 20 teeth, processor time:")
+    print(f"  reduced   {1e6 * ours:8.2f} us, {unknowns} unknowns")
+    seconds, unknowns = step_of_full()
+    print(f"  full      {1e3 * seconds:8.2f} ms, {unknowns} unknowns: {seconds / ours:.0f} times the reduced model's")
+    if shutil.which("ccx") is None:
+        print("  CalculiX  not run: no ccx on the path")
+        return
+    seconds, unknowns = increment_of_calculix()
+    print(f"  CalculiX  {seconds:8.2f} s, {unknowns} unknowns: {seconds / ours:.2g} times the reduced model's")
+
+
 def main() -> None:
-    """Print the real-time factor and the shares."""
+    """Print the real-time factor and the shares, and where asked for the peers."""
     case = read_case(case_path("paper_fe"))
     machine = machine_for(elastic_rig(case.rig, case.simulation), 2.0)
     scheme, start, torque = make_scheme(1 / STEPS, 0.9), initial_state(machine, 2.0), np.full(STEPS, 2.0)
@@ -86,6 +149,8 @@ def main() -> None:
     print(f"{STEPS} steps, 1 s of rig time: {total:.3f} s of processor time, {1 / total:.1f} times real time")
     for name, seconds in parts.items():
         print(f"  {name:8} {1e6 * seconds / STEPS:6.2f} us a step {seconds / total:6.0%}")
+    if "--peers" in sys.argv[1:]:
+        peers()
 
 
 if __name__ == "__main__":

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import inf
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -50,11 +51,11 @@ class Full:
     samples_per_period: int
     teeth: bool = False  # whether a record holds tooth forces
     decay: float | None = None  # where the speed changes: no periods could be compared
+    slowest: float | None = None  # rate [1/s] at which free vibrations die out, of the reduced model
 
     keep: ClassVar[Keep] = "every"
     piece: ClassVar[int] = 8
     absolute: ClassVar[bool] = True
-    slowest: ClassVar[float | None] = None
     warnings: ClassVar[tuple[str, ...]] = ()
 
     @property
@@ -148,6 +149,7 @@ def prepare(case: Case, plan: Schedule, note: Note) -> Full:
     if plan.rotation is not None:
         highest = plan.sampling_rate / 4
         decay = min(slowest_decay(small, case.experiment.torque_mean, phase, highest) for phase in (0.0, 0.5))
+    slowest = min(slowest_decay(small, case.experiment.torque_mean, phase, inf) for phase in (0.0, 0.5))
     gears = full_gears(case.rig, case.simulation, note)
     machine = full_machine(
         elastic, gears, plan.mesh_frequency, case.simulation.contact == "penalty", plan.rotation
@@ -163,4 +165,5 @@ def prepare(case: Case, plan: Schedule, note: Note) -> Full:
         samples_per_period=plan.samples_per_period,
         teeth=case.simulation.outputs == "teeth",
         decay=decay,
+        slowest=slowest,
     )

@@ -48,12 +48,16 @@ class LinearRig:
     piece: ClassVar[int] = 0
     absolute: ClassVar[bool] = False
     decay: ClassVar[float | None] = None
-    slowest: ClassVar[float | None] = None
 
     @property
     def force_per_torque(self) -> float:
         """Generalised force per driver torque [1/m]."""
         return 1.0 / self.meshing.driver.base_radius
+
+    @property
+    def slowest(self) -> float:
+        """Slowest rate [1/s] at which free vibrations die out, the mesh held."""
+        return self.model.slowest_decay()
 
     @property
     def settings(self) -> dict[str, Any]:

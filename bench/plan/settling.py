@@ -53,10 +53,11 @@ class Steady:
 
 class Wait(NamedTuple):
     """How many excitation periods a motion may take to settle, and whether free vibrations have died out by then: what
-    still changes is then the answer itself."""
+    still changes is then the answer itself. Of a rig whose vibrations take longer: `damping`, which keys damp them."""
 
     most: int
     ends: bool
+    damping: str = ""
 
 
 class Settled(NamedTuple):
@@ -74,16 +75,17 @@ def change(before: Array, after: Array) -> float:
     return float(np.abs(after - before).max()) / scale
 
 
-def waiting(plan: Schedule, experiment: Experiment, slowest: float | None) -> Wait:
-    """How long a motion is waited for whose free vibrations die out at that slowest rate [1/s] (None: unknown)."""
+def waiting(plan: Schedule, experiment: Experiment, slowest: float | None, damping: str = "") -> Wait:
+    """How long a motion is waited for whose free vibrations die out at that slowest rate [1/s] (None: unknown);
+    `damping`: the keys that damp them, for an error to name."""
     if experiment.settling_periods_max:
-        return Wait(experiment.settling_periods_max, False)
+        return Wait(experiment.settling_periods_max, False, damping)
     if slowest is None or not slowest > 0.0:
-        return Wait(FEW, False)
+        return Wait(FEW, False, damping)
     period = plan.samples_per_period / plan.sampling_rate
     needed = log(1 / experiment.settling_tolerance) / slowest / period
     if needed > MOST:
-        return Wait(FEW, False)
+        return Wait(FEW, False, damping)
     return Wait(min(max(FEW, ceil(PATIENCE * needed)), MOST), True)
 
 
@@ -105,7 +107,7 @@ def steady_state(
     if not plan.repeats:
         if decay is None:
             return _from_two_starts(course, plan, experiment, dte, wait)
-        return _after_decay(course, plan, experiment, decay)
+        return _after_decay(course, plan, experiment, decay, wait)
     if keep == "every":
         return _every_block(course, plan, experiment, dte, wait)
     blocks = course(0, repeat(plan.block_samples))
@@ -148,7 +150,7 @@ def _settle(
                 f"after {periods} excitation periods the DTE still changes by {residual:.3g} of its standard deviation"
                 " from one repetition to the next",
                 experiment,
-                wait.most,
+                wait,
             )
         before = after
 
@@ -186,20 +188,21 @@ def _average(first: Array, blocks: Iterator[Array], count: int) -> tuple[Array, 
     return first + total, np.sqrt(np.maximum(variance, 0.0).mean(axis=0))
 
 
-def _after_decay(course: Course, plan: Schedule, experiment: Experiment, decay: float) -> Steady:
+def _after_decay(course: Course, plan: Schedule, experiment: Experiment, decay: float, wait: Wait) -> Steady:
     """A record shorter than what repeats: it begins when free vibrations have died out by their slowest rate."""
     period = plan.samples_per_period / plan.sampling_rate
     wanted = log(1 / experiment.settling_tolerance) * plan.sampling_rate / plan.samples_per_period
     most = experiment.settling_periods_max or MOST
+    wait = wait._replace(most=most)
     if not decay > 0:
-        raise _no_steady_state("free vibrations do not die out: they grow or keep their size", experiment, most)
+        raise _no_steady_state("free vibrations do not die out: they grow or keep their size", experiment, wait)
     periods = ceil(wanted / decay)
     if periods > most:
         raise _no_steady_state(
             f"free vibrations take {periods} excitation periods to die out: after {most} they still have"
             f" {exp(-decay * most * period):.3g} of their size",
             experiment,
-            most,
+            wait,
         )
     settling = periods * plan.samples_per_period
     if plan.rotation:  # an excitation period may be the whole record: the part of it that is needed is enough
@@ -233,7 +236,7 @@ def _from_two_starts(course: Course, plan: Schedule, experiment: Experiment, dte
                 f"after {settling} excitation periods the DTE still depends by {residual:.3g} of its standard deviation"
                 " on when the simulation began",
                 experiment,
-                wait.most,
+                wait,
             )
         further = settling + 1 if settling < FEW or experiment.settling_periods_max else 2 * settling
         before, settling = first, min(further, wait.most)
@@ -241,8 +244,10 @@ def _from_two_starts(course: Course, plan: Schedule, experiment: Experiment, dte
     return Steady(np.vstack(kept), residual, settling)
 
 
-def _no_steady_state(found: str, experiment: Experiment, most: int) -> BenchError:
+def _no_steady_state(found: str, experiment: Experiment, wait: Wait) -> BenchError:
+    longer = f"set experiment.settling_periods_max above {wait.most}"
+    damping = f" (raise one of {wait.damping})" if "," in wait.damping else f" ({wait.damping})" if wait.damping else ""
     return BenchError(
         f"no steady state: {found}, which experiment.settling_tolerance limits to {experiment.settling_tolerance:g};"
-        f" raise settling_periods_max = {most} or the damping"
+        f" {longer} or damp the rig{damping}"
     )

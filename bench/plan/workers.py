@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from threading import Event
+from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
+from threading import Event, Lock
 from typing import TypeVar
+
+# The mesher knows one model at a time: what is simulated side by side is made ready one after the other.
+READY = Lock()
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -37,7 +40,12 @@ def realisations(
     """
     pool = ThreadPoolExecutor(min(total, workers or processors()))
     try:
-        return [future.result() for future in [pool.submit(run, number) for number in range(total)]]
+        futures = [pool.submit(run, number) for number in range(total)]
+        wait(futures, return_when=FIRST_EXCEPTION)  # whichever fails first, in order or not
+        for future in futures:
+            if future.done() and (error := future.exception()) is not None:
+                raise error
+        return [future.result() for future in futures]
     except BaseException:
         stop.set()
         raise

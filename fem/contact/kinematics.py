@@ -198,14 +198,20 @@ def on_edge(tooth: Tooth, moved: float) -> float:
 
 
 @compiled(forceinline=True)
-def facing(t1: Tooth, t2: Tooth, dx: float, dy: float, side: int) -> Facing:
-    """What all contacts of a flank side (0: working, 1: back) share; (dx, dy) from driver to driven centre."""
+def facing(t1: Tooth, t2: Tooth, dx: float, dy: float) -> Facing:
+    """What all contacts of the working flanks share; (dx, dy) from driver to driven centre."""
     a = hypot(dx, dy)
     alpha = acos((t1.rb + t2.rb) / a)
-    up = dy if side == 0 else -dy
-    bearing = atan2(up, dx)
+    bearing = atan2(dy, dx)
     phi = bearing - alpha
-    return Facing(dx, up, bearing, alpha, phi, -sin(phi), cos(phi), a * sin(alpha))
+    return Facing(dx, dy, bearing, alpha, phi, -sin(phi), cos(phi), a * sin(alpha))
+
+
+@compiled(forceinline=True)
+def turned_over(at: Facing) -> Facing:
+    """What all contacts of the back flanks share."""
+    phi = -at.bearing - at.alpha
+    return Facing(at.dx, -at.dy, -at.bearing, at.alpha, phi, -sin(phi), cos(phi), at.line)
 
 
 @compiled(forceinline=True)
@@ -265,4 +271,5 @@ def pair_contact(
 
     The partner is the driven tooth of the same number on the working side, of the next one on the back side.
     """
-    return seen_contact(t1, t2, side, tooth, theta1, theta2, facing(t1, t2, dx, dy, side))
+    at = facing(t1, t2, dx, dy)
+    return seen_contact(t1, t2, side, tooth, theta1, theta2, turned_over(at) if side == 1 else at)

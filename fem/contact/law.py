@@ -11,7 +11,17 @@ from numpy.typing import NDArray
 from gearbench.fem.contact.curve import Curve, Curves, edge_reach, tabulate
 from gearbench.fem.contact.deviation import Flanks, deviate, flanks_of, ideal_flanks
 from gearbench.fem.contact.kernel import Kernel, make_kernel
-from gearbench.fem.contact.kinematics import EDGE1, EDGE2, Contact, Facing, Tooth, facing, seen_contact, teeth_of
+from gearbench.fem.contact.kinematics import (
+    EDGE1,
+    EDGE2,
+    Contact,
+    Facing,
+    Tooth,
+    facing,
+    seen_contact,
+    teeth_of,
+    turned_over,
+)
 from gearbench.fem.gear.body import CondensedGear
 from gearbench.fem.gear.elasticity import plane_moduli
 from gearbench.fem.limits import EDGE_SEPARATION, LOAD_RANGE, elastic_pair
@@ -117,23 +127,24 @@ def modelled(law: Law, k: Contact) -> bool:
 
 
 @compiled(forceinline=True)
-def line_gap(t1: Tooth, t2: Tooth, side: int, theta1: float, theta2: float, at: Facing) -> float:
-    """Gap [m] of ideal flanks of a side on the line of action, the same for all its teeth; none of them is closer."""
-    turned1, turned2 = theta1 + t1.zero, t2.zero - theta2
+def line_gap(t1: Tooth, t2: Tooth, side: int, theta1: float, theta2: float, front: Facing) -> float:
+    """Gap [m] of ideal flanks of a side on the line of action, the same for all its teeth; none of them is closer.
+    `front` is that of the working flanks."""
+    turned1, turned2, phi = theta1 + t1.zero, t2.zero - theta2, front.phi
     if side == 1:
-        turned1, turned2 = -turned1, -turned2 - t2.pitch
-    return at.line - t1.rb * (t1.psi + turned1 - at.phi) - t2.rb * (t2.psi + turned2 - at.phi)
+        turned1, turned2, phi = -turned1, -turned2 - t2.pitch, -front.bearing - front.alpha
+    return front.line - t1.rb * (t1.psi + turned1 - phi) - t2.rb * (t2.psi + turned2 - phi)
 
 
 @compiled(forceinline=True)
 def meet(law: Law, theta1: float, theta2: float, dx: float, dy: float, margin: float, found: Meetings) -> int:
     """Write tooth pairs on the modelled flanks whose gap is below `margin` into `found` (PAIRS,); returns how many."""
     t1, t2 = law.driver, law.driven
-    n = 0
+    front, n = facing(t1, t2, dx, dy), 0
     for side in range(2):
-        at = facing(t1, t2, dx, dy, side)
-        if line_gap(t1, t2, side, theta1, theta2, at) > margin + law.play + ROUNDED:
+        if line_gap(t1, t2, side, theta1, theta2, front) > margin + law.play + ROUNDED:
             continue
+        at = turned_over(front) if side == 1 else front
         first, last = near_teeth(t1, t2, law.reach1, law.reach2, side, theta1, at)
         for j in range(first, last + 1):
             k = seen_contact(t1, t2, side, j, theta1, theta2, at)
@@ -162,10 +173,11 @@ def find_pairs(law: Law, theta1: float, theta2: float, dx: float, dy: float, mar
 def off_flanks(law: Law, theta1: float, theta2: float, dx: float, dy: float) -> bool:
     """Whether a tooth pair overlaps where its flanks are not modelled: beyond a tip edge's turn, or in a fillet."""
     t1, t2 = law.driver, law.driven
+    front = facing(t1, t2, dx, dy)
     for side in range(2):
-        at = facing(t1, t2, dx, dy, side)
-        if line_gap(t1, t2, side, theta1, theta2, at) > law.play + ROUNDED:
+        if line_gap(t1, t2, side, theta1, theta2, front) > law.play + ROUNDED:
             continue
+        at = turned_over(front) if side == 1 else front
         first, last = near_teeth(t1, t2, law.reach1, law.reach2, side, theta1, at)
         for j in range(first, last + 1):
             k = seen_contact(t1, t2, side, j, theta1, theta2, at)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from gearbench.fem.contact.law import Law
 from gearbench.fem.full.gear import FullGear
-from gearbench.fem.motion.machine import STEADY, Course, Pace
+from gearbench.fem.motion.machine import STEADY, Course, Pace, pace_on
 from gearbench.geometry.pair.kinematics import Pair
 from gearbench.geometry.tooth.body import Body
 from gearbench.rig import Rig
@@ -104,17 +104,8 @@ class Angles(NamedTuple):
 
 
 def nominal(machine: Machine, t: float) -> Pace:
-    """The nominal rotation at time t [s], as `motion.machine.pace` has it."""
-    course, (one, two) = machine.course, machine.speeds
-    if not len(course.time) or t <= 0.0:
-        return Pace(one * t, two * t, one, two, 0.0, 0.0)
-    low, slope = int(np.searchsorted(course.time, t, side="left")) - 1, 0.0
-    if low < len(course.time) - 1:
-        slope = float((course.speed[low + 1] - course.speed[low]) / (course.time[low + 1] - course.time[low]))
-    since, ratio = t - float(course.time[low]), two / one
-    speed = float(course.speed[low]) + slope * since
-    angle = float(course.angle[low]) + 0.5 * (float(course.speed[low]) + speed) * since
-    return Pace(angle, ratio * angle, speed, ratio * speed, slope, ratio * slope)
+    """The nominal rotation at time t [s]."""
+    return pace_on(machine.course, *machine.speeds, t)
 
 
 def angles(machine: Machine, hub: Array, t: float) -> Angles:

@@ -16,18 +16,23 @@ Array = NDArray[np.float64]
 
 
 @compiled(**INLINED)
-def impose(machine: Machine, torque: float, theta1: float, outer: Array) -> float:
+def load_torque(machine: Machine, torque: float) -> float:
+    """The load's torque under the driver torque [N m], without what balances losses [N m]."""
+    balance = machine.balance
+    return machine.law.driven.rb / machine.law.driver.rb * (balance.follow * torque + balance.constant * balance.mean)
+
+
+@compiled(**INLINED)
+def impose(machine: Machine, torque: float, theta1: float, outer: Array) -> None:
     """Write the generalised forces of drive and load into `outer`, under the driver torque [N m] at a rotation of the
-    driver; returns the load's torque without what balances losses [N m]."""
-    ripple, balance = machine.ripple, machine.balance
-    load = machine.law.driven.rb / machine.law.driver.rb * (balance.follow * torque + balance.constant * balance.mean)
+    driver."""
+    ripple = machine.ripple
     if machine.driven_at >= 0:
         outer[machine.driven_at] = torque
         for i in range(len(ripple.order)):
             outer[machine.driven_at] += ripple.torque[i] * cos(ripple.order[i] * theta1 + ripple.phase[i])
     if machine.loaded_at >= 0:
-        outer[machine.loaded_at] = -load
-    return load
+        outer[machine.loaded_at] = -load_torque(machine, torque)
 
 
 @compiled(**INLINED)

@@ -174,8 +174,9 @@ def make_machine(
             losses=1.0 if free else 0.0,
         ),
         squares=squares,
-        hub1=driver.mode_hub,
-        hub2=driven.mode_hub,
+        # By columns: each of them is read from end to end.
+        hub1=np.asfortranarray(driver.mode_hub),
+        hub2=np.asfortranarray(driven.mode_hub),
         shapes1=_shapes(law.k1),
         shapes2=_shapes(law.k2),
         speed1=2 * pi * mesh_frequency / driver.teeth,
@@ -249,19 +250,25 @@ def write_hub_coupling(machine: Machine, theta1: float, theta2: float, out: Arra
     chi1, chi2 = theta1 + machine.law.driver.zero, machine.law.driven.zero - theta2 + pi
     n1, n2 = len(hub1), len(hub2)
     axis1, axis2 = seen_from(x, y, chi1), seen_from(x, y, chi2)
+    # Slices, whose indices count from 0: others might be negative for all that the compiler knows, and are gathered.
+    turn1, along1, along2 = out[at.driver], out[at.y1], out[at.y2, n1:]
     for k in range(n1):
-        out[at.driver, k] = hub1[k, 2]
-        out[at.y1, k] = hub1[k, 0] * axis1.x + hub1[k, 1] * axis1.y
+        turn1[k] = hub1[k, 2]
+    for k in range(n1):
+        along1[k] = hub1[k, 0] * axis1.x + hub1[k, 1] * axis1.y
     for k in range(n2):
-        if at.driven >= 0:
-            out[at.driven, n1 + k] = -hub2[k, 2]
-        out[at.y2, n1 + k] = hub2[k, 0] * axis2.x + hub2[k, 1] * axis2.y
+        along2[k] = hub2[k, 0] * axis2.x + hub2[k, 1] * axis2.y
+    if at.driven >= 0:
+        turn2 = out[at.driven, n1:]
+        for k in range(n2):
+            turn2[k] = -hub2[k, 2]
     if at.x1 >= 0:
         # Across the supports: their direction, turned clockwise.
+        across1, across2 = out[at.x1], out[at.x2, n1:]
         for k in range(n1):
-            out[at.x1, k] = hub1[k, 0] * axis1.y - hub1[k, 1] * axis1.x
+            across1[k] = hub1[k, 0] * axis1.y - hub1[k, 1] * axis1.x
         for k in range(n2):
-            out[at.x2, n1 + k] = hub2[k, 0] * axis2.y - hub2[k, 1] * axis2.x
+            across2[k] = hub2[k, 0] * axis2.y - hub2[k, 1] * axis2.x
 
 
 def hub_coupling(machine: Machine, theta1: float, theta2: float) -> Array:
@@ -292,11 +299,12 @@ class Pace(NamedTuple):
 
 
 @compiled(forceinline=True)
-def pace(machine: Machine, t: float) -> Pace:
-    """The nominal rotation at time t; at an instant of its course the acceleration is that before it."""
-    course, last = machine.course, len(machine.course.time) - 1
+def pace_on(course: Course, speed1: float, speed2: float, t: float) -> Pace:
+    """The nominal rotation at time t [s], of speeds [rad/s] that a course changes; at an instant of the course the
+    acceleration is that before it."""
+    last = len(course.time) - 1
     if last < 0 or t <= 0.0:
-        return Pace(machine.speed1 * t, machine.speed2 * t, machine.speed1, machine.speed2, 0.0, 0.0)
+        return Pace(speed1 * t, speed2 * t, speed1, speed2, 0.0, 0.0)
     low, high = 0, last + 1
     while high - low > 1:
         middle = (low + high) // 2
@@ -309,8 +317,14 @@ def pace(machine: Machine, t: float) -> Pace:
         slope = (course.speed[low + 1] - course.speed[low]) / (course.time[low + 1] - course.time[low])
     speed = course.speed[low] + slope * since
     angle = course.angle[low] + 0.5 * (course.speed[low] + speed) * since
-    ratio = machine.speed2 / machine.speed1
+    ratio = speed2 / speed1
     return Pace(angle, ratio * angle, speed, ratio * speed, slope, ratio * slope)
+
+
+@compiled(forceinline=True)
+def pace(machine: Machine, t: float) -> Pace:
+    """The nominal rotation of a machine at time t [s]."""
+    return pace_on(machine.course, machine.speed1, machine.speed2, t)
 
 
 @compiled(forceinline=True)
@@ -348,14 +362,14 @@ def write_rows(machine: Machine, pairs: Meetings, n: int, places: Places, rows: 
         if hub.x1 >= 0:
             across = k.nx * machine.axis_y - k.ny * machine.axis_x
             rows[p, hub.x1], rows[p, hub.x2] = -across, across
-        one, i = shapes1[k.side, (-k.tooth) % z1], at.node1
+        one, two = shapes1[k.side, (-k.tooth) % z1, at.node1 :], shapes2[k.side, (k.tooth + k.side) % z2, at.node2 :]
+        row1, row2 = rows[p, hubs:], rows[p, hubs + n1 :]
+        w0, w1, w2, w3 = at.w01, at.w11, at.w21, at.w31
         for q in range(n1):
-            value = at.w01 * one[i, q] + at.w11 * one[i + 1, q]
-            rows[p, hubs + q] = value + at.w21 * one[i + 2, q] + at.w31 * one[i + 3, q]
-        two, i = shapes2[k.side, (k.tooth + k.side) % z2], at.node2
+            row1[q] = w0 * one[0, q] + w1 * one[1, q] + w2 * one[2, q] + w3 * one[3, q]
+        w0, w1, w2, w3 = at.w02, at.w12, at.w22, at.w32
         for q in range(n2):
-            value = at.w02 * two[i, q] + at.w12 * two[i + 1, q]
-            rows[p, hubs + n1 + q] = value + at.w22 * two[i + 2, q] + at.w32 * two[i + 3, q]
+            row2[q] = w0 * two[0, q] + w1 * two[1, q] + w2 * two[2, q] + w3 * two[3, q]
 
 
 def contact_rows(machine: Machine, pairs: Meetings) -> Array:

@@ -37,9 +37,10 @@ class Room(NamedTuple):
     """Where a step works.
 
     corner, spread (hubs, modes): coupling mass, and its part of the effective mass over the modes' own; soft (modes,):
-    inverse effective mass of the modes; block, inverse (hubs, hubs): of the effective mass after elimination of the
-    modes, and its inverse. d, v, rest, free, outer, inertia (d,): displacements and rates that old accelerations bring,
-    forces that the new accelerations must balance, these without new contact forces, imposed forces, M a.
+    inverse effective mass of the modes; ease (modes,): their static flexibility; block, inverse (hubs, hubs): of the
+    effective mass after elimination of the modes, and its inverse. d, v, rest, free, outer, inertia (d,): displacements
+    and rates that old accelerations bring, forces that the new accelerations must balance, these without new contact
+    forces, imposed forces, M a.
     rows, moved (PAIRS, d): contact rows and the accelerations by a unit force on each; cross, flexibility (PAIRS,
     PAIRS): residual and effective flexibility [m/N]; over, memory, held (PAIRS,): overlap, the residual that a pair
     carries over, and the residual of the step before [m]; arrived (PAIRS,): pairs that the step before did not know.
@@ -54,6 +55,7 @@ class Room(NamedTuple):
     corner: Array
     spread: Array
     soft: Array
+    ease: Array
     block: Array
     inverse: Array
     d: Array
@@ -102,6 +104,7 @@ def make_room(machine: Machine) -> Room:
         corner=np.zeros((hubs, modes)),
         spread=np.zeros((hubs, modes)),
         soft=np.zeros(modes),
+        ease=1.0 / machine.squares,
         block=np.zeros((hubs, hubs)),
         inverse=np.zeros((hubs, hubs)),
         d=np.zeros(size),

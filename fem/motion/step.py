@@ -16,7 +16,7 @@ from gearbench.fem.contact.coupling import couple, find_places
 from gearbench.fem.contact.law import meet
 from gearbench.fem.contact.sharing import share
 from gearbench.fem.contact.static import MARGIN
-from gearbench.fem.motion.imposed import common_excess, impose, lag, lean, stiffness_factor, thicken
+from gearbench.fem.motion.imposed import common_excess, impose, lag, lean, load_torque, stiffness_factor, thicken
 from gearbench.fem.motion.machine import Machine, Pace, angles, centres, pace, write_hub_coupling, write_rows
 from gearbench.fem.motion.scheme import Scheme
 from gearbench.fem.motion.stage import Room, Stage
@@ -31,43 +31,47 @@ PASSES = 20  # in which forces that are not linear are linearised
 
 
 class Torques(NamedTuple):
-    """Torques on the outer ends of drive and load [N m]."""
+    """Torques on the outer ends of drive and load [N m]: that which holds the driver at its speed, where that is
+    prescribed, and the one on the driven gear."""
 
     driver: float
     driven: float
 
 
 class Tried(NamedTuple):
-    """How a step went: whether contact was found, how many tooth pairs are near contact, the torque that holds the
-    driver at its speed, where that is prescribed, and the one on the driven gear, at the outer ends [N m]."""
+    """How a step went: whether contact was found, and how many tooth pairs are near contact."""
 
     found: bool
     pairs: int
-    torque_driver: float
-    torque_driven: float
 
 
 @compiled(fastmath=ROUNDING, **INLINED)
 def predict(machine: Machine, scheme: Scheme, old: Stage, room: Room) -> None:
     """What the next step would bring without new accelerations: d, v and rest of the room."""
     h, am, af, gamma, beta = scheme.step, scheme.alpha_m, scheme.alpha_f, scheme.gamma, scheme.beta
-    late, hubs = 1.0 - af, machine.hubs
+    late, hubs, modes = 1.0 - af, machine.hubs, len(room.soft)
     d, v, rest, corner = room.d, room.v, room.rest, room.corner
     for i in range(len(d)):
         d[i] = old.d[i] + h * old.v[i] + h * h * (0.5 - beta) * old.a[i]
+    for i in range(len(d)):
         v[i] = old.v[i] + h * (1.0 - gamma) * old.a[i]
+    for i in range(len(d)):
         rest[i] = late * room.outer[i] + af * old.load[i] - am * machine.mass[i] * old.a[i]
+    d_modes, v_modes, d_old, v_old = d[hubs:], v[hubs:], old.d[hubs:], old.v[hubs:]
+    a_old, behind = old.a[hubs:], rest[hubs:]
+    for k in range(modes):
+        moving = machine.beta * (late * v_modes[k] + af * v_old[k]) + late * d_modes[k] + af * d_old[k]
+        behind[k] -= machine.squares[k] * moving
     for i in range(hubs):
-        for k in range(len(room.soft)):
-            rest[i] -= am * corner[i, k] * old.a[hubs + k]
-            rest[hubs + k] -= am * corner[i, k] * old.a[i]
+        total, push = rest[i], am * old.a[i]
+        for k in range(modes):
+            total -= am * corner[i, k] * a_old[k]
+        for k in range(modes):
+            behind[k] -= corner[i, k] * push
         for j in range(hubs):
-            rest[i] -= machine.hub_damping[i, j] * (late * v[j] + af * old.v[j])
-            rest[i] -= machine.hub_stiffness[i, j] * (late * d[j] + af * old.d[j])
-    for k in range(len(room.soft)):
-        i = hubs + k
-        moving = machine.beta * (late * v[i] + af * old.v[i]) + late * d[i] + af * old.d[i]
-        rest[i] -= machine.squares[k] * moving
+            total -= machine.hub_damping[i, j] * (late * v[j] + af * old.v[j])
+            total -= machine.hub_stiffness[i, j] * (late * d[j] + af * old.d[j])
+        rest[i] = total
 
 
 @compiled(fastmath=ROUNDING, **INLINED)
@@ -76,20 +80,23 @@ def factorise(machine: Machine, scheme: Scheme, room: Room) -> None:
     h, keep, hubs = scheme.step, 1.0 - scheme.alpha_m, machine.hubs
     viscous = (1.0 - scheme.alpha_f) * h * scheme.gamma
     elastic = (1.0 - scheme.alpha_f) * h * h * scheme.beta
-    corner, spread, soft, block = room.corner, room.spread, room.soft, room.block
+    corner, spread, soft, block, mass = room.corner, room.spread, room.soft, room.block, machine.mass[hubs:]
     for k in range(len(soft)):
-        soft[k] = 1.0 / (keep * machine.mass[hubs + k] + (viscous * machine.beta + elastic) * machine.squares[k])
+        soft[k] = 1.0 / (keep * mass[k] + (viscous * machine.beta + elastic) * machine.squares[k])
     for i in range(hubs):
         for k in range(len(soft)):
             spread[i, k] = keep * corner[i, k] * soft[k]
     for i in range(hubs):
-        for j in range(hubs):
-            total = viscous * machine.hub_damping[i, j] + elastic * machine.hub_stiffness[i, j]
+        for j in range(i + 1):
             shared = 0.0
             for k in range(len(soft)):
                 shared += spread[i, k] * corner[j, k]
-            block[i, j] = total - keep * shared + room.extra_block[i, j]
+            block[i, j] = block[j, i] = -keep * shared
         block[i, i] += keep * machine.mass[i]
+    for i in range(hubs):
+        for j in range(hubs):
+            total = viscous * machine.hub_damping[i, j] + elastic * machine.hub_stiffness[i, j]
+            block[i, j] += total + room.extra_block[i, j]
     for i in range(hubs):
         if machine.held[i]:
             for j in range(hubs):
@@ -106,19 +113,21 @@ def accelerate(room: Room, push: Array, out: Array) -> None:
     """Accelerations (d,) by generalised forces (d,)."""
     hubs, modes = room.corner.shape
     spread, soft, inverse = room.spread, room.soft, room.inverse
+    push_modes, out_modes = push[hubs:], out[hubs:]
     for i in range(hubs):
         out[i] = 0.0
     for j in range(hubs):
         head = push[j]
         for k in range(modes):
-            head -= spread[j, k] * push[hubs + k]
+            head -= spread[j, k] * push_modes[k]
         for i in range(hubs):
             out[i] += inverse[i, j] * head
     for k in range(modes):
-        value = push[hubs + k] * soft[k]
-        for i in range(hubs):
-            value -= spread[i, k] * out[i]
-        out[hubs + k] = value
+        out_modes[k] = push_modes[k] * soft[k]
+    for i in range(hubs):
+        moved = out[i]
+        for k in range(modes):
+            out_modes[k] -= spread[i, k] * moved
 
 
 @compiled(fastmath=ROUNDING, **INLINED)
@@ -167,10 +176,11 @@ def soften(
         for i in range(hubs):
             room.push[i] += room.turned[q] * room.rub[q, i]
     accelerate(room, room.push, moved[q])
+    pushed = rows[q, hubs:]
     for p in range(n):
-        modal = 0.0
-        for k in range(len(machine.squares)):
-            modal += rows[p, hubs + k] * rows[q, hubs + k] / machine.squares[k]
+        modal, pressed = 0.0, rows[p, hubs:]
+        for k in range(len(room.ease)):
+            modal += pressed[k] * pushed[k] * room.ease[k]
         room.cross[p, q] = room.cross[p, q] * soft - modal
         shift = 0.0
         for i in range(rows.shape[1]):
@@ -182,7 +192,7 @@ def soften(
 @compiled(fastmath=ROUNDING, **INLINED)
 def overlap(machine: Machine, new: Stage, n: int, gain: float, room: Room) -> None:
     """Overlaps of n pairs that rigid motion, modes and what the residual carries over leave to new forces."""
-    slow = 1.0 - gain
+    slow, moved = 1.0 - gain, new.d[machine.hubs :]
     for p in range(n):
         if room.arrived[p]:
             # A pair that is new comes with the residual that its neighbours' forces hold it at.
@@ -194,8 +204,9 @@ def overlap(machine: Machine, new: Stage, n: int, gain: float, room: Room) -> No
         over = -new.pairs[p].gap - room.memory[p]
         for i in range(machine.hubs):
             over -= room.rows[p, i] * (new.d[i] - room.sought[i])
-        for i in range(machine.hubs, len(new.d)):
-            over -= room.rows[p, i] * new.d[i]
+        row = room.rows[p, machine.hubs :]
+        for k in range(len(moved)):
+            over -= row[k] * moved[k]
         room.over[p] = over
 
 
@@ -228,17 +239,20 @@ def conclude(machine: Machine, scheme: Scheme, new: Stage, n: int, gain: float, 
     """Unknowns, rates, accelerations, generalised forces and residuals under the forces that were found."""
     h, late = scheme.step, 1.0 - scheme.alpha_f
     for i in range(len(new.d)):
-        load, a = room.outer[i], new.a[i]
-        for p in range(n):
-            if new.force[p] > 0.0:
-                load += new.force[p] * room.rows[p, i]
-                a += late * new.force[p] * room.moved[p, i]
-        if i == machine.loaded_at:
-            for p in range(n):
-                load -= new.force[p] * room.lean[p]
-        new.load[i], new.a[i] = load, a
-        new.d[i] = room.d[i] + scheme.beta * h * h * a
-        new.v[i] = room.v[i] + scheme.gamma * h * a
+        new.load[i] = room.outer[i]
+    for p in range(n):
+        force = new.force[p]
+        if force > 0.0:
+            for i in range(len(new.d)):
+                new.load[i] += force * room.rows[p, i]
+            for i in range(len(new.d)):
+                new.a[i] += late * force * room.moved[p, i]
+            if machine.loaded_at >= 0:
+                new.load[machine.loaded_at] -= force * room.lean[p]
+    for i in range(len(new.d)):
+        new.d[i] = room.d[i] + scheme.beta * h * h * new.a[i]
+    for i in range(len(new.d)):
+        new.v[i] = room.v[i] + scheme.gamma * h * new.a[i]
     for p in range(n):
         pushed = 0.0
         for q in range(n):
@@ -251,10 +265,11 @@ def conclude(machine: Machine, scheme: Scheme, new: Stage, n: int, gain: float, 
 
 
 @compiled(fastmath=ROUNDING, **INLINED)
-def torques(machine: Machine, new: Stage, n: int, load: float, nominal: Pace, room: Room) -> Torques:
-    """Torques on the outer ends of drive and load under the load's torque [N m] without its balance of losses."""
+def torques(machine: Machine, new: Stage, n: int, torque: float, nominal: Pace, room: Room) -> Torques:
+    """Torques on the outer ends of drive and load after a step that found n pairs, under the driver torque [N m]."""
     at, hubs = machine.at, machine.hubs
     n1, n2 = len(machine.hub1), len(machine.hub2)
+    load = load_torque(machine, torque)
     one, two, balanced, ratio = 0.0, 0.0, 0.0, machine.law.driven.rb / machine.law.driver.rb
     for p in range(n):
         sign = 1.0 - 2.0 * new.pairs[p].side
@@ -304,8 +319,10 @@ def seek(machine: Machine, new: Stage, theta1: float, theta2: float, nominal: Pa
 def let_go(machine: Machine, scheme: Scheme, new: Stage, room: Room) -> None:
     """Accelerations and unknowns of the new stage without new contact forces."""
     factorise(machine, scheme, room)
-    for i in range(len(new.d)):
-        room.push[i] = room.rest[i] + (room.extra[i] if i < machine.hubs else 0.0)
+    for i in range(len(room.push)):
+        room.push[i] = room.rest[i]
+    for i in range(machine.hubs):
+        room.push[i] += room.extra[i]
     accelerate(room, room.push, new.a)
     for i in range(len(new.d)):
         new.d[i] = room.d[i] + scheme.beta * scheme.step * scheme.step * new.a[i]
@@ -325,7 +342,7 @@ def try_step(
     theta1, theta2 = angles(machine, old.d, t)
     before, nominal = pace(machine, t), pace(machine, t + h)
     write_hub_coupling(machine, theta1 + late * before.speed1, theta2 + late * before.speed2, room.corner)
-    load = impose(machine, torque, theta1 + h * (before.speed1 + old.v[0]), room.outer)
+    impose(machine, torque, theta1 + h * (before.speed1 + old.v[0]), room.outer)
     if len(machine.course.time) > 0:
         lag(machine, nominal, room.outer)
     predict(machine, scheme, old, room)
@@ -354,5 +371,4 @@ def try_step(
             room.desk.known[p] = False
     if yields(machine):
         yield_to(machine, new, n, room)
-    held = torques(machine, new, n, load, nominal, room)
-    return Tried(found, n, held.driver, held.driven)
+    return Tried(found, n)

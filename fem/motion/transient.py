@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.fem.contact.law import off_flanks
-from gearbench.fem.motion.machine import Machine, angles, centres
+from gearbench.fem.motion.machine import Machine, angles, centres, pace
 from gearbench.fem.motion.scheme import Scheme
 from gearbench.fem.motion.stage import Room, Stage, make_room, make_stage
 from gearbench.fem.motion.start import State
-from gearbench.fem.motion.step import Tried, try_step
+from gearbench.fem.motion.step import Tried, torques, try_step
 from gearbench.kernels.borrowed import borrowed
 from gearbench.kernels.compiled import INLINED, compiled
 
@@ -121,7 +121,13 @@ def columns(samples: Array) -> Samples:
 def take_over(new: Stage, old: Stage, n: int) -> None:
     """Write a new stage with n pairs over the old one."""
     for i in range(len(new.d)):
-        old.d[i], old.v[i], old.a[i], old.load[i] = new.d[i], new.v[i], new.a[i], new.load[i]
+        old.d[i] = new.d[i]
+    for i in range(len(new.d)):
+        old.v[i] = new.v[i]
+    for i in range(len(new.d)):
+        old.a[i] = new.a[i]
+    for i in range(len(new.d)):
+        old.load[i] = new.load[i]
     for p in range(n):
         old.pairs[p] = new.pairs[p]
         old.force[p], old.before[p], old.residual[p], old.older[p] = (
@@ -130,7 +136,7 @@ def take_over(new: Stage, old: Stage, n: int) -> None:
 
 
 @compiled(**INLINED)
-def sample(machine: Machine, now: Stage, run: Run, tried: Tried, k: int, out: Samples) -> bool:
+def sample(machine: Machine, now: Stage, run: Run, room: Room, k: int, out: Samples) -> bool:
     """Fill row k of `out`; whether contact is on the modelled flanks."""
     at = machine.at
     theta1, theta2 = angles(machine, now.d, run.t)
@@ -138,7 +144,8 @@ def sample(machine: Machine, now: Stage, run: Run, tried: Tried, k: int, out: Sa
     out.y_driver[k], out.y_driven[k] = now.d[at.y1], now.d[at.y2]
     if at.x1 >= 0:
         out.x_driver[k], out.x_driven[k] = now.d[at.x1], now.d[at.x2]
-    out.torque_driver[k], out.torque_driven[k] = tried.torque_driver, tried.torque_driven
+    held = torques(machine, now, run.pairs, run.torque, pace(machine, run.t), room)
+    out.torque_driver[k], out.torque_driven[k] = held.driver, held.driven
     nearest = floor(theta2 / machine.law.driven.pitch + 0.5)
     for p in range(run.pairs):
         force = now.force[p]
@@ -170,7 +177,7 @@ def integrate(
     machine, now, new, room, out = borrowed(machine), borrowed(now), borrowed(new), borrowed(room), borrowed(out)
     t, lately, before, pairs, divided = begin.t, begin.lately, begin.torque, begin.pairs, 0
     for i in range(len(torque)):
-        tried = Tried(False, 0, 0.0, 0.0)
+        tried = Tried(False, 0)
         # Parts of the step: what is done of it, and what is tried next.
         done, part, whole = 0, PARTS, True
         while done < PARTS:
@@ -193,6 +200,6 @@ def integrate(
         if (i + 1) % substeps == 0:
             run, k = Run(t, lately, before, pairs, i, True), (i + 1) // substeps - 1
             out.divided[k], divided = divided, 0
-            if not sample(machine, now, run, tried, k, out):
+            if not sample(machine, now, run, room, k, out):
                 return run
     return Run(t, lately, before, pairs, -1, False)

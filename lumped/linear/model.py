@@ -110,11 +110,19 @@ class Lumped:
         x = force / float(self.stiffness.at(phase)) + float(error) - g * (y1 - y2)
         return np.array([x, y1, y2, 0.0, 0.0, 0.0])
 
-    def fastest_rate(self) -> float:
-        """Largest magnitude [rad/s] of an eigenvalue of the frozen system over the mesh cycle."""
+    def _frozen_eigenvalues(self) -> NDArray[np.complex128]:
+        """Eigenvalues (3, 6) [1/s] of the frozen system where the mesh is softest, at its median, and stiffest."""
         k = self.stiffness.at(np.arange(256) / 256)
         extremes = np.array([k.min(), np.median(k), k.max()])
-        return float(np.abs(np.linalg.eigvals(self.state_matrix(extremes))).max())
+        return np.asarray(np.linalg.eigvals(self.state_matrix(extremes)), dtype=complex)
+
+    def fastest_rate(self) -> float:
+        """Largest magnitude [rad/s] of an eigenvalue of the frozen system over the mesh cycle."""
+        return float(np.abs(self._frozen_eigenvalues()).max())
+
+    def slowest_decay(self) -> float:
+        """Slowest rate [1/s] at which free vibrations of the frozen system die out over the mesh cycle."""
+        return float(-self._frozen_eigenvalues().real.max())
 
 
 def periodic_matrices(model: Lumped, phases: int) -> tuple[Array, Array, Array]:

@@ -14,6 +14,7 @@ from gearbench.shell.options import (
     ModelOption,
     ReportOption,
     SetOption,
+    WorkersOption,
     check_out,
     check_picture,
     load_case,
@@ -31,14 +32,15 @@ def sweep(
     figure: Annotated[Path | None, typer.Option("--figure", help="picture over speed (.png, .svg, .pdf)")] = None,
     waterfall: Annotated[Path | None, typer.Option("--waterfall", help="picture of the orders over speed")] = None,
     report: ReportOption = True,
+    workers: WorkersOption = None,
     model: ModelOption = None,
     settings: SetOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Run a rig up and down in speed under its mean torque: DTE, dynamic factor and contact loss at every speed.
 
-    Each speed begins where the one before ended, so that jumps show as differences between up and down. Beside the
-    dynamic factor stands K_v of ISO 6336-1, Method B.
+    Each speed begins where the one before ended, so that jumps show as differences between up and down, which run side
+    by side. Beside the dynamic factor stands K_v of ISO 6336-1, Method B.
     """
     loaded = load_case(case, settings)
     check_out(out, [case])
@@ -61,7 +63,8 @@ def sweep(
 
     with Progress(f"sweep {loaded.name}") as progress:
         progress.step("speeds")
-        result = swept(loaded, [float(one) for one in np.linspace(low, high, points) * pi / 30], model, progress)
+        speeds = [float(one) for one in np.linspace(low, high, points) * pi / 30]
+        result = swept(loaded, speeds, model, progress, workers=workers)
         write_dataset(result, out)
         if figure is not None:
             from gearbench.figures.records.sweep import plot_sweep

@@ -119,8 +119,8 @@ def test_settling_that_takes_too_long_is_one_sentence(keep: Keep, block: int, mo
         return
     # Every block kept, the first one is not looked at.
     run = 3 * block if block > 1 and keep == "every" else (most // block + 1) * block
-    words = rf"no steady state: after {run} excitation periods the DTE still changes by .*"
-    with pytest.raises(BenchError, match=words + rf"limits to {tolerance:g}; raise settling_periods_max = {most} or"):
+    words = rf"no steady state: after {run} excitation periods the DTE still changes by .* limits to {tolerance:g}; set"
+    with pytest.raises(BenchError, match=words + rf" experiment\.settling_periods_max above {most} or damp the rig"):
         settle(keep, tolerance, most, periods=4, repeat_periods=block)
 
 

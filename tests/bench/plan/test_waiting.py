@@ -67,7 +67,7 @@ def test_a_motion_that_fades_slowly_settles(keep: Keep, repeat: int) -> None:
     )
     assert found.residual <= experiment.settling_tolerance
     assert found.settling_periods > 5 * FEW
-    with pytest.raises(BenchError, match=f"raise settling_periods_max = {FEW} or"):
+    with pytest.raises(BenchError, match=f"set experiment.settling_periods_max above {FEW} or"):
         steady_state(fading, plan, experiment, lambda out: out[:, 0], keep, None)
 
 

@@ -72,7 +72,11 @@ def test_run_up_moves_as_the_reduced_one_and_gains_its_momentum(
     other, theirs = reduced_run(twins, boundary, torque)
 
     for t in (-1e-3, 1e-4, TIME[1], TIME[2], 5e-3, 1.0):
-        assert nominal(machine, float(t)) == pytest.approx(tuple(small.pace(other, float(t))), rel=1e-12)
+        at, until = nominal(machine, float(t)), np.union1d(TIME[t > TIME], [0.0, t])
+        assert (at.speed1, at.speed2) == pytest.approx((np.interp(t, TIME, SPEED),) * 2, rel=1e-12)
+        turned = np.trapezoid(np.interp(until, TIME, SPEED), until) * np.sign(t)
+        assert (at.angle1, at.angle2) == pytest.approx((turned, turned), rel=1e-12)
+        assert nominal(machine, float(t)) == small.pace(other, float(t))
     mine, reference = dte(machine, out), dte(machine, theirs)
     assert np.std(mine - reference) < DIFFERENCE[boundary] * np.std(reference)
     assert mine.mean() == pytest.approx(reference.mean(), rel=5e-3)
