@@ -76,12 +76,21 @@ def followed(lines: NDArray[np.int64]) -> NDArray[np.int64]:
 
 def drawn_models(found: Feedback) -> list[Model]:
     """Models with parameters drawn from their covariance, each with the common factor of its own N."""
-    model, rng = found.model, np.random.default_rng(0)
-    covariance = found.refined.covariance
-    values, vectors = np.linalg.eigh(0.5 * (covariance + covariance.T))
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
-    moved = (model.moved(model.vector() + root @ rng.standard_normal(values.size)) for _ in range(DRAWS))
-    return [gauged(one, found.data) for one in moved]
+    model = found.model
+    steps = drawn_steps(found.refined.covariance)
+    return [gauged(model.moved(model.vector() + step), found.data) for step in steps]
+
+
+def drawn_steps(covariance: Floats) -> Floats:
+    """DRAWS steps (DRAWS, P) of the parameters with this covariance (P, P), the same at each call.
+
+    Drawn from the correlations: splines without data leave variances 1e20 times those of others, which would drown in
+    the rounding of the covariance's own eigenvalues.
+    """
+    size = np.sqrt(np.maximum(np.diagonal(covariance), np.finfo(float).tiny))
+    values, vectors = np.linalg.eigh(covariance / size / size[:, None])
+    root = size[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
+    return np.asarray(np.random.default_rng(0).standard_normal((DRAWS, size.size)) @ root.T)
 
 
 def along_phase(model: Model, data: ClassData, phases: int) -> tuple[Floats, Floats]:
