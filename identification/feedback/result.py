@@ -14,6 +14,9 @@ from gearbench.identification.spectra.joint import Complexes, Floats
 
 # Draws of the parameters from their covariance, and output lines on which they are followed.
 DRAWS = 16
+# Part of their deviation that parameters are drawn by: variances are those of a response that is linear in them. Whole
+# steps would lead through poles at zero frequency and functions that vanish.
+STEP = 1e-3
 FOLLOWED = 40
 # Equations of a window in which residuals are compared with the inputs.
 COMPARED = 80
@@ -75,14 +78,14 @@ def followed(lines: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def drawn_models(found: Feedback) -> list[Model]:
-    """Models with parameters drawn from their covariance, each with the common factor of its own N."""
+    """Models with parameters drawn by STEP of their covariance's root, each with the common factor of its own N."""
     model = found.model
     steps = drawn_steps(found.refined.covariance)
     return [gauged(model.moved(model.vector() + step), found.data) for step in steps]
 
 
 def drawn_steps(covariance: Floats) -> Floats:
-    """DRAWS steps (DRAWS, P) of the parameters with this covariance (P, P), the same at each call.
+    """STEP times DRAWS draws (DRAWS, P) of parameters with this covariance (P, P), the same at each call.
 
     Drawn from the correlations: splines without data leave variances 1e20 times those of others, which would drown in
     the rounding of the covariance's own eigenvalues.
@@ -90,7 +93,7 @@ def drawn_steps(covariance: Floats) -> Floats:
     size = np.sqrt(np.maximum(np.diagonal(covariance), np.finfo(float).tiny))
     values, vectors = np.linalg.eigh(covariance / size / size[:, None])
     root = size[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
-    return np.asarray(np.random.default_rng(0).standard_normal((DRAWS, size.size)) @ root.T)
+    return np.asarray(STEP * np.random.default_rng(0).standard_normal((DRAWS, size.size)) @ root.T)
 
 
 def along_phase(model: Model, data: ClassData, phases: int) -> tuple[Floats, Floats]:

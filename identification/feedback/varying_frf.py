@@ -143,7 +143,7 @@ def varying_frf(
 
 
 def _draws(found: Varying, about: ClassData) -> list[Model]:
-    """Models with parameters drawn from their covariance."""
+    """Models with parameters drawn by a part of their covariance's root."""
     steps = drawn_steps(found.covariance)
     return [gauged(found.model.moved(found.model.vector() + step), about) for step in steps]
 

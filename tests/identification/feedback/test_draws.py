@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from gearbench.identification.feedback.result import DRAWS, drawn_steps
+from gearbench.identification.feedback.result import DRAWS, STEP, drawn_steps
 
 
 def test_variances_far_apart_do_not_drown_each_other() -> None:
@@ -13,7 +13,7 @@ def test_variances_far_apart_do_not_drown_each_other() -> None:
     correlation = mixed @ mixed.T
     diagonal = np.sqrt(np.diagonal(correlation))
     covariance = size[:, None] * (correlation / diagonal / diagonal[:, None]) * size
-    steps = drawn_steps(covariance) / size
+    steps = drawn_steps(covariance) / STEP / size
     assert steps.shape == (DRAWS, count)
     # 30 parameters of 16 draws each: their mean square is within a few tenths of 1.
     for part in (steps[:, ::2], steps[:, 1::2]):
@@ -22,6 +22,6 @@ def test_variances_far_apart_do_not_drown_each_other() -> None:
 
 def test_correlated_parameters_move_together() -> None:
     covariance = np.outer([1e6, -1e-4, 2.0], [1e6, -1e-4, 2.0])
-    steps = drawn_steps(covariance)
+    steps = drawn_steps(covariance) / STEP
     assert np.allclose(steps[:, 0] * 1e-6, -steps[:, 1] * 1e4, rtol=0, atol=1e-6)
     assert np.allclose(steps[:, 0] * 1e-6, steps[:, 2] / 2.0, rtol=0, atol=1e-6)
