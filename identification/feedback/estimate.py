@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from gearbench.identification.feedback.data import ClassData, class_data, fewer_classes
 from gearbench.identification.feedback.functions import Fractions, Splines, common_pairs
 from gearbench.identification.feedback.model import Model
-from gearbench.identification.feedback.refine import Refined, linearised, refined
+from gearbench.identification.feedback.refine import Refined, linearised, refined, settled_covariance
 from gearbench.identification.feedback.start import first_model
 from gearbench.identification.lpm.local_solve import LpmError
 from gearbench.identification.spectra.joint import Complexes, Spectra
@@ -87,7 +87,7 @@ def mesh_feedback(
         elif found:
             break
     report(1.0, "mesh feedback: last rounds")
-    return Feedback(data, refined(best.model, data))
+    return Feedback(data, settled_covariance(refined(best.model, data), data))
 
 
 def criterion(fit: Refined, data: ClassData) -> float:

@@ -72,9 +72,11 @@ def doubt_beyond(found: Feedback) -> float:
 
 
 def followed(lines: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Some of the output lines, on which the drawn models are solved."""
+    """Some of the output lines, on which the drawn models are solved: evenly spread, and from the first to the second
+    of these at doubled distances, as the poles of over-damped supports near zero frequency are uncertain there only."""
     step = max(1, -(-lines.size // FOLLOWED))
-    return np.unique(np.append(lines[::step], lines[-1]))
+    near = lines[: step + 1][2 ** np.arange(int(np.log2(step)) + 1) if step > 1 else slice(0)]
+    return np.unique(np.concatenate([lines[::step], near, lines[-1:]]))
 
 
 def drawn_models(found: Feedback) -> list[Model]:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from gearbench.identification.feedback.result import DRAWS, STEP, drawn_steps
+from gearbench.identification.feedback.result import DRAWS, STEP, drawn_steps, followed
 
 
 def test_variances_far_apart_do_not_drown_each_other() -> None:
@@ -25,3 +25,11 @@ def test_correlated_parameters_move_together() -> None:
     steps = drawn_steps(covariance) / STEP
     assert np.allclose(steps[:, 0] * 1e-6, -steps[:, 1] * 1e4, rtol=0, atol=1e-6)
     assert np.allclose(steps[:, 0] * 1e-6, steps[:, 2] / 2.0, rtol=0, atol=1e-6)
+
+
+def test_lines_that_are_followed_are_dense_where_they_begin() -> None:
+    found = followed(np.arange(5, 3005))
+    assert list(found[:9]) == [5, 6, 7, 9, 13, 21, 37, 69, 80]
+    assert found[-1] == 3004
+    assert np.diff(found).max() <= 75
+    assert list(followed(np.arange(3, 9))) == [3, 4, 5, 6, 7, 8]
