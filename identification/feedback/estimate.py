@@ -36,8 +36,8 @@ SEARCHED = 6000
 GAIN = 4.0
 # Decrease of the cost at which rounds end while numbers of poles are compared.
 COMPARED = 0.02
-# Where further pairs of poles are tried, as parts of the excited band, and their damping ratios: the lowest are those of
-# over-damped supports.
+# Where further pairs of poles are tried, as parts of the excited band, and their damping ratios: the lowest are those
+# of over-damped supports.
 PLACES = (0.01, 0.04, 0.08, 0.14, 0.2, 0.26, 0.32, 0.38, 0.44, 0.52, 0.6, 0.7, 0.85)
 PLACED_DAMPING = (1.0, 1.0, *(11 * [0.03]))
 # Added to the scaled Gram matrix there: the common factor of all parameters is free.
