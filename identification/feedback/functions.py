@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 
 from gearbench.identification.spectra.joint import Complexes, Floats
@@ -64,7 +65,7 @@ class Fractions:
         """Pairs of poles."""
         return self.pairs.shape[0]
 
-    def _squares(self, s: Complexes) -> Complexes:
+    def _squares(self, s: NDArray) -> Complexes:
         return np.asarray(s**2 + self.pairs[:, 0] * s + self.pairs[:, 1])
 
 
