@@ -1,4 +1,4 @@
-"""What models drawn from the covariance of a mesh-feedback model's parameters scatter by."""
+"""What models scatter by that are drawn by STEP of the deviation of a mesh-feedback model's parameters."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gearbench.identification.feedback.data import ClassData
 from gearbench.identification.feedback.model import Model
-from gearbench.identification.feedback.result import along_phase, followed, htf_on
+from gearbench.identification.feedback.result import STEP, along_phase, followed, htf_on
 from gearbench.identification.spectra.joint import Floats
 from gearbench.identification.truth.periodic import itf_from_htf
 
@@ -21,7 +21,7 @@ def response_variances(
     """Variances of HTF (2L+1, F) and ITF (F, phases), from the drawn models on some of the lines."""
     chosen = followed(lines)
     centre = htf_on(model, data, chosen, branches)
-    errors = [htf_on(drawn, data, chosen, branches) - centre for drawn in draws]
+    errors = [(htf_on(drawn, data, chosen, branches) - centre) / STEP for drawn in draws]
     of_htf = np.mean([np.abs(error) ** 2 for error in errors], axis=0)
     of_itf = np.mean([np.abs(itf_from_htf(error, phases)) ** 2 for error in errors], axis=0)
     return (
@@ -34,7 +34,7 @@ def add_mesh_curves(frf: xr.Dataset, model: Model, draws: Sequence[Model], data:
     """Add `mesh_stiffness` and `mesh_damping` (phase) and their variances to a response."""
     phases = frf.sizes["phase"]
     curves = np.array([along_phase(one, data, phases) for one in (model, *draws)])
-    spread = np.mean((curves[1:] - curves[0]) ** 2, axis=0)
+    spread = np.mean(((curves[1:] - curves[0]) / STEP) ** 2, axis=0)
     for number, (name, unit) in enumerate((("mesh_stiffness", "N/m"), ("mesh_damping", "N s/m"))):
         frf[name] = ("phase", curves[0, number], {"units": unit})
         frf[f"{name}_var"] = ("phase", spread[number], {"units": f"({unit})^2"})

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.identification.feedback.data import ClassData, class_data, fewer_classes
-from gearbench.identification.feedback.functions import Fractions, Splines, common_poles
+from gearbench.identification.feedback.functions import Fractions, Splines, common_pairs
 from gearbench.identification.feedback.model import Model
-from gearbench.identification.feedback.refine import Refined, linearised, refined
+from gearbench.identification.feedback.refine import Refined, linearised, refined, settled_covariance
 from gearbench.identification.feedback.start import first_model
 from gearbench.identification.lpm.local_solve import LpmError
 from gearbench.identification.spectra.joint import Complexes, Spectra
@@ -36,9 +36,10 @@ SEARCHED = 6000
 GAIN = 4.0
 # Decrease of the cost at which rounds end while numbers of poles are compared.
 COMPARED = 0.02
-# Where further pairs of poles are tried, as parts of the excited band, and their damping ratio.
-PLACES = (0.08, 0.14, 0.2, 0.26, 0.32, 0.38, 0.44, 0.52, 0.6, 0.7, 0.85)
-PLACED_DAMPING = 0.03
+# Where further pairs of poles are tried, as parts of the excited band, and their damping ratios: the lowest are those
+# of over-damped supports.
+PLACES = (0.01, 0.04, 0.08, 0.14, 0.2, 0.26, 0.32, 0.38, 0.44, 0.52, 0.6, 0.7, 0.85)
+PLACED_DAMPING = (1.0, 1.0, *(11 * [0.03]))
 # Added to the scaled Gram matrix there: the common factor of all parameters is free.
 FIRMNESS = 1e-9
 
@@ -86,7 +87,7 @@ def mesh_feedback(
         elif found:
             break
     report(1.0, "mesh feedback: last rounds")
-    return Feedback(data, refined(best.model, data))
+    return Feedback(data, settled_covariance(refined(best.model, data), data))
 
 
 def criterion(fit: Refined, data: ClassData) -> float:
@@ -112,24 +113,25 @@ def rational(fit: Refined, data: ClassData, pairs: int) -> Model:
         variance = np.einsum("fi,ij,fj->f", values, fit.covariance[own, own], values.conj(), optimize=True).real
         weights.append(1.0 / np.sqrt(np.maximum(variance, 0.0) + (ROUGH * np.abs(values @ coefficients)) ** 2))
     d, n = model.functions(position)
-    poles = common_poles(position, [d, n], weights, pairs)
-    fractions = Fractions(poles).at(position)
+    basis = Fractions(common_pairs(position, [d, n], weights, pairs))
+    fractions = basis.at(position)
     of_d, of_n = (_fitted(fractions, f, weight) for f, weight in zip((d, n), weights, strict=True))
-    return Model(Fractions(poles), of_d, of_n, model.k, model.c)
+    return Model(basis, of_d, of_n, model.k, model.c)
 
 
 def extended(model: Model, data: ClassData) -> Model:
     """The model with one more pair of poles where, of PLACES, it lowers the output error most to first order."""
-    kept, count = model.basis.poles, len(PLACES)
-    placed = np.array(PLACES) * data.excited / data.top * (1j - PLACED_DAMPING)
-    basis = Fractions(np.concatenate([kept, placed]))
-    wide_d, wide_n = (_spread(x, kept.size, count) for x in (model.d, model.n))
+    known, count = model.basis.pairs, len(PLACES)
+    kept, size_of = known.shape[0], np.array(PLACES) * data.excited / data.top
+    placed = np.stack([2 * np.array(PLACED_DAMPING) * size_of, size_of**2], axis=1)
+    basis = Fractions(np.concatenate([known, placed]))
+    wide_d, wide_n = (_spread(x, kept, count) for x in (model.d, model.n))
     start = Model(basis, wide_d, wide_n, model.k, model.c)
     gram, right = linearised(start, data)
-    size, pairs = start.d.size, kept.size + count
-    new = np.array([[3 + kept.size + place, 3 + pairs + kept.size + place] for place in range(count)])
+    size, pairs = start.d.size, kept + count
+    new = np.array([[3 + kept + place, 3 + pairs + kept + place] for place in range(count)])
     new = np.concatenate([new, size + new], axis=1)  # (places, 4): residues of D and N
-    poles = 2 * size + np.arange(2 * pairs).reshape(2, pairs)[:, kept.size :]
+    poles = 2 * size + np.arange(2 * pairs).reshape(2, pairs)[:, kept:]
     others = np.setdiff1d(np.arange(right.size), np.concatenate([new.ravel(), poles.ravel()]))
     best, chosen, residues = 0.0, 0, np.zeros(4)
     for place in range(count):
@@ -142,18 +144,17 @@ def extended(model: Model, data: ClassData) -> Model:
         gain = float(step @ (right[own] / scale))
         if gain > best:
             best, chosen, residues = gain, place, (step / scale)[-4:]
-    pair = kept.size + 1
-    d, n = (_spread(x, kept.size, 1) for x in (model.d, model.n))
-    for coefficients, (real, imaginary) in ((d, residues[:2]), (n, residues[2:])):
-        coefficients[3 + kept.size], coefficients[3 + pair + kept.size] = real, imaginary
-    return Model(Fractions(np.append(kept, placed[chosen])), d, n, model.k, model.c)
+    d, n = (_spread(x, kept, 1) for x in (model.d, model.n))
+    for coefficients, (constant, slope) in ((d, residues[:2]), (n, residues[2:])):
+        coefficients[3 + kept], coefficients[4 + 2 * kept] = constant, slope
+    return Model(Fractions(np.concatenate([known, placed[chosen : chosen + 1]])), d, n, model.k, model.c)
 
 
 def _spread(coefficients: NDArray[np.float64], kept: int, more: int) -> NDArray[np.float64]:
     """Coefficients of `kept` pairs of poles with zeros for `more` of them."""
-    head, real, imaginary = np.split(coefficients, [3, 3 + kept])
+    head, constants, slopes = np.split(coefficients, [3, 3 + kept])
     none = np.zeros(more)
-    return np.concatenate([head, real, none, imaginary, none])
+    return np.concatenate([head, constants, none, slopes, none])
 
 
 def _fitted(values: Complexes, response: Complexes, weight: NDArray[np.float64]) -> NDArray[np.float64]:

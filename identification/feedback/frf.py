@@ -94,7 +94,7 @@ def _about_fit(found: Feedback) -> dict[str, Any]:
     """Attributes that say what was fitted, and how well."""
     return {
         "mesh_harmonics": found.model.harmonics,
-        "pole_pairs": found.model.basis.poles.size,
+        "pole_pairs": found.model.basis.pairs.shape[0],
         "unknowns": found.model.vector().size,
         "equations": round(found.data.equations),
         "residual": float(np.sqrt(found.refined.noise)),

@@ -9,12 +9,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 
 from gearbench.identification.spectra.joint import Complexes, Floats
 
 FITTING_ROUNDS = 12
-# Poles that fitting would make unstable or all but undamped come back with this damping ratio.
+# Complex poles that fitting would make unstable or all but undamped come back with this damping ratio.
 LEAST_DAMPING = 2e-3
 
 
@@ -32,48 +33,60 @@ class Splines:
         return np.concatenate([values + 0j, values * (1j * np.sign(position))[..., None]], axis=-1)
 
     @property
-    def poles(self) -> Complexes:
-        """None."""
-        return np.empty(0, dtype=complex)
+    def pairs(self) -> Floats:
+        """No poles."""
+        return np.empty((0, 2))
 
 
 @dataclass(frozen=True)
 class Fractions:
-    """1, s, s^2 and two functions for each pair of `poles` (m,) (upper half plane, stable); s = j position.
+    """1, s, s^2, and 1/q and s/q for each q = s^2 + a s + b of `pairs` (m, 2), a and b positive; s = j position.
 
-    r / (s - p) + conj r / (s - conj p) has the coefficients Re r, Im r.
+    A pair of poles so written passes from complex to real ones, as those of over-damped supports, without a seam.
     """
 
-    poles: Complexes
+    pairs: Floats
 
     def at(self, position: Floats) -> Complexes:
         """Values (..., 3 + 2 m)."""
         s = 1j * np.asarray(position)[..., None]
-        first, second = 1.0 / (s - self.poles), 1.0 / (s - self.poles.conj())
-        return np.concatenate([s**0, s, s**2, first + second, 1j * (first - second)], axis=-1)
+        fraction = 1.0 / self._squares(s)
+        return np.concatenate([s**0, s, s**2, fraction, s * fraction], axis=-1)
 
     def slopes(self, position: Floats, coefficients: Floats) -> Complexes:
-        """Derivatives (..., 2 m) of sum coefficients phi with respect to Re p and Im p of each pole."""
+        """Derivatives (..., 2 m) of sum coefficients phi with respect to a and b of each pair."""
         s = 1j * np.asarray(position)[..., None]
-        count = self.poles.size
-        residue = coefficients[3 : 3 + count] + 1j * coefficients[3 + count :]
-        first, second = residue / (s - self.poles) ** 2, residue.conj() / (s - self.poles.conj()) ** 2
-        return np.concatenate([first + second, 1j * (first - second)], axis=-1)
+        count = self.count
+        change = -(coefficients[3 : 3 + count] + coefficients[3 + count :] * s) / self._squares(s) ** 2
+        return np.concatenate([s * change, change], axis=-1)
+
+    @property
+    def count(self) -> int:
+        """Pairs of poles."""
+        return self.pairs.shape[0]
+
+    def _squares(self, s: NDArray) -> Complexes:
+        return np.asarray(s**2 + self.pairs[:, 0] * s + self.pairs[:, 1])
 
 
 Basis = Splines | Fractions
 
 
-def common_poles(position: Floats, responses: list[Complexes], weights: list[Floats], pairs: int) -> Complexes:
-    """Poles (pairs,) of partial fractions fitted to all `responses` at `position` > 0 at once.
+def pairs_of(poles: Complexes) -> Floats:
+    """(m, 2): a and b of complex poles (m,) and their conjugates."""
+    return np.stack([-2 * poles.real, np.abs(poles) ** 2], axis=1)
+
+
+def common_pairs(position: Floats, responses: list[Complexes], weights: list[Floats], pairs: int) -> Floats:
+    """Pairs of poles (pairs, 2) of fractions fitted to all `responses` at `position` > 0 at once.
 
     Vector fitting (Gustavsen and Semlyen 1999): sigma = 1 + sum c_i phi_i times each response is fitted with the same
     poles; the zeros of sigma are the next poles.
     """
     imaginary = np.linspace(position[0], position[-1], pairs + 2)[1:-1]
-    poles = imaginary * (1j - 0.02)
+    found = pairs_of(imaginary * (1j - 0.02))
     for _ in range(FITTING_ROUNDS):
-        values = Fractions(poles).at(position)
+        values = Fractions(found).at(position)
         size = values.shape[1]
         blocks, right = [], []
         for index, (response, weight) in enumerate(zip(responses, weights, strict=True)):
@@ -86,19 +99,21 @@ def common_poles(position: Floats, responses: list[Complexes], weights: list[Flo
         stacked = np.concatenate([matrix.real, matrix.imag])
         scale = np.maximum(np.linalg.norm(stacked, axis=0), np.finfo(float).tiny)
         solution = np.linalg.lstsq(stacked / scale, np.concatenate([target.real, target.imag]), rcond=1e-12)[0] / scale
-        poles = _zeros(poles, solution[len(responses) * size :])
-    return poles
+        found = _zeros(found, solution[len(responses) * size :])
+    return found
 
 
-def _zeros(poles: Complexes, coefficients: Floats) -> Complexes:
-    """Zeros (upper half plane) of 1 + sum of the fractions, made stable."""
-    count = poles.size
-    residue = coefficients[:count] + 1j * coefficients[count:]
-    matrix = np.diag(np.concatenate([poles, poles.conj()])) - np.outer(
-        np.ones(2 * count), np.concatenate([residue, residue.conj()])
-    )
+def _zeros(pairs: Floats, coefficients: Floats) -> Floats:
+    """Pairs of the zeros of 1 + sum of (c + e s) / q, made stable: those of A - B C of companion blocks."""
+    count = pairs.shape[0]
+    matrix = np.zeros((2 * count, 2 * count))
+    above, below = np.arange(0, 2 * count, 2), np.arange(1, 2 * count, 2)
+    matrix[above, below] = 1.0
+    matrix[below, above], matrix[below, below] = -pairs[:, 1], -pairs[:, 0]
+    matrix[below] -= np.stack([coefficients[:count], coefficients[count:]], axis=1).ravel()
     found = np.linalg.eigvals(matrix)
-    upper = found[np.argsort(-found.imag)][:count]
+    upper = found[found.imag > 0]
+    real = np.maximum(np.sort(np.abs(found[found.imag == 0].real)), 1e-6)
     size = np.maximum(np.abs(upper), 1e-6)
-    real = -np.maximum(np.abs(upper.real), LEAST_DAMPING * size)
-    return np.asarray(real + 1j * np.maximum(np.abs(upper.imag), 1e-4), dtype=complex)
+    oscillating = np.stack([2 * np.maximum(np.abs(upper.real), LEAST_DAMPING * size), size**2], axis=1)
+    return np.concatenate([oscillating, np.stack([real[::2] + real[1::2], real[::2] * real[1::2]], axis=1)])

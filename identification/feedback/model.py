@@ -36,12 +36,12 @@ class Model:
     @property
     def free(self) -> int:
         """Real parameters of D and N, poles included."""
-        return self.d.size + self.n.size + 2 * self.basis.poles.size
+        return self.d.size + self.n.size + self.basis.pairs.size
 
     def vector(self) -> Floats:
-        """All parameters as real numbers: d, n, poles, k, c, of complex ones real parts first."""
-        mesh = [part for x in (self.basis.poles, self.k, self.c) for part in (x.real, x.imag)]
-        return np.concatenate([self.d, self.n, *mesh])
+        """All parameters as real numbers: d, n, a and b of the pairs, k, c, of complex ones real parts first."""
+        mesh = [part for x in (self.k, self.c) for part in (x.real, x.imag)]
+        return np.concatenate([self.d, self.n, self.basis.pairs.T.ravel(), *mesh])
 
     def scaled(self, factor: float) -> Model:
         """D, N, k, c times a real number: the same response."""
@@ -55,12 +55,11 @@ class Model:
 
     def moved(self, vector: Floats) -> Model:
         """The model with these parameters; poles are kept stable."""
-        pairs = self.basis.poles.size
-        sizes = [self.d.size, self.n.size, pairs, pairs, *(4 * [self.harmonics])]
-        d, n, real, imaginary, k, kj, c, cj = np.split(vector, np.cumsum(sizes)[:-1])
+        sizes = [self.d.size, self.n.size, self.basis.pairs.size, *(4 * [self.harmonics])]
+        d, n, pairs, k, kj, c, cj = np.split(vector, np.cumsum(sizes)[:-1])
         basis = self.basis
         if isinstance(basis, Fractions):
-            basis = Fractions(-np.abs(real) + 1j * np.abs(imaginary))
+            basis = Fractions(np.abs(pairs.reshape(2, -1).T))
         return Model(basis, d, n, k + 1j * kj, c + 1j * cj)
 
     def functions(self, position: Floats) -> tuple[Complexes, Complexes]:

@@ -9,7 +9,7 @@ variance tau^2 / l^2, c_l likewise. tau follows from the estimate itself (MacKay
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
@@ -67,6 +67,14 @@ def refined(model: Model, data: ClassData, settled: float = SETTLED) -> Refined:
             break
     left = (data.dte - predicted) * data.valid[:, :, None]
     return Refined(model, left, cost / _freedom(data, model), covariance, _freedom(data, model))
+
+
+def settled_covariance(fit: Refined, data: ClassData) -> Refined:
+    """The same with the covariance at the model itself; that of `refined` belongs to the model before its last step,
+    which is another one where a pole comes near zero frequency."""
+    gram, right = linearised(fit.model, data)
+    covariance = _step(fit.model, gram, right, fit.noise, _prior(fit.model, fit.covariance))[1]
+    return replace(fit, covariance=covariance)
 
 
 def linearised(model: Model, data: ClassData) -> tuple[Floats, Floats]:

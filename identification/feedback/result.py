@@ -14,6 +14,9 @@ from gearbench.identification.spectra.joint import Complexes, Floats
 
 # Draws of the parameters from their covariance, and output lines on which they are followed.
 DRAWS = 16
+# Part of their deviation that parameters are drawn by: variances are those of a response that is linear in them. Whole
+# steps would lead through poles at zero frequency and functions that vanish.
+STEP = 1e-3
 FOLLOWED = 40
 # Equations of a window in which residuals are compared with the inputs.
 COMPARED = 80
@@ -69,19 +72,30 @@ def doubt_beyond(found: Feedback) -> float:
 
 
 def followed(lines: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Some of the output lines, on which the drawn models are solved."""
+    """Some of the output lines, on which the drawn models are solved: evenly spread, and from the first to the second
+    of these at doubled distances, as the poles of over-damped supports near zero frequency are uncertain there only."""
     step = max(1, -(-lines.size // FOLLOWED))
-    return np.unique(np.append(lines[::step], lines[-1]))
+    near = lines[: step + 1][2 ** np.arange(int(np.log2(step)) + 1) if step > 1 else slice(0)]
+    return np.unique(np.concatenate([lines[::step], near, lines[-1:]]))
 
 
 def drawn_models(found: Feedback) -> list[Model]:
-    """Models with parameters drawn from their covariance, each with the common factor of its own N."""
-    model, rng = found.model, np.random.default_rng(0)
-    covariance = found.refined.covariance
-    values, vectors = np.linalg.eigh(0.5 * (covariance + covariance.T))
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
-    moved = (model.moved(model.vector() + root @ rng.standard_normal(values.size)) for _ in range(DRAWS))
-    return [gauged(one, found.data) for one in moved]
+    """Models with parameters drawn by STEP of their covariance's root, each with the common factor of its own N."""
+    model = found.model
+    steps = drawn_steps(found.refined.covariance)
+    return [gauged(model.moved(model.vector() + step), found.data) for step in steps]
+
+
+def drawn_steps(covariance: Floats) -> Floats:
+    """STEP times DRAWS draws (DRAWS, P) of parameters with this covariance (P, P), the same at each call.
+
+    Drawn from the correlations: splines without data leave variances 1e20 times those of others, which would drown in
+    the rounding of the covariance's own eigenvalues.
+    """
+    size = np.sqrt(np.maximum(np.diagonal(covariance), np.finfo(float).tiny))
+    values, vectors = np.linalg.eigh(covariance / size / size[:, None])
+    root = size[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
+    return np.asarray(STEP * np.random.default_rng(0).standard_normal((DRAWS, size.size)) @ root.T)
 
 
 def along_phase(model: Model, data: ClassData, phases: int) -> tuple[Floats, Floats]:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from gearbench.identification.feedback.data import ClassData
 from gearbench.identification.feedback.draws import add_mesh_curves, response_variances
 from gearbench.identification.feedback.model import Model
-from gearbench.identification.feedback.result import DRAWS, doubt_of, htf_on
+from gearbench.identification.feedback.result import doubt_of, drawn_steps, htf_on
 from gearbench.identification.feedback.start import gauged
 from gearbench.identification.feedback.varying import Signals, Varying, unexplained_at, varying_feedback
 from gearbench.identification.response.frf import make_frf
@@ -143,10 +143,8 @@ def varying_frf(
 
 
 def _draws(found: Varying, about: ClassData) -> list[Model]:
-    """Models with parameters drawn from their covariance."""
-    values, vectors = np.linalg.eigh(0.5 * (found.covariance + found.covariance.T))
-    root, rng = vectors * np.sqrt(np.maximum(values, 0.0)), np.random.default_rng(0)
-    steps = (root @ rng.standard_normal(values.size) for _ in range(DRAWS))
+    """Models with parameters drawn by a part of their covariance's root."""
+    steps = drawn_steps(found.covariance)
     return [gauged(found.model.moved(found.model.vector() + step), about) for step in steps]
 
 

@@ -12,6 +12,8 @@ Complexes = NDArray[np.complex128]
 
 # Largest departure of a joint period from a whole number of mesh periods [mesh periods].
 WHOLE = 1e-6
+# Excitation periods that an advice may ask for.
+MOST_REPEATS = 1000
 # Largest in-band change from the first to the last period, relative to the in-band response, of a steady state.
 STEADY = 1e-3
 # ... or relative to the change between the last two periods, which then is noise.
@@ -76,8 +78,21 @@ def joint_periods(samples: int, sampling_rate: float, periods: int, mesh_period:
             return repeats, whole
     raise SpectraError(
         f"the record spans {periods * ratio:.6g} mesh periods ({periods} excitation period(s) of"
-        f" {ratio:.6g} mesh periods); the identification needs a whole number of them"
+        f" {ratio:.6g} mesh periods); the identification needs a whole number of them{_advice(ratio, periods)}"
     )
+
+
+def _advice(ratio: float, periods: int) -> str:
+    """What would make excitation periods of `ratio` mesh periods whole."""
+    tried = np.arange(1, MOST_REPEATS + 1)
+    whole = tried[np.abs(tried * ratio - np.round(tried * ratio)) < WHOLE * np.maximum(1.0, tried * ratio)]
+    least = next((int(n) for n in whole if round(n * ratio) >= 1), None)
+    lengths = f"an excitation period of {int(ratio)} or {int(ratio) + 1} mesh periods" if ratio > 1 else "longer ones"
+    if least is None:
+        return f": record {lengths}"
+    if least <= periods:
+        return f": give a multiple of {least} excitation periods, which hold {round(least * ratio)} mesh periods"
+    return f": record {least} excitation periods, which hold {round(least * ratio)} mesh periods, or {lengths}"
 
 
 def period_spectra(signal: Floats, joint: int, highest: int) -> tuple[Complexes, Complexes, Floats | None]:

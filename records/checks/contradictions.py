@@ -7,8 +7,9 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
+from gearbench.records.checks.devices import error_of_lag, late_device
 from gearbench.records.checks.finding import Finding
-from gearbench.records.checks.look import GEARS, Complexes, Look
+from gearbench.records.checks.look import GEARS, Look
 from gearbench.records.checks.mesh_force import Accounts, accounts_of
 
 Array = NDArray[np.float64]
@@ -26,6 +27,8 @@ LONGEST, STEPS, MATTERS = 100, 8, 0.02
 # accounts that it repairs are left with what the others have, NOISE times at most, and were CLEARLY worse before.
 EXACT, FLOOR = 0.06, 3.0
 NOISE, CLEARLY = 1.5, 1 / 1.5
+# A device with several channels is late, rather than one of them, where that leaves so much less.
+BETTER = 0.5
 # Misfit below which no delay is looked for.
 SUSPICIOUS = 0.03
 # Friction pushes the centres too, a little out of step.
@@ -79,11 +82,8 @@ def torques_fit_inertias(look: Look) -> list[Finding]:
 
 
 def clocks_agree(look: Look) -> list[Finding]:
-    """No channel lags behind the others: a delay of one of them does not make the mesh forces agree.
-
-    The error of a lag tau in a channel that makes the part c(w) of force or DTE: rms of |1 - e^(j w tau)| |c| over the
-    excited lines, weighted with the DTE.
-    """
+    """No channel, and no device with several of them, lags behind the others: a delay does not make the mesh forces
+    agree."""
     accounts = accounts_of(look)
     if accounts is None:
         return []
@@ -103,7 +103,8 @@ def clocks_agree(look: Look) -> list[Finding]:
 
         def worst(at: Array, name: str = name, relations: list[tuple[str, str]] = relations) -> Array:
             turn = np.exp(1j * np.outer(at, accounts.omega))
-            return np.asarray(np.max([accounts.misfit(relation, name, turn) for relation in relations], axis=0))
+            own = frozenset([name])
+            return np.asarray(np.max([accounts.misfit(relation, own, turn) for relation in relations], axis=0))
 
         coarse = float(delays[int(np.argmin(worst(delays)))])
         fine = coarse + step * np.linspace(-1.0, 1.0, 41)
@@ -115,16 +116,22 @@ def clocks_agree(look: Look) -> list[Finding]:
         noisy = after < NOISE * floor and after < CLEARLY * now
         if (clean or noisy) and (best is None or after < best[0]):
             best = (after, name, delay)
-    if best is None:
+    device = late_device(accounts, delays)
+    if device is not None and (best is None or device[0] < BETTER * best[0]):
+        return _late(look, f"the {device[1]} ({', '.join(sorted(device[2]))})", device[2], device[3])
+    return [] if best is None else _late(look, best[1], frozenset([best[1]]), best[2])
+
+
+def _late(look: Look, what: str, names: frozenset[str], delay: float) -> list[Finding]:
+    """The finding of channels that are late by `delay` [s], if that matters."""
+    error = error_of_lag(look, names, delay)
+    if error < MATTERS and abs(delay) < 0.1 / look.rate:
         return []
-    error = _error_of_delay(look, best[1], best[2])
-    if error < MATTERS and abs(best[2]) < 0.1 / look.rate:
-        return []
-    words = "lags behind" if best[2] > 0 else "leads"
+    words = ("lag behind" if delay > 0 else "lead") if len(names) > 1 else ("lags behind" if delay > 0 else "leads")
     return [
         Finding(
-            f"{best[1]} {words} the other channels by {1e6 * abs(best[2]):.3g} us ({abs(best[2]) * look.rate:.2g}"
-            f" samples), which the balance of forces at the gears shows; it costs about {error:.0%} of the response",
+            f"{what} {words} the other channels by {1e6 * abs(delay):.3g} us ({abs(delay) * look.rate:.2g} samples),"
+            f" which the balance of forces at the gears shows; it costs about {error:.0%} of the response",
             refused=False,
             error=error,
         )
@@ -207,42 +214,3 @@ def _suspects(accounts: Accounts, kinds: tuple[str, ...]) -> list[str]:
 
 def _explains(before: float, after: float) -> bool:
     return after < AGREE and after < EXPLAINED * before
-
-
-def _error_of_delay(look: Look, name: str, delay: float) -> float:
-    force, error = look.force, look.dte
-    if force is None or error is None:
-        return 0.0
-    driving, response = look.spectrum(force), look.spectrum(error)
-    lines = look.excited(force)
-    if not lines.any():
-        return 0.0
-    part, whole = _part(look, name), driving if name.startswith("torque_") else response
-    if part is None:
-        return 0.0
-    turned = np.abs(1 - np.exp(1j * look.omega * delay)) * np.abs(part) / np.maximum(np.abs(whole), 1e-300)
-    turned = np.minimum(turned, 2.0) * np.abs(response)
-    return float(np.linalg.norm(turned[lines]) / np.linalg.norm(response[lines]))
-
-
-def _part(look: Look, name: str) -> Complexes | None:
-    """What a channel contributes to force or DTE (lines,); None where it does not."""
-    quantity, gear = name.split("_")
-    radius = look.number(f"base_radius_{gear}")
-    values = look.swing(gear) if quantity == "angle" else look.channel(name)
-    if values is None or radius is None:
-        return None
-    if quantity == "angle":
-        return look.spectrum(values) * radius
-    if quantity == "y":
-        return look.spectrum(values) * (look.support_factor or 1.0)
-    if look.record.attrs.get("driven_boundary") == "speed":
-        return look.spectrum(values) / radius if gear == "driver" else None
-    radii = [look.number(f"base_radius_{one}") for one in ("driver", "driven")]
-    inertias = [look.number(f"inertia_{one}") for one in ("driver", "driven")]
-    if None in radii or None in inertias:
-        return None
-    r1, r2, j1, j2 = (float(one or 0.0) for one in (*radii, *inertias))
-    mass = j1 * j2 / (j1 * r2**2 + j2 * r1**2)
-    share = mass * (r1 / j1 if gear == "driver" else r2 / j2)
-    return look.spectrum(values) * share

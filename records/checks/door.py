@@ -25,6 +25,7 @@ from gearbench.records.checks.derived import (
     swings_fit_the_teeth,
 )
 from gearbench.records.checks.finding import Finding
+from gearbench.records.checks.lag import force_and_dte_in_step
 from gearbench.records.checks.look import Look
 from gearbench.records.checks.passive import force_feeds_the_rig
 from gearbench.records.checks.periods import periods_repeat
@@ -56,6 +57,7 @@ CHECKS: tuple[Check, ...] = (
     inertias_as_declared,
     not_clipped,
     clocks_agree,
+    force_and_dte_in_step,
     periods_repeat,
 )
 

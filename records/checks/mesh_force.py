@@ -45,19 +45,21 @@ class Accounts:
         first, second = relation
         return {*self.gears[first], *self.gears.get(second, {second: None})}
 
-    def misfit(self, relation: tuple[str, str], channel: str = "", turn: Complexes | None = None) -> Array:
-        """Disagreement (D,) of two accounts relative to their rms, after `channel` is multiplied by `turn` (D, lines).
+    def misfit(
+        self, relation: tuple[str, str], channels: frozenset[str] = frozenset(), turn: Complexes | None = None
+    ) -> Array:
+        """Disagreement (D,) of two accounts relative to their rms, `channels` multiplied by `turn` (D, lines) before.
 
         Gear against gear: |F1 - F2| over the mean of both. Gear against centre: what the best k, c, m leave of F.
         """
         turn = np.ones((1, self.omega.size), dtype=complex) if turn is None else turn
-        first = self._force(relation[0], channel, turn)
+        first = self._force(relation[0], channels, turn)
         if relation[1] in self.gears:
-            second = self._force(relation[1], channel, turn)
+            second = self._force(relation[1], channels, turn)
             scale = 0.5 * (np.linalg.norm(first, axis=1) + np.linalg.norm(second, axis=1))
             return np.asarray(np.linalg.norm(first - second, axis=1) / scale)
         gear = relation[1].removeprefix("y_")
-        if channel == relation[1]:  # a turned y is a force turned the other way
+        if relation[1] in channels:  # a turned y is a force turned the other way
             first = first * np.conj(turn / np.abs(turn))
         columns = self._columns(gear)
         basis = _orthonormal(columns)
@@ -69,7 +71,7 @@ class Accounts:
         """k, c, m (3,) of a centre's support [N/m, N s/m, kg] by least squares, the part of the force's rms that each
         explains (3,), and what they leave of it."""
         columns = self._columns(centre)
-        force = self._force(gear, "", np.ones((1, self.omega.size), dtype=complex))[0]
+        force = self._force(gear, frozenset(), np.ones((1, self.omega.size), dtype=complex))[0]
         stacked = np.vstack([columns.real, columns.imag])
         scale = np.linalg.norm(stacked, axis=0)
         target = np.concatenate([force.real, force.imag])
@@ -81,8 +83,8 @@ class Accounts:
         """Force (lines,) [N] on the mesh as a gear has it."""
         return np.asarray(sum(self.gears[gear].values()))
 
-    def _force(self, gear: str, channel: str, turn: Complexes) -> Complexes:
-        parts = [part * turn if name == channel else part[None, :] for name, part in self.gears[gear].items()]
+    def _force(self, gear: str, channels: frozenset[str], turn: Complexes) -> Complexes:
+        parts = [part * turn if name in channels else part[None, :] for name, part in self.gears[gear].items()]
         return np.asarray(sum(parts) * np.ones_like(turn))
 
     def _columns(self, centre: str) -> Complexes:

@@ -8,7 +8,7 @@ from shared.reference_rig import ReferenceRig, reference_record
 
 from gearbench.identification import IdentificationSettings, LpmError, htf, identify, itf
 from gearbench.identification.feedback.data import ClassData, class_data
-from gearbench.identification.feedback.functions import Basis, Fractions, Splines, common_poles
+from gearbench.identification.feedback.functions import Basis, Fractions, Splines, common_pairs, pairs_of
 from gearbench.identification.feedback.model import Model
 from gearbench.identification.feedback.refine import response
 from gearbench.identification.feedback.result import along_phase, htf_on
@@ -60,8 +60,8 @@ def rig_model(data: ClassData) -> Model:
     d = (1.0 / (torsion + supports) + k[0].real + s * c[0].real) / data.stiffness_unit
     n = torsion / (torsion + supports)
     weight = 1.0 / np.abs(d)
-    poles = common_poles(position, [d, n], [weight, weight], 2)
-    values = Fractions(poles).at(position)
+    basis = Fractions(common_pairs(position, [d, n], [weight, weight], 2))
+    values = basis.at(position)
 
     def fitted(f: np.ndarray) -> np.ndarray:
         stacked = np.concatenate([(values * weight[:, None]).real, (values * weight[:, None]).imag])
@@ -71,7 +71,7 @@ def rig_model(data: ClassData) -> Model:
         return found
 
     unit = data.stiffness_unit
-    return Model(Fractions(poles), fitted(d), fitted(n), k[1:41] / unit, c[1:41] * data.omega_unit / unit)
+    return Model(basis, fitted(d), fitted(n), k[1:41] / unit, c[1:41] * data.omega_unit / unit)
 
 
 def test_partial_fractions_of_the_rig_give_its_exact_response(record: xr.Dataset) -> None:
@@ -123,17 +123,19 @@ def test_derivatives_of_the_equations(record: xr.Dataset) -> None:
         assert slope == pytest.approx(columns[:, parameter], abs=1e-5 * np.abs(columns[:, parameter]).max() + 1e-12)
 
 
-def test_poles_of_a_known_rational_function() -> None:
-    position = np.linspace(0.01, 1, 400)
-    poles = np.array([-0.01 + 0.4j, -0.02 + 0.7j])
-    basis = Fractions(poles)
+@pytest.mark.parametrize("last", [pairs_of(np.array([-0.02 + 0.7j]))[0], np.array([0.01 + 0.3, 0.01 * 0.3])])
+def test_poles_of_a_known_rational_function(last: np.ndarray) -> None:
+    """Two resonances, or one and two real poles as those of an over-damped support: (s + 0.01)(s + 0.3)."""
+    position = np.linspace(0.001, 1, 1000)
+    pairs = np.stack([pairs_of(np.array([-0.01 + 0.4j]))[0], last])
+    basis = Fractions(pairs)
     d = basis.at(position) @ np.array([1.0, 0.1, 2.0, 0.02, 0.03, -0.01, 0.02])
     n = basis.at(position) @ np.array([1.0, 0.0, 0.0, 0.01, -0.02, 0.01, 0.0])
-    found = common_poles(position, [d, n], [np.ones(400)] * 2, 2)
-    assert np.sort_complex(found) == pytest.approx(np.sort_complex(poles), abs=1e-9)
+    found = common_pairs(position, [d, n], [np.ones(1000)] * 2, 2)
+    assert found[np.argsort(found[:, 0])] == pytest.approx(pairs[np.argsort(pairs[:, 0])], abs=1e-9)
 
 
-@pytest.mark.parametrize("basis", [Splines(7), Fractions(np.array([-0.1 + 0.5j]))])
+@pytest.mark.parametrize("basis", [Splines(7), Fractions(np.array([[0.2, 0.26]]))])
 def test_bases_are_those_of_real_systems(basis: Basis) -> None:
     position = np.array([0.1, 0.35, 0.8])
     assert basis.at(-position) == pytest.approx(basis.at(position).conj())
