@@ -98,8 +98,8 @@ def decide_simulated(
 def _changes(place: Place, changing: float) -> str:
     """That records change between repetitions where this is not the cause of the gap."""
     return (
-        f"the force missing {at_place(place)} changes from one repetition to the next, so that something drifts, but that"
-        f" is {percent(changing)} of the gap"
+        f"the force missing {at_place(place)} changes from one repetition to the next, so that something drifts, but"
+        f" that is {percent(changing)} of the gap"
     )
 
 
