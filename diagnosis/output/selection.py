@@ -124,15 +124,16 @@ def _restructured(simulator: Simulator, found: Optimum, chosen: NDArray[np.bool_
         return found
     report("simulating: another structure")
     sensitivity = sensitivity_of(simulator, p, unknowns.prior(), chosen)
-    again: Optimum | None = None
-    while sensitivity is not None:
-        before, again = again, fit(simulator, p, found.sd, sensitivity, renewals=RENEWALS_OTHERWISE, chosen=chosen)
-        if again is None or again.evidence <= found.evidence:
-            return before or found
-        if before is not None and again.cost > before.cost - 1.0 or again.left < SETTLED:
-            return again
-        p, sensitivity = again.p, again.sensitivity
-    return found
+    if sensitivity is None:
+        return found
+    again = fit(simulator, p, found.sd, sensitivity, renewals=RENEWALS_OTHERWISE, chosen=chosen)
+    if again is None or again.evidence <= found.evidence:
+        return found
+    if again.left > SETTLED:
+        report("simulating: another structure, further")
+        renewals = RENEWALS_OTHERWISE
+        again = fit(simulator, again.p, found.sd, again.sensitivity, renewals=renewals, chosen=chosen) or again
+    return again
 
 
 def prior_of(simulator: Simulator, sd: Array) -> Array:

@@ -77,7 +77,7 @@ def test_a_start_of_the_force_residuals_is_tried_even_if_the_quadratic_does_not_
 
 
 def test_structure_beyond_a_hill_is_found_by_beginning_again() -> None:
-    """A little yielding across makes it worse, what the rig has makes it right: from rigid supports no fit gets there."""
+    """A little yielding across makes it worse, what the rig has makes it right: no fit gets there from rigid."""
     unknowns = unknowns_of(
         [
             group("stiffness", "1", ("driver", "driven", "more"), 0.1, slot="stiffness"),
