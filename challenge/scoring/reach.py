@@ -22,14 +22,17 @@ class Reach:
 
 
 REACHES = (
-    Reach("effect named rightly", ("effect", "right"), 0.75, False),
-    Reach("wrong cause", ("effect", "wrong"), 0.03, True),
-    Reach("false alarm, named", ("none", "named"), 0.05, True),
+    Reach("named effects that are true", ("due", "true"), 0.97, False),
+    Reach("due effects that are found", ("due", "found"), 0.85, False),
+    Reach("false alarm, named", ("none", "named"), 0.03, True),
     Reach("false alarm, flagged", ("none", "flagged"), 0.10, True),
-    Reach("foreign effect blamed on one of the library", ("foreign", "blamed"), 0.10, True),
-    Reach("foreign effect refused at the right place", ("foreign", "refused_at_right_place"), 0.70, False),
-    Reach("place right", ("effect", "place_right"), 0.75, False),
-    Reach("held-out gap over the oracle fit, median", ("shrinkage", "oracle"), 1.5, True),
+    Reach("foreign effect blamed on one of the library", ("foreign", "blamed"), 0.03, True),
+    Reach("foreign effect refused at the right place", ("foreign", "refused_at_right_place"), 0.80, False),
+    Reach("parameters within their 90 % interval", ("due", "within"), 0.85, False),
+    Reach("held-out gap over the oracle fit, median", ("shrinkage", "oracle"), 1.2, True),
+    Reach("held-out gap within 1.5 x of the oracle fit", ("shrinkage", "oracle_within_1.5"), 0.9, False),
+    Reach("held-out gap over the nominal one, median", ("shrinkage", "with_effect"), 0.25, True),
+    Reach("calibration error of probabilities", ("calibration", "of_verdicts"), 0.05, True),
 )
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from gearbench.challenge.scoring.due import found_of_due, true_of_named, within_intervals
 from gearbench.challenge.scoring.intervals import COVERAGE, Rate, brier, calibration_error, middle, reliability
 from gearbench.challenge.scoring.outcomes import TRUE_VERDICT, VERDICTS, Outcome, named_effects, said
 from gearbench.challenge.scoring.reach import reach_table
@@ -44,6 +45,11 @@ def score(outcomes: Sequence[Outcome]) -> Table:
         "calibration": _calibration(outcomes),
         "parameters": parameter_errors(effects),
         "shrinkage": shrinkage(effects),
+    }
+    table["due"] = {
+        "found": found_of_due(effects).plain(),
+        "true": true_of_named(outcomes).plain(),
+        "within": within_intervals(table["parameters"]).plain(),
     }
     table["reach"] = reach_table(table)
     return table
@@ -126,6 +132,7 @@ def _calibration(outcomes: Sequence[Outcome]) -> Table:
         "verdict": verdict,
         "effect": effect,
         "error": {"verdict": calibration_error(verdict), "effect": calibration_error(effect)},
+        "of_verdicts": {"median": calibration_error(verdict), "low": None, "high": None, "total": len(given)},
     }
 
 

@@ -74,7 +74,7 @@ ECCENTRICITY = Effect(
     name="eccentricity",
     noun="run-out of a gear",
     meaning="The teeth stand farther out on one side of the gear than on the other: check how it is seated on its"
-    " shaft, and the shaft's own run-out.",
+    " shaft, and the shaft's own run-out. An encoder that sits off its axis reads the same at low speed: check both.",
     parameters={"runout": "run-out", "runout_phase": "angle at which the teeth stand out most"},
     fields=of_gears("rig.{}.runout") + of_gears("rig.{}.runout_phase"),
     hypotheses_of=hypotheses,

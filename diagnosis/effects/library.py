@@ -12,6 +12,7 @@ from gearbench.diagnosis.effects.eccentricity import ECCENTRICITY
 from gearbench.diagnosis.effects.effect import Effect, Hypothesis
 from gearbench.diagnosis.effects.free_forms import unknowns as free_unknowns
 from gearbench.diagnosis.effects.friction import FRICTION
+from gearbench.diagnosis.effects.mesh_damping import MESH_DAMPING
 from gearbench.diagnosis.effects.pitch_error import PITCH_ERROR
 from gearbench.diagnosis.effects.sensor_delay import SENSOR_DELAY
 from gearbench.diagnosis.effects.support_stiffness import SUPPORT_STIFFNESS
@@ -33,6 +34,7 @@ LIBRARY: tuple[Effect, ...] = (
     TORQUE_RIPPLE,
     BACKLASH,
     SUPPORT_STIFFNESS,
+    MESH_DAMPING,
 )
 
 

@@ -12,6 +12,8 @@ from gearbench.rig import Case, Rig
 
 Array = NDArray[np.float64]
 
+MOST_RATIO = 0.49  # damping ratio that the mesh of a rig may have
+
 
 def recalibrated(nominal: Case, fitted: Fitted) -> Case:
     """The nominal case with supports, masses, inertias and mesh as the fit has them, and no effect."""
@@ -32,7 +34,7 @@ def recalibrated(nominal: Case, fitted: Fitted) -> Case:
         coupling = rig.drive.coupling.model_copy(update={"inertia": float(rotor)})
         update["drive"] = rig.drive.model_copy(update={"coupling": coupling})
     ratio = model.mesh_ratio * np.exp(fitted.of("mesh-ratio")[0])
-    update["damping"] = rig.damping.model_copy(update={"mesh_ratio": float(min(ratio, 0.49))})
+    update["damping"] = rig.damping.model_copy(update={"mesh_ratio": float(min(ratio, MOST_RATIO))})
     update["mesh"] = rig.mesh.model_copy(update=_mesh(rig, model, fitted))
     return with_rig(nominal, rig.model_copy(update=update))
 

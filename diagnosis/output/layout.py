@@ -38,7 +38,6 @@ Array = NDArray[np.float64]
 FORCES_ONLY = ("curvature", "compliance", "radial")
 NEARLY_RIGID = 1e-3  # compliance of a coupling below this part of its prior is left out of the rig
 LEAST_LOSS = 1e-6
-MOST_MESH_RATIO = 0.49
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,7 @@ from gearbench.diagnosis.output.jacobian import (
     sensor_columns,
 )
 from gearbench.diagnosis.output.layout import Layout
+from gearbench.diagnosis.output.structure import LEAST_STEP
 from gearbench.diagnosis.output.target import Target
 from gearbench.rig import Case
 
@@ -101,7 +102,8 @@ class Simulator:
             for index in range(*unknowns[key].indices(unknowns.size)):
                 if not chosen[index] or sd[index] <= 0.0 or out[index].any():
                     continue
-                step = STEP * sd[index]
+                least = LEAST_STEP.get(key, 0.0)
+                step = least if 0.0 <= p[index] < least else STEP * sd[index]
                 for signed in (step, -step):
                     moved = p.copy()
                     moved[index] += signed

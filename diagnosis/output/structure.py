@@ -39,6 +39,9 @@ ENCODER, ENCODER_SD = "encoder", 0.03
 # Softer than the former part a rig has it, and then at least the latter: steps stay long.
 FELT, STIFFEST = 0.01, 0.03
 SHAFT_FELT, SHAFT_STIFFEST = 0.03, 0.06
+# Moved from nothing by the least that a rig feels: a smaller step would show no derivative, and a fit that begins
+# without it would never find it.
+LEAST_STEP: Mapping[str, float] = {ACROSS: STIFFEST, SHAFT: SHAFT_STIFFEST}
 NONE = 1e-4  # compliance of a housing below which there is none
 # Moved and simulated: no small force at an unchanged motion stands for them.
 STRUCTURE_MOVED = (ACROSS, CROSS, HOUSING, MODE, SHAFT)
@@ -84,6 +87,19 @@ def beginnings(unknowns: Unknowns, p: Array) -> list[Array]:
         twisting[unknowns[SHAFT]] = soft
         out.append(twisting)
     return out
+
+
+def otherwise(unknowns: Unknowns, p: Array) -> Array | None:
+    """`p` (size,) with the structure that a fit does not walk to from there: supports that yield across where they are
+    rigid, else no shaft where there is one; None where neither is a question."""
+    trial = p.copy()
+    if ACROSS in unknowns.slices and p[unknowns[ACROSS]].max() < FELT:
+        trial[unknowns[ACROSS]] = ACROSS_BEGIN
+    elif SHAFT in unknowns.slices and p[unknowns[SHAFT]][0] > SHAFT_FELT:
+        trial[unknowns[SHAFT]] = 0.0
+    else:
+        return None
+    return trial
 
 
 def housings(unknowns: Unknowns, p: Array) -> list[Array]:

@@ -61,6 +61,7 @@ def decide_simulated(
     named = selection.entered
     share = max((judged.share(judged.closings[one.hypothesis.name].without) for one in named), default=0.0)
     place, over = worst(unsteady, limits.unsteady)
+    aside = (_changes(place, changing),) if over > 1.0 else ()
     if over > 1.0 and changing > known.changing and share < CLOSES:
         because = f"the force missing {at_place(place)} changes from one repetition to the next"
         return Decided("unknown", place, (), changing / known.changing, (because,))
@@ -78,7 +79,7 @@ def decide_simulated(
     sign = max(min(judged.left / GREATER, size), seen)
     if named:
         because = "simulated with it, the rig comes closer to the records than any rig without an effect"
-        return Decided("effects", named[0].hypothesis.place, named, sign, (because,))
+        return Decided("effects", named[0].hypothesis.place, named, sign, (because, *aside))
     if size > 1.0 and judged.left > GREATER:
         because = "no effect of the library closes the gap, and the greater part of it stays"
         return Decided("unknown", place if over > 1.0 else "none", (), sign, (because,))
@@ -91,7 +92,15 @@ def decide_simulated(
         f" {percent(judged.remains)} of any channel's fluctuation, is"
         f" {sound if size <= 1.0 else 'the smaller part of the gap'}"
     )
-    return Decided("none", "none", (), sign, (because,))
+    return Decided("none", "none", (), sign, (because, *aside))
+
+
+def _changes(place: Place, changing: float) -> str:
+    """That records change between repetitions where this is not the cause of the gap."""
+    return (
+        f"the force missing {at_place(place)} changes from one repetition to the next, so that something drifts, but"
+        f" that is {percent(changing)} of the gap"
+    )
 
 
 def outstanding(missing: Missing) -> tuple[Place, float]:

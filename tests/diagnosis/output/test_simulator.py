@@ -83,6 +83,20 @@ def test_a_derivative_is_what_two_simulations_differ_by(bench: Bench, key: str, 
     assert largest > 0.0
 
 
+@pytest.mark.parametrize("key", [ACROSS, SHAFT, HOUSING])
+def test_structure_that_is_not_there_has_a_derivative(bench: Bench, key: str) -> None:
+    """A fit that begins with a rigid structure is told that a softer one would come closer: supports across have one
+    direction for both, as a rig has them at both gears."""
+    unknowns, p = bench.layout.unknowns, np.zeros(bench.layout.size)
+    here = bench.simulator.lines(p)
+    p[unknowns[key]] = 0.06
+    softer = bench.simulator.lines(p)
+    assert here is not None and softer is not None
+    change, column = (softer - here) / 0.06, bench.jacobian[unknowns[key].start]
+    along = float(np.vdot(column, change).real / np.linalg.norm(change) ** 2)
+    assert 0.5 < along < 2.0
+
+
 def test_unknowns_make_the_rig_that_they_name(bench: Bench) -> None:
     layout, unknowns = bench.layout, bench.layout.unknowns
     p = np.zeros(layout.size)

@@ -98,6 +98,9 @@ def test_what_changes_counts_by_its_part_of_the_gap() -> None:
     made = decided(900.0, unsteady=out, changing=0.3)
     assert (made.verdict, made.place) == ("unknown", "driven-support") and "repetition" in made.because[0]
     assert decided(900.0, unsteady=out, changing=0.02).verdict == "effects"
-    assert decided(None, unsteady=out, changing=0.02).verdict == "none"
+    quiet = decided(None, unsteady=out, changing=0.02)
+    # What drifts is told even where the gap does not come from it.
+    assert quiet.verdict == "none" and "changes from one repetition to the next" in quiet.because[-1]
+    assert "2.0 % of the gap" in quiet.because[-1] and len(decided(None).because) == 1
     assert decided(None, unsteady=out, changing=0.04).place == "driven-support"
     assert decided(900.0, unsteady=out, changing=0.3, share=0.8).verdict == "effects"

@@ -1,0 +1,57 @@
+"""Which effects a diagnosis owes: those without which the oracle's held-out gap is at least a tenth larger.
+
+The oracle is the same fit with the true effects: a verdict lists it among its candidates where it was simulated. An
+effect of which the candidates tell nothing counts as due, so that a search cannot excuse itself by not looking.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from gearbench.challenge.scoring.intervals import Rate
+from gearbench.challenge.scoring.outcomes import Outcome, named_effects
+
+DUE = 1.1
+
+
+def owed(outcome: Outcome) -> tuple[str, ...]:
+    """The true effects of a case of the library that are due."""
+    if outcome.answer.kind != "effect":
+        return ()
+    true = frozenset(outcome.answer.effects)
+    candidates = (outcome.verdict or {}).get("candidates", ())
+    gaps = {frozenset(candidate["effects"]): candidate.get("held_out") for candidate in candidates}
+    oracle = gaps.get(true)
+    left = {name: gaps.get(true - {name}) for name in true}
+    return tuple(
+        name for name, gap in sorted(left.items()) if oracle is None or gap is None or gap >= DUE * oracle
+    )
+
+
+def found_of_due(outcomes: Sequence[Outcome]) -> Rate:
+    """How many of the effects that are due were named, or a class that holds them."""
+    found = total = 0
+    for outcome in outcomes:
+        names = set(named_effects(outcome.verdict)) if outcome.verdict else set()
+        for name in owed(outcome):
+            total += 1
+            found += name in names or outcome.result == "class"
+    return Rate(found, total)
+
+
+def true_of_named(outcomes: Sequence[Outcome]) -> Rate:
+    """How many of the effects named in any case were at work there; one of a class with the true one counts."""
+    true = total = 0
+    for outcome in outcomes:
+        for name in named_effects(outcome.verdict) if outcome.verdict else ():
+            total += 1
+            at_work = outcome.answer.kind == "effect" and name in outcome.answer.effects
+            true += at_work or outcome.result == "class"
+    return Rate(true, total)
+
+
+def within_intervals(rows: Sequence[dict[str, object]]) -> Rate:
+    """How many of all parameters lay within their stated interval (rows of `parameter_errors`)."""
+    rates = [row["within"] for row in rows]
+    counts = [(int(rate["count"]), int(rate["total"])) for rate in rates if isinstance(rate, dict)]
+    return Rate(sum(count for count, _ in counts), sum(total for _, total in counts))

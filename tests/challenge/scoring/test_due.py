@@ -1,0 +1,52 @@
+"""Which effects are due, by verdicts made by hand."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from shared.fake_verdicts import verdict
+
+from gearbench.challenge.answers import Answer
+from gearbench.challenge.scoring.due import found_of_due, owed, true_of_named
+from gearbench.challenge.scoring.outcomes import Outcome, judge
+
+TWO = Answer("effect", ("friction", "coupling"), "mesh", {"friction": {}, "coupling": {}})
+FRICTION = Answer("effect", ("friction",), "mesh", {"friction": {}})
+
+
+def judged(answer: Answer, named: tuple[str, ...], gaps: dict[tuple[str, ...], float | None]) -> Outcome:
+    given: dict[str, Any] = verdict("effect", *named) if named else verdict("none")
+    given["candidates"] = [
+        {"effects": list(effects), "log_evidence": 0.0, "held_out": gap} for effects, gap in gaps.items()
+    ]
+    return judge("x", answer, given)
+
+
+@pytest.mark.parametrize(
+    ("gap_without", "gap_with", "due"),
+    [(0.221, 0.2, True), (0.219, 0.2, False), (0.2, None, True), (None, 0.2, True)],
+)
+def test_one_effect_is_due_from_a_tenth_on(gap_without: float | None, gap_with: float | None, due: bool) -> None:
+    outcome = judged(FRICTION, (), {(): gap_without, ("friction",): gap_with})
+    assert owed(outcome) == (("friction",) if due else ())
+
+
+def test_of_two_effects_each_is_held_against_the_other_alone() -> None:
+    gaps = {(): 1.0, ("friction",): 0.9, ("coupling",): 0.205, ("coupling", "friction"): 0.2}
+    outcome = judged(TWO, ("coupling",), gaps)
+    # Without the coupling the gap grows from 0.2 to 0.9, without the friction by 2.5 %.
+    assert owed(outcome) == ("coupling",)
+    assert found_of_due([outcome]).plain()["count"] == found_of_due([outcome]).plain()["total"] == 1
+
+
+def test_nothing_is_due_of_foreign_cases_and_nothing_named_there_is_true() -> None:
+    foreign = judged(Answer("foreign", ("temperature-drift",), "mesh", {}), ("friction",), {})
+    right = judged(FRICTION, ("friction", "coupling"), {})
+    assert owed(foreign) == ()
+    assert (true_of_named([foreign, right]).count, true_of_named([foreign, right]).total) == (1, 3)
+    assert found_of_due([foreign, right]).total == 1
+
+
+def test_a_failed_case_owes_its_effect() -> None:
+    assert owed(judge("x", FRICTION, None)) == ("friction",)
