@@ -179,7 +179,7 @@ def test_cases_lists_prints_and_copies(capsys: pytest.CaptureFixture[str], tmp_p
 
 
 def test_mesh_writes_one_gear_and_both(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    coarse = ["--set", "simulation.element_size_um=1600"]
+    coarse = ["--set", "simulation.element_size_um=800"]
     both, one = tmp_path / "both.vtu", tmp_path / "one.msh"
     assert run_command_line(["mesh", "paper_fe", "--out", str(both), "--json", *coarse]) == 0
     summary = json.loads(capsys.readouterr().out)
