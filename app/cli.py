@@ -12,7 +12,7 @@ from typing import Annotated
 import typer
 
 from gearbench import __version__
-from gearbench.commands.house.completion import COMPLETE, prepare
+from gearbench.commands.house.completion import COMPLETE, enable_completion
 from gearbench.shell.failure import INTERRUPTED, guarded, show_warning
 from gearbench.shell.options import expand_lists
 
@@ -112,5 +112,5 @@ def main() -> None:
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     warnings.showwarning = show_warning
     if COMPLETE in os.environ:
-        prepare()
+        enable_completion()
     sys.exit(run_command_line(sys.argv[1:]))

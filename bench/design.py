@@ -105,14 +105,9 @@ def design(
     report(0.0, "exact response")
     system = lumped_periodic_system(case)
     natural, bandwidth = _first_mode(system)
-    step = min(bandwidth / PER_BANDWIDTH, (wanted.band[1] - wanted.band[0]) / 20)
-    if (wanted.band[1] - wanted.band[0]) / step > MOST_FREQUENCIES:
-        step = (wanted.band[1] - wanted.band[0]) / MOST_FREQUENCIES
-    grid = np.arange(wanted.band[0], wanted.band[1] + 2 * step, step)
-    phases = _phases(system)
-    htf = htf_from_itf(exact_itf(system, grid, np.arange(phases) / phases), BRANCHES)
+    htf = _known_htf(system, wanted.band, bandwidth)
     report(0.2, "spectra")
-    clean, peak, rms = _spectra(case, CubicSpline(grid, htf, axis=1))
+    clean, peak, rms = _spectra(case, htf)
     spectra = _noisy(clean, wanted.band, snr_db, case.experiment.seed)
     excited = np.flatnonzero(np.abs(clean.force).max(axis=0)[1:]) + 1
     edges = float(excited[0] * clean.spacing), float(excited[-1] * clean.spacing)
@@ -143,8 +138,19 @@ def design(
         method=str(found.attrs["method"]),
         window=tuple(found.attrs.get(name) for name in ("harmonics", "order", "window")),  # type: ignore[arg-type]
         expected=float(found.attrs["expected_error"]),
-        actual=_error(found, CubicSpline(grid, htf, axis=1)),
+        actual=_error(found, htf),
     )
+
+
+def _known_htf(system: PeriodicSystem, band: tuple[float, float], bandwidth: float) -> CubicSpline:
+    """The exact HTF (2 BRANCHES + 1,) over frequency [Hz] in a band, fine enough for modes of that bandwidth [Hz]."""
+    width = band[1] - band[0]
+    step = min(bandwidth / PER_BANDWIDTH, width / 20)
+    if width / step > MOST_FREQUENCIES:
+        step = width / MOST_FREQUENCIES
+    grid = np.arange(band[0], band[1] + 2 * step, step)
+    phases = _phases(system)
+    return CubicSpline(grid, htf_from_itf(exact_itf(system, grid, np.arange(phases) / phases), BRANCHES), axis=1)
 
 
 def _phases(system: PeriodicSystem) -> int:

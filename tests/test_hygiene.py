@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import subprocess
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -37,6 +38,7 @@ def kept_files() -> list[Path]:
     return [ROOT / name for name in names if (ROOT / name).is_file() and not (ROOT / name).is_symlink()]
 
 
+@cache
 def texts() -> dict[str, str]:
     """Text of every kept file; what is not UTF-8 (pictures, records) is left out."""
     found = {}

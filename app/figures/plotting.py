@@ -55,7 +55,20 @@ def figure(
 def save(drawing: Figure, path: Path) -> None:
     """Write a picture in the format of the suffix, without a date: the same picture gives the same file."""
     undated = {"Date": None} if path.suffix == ".svg" else {"Software": None}
-    write_whole(path, lambda temporary: drawing.savefig(temporary, metadata=undated))
+    write_whole(path, lambda temporary: _print(drawing, temporary, undated))
+
+
+def _print(drawing: Figure, path: Path, metadata: dict[str, None]) -> None:
+    """`savefig` at the figure's own resolution, without the trial drawing that it makes first and throws away."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+
+    if path.suffix == ".png":
+        FigureCanvasAgg(drawing).print_png(path, metadata=metadata)
+    elif path.suffix == ".svg":
+        FigureCanvasSVG(drawing).print_svg(path, metadata=metadata)
+    else:
+        drawing.savefig(path, metadata=metadata)
 
 
 def closed(phase: Array, values: Array, period: float = 1.0) -> tuple[Array, Array]:

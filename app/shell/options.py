@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -105,6 +105,16 @@ def check_picture(path: Path, inputs: Sequence[Path | str] = (), option: str = "
         raise InputError(f"{option} {path} must end in {' or '.join(PICTURES)}")
     if any(path.resolve() == Path(one).resolve() for one in inputs):
         raise InputError(f"{option} {path} is one of the other files, which it would replace: choose another name")
+
+
+def check_pictures(pictures: Mapping[str, Path | None], inputs: Sequence[Path | str]) -> list[Path | str]:
+    """`check_picture` of each option that is given; `inputs` with these pictures, none of which may replace another."""
+    others = list(inputs)
+    for option, picture in pictures.items():
+        if picture is not None:
+            check_picture(picture, others, option)
+            others.append(picture)
+    return others
 
 
 def load_case(name: str, settings: Sequence[str] | None) -> Case:

@@ -1,4 +1,4 @@
-"""What a record says about its rig and its experiment."""
+"""What a record says about its rig and its experiment: attributes, and warnings of what it does not hold."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
-from scipy.stats import gamma
+from scipy.special import gammaincinv
 
 from gearbench.diagnosis.forces.condition import prepare
 from gearbench.diagnosis.forces.covariance import ALIASED, BLOCK, KINDS, expected_squares, kinds_of, noise_of_equations
@@ -75,9 +75,9 @@ def quiet_level(scatter: Complex, quiet: NDArray[np.bool_]) -> Array:
     at = np.flatnonzero(quiet)
     if at.size < 2 * NEIGHBOURS:
         return out
-    # Energies of P departures from their mean are like a gamma distribution of shape P - 1.
+    # Energies of P departures from their mean are like a gamma distribution of shape P - 1: its median.
     free = len(scatter) - 1
-    middle = float(gamma.median(free)) / free
+    middle = float(gammaincinv(free, 0.5)) / free
     for row in range(rows):
         energy = (np.abs(scatter[:, row, at]) ** 2).mean(axis=0)
         if np.isfinite(energy).all():

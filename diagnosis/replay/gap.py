@@ -25,7 +25,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import gammaincinv
 
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.intake.signals import (
@@ -109,7 +109,8 @@ class BandEnergy:
         if self.energy <= 0.0 or not np.isfinite(self.freedom):
             return Range(value=value, low=value, high=value)
         tail = (1 - COVERAGE) / 2
-        low, high = np.sqrt(self.energy * self.freedom / chi2.ppf([1 - tail, tail], self.freedom))
+        chi_squared = 2 * gammaincinv(self.freedom / 2, [1 - tail, tail])  # its quantiles
+        low, high = np.sqrt(self.energy * self.freedom / chi_squared)
         return Range(value=value, low=min(value, float(low)), high=max(value, float(high)))
 
 

@@ -80,7 +80,9 @@ def make_kernel(gear: CondensedGear, order: int = 1) -> Kernel:
     def resample_modes(table: Array) -> Array:
         if not len(table):
             return np.zeros((0, gear.teeth, POINTS))
-        return np.concatenate([make_interp_spline(x, table[:, :, i], k=3, axis=2)(t) for i, x, t in pieces], axis=2)
+        parts = [make_interp_spline(x, table[:, :, i], k=3, axis=2)(t) for i, x, t in pieces]
+        # Of one layout whatever the splines return: loops are compiled anew for every other one.
+        return np.ascontiguousarray(np.concatenate(parts, axis=2))
 
     def resample_crack(table: Array) -> Array:
         splines = np.zeros((POINTS, len(gear.s)))

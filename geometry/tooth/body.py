@@ -31,7 +31,7 @@ class Body:
     inertia_hub: float
 
 
-def boundary_quadrature(tooth: Profile) -> tuple[Array, Array, Array]:
+def outline_quadrature(tooth: Profile) -> tuple[Array, Array, Array]:
     """Quadrature along the counter-clockwise half of a tooth's outline: points (n, 2), normals (n, 2),
     weights (n,) [m]. Gauss-Legendre on each smooth piece in its natural parameter, exact to rounding."""
     x, w = np.polynomial.legendre.leggauss(48)
@@ -69,7 +69,7 @@ def boundary_quadrature(tooth: Profile) -> tuple[Array, Array, Array]:
 def gear_area(tooth: Profile) -> tuple[float, float]:
     """Area [m^2] and polar second moment of area [m^4] of the whole gear (no bore), by Gauss' theorem:
     A = 1/2 integral of X.n ds, I = 1/4 integral of |X|^2 X.n ds (both sides of z teeth)."""
-    points, normals, weights = boundary_quadrature(tooth)
+    points, normals, weights = outline_quadrature(tooth)
     reach = np.einsum("ij,ij->i", points, normals) * weights
     squares = np.einsum("ij,ij->i", points, points)
     return tooth.teeth * float(reach.sum()), tooth.teeth * float((squares * reach).sum()) / 2

@@ -89,7 +89,7 @@ def local_polynomial(
     rows = needed_rows(lines, window.harmonics, spectra.mesh_lines)
     centres = plan_centres(rows, window, regression.last_row(window.harmonics))
     require_equations(regression, [centre for centre, _ in centres], window)
-    return _Sweep(regression, window, lines, centres, spectra.noise).run(progress)
+    return _Pass(regression, window, lines, centres, spectra.noise).run(progress)
 
 
 def require_lines(spectra: Spectra, lines: Lines, window: Window) -> None:
@@ -154,7 +154,7 @@ def plan_centres(rows: Lines, window: Window, highest: int) -> list[tuple[int, L
     return plan
 
 
-class _Sweep:
+class _Pass:
     """One pass over all windows; collects branches and variances on the output lines."""
 
     def __init__(

@@ -71,10 +71,6 @@ def make_frf(
         "damping_ratio": modes[1],
     }
     sizes = {"frequency": frequency.size, "phase": phases, "harmonic": 2 * limit + 1, "mode": modes[0].shape[0]}
-    for name, value in values.items():
-        wanted = tuple(sizes[dimension] for dimension in VARIABLES[name][0])
-        if value.shape != wanted:
-            raise FrfError(f"{name} has shape {value.shape}, but must be {VARIABLES[name][0]} = {wanted}")
     coordinates = {
         "frequency": np.asarray(frequency, dtype=float),
         "phase": np.arange(phases) / phases,
@@ -82,14 +78,7 @@ def make_frf(
         "mode": np.arange(modes[0].shape[0]),
     }
     dataset = xr.Dataset(
-        {
-            name: (
-                VARIABLES[name][0],
-                np.ascontiguousarray(value, dtype=float),
-                {"units": VARIABLES[name][1]},
-            )
-            for name, value in values.items()
-        },
+        _variables(values, sizes),
         coords={name: (name, value, {"units": COORDINATES[name]}) for name, value in coordinates.items()},
         attrs={
             "schema": SCHEMA,
@@ -103,6 +92,18 @@ def make_frf(
             dataset[name] = (dimensions, np.asarray(more, dtype=float), {"units": unit})
     validate_frf(dataset)
     return dataset
+
+
+def _variables(values: Mapping[str, Any], sizes: Mapping[str, int]) -> dict[str, Any]:
+    """Arrays with their dimensions and units. Raises FrfError for shapes that do not fit."""
+    out: dict[str, Any] = {}
+    for name, value in values.items():
+        dimensions, unit = VARIABLES[name]
+        wanted = tuple(sizes[dimension] for dimension in dimensions)
+        if value.shape != wanted:
+            raise FrfError(f"{name} has shape {value.shape}, but must be {dimensions} = {wanted}")
+        out[name] = dimensions, np.ascontiguousarray(value, dtype=float), {"units": unit}
+    return out
 
 
 def validate_frf(dataset: xr.Dataset) -> None:

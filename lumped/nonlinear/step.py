@@ -68,7 +68,8 @@ def integrate(
     if state.shape != (2 * size,):
         raise LumpedError(f"the state has shape {state.shape}, not ({2 * size},)")
     width = PLAIN if structure is None else len(Outputs._fields)
-    samples = np.empty((entries // (2 * substeps), width))
+    # Columns lie in one piece however many samples there are: the loop is compiled anew for every other layout.
+    samples = np.empty((width, entries // (2 * substeps))).T
     equations = Equations(
         secant=np.ascontiguousarray(model.law.secant),
         constants=model.constants(),

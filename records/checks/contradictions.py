@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from gearbench.records.checks.devices import error_of_lag, late_device
 from gearbench.records.checks.finding import Finding
-from gearbench.records.checks.look import GEARS, Look
+from gearbench.records.checks.look import GEARS, Complexes, Look
 from gearbench.records.checks.mesh_force import Accounts, accounts_of
 
 Array = NDArray[np.float64]
@@ -90,6 +90,7 @@ def clocks_agree(look: Look) -> list[Finding]:
     top = float(accounts.omega[-1]) / (2 * pi)
     step = min(1 / (STEPS * top), 1 / look.rate)
     delays = np.arange(-np.ceil(LONGEST / look.rate / step), np.ceil(LONGEST / look.rate / step) + 1) * step
+    turns: Complexes | None = None  # the same for every channel
     best: tuple[float, str, float] | None = None
     for name in _suspects(accounts, ("torque_", "angle_", "y_")):
         relations = [relation for relation in accounts.relations() if name in accounts.channels(relation)]
@@ -101,14 +102,10 @@ def clocks_agree(look: Look) -> list[Finding]:
         if now < (SUSPICIOUS_Y if y else SUSPICIOUS):
             continue
 
-        def worst(at: Array, name: str = name, relations: list[tuple[str, str]] = relations) -> Array:
-            turn = np.exp(1j * np.outer(at, accounts.omega))
-            own = frozenset([name])
-            return np.asarray(np.max([accounts.misfit(relation, own, turn) for relation in relations], axis=0))
-
-        coarse = float(delays[int(np.argmin(worst(delays)))])
+        turns = np.exp(1j * np.outer(delays, accounts.omega)) if turns is None else turns
+        coarse = float(delays[int(np.argmin(_after(accounts, relations, name, turns)))])
         fine = coarse + step * np.linspace(-1.0, 1.0, 41)
-        found = worst(fine)
+        found = _after(accounts, relations, name, np.exp(1j * np.outer(fine, accounts.omega)))
         after, delay = float(found.min()), float(fine[int(np.argmin(found))])
         others = [relation for relation in accounts.relations() if relation not in relations]
         floor = max((float(accounts.misfit(relation)[0]) for relation in others), default=0.0)
@@ -205,6 +202,12 @@ def accounts_agree(look: Look) -> bool:
 
 def _worst(accounts: Accounts) -> float:
     return max(float(accounts.misfit(relation)[0]) for relation in accounts.relations())
+
+
+def _after(accounts: Accounts, relations: list[tuple[str, str]], name: str, turns: Complexes) -> Array:
+    """The worst misfit (D,) of the relations once a channel is turned."""
+    own = frozenset([name])
+    return np.asarray(np.max([accounts.misfit(relation, own, turns) for relation in relations], axis=0))
 
 
 def _suspects(accounts: Accounts, kinds: tuple[str, ...]) -> list[str]:

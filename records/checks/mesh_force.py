@@ -53,25 +53,25 @@ class Accounts:
         Gear against gear: |F1 - F2| over the mean of both. Gear against centre: what the best k, c, m leave of F.
         """
         turn = np.ones((1, self.omega.size), dtype=complex) if turn is None else turn
-        first = self._force(relation[0], channels, turn)
+        first = self._parts(relation[0], channels)
         if relation[1] in self.gears:
-            second = self._force(relation[1], channels, turn)
-            scale = 0.5 * (np.linalg.norm(first, axis=1) + np.linalg.norm(second, axis=1))
-            return np.asarray(np.linalg.norm(first - second, axis=1) / scale)
+            second = self._parts(relation[1], channels)
+            scale = 0.5 * (_size(first, turn) + _size(second, turn))
+            return _size(first - second, turn) / scale
         gear = relation[1].removeprefix("y_")
-        if relation[1] in channels:  # a turned y is a force turned the other way
-            first = first * np.conj(turn / np.abs(turn))
-        columns = self._columns(gear)
-        basis = _orthonormal(columns)
-        inside = (first @ basis.conj()).real
-        total = np.linalg.norm(first, axis=1)
+        basis = _orthonormal(self._columns(gear)).conj()
+        if relation[1] in channels:  # a turned y is a force turned the other way: Re(turn* F b*) = Re(turn F* b)
+            inside = (first[1] @ basis).real + (turn @ (first[0][:, None] * basis).conj()).real
+        else:
+            inside = (first[0] @ basis).real + (turn @ (first[1][:, None] * basis)).real
+        total = _size(first, turn)
         return np.asarray(np.sqrt(np.maximum(total**2 - (inside**2).sum(axis=1), 0.0)) / total)
 
     def support(self, gear: str, centre: str) -> tuple[Array, Array, float]:
         """k, c, m (3,) of a centre's support [N/m, N s/m, kg] by least squares, the part of the force's rms that each
         explains (3,), and what they leave of it."""
         columns = self._columns(centre)
-        force = self._force(gear, frozenset(), np.ones((1, self.omega.size), dtype=complex))[0]
+        force = self.force(gear)
         stacked = np.vstack([columns.real, columns.imag])
         scale = np.linalg.norm(stacked, axis=0)
         target = np.concatenate([force.real, force.imag])
@@ -83,9 +83,12 @@ class Accounts:
         """Force (lines,) [N] on the mesh as a gear has it."""
         return np.asarray(sum(self.gears[gear].values()))
 
-    def _force(self, gear: str, channels: frozenset[str], turn: Complexes) -> Complexes:
-        parts = [part * turn if name in channels else part[None, :] for name, part in self.gears[gear].items()]
-        return np.asarray(sum(parts) * np.ones_like(turn))
+    def _parts(self, gear: str, channels: frozenset[str]) -> Complexes:
+        """Force (2, lines) of a gear without some channels, and what those make of it."""
+        out = np.zeros((2, self.omega.size), dtype=complex)
+        for name, part in self.gears[gear].items():
+            out[int(name in channels)] += part
+        return out
 
     def _columns(self, centre: str) -> Complexes:
         y = SIGNS[centre] * self.centres[centre]
@@ -122,6 +125,13 @@ def _turned(look: Look, gear: str) -> float:
     """How far the flanks of a gear swing with its rotation [m]; 0 where that is not known."""
     swing, radius = look.swing(gear), look.number(f"base_radius_{gear}")
     return 0.0 if swing is None or radius is None else float(np.ptp(swing)) * radius
+
+
+def _size(parts: Complexes, turn: Complexes) -> Array:
+    """Norms (D,) of parts[0] + turn parts[1], turn (D, lines) of size 1: from products instead of D sums of lines."""
+    fixed, turned = parts
+    mixed = 2 * (turn @ (fixed.conj() * turned)).real
+    return np.asarray(np.sqrt(np.maximum(np.vdot(fixed, fixed).real + np.vdot(turned, turned).real + mixed, 0.0)))
 
 
 def _orthonormal(columns: Complexes) -> Complexes:

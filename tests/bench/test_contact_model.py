@@ -21,7 +21,7 @@ SMALL = [
     "rig.driver.teeth=20",
     "rig.driven.teeth=21",
     "simulation.modes=0",
-    "simulation.element_size_um=500",
+    "simulation.element_size_um=700",
     "experiment.torque_mean_nm=50",
 ]
 

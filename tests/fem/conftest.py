@@ -11,10 +11,12 @@ import pytest
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
-from gearbench.fem.contact.law import Law, elastic_pair, make_law
-from gearbench.fem.gear.body import CondensedGear, condense
+from gearbench.fem.contact.law import Law, elastic_pair
+from gearbench.fem.contact.store import stored_law
+from gearbench.fem.gear.body import CondensedGear
 from gearbench.fem.gear.elasticity import PlaneModuli, assemble, plane_moduli
 from gearbench.fem.gear.ring import Ring, make_ring
+from gearbench.fem.gear.store import stored_gear
 from gearbench.geometry.mesh.assembly import full_mesh
 from gearbench.geometry.mesh.sector_mesh import sector_mesh
 from gearbench.geometry.mesh.values import GearMesh, SectorMesh
@@ -59,9 +61,13 @@ class Elastic:
     law: Law
 
 
-def solve_elastic(rig: Rig, gears: tuple[CondensedGear, CondensedGear]) -> Elastic:
-    meshing = elastic_pair(rig)
-    return Elastic(rig, meshing, gears, make_law(meshing, *gears, rig.material))
+SIZE, MODES = 0.5e-3, 4
+
+
+def solve_elastic(rig: Rig) -> Elastic:
+    """From disk where the same sources have made it before."""
+    one, two = (stored_gear(gear, rig.material, SIZE, MODES) for gear in (rig.driver, rig.driven))
+    return Elastic(rig, elastic_pair(rig), (one, two), stored_law(rig, (one, two), SIZE, MODES))
 
 
 @pytest.fixture(scope="session")
@@ -88,20 +94,19 @@ def coarse() -> Coarse:
 @pytest.fixture(scope="session")
 def small() -> CondensedGear:
     """z = 20, plane stress, four modes."""
-    return condense(make_gear(), STEEL, 0.5e-3, 4)
+    return stored_gear(make_gear(), STEEL, SIZE, MODES)
 
 
 @pytest.fixture(scope="session")
-def twins(small: CondensedGear) -> Elastic:
+def twins() -> Elastic:
     """Two equal gears of 20 teeth without backlash but for their thinning."""
-    return solve_elastic(make_rig(make_gear(), make_gear(), centre_distance=0.06), (small, small))
+    return solve_elastic(make_rig(make_gear(), make_gear(), centre_distance=0.06))
 
 
 @pytest.fixture(scope="session")
-def unequal(small: CondensedGear) -> Elastic:
+def unequal() -> Elastic:
     """20 teeth drive 30."""
-    wheel = make_gear(30)
-    return solve_elastic(make_rig(make_gear(), wheel), (small, condense(wheel, STEEL, 0.5e-3, 4)))
+    return solve_elastic(make_rig(make_gear(), make_gear(30)))
 
 
 @pytest.fixture(scope="session")

@@ -69,7 +69,7 @@ def distance(meshing: Pair, side: int, tooth: int, angles: tuple[float, float], 
     one, two = meshing.driver, meshing.driven
     start, stop = one.s_form, one.s_tip
     best = np.inf
-    for turn in range(7):
+    for turn in range(5):
         s = np.linspace(start, stop, 120 if turn == 0 else 41)
         points = flank(meshing, 0, tooth, side, angles[0], np.zeros(2), s)
 
@@ -81,7 +81,7 @@ def distance(meshing: Pair, side: int, tooth: int, angles: tuple[float, float], 
         middle = coarse[np.argmin(all_apart, axis=0)]
         low = np.maximum(middle - (coarse[1] - coarse[0]), two.s_form)
         high = np.minimum(middle + (coarse[1] - coarse[0]), two.s_tip)
-        for _ in range(40):
+        for _ in range(24):
             left, right = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
             nearer = apart(left) < apart(right)
             low, high = np.where(nearer, low, left), np.where(nearer, right, high)

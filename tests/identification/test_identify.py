@@ -103,7 +103,7 @@ def test_choice_of_branches_and_progress(record: xr.Dataset) -> None:
     seen: list[tuple[float, str]] = []
     frf = identify(
         [record],
-        IdentificationSettings(band=(900.0, 1000.0), phases=64),
+        IdentificationSettings(band=(950.0, 1000.0), phases=64),
         progress=lambda part, message: seen.append((part, message)),
     )
     assert relative(itf(frf).values, truth(frf)) < 0.01

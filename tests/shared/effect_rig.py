@@ -70,10 +70,10 @@ def steady_dte(rig: Rig, *, frequency: float = 4.0, swing: float = 0.0) -> tuple
     """Mesh phase and DTE over one hunting period at constant torque, turning so slowly that the rig follows."""
     model = make_model(rig, hat_law(swing=swing, bend=0.0))
     state = model.equilibrium(FORCE, *first_entry(model), 0.0)
-    steps = 60 * 20000
+    steps = 60 * 8000
     time, out = run(model, lambda t: np.full(t.shape, FORCE), state, mesh_frequency=frequency, cycles=60.0, steps=steps)
     dte = out.u1 - out.u2 + cos(ALPHA) * (out.y1 - out.y2)
-    return time[::100] * frequency, dte[::100]
+    return time[::40] * frequency, dte[::40]
 
 
 def first_entry(model: NonLinear) -> tuple[float, float]:

@@ -61,7 +61,7 @@ def rack_half_angle(gear: Gear, radius: float) -> float:
         return pi / gear.teeth + delta - (radius * sin(delta) + width) / reference
 
     reach = acos(min(1.0, max(-1.0, (reference - deepest) / radius)))
-    grid = np.linspace(-reach, reach, 4001)
+    grid = np.linspace(-reach, reach, 1001)
     values = [angle(delta) for delta in grid]
     best = int(np.argmin(values))
     low, high = grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)]

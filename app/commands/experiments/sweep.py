@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import pi
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -16,11 +16,14 @@ from gearbench.shell.options import (
     SetOption,
     WorkersOption,
     check_out,
-    check_picture,
+    check_pictures,
     load_case,
     print_json,
 )
 from gearbench.shell.progress import Progress
+
+if TYPE_CHECKING:
+    from gearbench.rig import Case
 
 
 def sweep(
@@ -44,11 +47,7 @@ def sweep(
     """
     loaded = load_case(case, settings)
     check_out(out, [case])
-    others: list[Path | str] = [case, out]
-    for option, picture in (("--figure", figure), ("--waterfall", waterfall)):
-        if picture is not None:
-            check_picture(picture, others, option)
-            others.append(picture)
+    others = check_pictures({"--figure": figure, "--waterfall": waterfall}, [case, out])
     from gearbench.report.where import report_beside
     from gearbench.shell.failure import InputError
 
@@ -66,26 +65,41 @@ def sweep(
         speeds = [float(one) for one in np.linspace(low, high, points) * pi / 30]
         result = swept(loaded, speeds, model, progress, workers=workers)
         write_dataset(result, out)
-        if figure is not None:
-            from gearbench.figures.records.sweep import plot_sweep
-
-            plot_sweep(result, figure)
-        if waterfall is not None:
-            from gearbench.figures.records.sweep import plot_waterfall
-
-            plot_waterfall(result, waterfall)
+        _draw(result, figure, waterfall)
         summary = sweep_summary(result, out)
         if page is not None:
             progress.step(page.name)
-            from gearbench.files import write_text
-            from gearbench.report.parts import file_row
-            from gearbench.report.sweep import sweep_page
-
-            files = file_row(out, "DTE, dynamic factor, contact loss and orders over speed")
-            write_text(page, sweep_page(loaded, result, summary, files))
+            _write_page(page, loaded, result, summary)
     if as_json:
         print_json(summary)
-        return
+    else:
+        _tell(summary, points, page)
+
+
+def _draw(result: Any, figure: Path | None, waterfall: Path | None) -> None:
+    """The pictures that are asked for."""
+    if figure is not None:
+        from gearbench.figures.records.sweep import plot_sweep
+
+        plot_sweep(result, figure)
+    if waterfall is not None:
+        from gearbench.figures.records.sweep import plot_waterfall
+
+        plot_waterfall(result, waterfall)
+
+
+def _write_page(page: Path, case: Case, result: Any, summary: dict[str, Any]) -> None:
+    """The report beside the result."""
+    from gearbench.files import write_text
+    from gearbench.report.parts import file_row
+    from gearbench.report.sweep import sweep_page
+
+    files = file_row(Path(summary["file"]), "DTE, dynamic factor, contact loss and orders over speed")
+    write_text(page, sweep_page(case, result, summary, files))
+
+
+def _tell(summary: dict[str, Any], points: int, page: Path | None) -> None:
+    """Print the summary for people."""
     typer.echo(
         f"{summary['file']}: {points} speeds up and down; largest DTE {summary['dte_rms_um']:.4g} um rms at"
         f" {summary['dte_rms_rpm']:.0f} rpm, largest dynamic factor {summary['dynamic_factor']:.3g} (ISO 6336-1 Method"

@@ -15,7 +15,7 @@ from gearbench.shell.options import (
     ReportOption,
     SetOption,
     check_out,
-    check_picture,
+    check_pictures,
     load_case,
     print_json,
 )
@@ -64,11 +64,7 @@ def static(
     loaded = load_case(case, settings)
     check_out(out, [case])
     pictures = {"--figure": figure, "--stiffness-figure": stiffness_figure, "--root-figure": root_figure}
-    others: list[Path | str] = [case, out]
-    for option, picture in pictures.items():
-        if picture is not None:
-            check_picture(picture, others, option)
-            others.append(picture)
+    others = check_pictures(pictures, [case, out])
     from gearbench.bench.models import model_for
     from gearbench.report.where import report_beside
 
@@ -76,23 +72,12 @@ def static(
 
     elastic = model_for(loaded, model)[1].elastic
     files = _check_stress(loaded, elastic, out, fields or [], root_figure, others)
-    import gearbench as gb
     from gearbench.records import write_dataset
 
     with Progress(f"static {loaded.name}") as progress:
-        progress.step("mesh cycle")
-        result = gb.static(
-            loaded,
-            model,
-            torque=torque_nm or (),
-            dte=[1e-6 * value for value in dte_um or ()],
-            positions=positions,
-            cycles=cycles,
-            progress=progress,
-        )
-        if elastic:
-            progress.step("root stress")
-            result = _with_root_stress(loaded, result)
+        dte = [1e-6 * value for value in dte_um or ()]
+        wanted = {"torque": torque_nm or (), "dte": dte, "positions": positions, "cycles": cycles}
+        result = _solved(loaded, model, elastic, progress, **wanted)
         write_dataset(result, out)
         if figure is not None:
             progress.step("figure")
@@ -160,11 +145,18 @@ def _check_stress(
     return files
 
 
-def _with_root_stress(case: Case, result: Any) -> Any:
-    """The static result with the stress of the tooth roots."""
+def _solved(case: Case, model: str | None, elastic: bool, progress: Progress, **wanted: Any) -> Any:
+    """The static response that is `wanted`, of finite elements with the stress of the tooth roots."""
+    import gearbench as gb
+
+    progress.step("mesh cycle")
+    result = gb.static(case, model, progress=progress, **wanted)
+    if not elastic:
+        return result
     from gearbench.bench.elastic.rig import elastic_rig
     from gearbench.bench.stress.root import with_root_stress
 
+    progress.step("root stress")
     return with_root_stress(elastic_rig(case.rig, case.simulation), result, case.simulation.element_size)
 
 

@@ -26,7 +26,7 @@ def completion(shell: Annotated[Shell, typer.Argument(help="the shell that is to
     typer.echo(get_completion_script(prog_name="gearbench", complete_var=COMPLETE, shell=shell.value))
 
 
-def prepare() -> None:
+def enable_completion() -> None:
     """Make the command line understand what the scripts ask."""
     from typer.completion import completion_init
 

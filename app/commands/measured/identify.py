@@ -45,14 +45,7 @@ def identify(
     import gearbench as gb
     from gearbench.figures.responses.of_identified import draw_identified
 
-    check_out(out, records)
-    seen = {path.resolve() for path in records}
-    if len(seen) < len(records):
-        raise InputError(f"RECORD is given {len(records)} times but names {len(seen)} file(s): each one counts once")
-    for path in export or []:
-        check_export(path, [*records, out])
-    if pictures is not None:
-        check_folder(pictures)
+    _check_files(records, out, export or [], pictures)
     settings = gb.IdentificationSettings(method=method, harmonics=harmonics, order=order, window=window, band=band_hz)
     with Progress("identify") as progress:
         progress.step("reading")
@@ -82,6 +75,18 @@ def identify(
         typer.echo(line)
     for warning in summary["warnings"]:
         typer.echo(f"warning: {warning}")
+
+
+def _check_files(records: list[Path], out: Path, export: list[Path], pictures: Path | None) -> None:
+    """Refuse files that cannot be read or written as they are asked for, before any work is done."""
+    check_out(out, records)
+    seen = {path.resolve() for path in records}
+    if len(seen) < len(records):
+        raise InputError(f"RECORD is given {len(records)} times but names {len(seen)} file(s): each one counts once")
+    for path in export:
+        check_export(path, [*records, out])
+    if pictures is not None:
+        check_folder(pictures)
 
 
 def frf_summary(found: xr.Dataset, path: Path) -> dict[str, Any]:

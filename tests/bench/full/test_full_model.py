@@ -77,7 +77,11 @@ def test_contact_of_surfaces_is_the_full_model_s_alone() -> None:
     case, model = model_for(case_with(penalty, "rig.driver.runout_um=5.0"), "full")
     with pytest.raises(BenchError, match=r'simulation.contact = "penalty" does not represent rig\.driver\.runout'):
         model.refuse(case)
-    case, model = model_for(case_with(penalty), "full")
+
+
+@pytest.mark.validation
+def test_contact_of_surfaces_is_prepared() -> None:
+    case, model = model_for(case_with('simulation.contact="penalty"'), "full")
     model.refuse(case)
     prepared = model.prepare(case, schedule(case.experiment, case.rig), lambda note: None)
     assert prepared.settings["contact"] == "penalty" and prepared.integrator.machine.surfaces

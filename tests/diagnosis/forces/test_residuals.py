@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -57,7 +58,12 @@ def test_the_jacobian_is_that_of_differences(prepared: Prepared) -> None:
     made, condition, where = prepared
     sd, p = where.prior(), usual(where)
     at = linearised(made, condition, where, p, np.arange(condition.bins))
-    for entry, name in enumerate(where.names()):
+    names = where.names()
+    # Of a block of many alike (teeth, orders) every fourth.
+    alike = Counter(name.split(".")[0] for name in names)
+    for entry, name in enumerate(names):
+        if alike[name.split(".")[0]] > 8 and entry % 4:
+            continue
         step = np.zeros(where.size)
         step[entry] = STEP * sd[entry]
         above, below = (residuals(made, condition, where.departures(x, condition)) for x in (p + step, p - step))

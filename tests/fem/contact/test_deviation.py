@@ -99,8 +99,8 @@ class Real:
         low, high = np.array([one.s_form, two.s_form]), np.array([one.s_tip, two.s_tip])
         start, stop = low.copy(), high.copy()
         least = np.inf
-        for turn in range(12):
-            count = 1200 if turn == 0 else 80
+        for turn in range(10):
+            count = 400 if turn == 0 else 40
             s1, s2 = np.linspace(start[0], stop[0], count), np.linspace(start[1], stop[1], count)
             p1 = turned(self._points(one, self.rig.driver, tooth, side, s1), angle1)
             p2 = turned(self._points(two, self.rig.driven, tooth + side, side, s2), angle2) + centre

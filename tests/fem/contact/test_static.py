@@ -85,6 +85,7 @@ def test_tangent_stiffness_is_the_slope_of_force_over_dte(unequal: Any, cycle: A
         assert cycle.stiffness_tangent[0, at] == pytest.approx(slope, rel=2e-3)
 
 
+@pytest.mark.validation
 def test_te_does_not_depend_on_the_mesh(gear: Any, twins: Any) -> None:
     half = condense(gear(), twins.rig.material, 0.25e-3, 0)
     fine = make_law(twins.pair, half, half, twins.rig.material)

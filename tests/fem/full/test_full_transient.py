@@ -141,6 +141,7 @@ def test_order_of_the_step_is_two(build: Callable[..., Machine]) -> None:
     assert errors[0] / errors[1] > 3.3 and errors[1] / errors[2] > 3.3
 
 
+@pytest.mark.validation
 def test_reduced_model_moves_alike(twins: Any, build: Callable[..., Machine]) -> None:
     """The same rig with four modes a gear and a residual: another formulation of the same motion."""
     frequency, rate, steps = 40.0, 65536.0, 300

@@ -71,7 +71,7 @@ def off_profile(tooth: Profile, point: Sequence[float]) -> float:
         gaps.append(radius * abs(angle - float(tooth.half_angle(max(radius, tooth.base_radius)))))
     else:
         low, high = 0.0, tooth.beta_form
-        for _ in range(70):
+        for _ in range(45):
             middle = 0.5 * (low + high)
             low, high = (middle, high) if np.hypot(*tooth.fillet(middle)) < radius else (low, middle)
         found = tooth.fillet(low)

@@ -50,7 +50,7 @@ def integral(tooth: Profile, power: int) -> float:
     "changes",
     [
         {},
-        {"teeth": 62, "thinning": 60e-6},
+        pytest.param({"teeth": 62, "thinning": 60e-6}, marks=pytest.mark.validation),
         {"teeth": 12, "profile_shift": 0.5},
         {"teeth": 30, "rack_tip_radius": 0.0},
     ],

@@ -23,9 +23,9 @@ def inv(angle: float) -> float:
 def test_thickness_at_any_diameter_is_what_the_rack_leaves(name: str) -> None:
     gear, tooth = build(**GEARS[name])
     for radius in np.linspace(tooth.root_radius, tooth.end_radius, 14)[1:]:
-        assert thickness(tooth, radius) == pytest.approx(2 * radius * rack_half_angle(gear, radius), abs=1e-9)
-        across, height = chord(tooth, radius)
         half = rack_half_angle(gear, radius)
+        assert thickness(tooth, radius) == pytest.approx(2 * radius * half, abs=1e-9)
+        across, height = chord(tooth, radius)
         assert across == pytest.approx(2 * radius * sin(half), abs=1e-9)
         assert height == pytest.approx(tooth.tip_radius - radius * cos(half), abs=1e-9)
 

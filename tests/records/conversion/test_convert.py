@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from functools import lru_cache
 from math import pi
 from pathlib import Path
 from typing import Any
@@ -35,10 +36,16 @@ SPEEDS = tuple(2 * pi * MESH / teeth for teeth in TEETH)
 
 def vibration(t: np.ndarray, seed: int, highest: float = 900.0, lowest: float = 10.0) -> np.ndarray:
     """A sum of sines that repeats after 0.5 s, rms about 1."""
+    return np.frombuffer(_vibration(t.tobytes(), seed, highest, lowest))
+
+
+@lru_cache(maxsize=64)
+def _vibration(times: bytes, seed: int, highest: float, lowest: float) -> bytes:
+    t = np.frombuffer(times)
     rng = np.random.default_rng(seed)
     lines = rng.choice(np.arange(int(lowest / 2), int(highest / 2)), 40, replace=False) * 2.0
     phases = rng.uniform(0, 2 * pi, lines.size)
-    return np.sqrt(2 / lines.size) * np.sin(2 * pi * np.outer(t, lines) + phases).sum(axis=1)
+    return (np.sqrt(2 / lines.size) * np.sin(2 * pi * np.outer(t, lines) + phases).sum(axis=1)).tobytes()
 
 
 def signals(t: np.ndarray) -> dict[str, np.ndarray]:

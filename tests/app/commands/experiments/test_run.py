@@ -19,7 +19,7 @@ from gearbench.cli import run_command_line
 from gearbench.rig import read_case
 
 SMALL = {
-    "experiment.realisations": "8",
+    "experiment.realisations": "6",
     "experiment.samples_per_period": "2048",
     "experiment.sampling_rate_hz": "8192",
     "experiment.multisine.band_hz": "[4, 2500]",
@@ -52,7 +52,7 @@ def test_all_products_are_there_and_whole(done: Path) -> None:
     names = {path.name for path in done.iterdir()}
     assert names == PICTURES | DATA | {"case.toml", "summary.md", "summary.json", "run.json", "report.html"}
     assert all((done / name).read_bytes().startswith(b"\x89PNG") for name in PICTURES)
-    assert read_case(done / "case.toml").experiment.realisations == 8
+    assert read_case(done / "case.toml").experiment.realisations == 6
     record = xr.load_dataset(done / "record.nc", engine="h5netcdf", decode_cf=False)
     assert record.attrs["schema"] == "gearbench-record/1"
     for kind, name in (("identified", "frf.nc"), ("exact", "exact.nc"), ("frozen", "frozen.nc")):
