@@ -33,7 +33,7 @@ WORTH = 2.0  # nats promised from which a hypothesis is simulated
 # been found beside a gap that the effects now close.
 RENEWALS_BASE, RENEWALS, RENEWALS_LAST = 2, 0, 2
 RENEWALS_OTHERWISE = 3
-SETTLED = 5.0  # nats that another step may promise: a fit that is close enough not to be gone on with
+SETTLED = 25.0  # nats that another step may promise: a fit that is close enough not to be gone on with
 # Nats an independent line that are left, below which no other structure is tried.
 CLOSE = 0.25
 

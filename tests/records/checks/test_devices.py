@@ -78,6 +78,19 @@ def test_a_single_channel_is_still_named(record: xr.Dataset) -> None:
     assert found.sentence.startswith("angle_driven lags behind the other channels by 12")
 
 
+@pytest.mark.parametrize(("real", "out_of_step"), [(0.02, 0.03), (0.055, 0.06)])
+def test_a_gear_that_twists_is_no_late_channel(real: float, out_of_step: float) -> None:
+    """A rim that turns beyond its hub takes momentum that the hub's angle does not show: one gear's account falls with
+    the square of frequency (in kHz), out of step by its damping, and the others do not say so."""
+    softer = [*PAIR, "rig.support.damping_n_s_per_m=5e3"]
+    record = gb.simulate(gb.read_case("quick_lumped", softer)).drop_vars(["dte", "force"])
+    torque, samples = record["torque_driver"], record.sizes["time"]
+    kilohertz = np.fft.rfftfreq(samples, 1e3 / record.attrs["sampling_rate"])
+    spectrum = np.fft.rfft(torque.values, axis=1) / (1 - (real - 1j * out_of_step) * np.minimum(kilohertz, 3) ** 2)
+    twisting = record.assign(torque_driver=(torque.dims, np.fft.irfft(spectrum, samples, axis=1)))
+    assert clocks_agree(Look(twisting)) == []
+
+
 def test_one_clock_says_nothing(record: xr.Dataset) -> None:
     assert clocks_agree(Look(record)) == []
     everything = tuple(str(name) for name in record.data_vars if name != "mesh_phase")
