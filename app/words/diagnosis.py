@@ -189,8 +189,8 @@ def whole_band(gaps: Sequence[Gap]) -> list[Gap]:
 
 def with_std(value: float, std: float) -> str:
     """`0.0584 ± 0.0012`: both to the second significant digit of the standard deviation."""
-    if not (isfinite(std) and std > 0):
-        return number(value)
+    if not (isfinite(std) and std > 0):  # a tooth's number has none
+        return f"{value:.0f}" if std == 0 and value == round(value) else number(value)
     power = floor(log10(max(abs(value), std)))
     if power < -3 or power >= 6:
         return f"({with_std(value / 10.0**power, std / 10.0**power)})e{power}"
