@@ -92,7 +92,7 @@ def run(
 
     >>> import gearbench as gb
     >>> short = ["realisations=4", "samples_per_period=4096", "multisine.band_hz=[900, 1500]"]
-    >>> lpm = ["band_hz=[1200, 1300]", "harmonics=8", "order=1", "window=8"]
+    >>> lpm = ["band_hz=[1000, 1500]", "harmonics=8", "order=1", "window=8"]
     >>> keys = [f"experiment.{key}" for key in short] + [f"identification.{key}" for key in lpm]
     >>> (numbers,) = gb.run(gb.read_case("quick_lumped", keys), "out_first")
     >>> f"{numbers['te_peak_to_peak_um']:.2f} um"

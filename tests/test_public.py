@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import doctest
 import inspect
 import re
 import subprocess
 import sys
-from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
-from typing import Any
 
 import pytest
+from shared.examples import failures
 
 import gearbench
 
@@ -106,19 +104,11 @@ def test_names_are_there_from_the_start() -> None:
     assert run_python(code) == "quick_fe.toml read_case"
 
 
-@pytest.mark.parametrize("name", FUNCTIONS)
+# `run` takes longest: tests/app/commands/experiments/test_run.py holds its example against a run that it has anyway.
+@pytest.mark.parametrize("name", sorted(FUNCTIONS.keys() - {"run"}))
 def test_example_is_true(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     assert failures(getattr(gearbench, name), name) == (0, True)
-
-
-def failures(function: Callable[..., Any], name: str) -> tuple[int, bool]:
-    """How many lines of a docstring's examples fail, and whether there are any that use the public face."""
-    (test,) = doctest.DocTestFinder(recurse=False).find(function, name, globs={})
-    runner = doctest.DocTestRunner()
-    runner.run(test)
-    used = any(f"gb.{name}(" in example.source for example in test.examples)
-    return runner.failures, used
 
 
 def test_what_the_readme_says_of_python_runs(capsys: pytest.CaptureFixture[str]) -> None:

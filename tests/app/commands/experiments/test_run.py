@@ -13,20 +13,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from shared.examples import failures
 from shared.pages import fetched
 
+import gearbench as gb
 from gearbench.cli import run_command_line
 from gearbench.rig import read_case
 
+# The case of the example in the docstring of `run`.
 SMALL = {
-    "experiment.realisations": "6",
-    "experiment.samples_per_period": "2048",
-    "experiment.sampling_rate_hz": "8192",
-    "experiment.multisine.band_hz": "[4, 2500]",
+    "experiment.realisations": "4",
+    "experiment.samples_per_period": "4096",
+    "experiment.multisine.band_hz": "[900, 1500]",
     "identification.band_hz": "[1000, 1500]",
-    "identification.harmonics": "12",
+    "identification.harmonics": "8",
     "identification.order": "1",
-    "identification.window": "6",
+    "identification.window": "8",
 }
 PICTURES = {
     "gears.png", "transmission_error.png", "stiffness.png", "record.png", "spectrum.png", "itf.png",
@@ -43,7 +45,7 @@ def small(**more: str) -> list[str]:
 
 @pytest.fixture(scope="module")
 def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("run") / "out"
+    folder = tmp_path_factory.mktemp("run") / "out_first"
     assert run_command_line(["run", "quick_lumped", "--out", str(folder), *small()]) == 0
     return folder
 
@@ -52,12 +54,20 @@ def test_all_products_are_there_and_whole(done: Path) -> None:
     names = {path.name for path in done.iterdir()}
     assert names == PICTURES | DATA | {"case.toml", "summary.md", "summary.json", "run.json", "report.html"}
     assert all((done / name).read_bytes().startswith(b"\x89PNG") for name in PICTURES)
-    assert read_case(done / "case.toml").experiment.realisations == 6
+    assert read_case(done / "case.toml").experiment.realisations == 4
     record = xr.load_dataset(done / "record.nc", engine="h5netcdf", decode_cf=False)
     assert record.attrs["schema"] == "gearbench-record/1"
     for kind, name in (("identified", "frf.nc"), ("exact", "exact.nc"), ("frozen", "frozen.nc")):
         frf = xr.load_dataset(done / name, engine="h5netcdf", decode_cf=False)
         assert (frf.attrs["schema"], frf.attrs["kind"]) == ("gearbench-frf/1", kind)
+
+
+def test_the_example_in_python_is_the_same_run(done: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The case that its keys make is this one, or the folder would be refused; its numbers are those."""
+    monkeypatch.chdir(done.parent)
+    before = (done / "run.json").read_bytes()
+    assert failures(gb.run, "run") == (0, True)
+    assert done.name in str(gb.run.__doc__) and (done / "run.json").read_bytes() == before
 
 
 def test_summary_opens_with_the_answers_and_accounts_for_them(done: Path) -> None:
@@ -117,9 +127,9 @@ def test_the_report_holds_the_answers_and_is_made_again_from_the_products(done: 
 def test_identify_gives_what_the_run_gave(done: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "frf.nc"
     arguments = ["identify", str(done / "record.nc"), "--out", str(out), "--band-hz", "1000", "1500", "--json"]
-    arguments += ["--harmonics", "12", "--order", "1", "--window", "6"]
+    arguments += ["--harmonics", "8", "--order", "1", "--window", "8"]
     assert run_command_line(arguments) == 0
-    assert json.loads(capsys.readouterr().out)["unknowns"] == 50  # (2 x 12 + 1) branches x 2 coefficients
+    assert json.loads(capsys.readouterr().out)["unknowns"] == 34  # (2 x 8 + 1) branches x 2 coefficients
     one, two = (xr.load_dataset(path, engine="h5netcdf", decode_cf=False) for path in (out, done / "frf.nc"))
     assert np.array_equal(one["itf_re"], two["itf_re"])
 
