@@ -5,11 +5,13 @@ from __future__ import annotations
 import subprocess
 import sys
 import warnings
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from gearbench.files import digest_of
 from gearbench.records.errors import RecordError
 from gearbench.records.formats.source import Column, Source, first_line, make_column
 
@@ -21,7 +23,7 @@ def read_mat(path: Path) -> Source:
     objects, tables and sparse matrices are no columns. Raises RecordError."""
     from scipy.io import loadmat
 
-    _try_apart(path)
+    _try_apart(path, digest_of(path))
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of objects, which are said to be skipped
@@ -39,8 +41,13 @@ def read_mat(path: Path) -> Source:
     return Source(path, "MAT", tuple(columns), facts, skipped)
 
 
-def _try_apart(path: Path) -> None:
-    """Read the file in a process of its own first: SciPy's reader crashes on some damaged files instead of failing."""
+@lru_cache
+def _try_apart(path: Path, _content: str) -> None:
+    """Read the file in a process of its own first: SciPy's reader crashes on some damaged files instead of failing.
+
+    Starting one takes longer than reading, and a file is often read twice (for a guess, then for good): one that still
+    has the content (a digest) with which it passed is not tried again.
+    """
     code = "import sys; from scipy.io import loadmat; loadmat(sys.argv[1], appendmat=False)"
     done = subprocess.run([sys.executable, "-P", "-W", "ignore", "-c", code, str(path)], capture_output=True)
     if done.returncode < 0:
