@@ -62,7 +62,8 @@ class MissingPower:
         self.response = np.concatenate([[0.0], uniform_filter1d(np.where(self.operating, 0.0, data), width)])
         self.response *= self.excited
         rising = self.response[: int(np.argmax(self.response)) + 1]
-        self.static = float(np.median(rising[rising > 0]))
+        rising = rising[rising > 0]
+        self.static = float(np.median(rising)) if rising.size else 0.0
         # Rows without a window: all response is missing.
         self.level: Floats = np.concatenate([[0.0], data])
         self.covered = np.zeros(self.rows.size + 1, dtype=bool)
@@ -82,9 +83,9 @@ class MissingPower:
         """Noise [m^2] of a line and experiment from the quietest part of the excited band."""
         driven = np.flatnonzero(self.covered & (np.arange(self.covered.size) <= np.flatnonzero(self.excited)[-1]))
         driven = driven[driven > 0]
+        driven = driven[~self.operating[driven - 1]]
         if driven.size < PARTS:
             return 0.0
-        driven = driven[~self.operating[driven - 1]]
         parts = np.array_split(driven, PARTS)
         freedom = np.array([self.freedom[part].sum() for part in parts])
         sums = np.array([np.sum(self.level[part] * self.freedom[part]) for part in parts])
