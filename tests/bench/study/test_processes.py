@@ -30,14 +30,14 @@ def children() -> list[int]:
 
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="children are found in /proc")
 def test_a_process_that_is_killed_loses_nothing() -> None:
-    wanted = tasks(6)
+    wanted = tasks(3)
     before = set(children())
     stream = compute_here(wanted, 1)
     found = [next(stream)]
     for process in set(children()) - before:
         os.kill(process, signal.SIGKILL)
     found += list(stream)
-    assert sorted(one.number for one in found) == list(range(6))
+    assert sorted(one.number for one in found) == [0, 1, 2]
     assert [one.numbers for one in sorted(found, key=lambda one: one.number)] == [compute(t).numbers for t in wanted]
     assert not set(children()) - before
 

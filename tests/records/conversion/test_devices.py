@@ -6,9 +6,9 @@ from math import pi
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
-import scipy.io
 import xarray as xr
 
 from gearbench.records import ChannelMap, ChannelSpec, RecordError
@@ -56,13 +56,14 @@ def columns() -> dict[str, np.ndarray]:
 
 
 def convert(tmp_path: Path, data: dict[str, np.ndarray], **specs: dict[str, Any]) -> xr.Dataset:
-    scipy.io.savemat(tmp_path / "m.mat", data)
+    with h5py.File(tmp_path / "m.h5", "w") as file:
+        file.update(data)
     channels = {
         name: ChannelSpec(**({"column": (name,), "unit": UNITS[name[:5]]} | specs.get(name, {})))
         for name in data
         if name != "t"
     }
-    return convert_sources([tmp_path / "m.mat"], ChannelMap(channels, ABOUT | {"time": "t"}))
+    return convert_sources([tmp_path / "m.h5"], ChannelMap(channels, ABOUT | {"time": "t"}))
 
 
 def test_runout_is_found_and_taken_off(tmp_path: Path) -> None:
