@@ -34,7 +34,7 @@ def test_it_is_about_what_the_allocator_counts(
         return told[-1]
 
     monkeypatch.setattr(memory, "memory_needed", needed)
-    case = quick(realisations, *settings)
+    case = quick(realisations, "experiment.samples_per_period=32768", *settings)
     simulate(quick(1, "experiment.samples_per_period=16384", *settings))  # compiled
     tracemalloc.start()
     simulate(case, workers=1)

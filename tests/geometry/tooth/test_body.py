@@ -9,6 +9,7 @@ from math import pi
 import numpy as np
 import pytest
 from scipy.integrate import quad
+from scipy.optimize import brentq
 
 from gearbench.geometry import Profile, body, gear_area, profile, sector_area
 from gearbench.rig import Gear
@@ -28,9 +29,10 @@ def half_angle(tooth: Profile, radius: float) -> float:
         cosine = (radius**2 + reach**2 - tooth.edge_radius**2) / (2 * radius * reach)
         return float(np.arctan2(centre[1], centre[0]) + np.arccos(min(1.0, cosine)))
     low, high = 0.0, tooth.beta_form
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if np.hypot(*tooth.fillet(middle)) < radius else (low, middle)
+    if np.hypot(*tooth.fillet(low)) < radius < np.hypot(*tooth.fillet(high)):
+        low = brentq(lambda beta: np.hypot(*tooth.fillet(beta)) - radius, low, high, xtol=1e-15)
+    elif np.hypot(*tooth.fillet(high)) <= radius:
+        low = high
     point = tooth.fillet(low)
     return float(np.arctan2(point[1], point[0]))
 
