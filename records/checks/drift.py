@@ -68,7 +68,7 @@ def _halves(
         return None
     size = 2 * half // (SEGMENTS + 1)
     window = np.hanning(size)
-    sums = []
+    sums: list[tuple[NDArray[np.complex128], Array]] = []
     for first in (0, half):
         cross, power = np.zeros(size // 2 + 1, dtype=complex), np.zeros(size // 2 + 1)
         for number in range(SEGMENTS):
@@ -84,7 +84,8 @@ def _halves(
         return None
     one, two = (cross[lines] / power[lines] for cross, power in sums)
     omega = 2 * np.pi * lines * look.rate / size
-    return omega, one.conj() * two, np.sqrt(np.abs(one) * np.abs(two)), half / look.rate
+    turned = np.asarray(one.conj() * two, dtype=complex)
+    return np.asarray(omega), turned, np.sqrt(np.abs(turned)), half / look.rate
 
 
 def _shift(omega: Array, turned: NDArray[np.complex128]) -> tuple[float, float]:
