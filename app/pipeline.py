@@ -16,8 +16,9 @@ from gearbench.shell.checkpoints import checkpoints_of
 from gearbench.shell.failure import InputError
 from gearbench.shell.output import Output, claimed
 from gearbench.shell.progress import Silent, Steps
+from gearbench.words.accuracy import honest_warning
 from gearbench.words.distortion import distortion_numbers
-from gearbench.words.summary import honest_warning, summary_text
+from gearbench.words.summary import summary_text
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -9,6 +9,7 @@ import xarray as xr
 
 from gearbench.identification.lpm.accuracy import MISSING, Accuracy, RecordRule, expected_accuracy, record_rule
 from gearbench.identification.lpm.estimate import LpmResult, local_polynomial
+from gearbench.identification.lpm.limits import Limits, limits_of
 from gearbench.identification.lpm.regression import Window
 from gearbench.identification.lpm.selection import choose_window
 from gearbench.identification.response.frf import make_frf
@@ -50,8 +51,9 @@ def _dataset(task: Task, window: Window, result: LpmResult) -> xr.Dataset:
     step = int(result.lines[1] - result.lines[0])
     together = max(1.0, window.width / (window.order + 1) / step)
     accuracy = expected_accuracy(result, task.record_error)
+    limits = limits_of(result, accuracy)
     rule = record_rule(spectra, window.harmonics, window.order, *modes, accuracy.truncation)
-    attributes = task.attributes() | _about_fit(window, result, accuracy)
+    attributes = task.attributes() | _about_fit(window, result, accuracy, limits)
     if rule is not None:
         attributes |= {
             "record_duration": rule.duration,
@@ -59,7 +61,7 @@ def _dataset(task: Task, window: Window, result: LpmResult) -> xr.Dataset:
             "bandwidth": rule.bandwidth,
             "harmonics_needed": rule.harmonics_needed,
         }
-    attributes["warnings"] = "\n".join([*task.notes, *_warnings(accuracy, rule, spectra, task.simulated)])
+    attributes["warnings"] = "\n".join([*task.notes, *_warnings(accuracy, limits, rule, spectra, task.simulated)])
     return make_frf(
         "identified",
         frequency=frequency,
@@ -74,7 +76,7 @@ def _dataset(task: Task, window: Window, result: LpmResult) -> xr.Dataset:
     )
 
 
-def _about_fit(window: Window, result: LpmResult, accuracy: Accuracy) -> dict[str, Any]:
+def _about_fit(window: Window, result: LpmResult, accuracy: Accuracy, limits: Limits) -> dict[str, Any]:
     """Attributes that say what was fitted, and how well."""
     return {
         "harmonics": window.harmonics,
@@ -91,12 +93,18 @@ def _about_fit(window: Window, result: LpmResult, accuracy: Accuracy) -> dict[st
         "record_error": accuracy.record,
         "expected_error": accuracy.expected,
         "expected_error_bound": accuracy.bound,
+        "noise_error": limits.noise,
+        "branches_error": limits.branches,
+        "window_error": limits.window,
+        "limited_by": limits.largest,
         "variance_sampled": result.variance_sampled,
         "variance_cross_terms": result.cross_terms,
     }
 
 
-def _warnings(accuracy: Accuracy, rule: RecordRule | None, spectra: Spectra, simulated: bool) -> list[str]:
+def _warnings(
+    accuracy: Accuracy, limits: Limits, rule: RecordRule | None, spectra: Spectra, simulated: bool
+) -> list[str]:
     notes = []
     if accuracy.expected >= 1.0:
         period = 1.0 / (spectra.mesh_lines * spectra.spacing)
@@ -107,8 +115,9 @@ def _warnings(accuracy: Accuracy, rule: RecordRule | None, spectra: Spectra, sim
     if accuracy.expected > DOUBTFUL:
         doubtful = f", doubtful channels {accuracy.record:.0%}" if accuracy.record else ""
         notes.append(
-            f"expected error of the ITF: {accuracy.expected:.0%} (variance {accuracy.variance:.0%}, missing branches"
-            f" {accuracy.truncation:.0%}{doubtful}); nothing has been smoothed"
+            f"expected error of the ITF: {accuracy.expected:.0%} (noise {limits.noise:.0%}, missing branches"
+            f" {limits.branches:.0%}, polynomials that do not follow {limits.window:.0%}{doubtful}); nothing has been"
+            " smoothed"
         )
     if rule is not None:
         lacking = accuracy.truncation > MISSING and rule.harmonics < rule.harmonics_needed

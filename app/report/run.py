@@ -12,7 +12,8 @@ from gearbench.report.curves import itf_map, natural_frequencies, over_phase, ov
 from gearbench.report.html import captioned, image, table, text
 from gearbench.report.live import live_page
 from gearbench.report.parts import about_record, files_table, lead, limits, mark, provenance, warned
-from gearbench.words.summary import findings, first_mode, trust, warnings_of
+from gearbench.words.accuracy import trust
+from gearbench.words.summary import findings, first_mode, warnings_of
 
 if TYPE_CHECKING:
     from gearbench.figures.of_run import RunResults

@@ -5,28 +5,11 @@ from __future__ import annotations
 from math import isfinite
 from typing import Any
 
+from gearbench.words.accuracy import honest_warning, trust
 from gearbench.words.distortion import distortion_lines
 from gearbench.words.te_source import te_source
 
 AGREES = 0.75  # identified and linearised ranges further apart than this ratio are not the same mode
-ENOUGH = 0.02  # expected rms error of the ITF above which pictures carry a warning
-
-
-def honest_warning(numbers: dict[str, Any]) -> str:
-    """A sentence or two for the pictures where the record cannot support the ITF, else nothing."""
-    found = numbers["identification"]
-    duration = found.get("record_duration", numbers["realisations"] * found["joint_period"])
-    needed = found.get("record_needed", 0.0)
-    expected, branches = found["expected_error"], found["harmonics"]
-    if needed <= duration and expected <= ENOUGH:
-        return ""
-    wanted = f" where about {needed:.3g} s are needed" if needed > duration else ""
-    smear = f", which smear the switches over {1 / (2 * branches):.2g} mesh periods" if branches else ""
-    return (
-        f"This record cannot support the ITF in full: {numbers['realisations']} realisation(s) give {duration:g} s of"
-        f" distinct excitation{wanted}, enough for {branches} branches a side{smear}. Expected error"
-        f" {expected:.0%} rms, several times that at the switches; nothing is smoothed or masked."
-    )
 
 
 def headline(numbers: dict[str, Any]) -> list[str]:
@@ -128,27 +111,6 @@ def _account(numbers: dict[str, Any]) -> list[str]:
     bold = honest_warning(numbers)
     notes = [f"- **{line}**" if line == bold else f"- {line}" for line in warnings_of(numbers)]
     return ["## How far to trust the identified response", *trust(numbers), "\n".join(notes)]
-
-
-def trust(numbers: dict[str, Any]) -> list[str]:
-    """How far to trust the identified response, in plain paragraphs."""
-    found = numbers["identification"]
-    lines = [
-        f"Local polynomial method with {found['harmonics']} branches on each side, order {found['order']} and"
-        f" {2 * found['window'] + 1} lines a window: {found['unknowns']} unknowns from {found['equations']} equations"
-        f" in each of {found['windows']} windows; condition number {found['condition_number']:.3g}.",
-        f"Expected error of the ITF: {found['expected_error']:.2%} of its rms (variance"
-        f" {found['variance_error']:.2%}, missing branches {found['truncation_error']:.2%}); at most"
-        f" {found['expected_error_bound']:.2%} if the whole residual is missing response.",
-    ]
-    if "itf_error_against_exact" in numbers:
-        lines.append(
-            f"Measured against the exact ITF the identified one errs by {numbers['itf_error_against_exact']:.2%};"
-            f" the frozen one differs from the exact by {numbers['frozen_against_exact']:.1%} and is no reference."
-        )
-    else:
-        lines.append("This model has no exact response to measure against: the error is an estimate.")
-    return lines
 
 
 def warnings_of(numbers: dict[str, Any]) -> list[str]:

@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from gearbench.identification.feedback.branches import enough_branches
 from gearbench.identification.feedback.draws import add_mesh_curves, response_variances
 from gearbench.identification.feedback.estimate import Feedback
 from gearbench.identification.feedback.result import (
@@ -17,7 +18,6 @@ from gearbench.identification.feedback.result import (
     doubt_beyond,
     doubt_of,
     drawn_models,
-    furthest_line,
     htf_on,
     unexplained,
 )
@@ -27,8 +27,6 @@ from gearbench.identification.response.modes import itf_modes
 from gearbench.identification.spectra.joint import Floats, Spectra
 from gearbench.identification.truth.periodic import itf_from_htf
 
-# Branches of the HTF, at most.
-BRANCHES = 160
 # N is 1 only far below the first mode: beyond this part of its frequency k(theta) has a free factor.
 GAUGED = 0.2
 
@@ -48,7 +46,7 @@ def feedback_frf(
     variances. `record`: what doubtful channels may cost."""
     data, model = found.data, found.model
     frequency = np.asarray(lines * spectra.spacing, dtype=float)
-    branches = min(BRANCHES, 2 * furthest_line(model, data) // data.mesh_lines)
+    branches, beyond = enough_branches(model, data, lines)
     response = htf_on(model, data, lines, branches)
     itf = itf_from_htf(response, phases)
     draws = drawn_models(found)
@@ -59,8 +57,9 @@ def feedback_frf(
     extrapolated *= doubt_beyond(found)
     htf_variance += extrapolated
     itf_variance += extrapolated.sum(axis=0)[:, None]
+    itf_variance += beyond[:, None]
     power = float(np.sum(np.abs(response) ** 2))
-    variance = float(np.sqrt(htf_variance.sum() / power))
+    variance, truncation = (float(np.sqrt(part.sum() / power)) for part in (htf_variance, beyond))
     apart = unexplained(found, (int(lines[0]), int(lines[-1]))) * lines.size / (lines[-1] - lines[0] + 1)
     apart = float(np.sqrt(max(apart, 0.0) / power))
     natural = itf_modes(frequency, itf, itf_variance, modes=modes)
@@ -80,9 +79,10 @@ def feedback_frf(
             **_about_fit(found),
             "harmonics": branches,
             "variance_error": variance,
+            "truncation_error": truncation,
             "unexplained_error": apart,
             "record_error": record,
-            "expected_error": hypot(variance, apart, record),
+            "expected_error": hypot(variance, truncation, apart, record),
             "warnings": "\n".join([*notes, *_doubts(found, spectra, natural[0], variance, apart)]),
         },
     )

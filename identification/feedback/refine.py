@@ -22,7 +22,10 @@ from gearbench.identification.spectra.joint import Complexes, Floats
 ROUNDS = 12
 # Relative decrease of the cost at which the rounds end.
 SETTLED = 1e-3
-HALVINGS = 6
+# Steps that do not lower the cost are tried again with more damping (Levenberg 1944, Marquardt 1963): relative to the
+# diagonal, the first one, its growth, and how often. Steps that are merely shortened creep along a pole that noise all
+# but hides, and end far from the least cost.
+DAMPING, GROWTH, TRIALS = 1e-4, 10.0, 7
 TINY = 1e-11
 # Weight of the row that keeps the common factor of all parameters where it is.
 GAUGE = 1e3
@@ -53,12 +56,14 @@ def refined(model: Model, data: ClassData, settled: float = SETTLED) -> Refined:
     predicted = response(model, data, operator)
     cost = _cost(data, predicted)
     prior = _prior(model, None)
+    damping = 0.0
     for _ in range(ROUNDS):
         gram, right = _normal(model, data, operator, predicted)
         freedom = _freedom(data, model)
         noise = cost / freedom
-        step, covariance = _step(model, gram, right, noise, prior)
-        trial, operator_of, of_trial, cost_of = _shortened(model, step, data, cost)
+        system = _System(model, gram, right, noise, prior)
+        covariance = system.covariance()
+        trial, operator_of, of_trial, cost_of, damping = _damped(model, system, data, cost, damping)
         if cost_of > cost * (1 + SETTLED):
             break  # no step along this direction helps
         before, cost = cost, cost_of
@@ -73,8 +78,8 @@ def settled_covariance(fit: Refined, data: ClassData) -> Refined:
     """The same with the covariance at the model itself; that of `refined` belongs to the model before its last step,
     which is another one where a pole comes near zero frequency."""
     gram, right = linearised(fit.model, data)
-    covariance = _step(fit.model, gram, right, fit.noise, _prior(fit.model, fit.covariance))[1]
-    return replace(fit, covariance=covariance)
+    system = _System(fit.model, gram, right, fit.noise, _prior(fit.model, fit.covariance))
+    return replace(fit, covariance=system.covariance())
 
 
 def linearised(model: Model, data: ClassData) -> tuple[Floats, Floats]:
@@ -83,20 +88,21 @@ def linearised(model: Model, data: ClassData) -> tuple[Floats, Floats]:
     return _normal(model, data, operator, response(model, data, operator))
 
 
-def _shortened(
-    model: Model, step: Floats, data: ClassData, cost: float
-) -> tuple[Model, Operator, Complexes, float]:
-    """The model after the step, or the first of ever shorter ones that does not raise the cost."""
-    scale = 1.0
-    for _ in range(HALVINGS):
-        trial = gauged(model.moved(model.vector() + scale * step), data)
+def _damped(
+    model: Model, system: _System, data: ClassData, cost: float, damping: float
+) -> tuple[Model, Operator, Complexes, float, float]:
+    """The model after the step, or the first of ever more damped ones that does not raise the cost; the damping that
+    the next step begins with."""
+    for _ in range(TRIALS):
+        trial = gauged(model.moved(model.vector() + system.step(damping)), data)
         operator = Operator(trial, data.omega, data.valid)
         predicted = response(trial, data, operator)
         found = _cost(data, predicted)
         if found < cost * (1 + SETTLED):
             break
-        scale *= 0.3
-    return trial, operator, predicted, found
+        damping = max(GROWTH * damping, DAMPING)
+    following = damping / GROWTH if damping > DAMPING else 0.0
+    return trial, operator, predicted, found, following
 
 
 def _cost(data: ClassData, predicted: Complexes) -> float:
@@ -151,19 +157,26 @@ def _normal(model: Model, data: ClassData, operator: Operator, predicted: Comple
     return gram, right
 
 
-def _step(model: Model, gram: Floats, right: Floats, noise: float, prior: Floats) -> tuple[Floats, Floats]:
-    """Step of all real parameters and their covariance. `noise` is the variance of a complex equation."""
-    vector = model.vector()
-    precision = 2.0 / noise
-    total = precision * gram + np.diag(prior)
-    pull = precision * right - prior * vector
-    direction = model.scale_direction()
-    size = np.sqrt(np.maximum(np.diagonal(total), TINY * np.diagonal(total).max()))
-    total = total / size / size[:, None]
-    total[np.diag_indices_from(total)] += TINY
-    scaled = direction * size
-    scaled /= np.linalg.norm(scaled)
-    total += GAUGE * np.outer(scaled, scaled)
-    factor = cho_factor(total, lower=True)
-    covariance = cho_solve(factor, np.eye(size.size)) / size / size[:, None]
-    return cho_solve(factor, pull / size) / size, covariance
+class _System:
+    """Normal equations of all real parameters, scaled to a diagonal of one; `noise`: variance of a complex equation."""
+
+    def __init__(self, model: Model, gram: Floats, right: Floats, noise: float, prior: Floats) -> None:
+        precision = 2.0 / noise
+        total = precision * gram + np.diag(prior)
+        self.size = np.sqrt(np.maximum(np.diagonal(total), TINY * np.diagonal(total).max()))
+        self.pull = (precision * right - prior * model.vector()) / self.size
+        self.total = total / self.size / self.size[:, None]
+        self.total[np.diag_indices_from(self.total)] += TINY
+        scaled = model.scale_direction() * self.size
+        scaled /= np.linalg.norm(scaled)
+        self.total += GAUGE * np.outer(scaled, scaled)
+
+    def step(self, damping: float) -> Floats:
+        """Step of all parameters; `damping` relative to the diagonal."""
+        total = self.total + damping * np.eye(self.size.size)
+        return np.asarray(cho_solve(cho_factor(total, lower=True), self.pull) / self.size)
+
+    def covariance(self) -> Floats:
+        """Covariance of all parameters."""
+        inverse = cho_solve(cho_factor(self.total, lower=True), np.eye(self.size.size))
+        return np.asarray(inverse / self.size / self.size[:, None])

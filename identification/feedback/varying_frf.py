@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from gearbench.identification.feedback.branches import enough_branches
 from gearbench.identification.feedback.data import ClassData
 from gearbench.identification.feedback.draws import add_mesh_curves, response_variances
 from gearbench.identification.feedback.model import Model
@@ -28,7 +29,6 @@ VARIES = 0.05
 LOST = 0.25
 # A line counts as excited if its force exceeds this part of the strongest one's.
 EXCITED = 1e-2
-BRANCHES = 160
 
 
 def mesh_phase(record: xr.Dataset) -> Floats | None:
@@ -103,15 +103,16 @@ def varying_frf(
     `mesh_damping` (phase). `record`: what doubtful channels may cost."""
     found = varying_feedback(signals, harmonics, progress)
     about = _as_data(signals, spectra)
-    branches = min(BRANCHES, 2 * signals.top // spectra.mesh_lines)
     frequency = np.asarray(lines * spectra.spacing, dtype=float)
     model = gauged(found.model, about)
+    branches, beyond = enough_branches(model, about, lines)
     response = htf_on(model, about, lines, branches)
     itf = itf_from_htf(response, phases)
     draws = _draws(found, about)
     htf_variance, itf_variance = response_variances(model, draws, about, lines, branches, phases)
+    itf_variance += beyond[:, None]
     power = float(np.sum(np.abs(response) ** 2))
-    variance = float(np.sqrt(htf_variance.sum() / power))
+    variance, truncation = (float(np.sqrt(part.sum() / power)) for part in (htf_variance, beyond))
     density = lines.size / (lines[-1] - lines[0] + 1) / about.stiffness_unit**2
     shared = unexplained_at(signals, found.left, spectra.mesh_lines, (int(lines[0]), int(lines[-1])))
     apart, chance = (float(np.sqrt(max(density * value, 0.0) / power)) for value in shared)
@@ -132,9 +133,10 @@ def varying_frf(
             "equations": found.equations,
             "residual": found.residual,
             "variance_error": variance,
+            "truncation_error": truncation,
             "unexplained_error": apart,
             "record_error": record,
-            "expected_error": hypot(variance, apart, record),
+            "expected_error": hypot(variance, truncation, apart, record),
             "warnings": "\n".join([*notes, *doubt_of(apart, chance)]),
         },
     )

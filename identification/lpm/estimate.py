@@ -37,7 +37,8 @@ class LpmResult:
     `htf`, `htf_variance` (2L+1, F), l = -L..L [m/N]; `itf_covariance` (Q+1, F): sums over l
     of E[dG_l conj(dG_{l+q})], q = 0 first, which give the ITF's variance at any phase; `missing`: estimated sum over
     output lines and branches of |error of G_l|^2 that the variance does not hold, `missing_bound` the same with all
-    of the residual taken for it unless repeated periods tell the noise; `residual`: rms of
+    of the residual taken for it unless repeated periods tell the noise, `residual_missing` in any
+    case; `residual`: rms of
     the residual over that of the response in the windows (degrees of freedom accounted for); `condition`:
     largest estimated condition number; `unknowns`, `equations`, `freedom`: of an inner window, transients
     included; `windows`: how many; `variance_sampled`: windows per computed variance; `cross_terms`:
@@ -50,6 +51,7 @@ class LpmResult:
     itf_covariance: Complexes
     missing: float
     missing_bound: float
+    residual_missing: float
     residual: float
     condition: float
     unknowns: int
@@ -265,6 +267,7 @@ class _Pass:
             np.concatenate([diagonal, cross]),
             self.missing.total(self.missing.quietest() if self.noise is None else self.noise),
             self.missing.total(0.0 if self.noise is None else self.noise),
+            self.missing.total(0.0),
             float(np.sqrt(self.residual / self.power)) if self.power else 0.0,
             self.condition,
             int(middle.unknowns[0]) + transient,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import cos, radians
+from math import cos, pi, radians
 from typing import Literal
 
 import numpy as np
@@ -23,6 +23,11 @@ SOFTEST = 1e-4
 # ... no mesh stiffer than 50 N/(um mm) (ISO 6336-1 has 20 for steel) on a face WIDEST modules wide; above its
 # resonances a rig answers by its mass, up to a thousand times less.
 STIFFEST, WIDEST, BY_MASS = 50e9, 40.0, 1e-3
+# Lines at the low end of the excitation that may show a spring: fewest, and part of all; part of their rms that is
+# alike, and of that in phase with the force. Springs below are no mesh of metal's, unless on very soft supports [N/m].
+LOW_LINES, LOW_PART, ALIKE, SOFT = 6, 0.04, 0.8, 2e6
+# Departure from whole mesh cycles from which on a line is none of the operating response's.
+WHOLE = 1e-6
 # A DTE that swings by more than this part of the module is no mesh's, and neither is a gear centre that does.
 OF_MODULE = 1.0
 # Where teeth or base radii are not known: the largest swing [m].
@@ -163,6 +168,47 @@ def response_is_a_gears(look: Look) -> list[Finding]:
             f" and {SOFTEST:g} m/N: {hint}"
         )
     ]
+
+
+def spring_is_a_mesh(look: Look) -> list[Finding]:
+    """Where the dte follows the lowest excited lines as a spring does, that spring is no stiffer than a mesh, and
+    hardly softer than SOFT. For records without angles, which know the unit of their dte by nothing else."""
+    error, force = look.stored_or_own_dte, look.force
+    if error is None or force is None or "angle_driver" in look.record or not np.ptp(force) > 0:
+        return []
+    lines = look.excited(force)
+    lines &= np.cumsum(lines) <= max(LOW_LINES, LOW_PART * np.count_nonzero(lines))
+    if np.count_nonzero(lines) < LOW_LINES:
+        return []
+    driving, response = look.spectrum(force)[lines], look.spectrum(error)[lines]
+    if look.mesh_period is not None:
+        cycles = look.omega[lines] * look.mesh_period / (2 * pi)
+        between = np.abs(cycles - np.round(cycles)) > WHOLE
+        driving, response = driving[between], response[between]
+    each = response * driving.conj() / np.maximum(np.abs(driving) ** 2, np.finfo(float).tiny)
+    if each.size < LOW_LINES or abs(each.mean()) < ALIKE * float(np.sqrt(np.mean(np.abs(each) ** 2))):
+        return []  # noise, sidebands or a resonance
+    compliance = complex(each.mean())
+    if compliance.real < ALIKE * abs(compliance):
+        return []
+    stiffness, face = 1 / compliance.real, WIDEST * (_module(look) or LARGEST_SWING)
+    if stiffness > STIFFEST * face:
+        return [
+            Finding(
+                f"at the lowest excited lines the dte follows the force like a spring of {stiffness:.2g} N/m; the"
+                f" stiffest mesh, of a face {face:.2g} m wide, has {STIFFEST * face:.2g} N/m: is the dte divided by"
+                " 1000 once too often, or the force in mN?"
+            )
+        ]
+    if stiffness < SOFT:
+        return [
+            Finding(
+                f"at the lowest excited lines the dte follows the force like a spring of {stiffness:.2g} N/m, softer"
+                f" than meshes of metal on their supports ({SOFT:g} N/m): is the dte in mm, or the force in kN?",
+                refused=False,
+            )
+        ]
+    return []
 
 
 def _is_driver_torque(look: Look, stored: Array) -> bool:

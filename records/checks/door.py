@@ -21,9 +21,11 @@ from gearbench.records.checks.derived import (
     centres_alive,
     dte_alive,
     response_is_a_gears,
+    spring_is_a_mesh,
     stored_as_channels_have_it,
     swings_fit_the_teeth,
 )
+from gearbench.records.checks.drift import clocks_keep_pace
 from gearbench.records.checks.finding import Finding
 from gearbench.records.checks.lag import force_and_dte_in_step
 from gearbench.records.checks.look import Look
@@ -52,12 +54,14 @@ CHECKS: tuple[Check, ...] = (
     force_feeds_the_rig,
     stored_as_channels_have_it,
     response_is_a_gears,
+    spring_is_a_mesh,
     load_torque_alive,
     boundary_as_declared,
     inertias_as_declared,
     not_clipped,
     clocks_agree,
     force_and_dte_in_step,
+    clocks_keep_pace,
     periods_repeat,
 )
 

@@ -19,7 +19,8 @@ from gearbench.figures.responses import frf as figures_frf
 from gearbench.figures.responses.frf import draw_itf, draw_natural_frequencies
 from gearbench.geometry import pair
 from gearbench.rig import read_case
-from gearbench.words.summary import headline, honest_warning
+from gearbench.words.accuracy import honest_warning
+from gearbench.words.summary import headline
 
 
 def frf(rows: int = 40, phases: int = 32, scale: float = 1.0) -> xr.Dataset:
@@ -94,7 +95,7 @@ def test_the_same_picture_gives_the_same_file(tmp_path: Path) -> None:
         assert first.read_bytes() == second.read_bytes() and first.stat().st_size > 10_000
 
 
-def numbers(**found: float) -> dict:
+def numbers(**found: float | str) -> dict:
     about = {"expected_error": 0.02, "harmonics": 7, "joint_period": 1.0} | found
     return {"realisations": 1, "identification": about}
 
@@ -103,9 +104,26 @@ def test_warning_is_given_when_the_record_is_short_or_the_error_large() -> None:
     assert honest_warning(numbers()) == ""
     assert honest_warning(numbers(record_duration=5.0, record_needed=4.0)) == ""
     short = honest_warning(numbers(record_duration=1.0, record_needed=30.0))
-    assert "cannot support the ITF" in short and "1 s" in short and "30 s" in short and "smoothed" in short
-    large = honest_warning(numbers(expected_error=0.25))
-    assert "25%" in large and "7 branches" in large and "needed" not in large
+    assert "record is short" in short and "1 s" in short and "30 s" in short and "smoothed" in short
+    large = honest_warning(numbers(expected_error=0.25, truncation_error=0.2, variance_error=0.1))
+    assert "25%" in large and "7 a side" in large and "needed" not in large
+
+
+def test_warning_names_what_limits_and_what_helps() -> None:
+    """One cause each, as the result has it: a noisy record is not told that branches are missing."""
+    given = {
+        "expected_error": 0.1, "limited_by": "noise", "noise_error": 0.09, "branches_error": 0.0, "window_error": 0.04,
+        "order": 2, "window": 30,
+    }  # fmt: skip
+    noise = honest_warning(numbers(**given))
+    assert "noise (9.0%)" in noise and "stronger multisine" in noise and "branches" not in noise
+    window = honest_warning(numbers(**given | {"limited_by": "window"}))
+    assert "windows (4.0%)" in window and "order 2 over 61 Hz" in window and "longer periods" in window
+    channels = honest_warning(numbers(**given | {"record_error": 0.1}))
+    assert "doubtful channels" in channels
+    feedback = {"method": "mesh-feedback", "unexplained_error": 0.0, "variance_error": 0.1}
+    assert "noise (10.0%)" in honest_warning(numbers(**given | feedback))
+    assert "does not explain" in honest_warning(numbers(**given | feedback | {"unexplained_error": 0.1}))
 
 
 def test_headline_orders_the_answers() -> None:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gearbench.figures.plotting import BLUE, ORANGE, closed, explain_gaps, figure, phase_axis, save
 from gearbench.figures.responses.frf import NO_MODE, draw_itf
-from gearbench.words.summary import ENOUGH
+from gearbench.words.accuracy import ENOUGH, limit_and_advice
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -88,13 +88,14 @@ def named(result: Results) -> str:
 
 
 def _short(letter: str, result: Results) -> str:
-    """The expected error of a response whose record cannot support it in full."""
+    """The expected error of a response, and what limits it, where it is large."""
     about = result.frf.attrs if result.frf is not None else {}
     if about.get("expected_error", 0.0) <= ENOUGH:
         return ""
+    limit = f", limited by {limit_and_advice(about)[0]}" if "harmonics" in about else ""
     return (
-        f"{letter}: its record cannot support the ITF in full, expected error {about['expected_error']:.0%} rms and"
-        " several times that at the switches."
+        f"{letter}: expected error of the ITF {about['expected_error']:.0%} rms and several times that at the"
+        f" switches{limit}."
     )
 
 

@@ -25,7 +25,8 @@ def result(htf: np.ndarray, *, variance: float, missing: float, bound: float) ->
     spread = np.full(htf.shape, variance)
     total = spread.sum(axis=0)[None, :].astype(complex)
     lines = np.arange(1, htf.shape[1] + 1)
-    return LpmResult(lines, htf, spread, total, missing, bound, 0.25, 1.0, 1, 2, 1, 1, "none", np.ones(lines.size))
+    ones = np.ones(lines.size)
+    return LpmResult(lines, htf, spread, total, missing, bound, bound, 0.25, 1.0, 1, 2, 1, 1, "none", ones)
 
 
 def test_expected_error_adds_variance_and_missing_branches() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 import pytest
@@ -43,6 +44,7 @@ RIGS = {
 }
 
 
+@cache
 def simulated(name: str) -> xr.Dataset:
     return gb.simulate(gb.read_case("quick_lumped", SHORT + RIGS[name]))
 
