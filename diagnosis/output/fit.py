@@ -22,6 +22,7 @@ GAIN = 0.5  # nats that are worth a step
 POOR = 0.25  # part of what a step promised, below which the Jacobian is renewed
 HALVINGS = 3
 STEPS = 10
+SETTLED = 25.0  # nats that another step may promise: a fit that is close enough not to be gone on with
 
 
 @dataclass(frozen=True)

@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 from gearbench.bench.plan.workers import side_by_side
 from gearbench.diagnosis.effects.effect import Hypothesis
 from gearbench.diagnosis.forces.unknowns import Unknowns
-from gearbench.diagnosis.output.fit import Optimum, Sensitivity, cost_of, fit, sensitivity_of
+from gearbench.diagnosis.output.fit import SETTLED, Optimum, Sensitivity, cost_of, fit, sensitivity_of
+from gearbench.diagnosis.output.restructured import Around, restructured
 from gearbench.diagnosis.output.simulator import Simulator
-from gearbench.diagnosis.output.structure import housings, otherwise
+from gearbench.diagnosis.output.structure import housings
 
 Array = NDArray[np.float64]
 Report = Callable[[str], None]
@@ -32,10 +33,6 @@ WORTH = 2.0  # nats promised from which a hypothesis is simulated
 # Renewals of the Jacobian: of the background, of each hypothesis, and of what entered in the end, whose structure has
 # been found beside a gap that the effects now close.
 RENEWALS_BASE, RENEWALS, RENEWALS_LAST = 2, 0, 2
-RENEWALS_OTHERWISE = 3
-SETTLED = 25.0  # nats that another step may promise: a fit that is close enough not to be gone on with
-# Nats an independent line that are left, below which no other structure is tried.
-CLOSE = 0.25
 
 
 @dataclass(frozen=True)
@@ -75,9 +72,11 @@ def select(
     background: Sequence[Array],
     starts: Mapping[str, Start],
     report: Report = lambda step: None,
+    around: Around | None = None,
 ) -> Selection | None:
     """The effects of the hypotheses that the records call for; `background`: where to begin without any (size,),
-    `starts`: by a hypothesis' name. None where no start is a rig."""
+    `starts`: by a hypothesis' name; `around`: the rig around its mesh, asked for where a fit is led astray. None where
+    no start is a rig."""
     unknowns = simulator.layout.unknowns
     sd = prior_of(simulator, unknowns.prior())
     chosen = np.ones(unknowns.size, dtype=bool)
@@ -88,7 +87,7 @@ def select(
     base = fit(simulator, begin, sd, first, renewals=RENEWALS_BASE, chosen=chosen) if first else None
     if base is None:
         return None
-    base = _restructured(simulator, base, chosen, report)
+    base = restructured(simulator, base, around, report)
     best, weighed = base, None
     entered: list[Weighed] = []
     while len(entered) < MOST:
@@ -108,32 +107,9 @@ def select(
     if kept and best.left > SETTLED:
         report("simulating: all together")
         best = fit(simulator, best.p, best.sd, best.sensitivity, renewals=RENEWALS_LAST, chosen=chosen) or best
-    best = _restructured(simulator, best, chosen, report) if kept else best
+    best = restructured(simulator, best, around, report) if kept else best
     bare = _without(simulator, base, [one.hypothesis for one in kept], chosen)
     return Selection(base, bare, best, kept, tuple(weighed or ()))
-
-
-def _restructured(simulator: Simulator, found: Optimum, chosen: NDArray[np.bool_], report: Report) -> Optimum:
-    """The optimum begun again with the structure that its fit could not walk to, where that comes closer.
-
-    Beginnings are chosen by their cost before any fit: beside the gap of a large effect they all cost the same.
-    """
-    unknowns = simulator.layout.unknowns
-    p = otherwise(unknowns, found.p)
-    if p is None or found.misfit < CLOSE * float(simulator.target.counts.sum()):
-        return found
-    report("simulating: another structure")
-    sensitivity = sensitivity_of(simulator, p, unknowns.prior(), chosen)
-    if sensitivity is None:
-        return found
-    again = fit(simulator, p, found.sd, sensitivity, renewals=RENEWALS_OTHERWISE, chosen=chosen)
-    if again is None or again.evidence <= found.evidence:
-        return found
-    if again.left > SETTLED:
-        report("simulating: another structure, further")
-        renewals = RENEWALS_OTHERWISE
-        again = fit(simulator, again.p, found.sd, again.sensitivity, renewals=renewals, chosen=chosen) or again
-    return again
 
 
 def prior_of(simulator: Simulator, sd: Array) -> Array:

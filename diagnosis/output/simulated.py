@@ -17,6 +17,7 @@ from gearbench.diagnosis.evidence.problem import Problem
 from gearbench.diagnosis.evidence.search import Search
 from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.intake.measurements import Measurement
+from gearbench.diagnosis.output.around import around
 from gearbench.diagnosis.output.layout import Layout, layout_of
 from gearbench.diagnosis.output.selection import LIMIT, WORTH, Selection, Start, Weighed, select
 from gearbench.diagnosis.output.simulator import Simulate, Simulator
@@ -85,6 +86,7 @@ def simulated(
         _beginnings(layout, carried_over(layout, problem.unknowns, found.base.p)),
         starts,
         report,
+        lambda held: around(layout, [problem.conditions[number] for number in smooth], held),
     )
     if selection is None:
         return None

@@ -43,6 +43,7 @@ SHAFT_FELT, SHAFT_STIFFEST = 0.03, 0.06
 # without it would never find it.
 LEAST_STEP: Mapping[str, float] = {ACROSS: STIFFEST, SHAFT: SHAFT_STIFFEST}
 NONE = 1e-4  # compliance of a housing below which there is none
+LEAST_HOUSING = 1e-3  # and the least that is looked for
 # Moved and simulated: no small force at an unchanged motion stands for them.
 STRUCTURE_MOVED = (ACROSS, CROSS, HOUSING, MODE, SHAFT)
 # What is told of the structure that was found.
@@ -93,7 +94,7 @@ def otherwise(unknowns: Unknowns, p: Array) -> Array | None:
     """`p` (size,) with the structure that a fit does not walk to from there: supports that yield across where they are
     rigid, else no shaft where there is one; None where neither is a question."""
     trial = p.copy()
-    if ACROSS in unknowns.slices and p[unknowns[ACROSS]].max() < FELT:
+    if ACROSS in unknowns.slices and p[unknowns[ACROSS]].max() <= STIFFEST:
         trial[unknowns[ACROSS]] = ACROSS_BEGIN
     elif SHAFT in unknowns.slices and p[unknowns[SHAFT]][0] > SHAFT_FELT:
         trial[unknowns[SHAFT]] = 0.0

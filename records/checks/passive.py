@@ -18,8 +18,9 @@ def force_feeds_the_rig(look: Look) -> list[Finding]:
     """The excitation does positive work on the transmission error: mean of F d/dt over the excited lines >= 0.
 
     Behind a soft coupling the torque of the drive may well work against the gear. So a negative cosine counts where the
-    balance of both gears says that the torques are theirs, or where the means are opposed too; where the zero of the
-    dte is arbitrary it is only said. A delay that is found elsewhere explains it.
+    balance of both gears says that the torques are theirs, or where the means are opposed too, by more than the dte
+    fluctuates: flanks that part have their mean anywhere in the backlash. Where the zero of the dte is arbitrary it is
+    only said. A delay that is found elsewhere explains it.
     """
     force = look.force
     if force is None or float(np.ptp(force)) <= 1e-9 * float(np.abs(force).max()):
@@ -30,7 +31,7 @@ def force_feeds_the_rig(look: Look) -> list[Finding]:
     if error is None or cosine >= LIMIT or clocks_agree(look):
         return []
     whole = look.stored_or_own_dte
-    opposed = whole is not None and look.zero_known and float(whole.mean()) * float(force.mean()) < 0
+    opposed = whole is not None and look.zero_known and -float(whole.mean()) * np.sign(force.mean()) > whole.std()
     certain = opposed or accounts_agree(look)
     if not certain and (look.zero_known or name == "angles"):
         return []

@@ -101,6 +101,41 @@ def test_structure_beyond_a_hill_is_found_by_beginning_again() -> None:
     assert found.best.p[[3, 4, 5]] == pytest.approx([0.4, 0.23, 0.21], abs=0.01)
 
 
+def test_structure_that_the_rig_shows_around_its_mesh_is_begun_from() -> None:
+    """A resonance far from where the fit begins: downhill leads the other way, what is read of the rig leads there."""
+    unknowns = unknowns_of(
+        [
+            group("stiffness", "1", ("driver", "driven"), 0.1, slot="stiffness"),
+            group("scale", "1", ("mesh",), 0.06, slot="scale"),
+            group("housing-mode", "1", ("frequency",), 0.7, slot="structure", high=0.0),
+            group("across", "1", ("driver", "driven"), 0.15, slot="structure", low=0.0, high=1.0),
+            group("friction", "1", ("coefficient",), 0.01, 0.5, slot="friction"),
+            group("crack", "1", 2, 0.02, 0.35, slot="loss", low=0.0),
+        ],
+        2,
+    )
+
+    def lines_of(p: np.ndarray) -> np.ndarray:
+        """Uphill from 0 to -0.4, as the rig has it at -1."""
+        bent = p.copy()
+        bent[3] = p[3] * (p[3] + 0.8)
+        return np.concatenate([bent, np.zeros(len(MATRIX))])[: len(MATRIX)] @ MATRIX
+
+    true = np.array([0.08, -0.1, 0.02, -1.0, 0.23, 0.21, 0.0, 0.0, 0.0])
+    lines = lines_of(true)
+    simulator = FakeSimulator(lines_of, target(lines), layout=SimpleNamespace(unknowns=unknowns))
+
+    def read(held: np.ndarray) -> np.ndarray:
+        out = held.copy()
+        out[[0, 1, 3]] = true[[0, 1, 3]] + 0.01
+        return out
+
+    without, found = (select(simulator, (), [np.zeros(9)], {}, around=around) for around in (None, read))
+    assert without is not None and abs(without.base.p[3] + 1.0) > 0.3
+    assert found is not None
+    assert found.base.p[[0, 1, 2, 3]] == pytest.approx(true[:4], abs=0.01)
+
+
 def test_no_rig_at_the_start_is_no_selection() -> None:
     simulator = FakeSimulator(lambda q: q @ MATRIX, target(MATRIX[0]), largest=0.1)
     assert select(simulator, LISTED, [np.ones(8)], {}) is None

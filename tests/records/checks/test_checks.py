@@ -175,6 +175,23 @@ def test_dte_and_force_alone(rigs: dict[str, xr.Dataset], change: Change, words:
         check_record(change(rigs["free"][["dte", "force"]]))
 
 
+@pytest.mark.parametrize(("mean", "refused"), [(0.5, False), (3.0, True)])
+def test_a_mean_against_the_force_counts_beyond_what_parting_flanks_leave(
+    rigs: dict[str, xr.Dataset], mean: float, refused: bool
+) -> None:
+    """Mean of the dte in rms of its fluctuation: flanks that part have it anywhere in the backlash."""
+    record = rigs["free"][["dte", "force"]]
+    swings = record.dte.values - record.dte.values.mean()
+    opposed = with_values(record, "dte", -swings - mean * swings.std())
+    said = "nothing"
+    try:
+        found = check_record(opposed)
+        said = " ".join(one.sentence for one in found)
+    except RecordError as error:
+        said = str(error)
+    assert ("move against the torque" in said) == refused
+
+
 @pytest.mark.parametrize(
     ("name", "samples"), [("torque_driver", 1), ("torque_driver", -3), ("y_driver", 3), ("torque_driver", 20)]
 )

@@ -1,0 +1,95 @@
+"""What is read of a rig around its mesh, from records made by equations of motion that are written out here."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gearbench.bench import simulate
+from gearbench.cases import case_files
+from gearbench.diagnosis.evidence.problem import problem_of
+from gearbench.diagnosis.forces.condition import Condition
+from gearbench.diagnosis.intake.measurements import measurement
+from gearbench.diagnosis.output.around import around
+from gearbench.diagnosis.output.layout import Layout, layout_of
+from gearbench.diagnosis.output.structure import HOUSING, MODE
+from gearbench.rig import read_case
+
+K1, K2, HOUSED, RATIO = 0.93e8, 1.08e8, 0.06, 0.05  # stiffness of the supports, compliance of the housing, damping
+
+
+@pytest.fixture(scope="module")
+def rig() -> tuple[Layout, Condition]:
+    nominal = read_case(case_files()["gap_demo"])
+    measured = measurement(simulate(nominal.under(nominal.conditions[0])), "base", nominal)
+    problem = problem_of([measured], nominal)
+    return layout_of(nominal, problem.model, problem.conditions, ()), problem.conditions[0]
+
+
+def recorded(layout: Layout, like: Condition, frequency: float | None, heavier: float = 1.0) -> Condition:
+    """A condition whose rig has a housing of that logarithm of frequency (None: none) and any force in the mesh."""
+    m = layout.model
+    rng = np.random.default_rng(3)
+    omega = like.omega[: like.bins]
+    torque = like.spectra["torque_driver"][: like.bins]
+    force = 300.0 * (rng.standard_normal(like.bins) + 1j * rng.standard_normal(like.bins))
+    mean = 2 / (1 / m.stiffness[0] + 1 / m.stiffness[1])
+    big = mean / HOUSED
+    heavy = np.exp(-2.0 * (frequency or 0.0)) * 0.5 * (m.mass[0] + m.mass[1]) * big / mean
+    damped = 2 * RATIO * np.sqrt(big * heavy)
+    s = 1j * omega
+    mass = heavier * (m.inertia[0] + m.rotor) / m.base_radius[0] ** 2
+    turning = (torque / m.base_radius[0] - force) / (mass * s**2 + (omega == 0))
+    one, two = (k + s * c for k, c in zip((K1, K2), m.damping, strict=True))
+    housing = big + s * damped + s**2 * heavy
+    rows = np.array(
+        [
+            [m.mass[0] * s**2 + one, 0 * s, -one],
+            [0 * s, m.mass[1] * s**2 + two, -two],
+            [-one, -two, housing + one + two],
+        ]
+    )
+    push = np.array([-m.support_factor * force, m.support_factor * force, 0 * force])
+    if frequency is None:
+        y = np.array([push[0] / rows[0, 0], push[1] / rows[1, 1]])
+    else:
+        y = np.linalg.solve(np.moveaxis(rows, 2, 0), push.T[..., None])[:, :2, 0].T
+    spectra = {"torque_driver": like.spectra["torque_driver"], "angle_driver": turning, "y_driver": y[0],
+               "y_driven": y[1], "torque_driven": m.base_radius[1] * force}  # fmt: skip
+    noise = {name: 1e-8 * float(np.median(np.abs(values[1 : like.bins]) ** 2)) for name, values in spectra.items()}
+    return replace(like, spectra=spectra, noise=noise)
+
+
+@pytest.mark.parametrize("frequency", [-1.0, -0.3, 0.4])
+def test_a_housing_is_found_with_the_supports(rig: tuple[Layout, Condition], frequency: float) -> None:
+    layout, like = rig
+    found = around(layout, [recorded(layout, like, frequency)], np.zeros(layout.size))
+    assert found is not None
+    unknowns, model = layout.unknowns, layout.model
+    assert found[unknowns["stiffness"]] == pytest.approx(np.log([K1, K2] / np.array(model.stiffness)), abs=0.005)
+    assert found[unknowns[HOUSING]] == pytest.approx(HOUSED, rel=0.05)
+    assert found[unknowns[MODE]] == pytest.approx([frequency, 0.0], abs=0.1)
+
+
+def test_inertia_is_read_from_the_driver(rig: tuple[Layout, Condition]) -> None:
+    layout, like = rig
+    found = around(layout, [recorded(layout, like, -0.3, heavier=1.02)], np.zeros(layout.size))
+    assert found is not None
+    driver, _, rotor = np.exp(found[layout.unknowns["inertia"]])
+    parts = np.array([layout.model.inertia[0], layout.model.rotor])
+    assert parts @ [driver, rotor] / parts.sum() == pytest.approx(1.02, abs=0.003)
+
+
+def test_no_housing_is_hardly_any(rig: tuple[Layout, Condition]) -> None:
+    layout, like = rig
+    found = around(layout, [recorded(layout, like, None)], np.zeros(layout.size))
+    assert found is not None and found[layout.unknowns[HOUSING]] < 0.005
+    assert found[layout.unknowns["stiffness"]] == pytest.approx(np.log([K1 / 1e8, K2 / 1e8]), abs=0.005)
+
+
+def test_without_displacements_nothing_is_read(rig: tuple[Layout, Condition]) -> None:
+    layout, like = rig
+    spectra = {name: values for name, values in like.spectra.items() if not name.startswith("y_")}
+    assert around(layout, [replace(like, spectra=spectra)], np.zeros(layout.size)) is None
