@@ -89,9 +89,9 @@ def _from_around(simulator: Simulator, found: Optimum, around: Around | None, re
         for one in side_by_side(fitted, begins[first : first + 2]):
             if one is not None and (best is None or one.cost < best.cost):
                 best = one
-        if best is not None and is_close(simulator, best):
-            break
-    if best is None:
+        if best is not None and (best.cost > found.cost or is_close(simulator, best)):
+            break  # no way from there, or there already
+    if best is None or best.cost > found.cost:
         return None
     return _fitted(simulator, best.p, found.sd)
 
