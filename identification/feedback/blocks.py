@@ -12,7 +12,7 @@ import numpy as np
 from gearbench.identification.spectra.joint import Complexes, Floats
 
 # Matrices of up to so many times the band are one block.
-DENSE = 3
+DENSE = 2
 
 
 class MeshMatrices:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from gearbench.identification.feedback.data import ClassData
 from gearbench.identification.feedback.model import Model
-from gearbench.identification.feedback.result import followed, furthest_line, htf_on
+from gearbench.identification.feedback.result import followed, htf_on
 from gearbench.identification.spectra.joint import Floats
 
 # Branches that a result has at least, if its lines reach so far; the part of the response's rms that those beyond may
@@ -25,7 +25,7 @@ ROOM = 6_000_000
 def enough_branches(model: Model, data: ClassData, lines: NDArray[np.int64]) -> tuple[int, Floats]:
     """Branches on each side that hold all but NEGLIGIBLE of the response, within ROOM, and the power [m^2/N^2] (F,)
     beyond them on the output `lines`."""
-    most = 2 * furthest_line(model, data) // data.mesh_lines
+    most = 2 * data.furthest // data.mesh_lines
     chosen = followed(lines)
     power = np.abs(htf_on(model, data, chosen, most)) ** 2
     order = np.abs(np.arange(-most, most + 1))

@@ -14,13 +14,18 @@ from gearbench.identification.spectra.joint import Complexes, Floats, Spectra
 # excited lines, and tell the mesh's higher harmonics.
 MARGIN = 0.05
 SIDEBANDS = 8
+# Sidebands beyond those lines, in mesh harmonics, that a model has all the same: they too act back. A model that
+# ends where the record does puts their effect on the mesh's higher harmonics.
+BEYOND = 24
 
 
 @dataclass(frozen=True)
 class ClassData:
     """Two-sided lines of the residue classes 0..d/2 (the others are their complex conjugates).
 
-    `lines` (C, S), 0 where `valid` is False; `force` and `dte` (C, S, E) over `force_unit` [N] and `dte_unit` [m];
+    `lines` (C, S), 0 where `modelled` is False; `valid` (C, S) up to the line `top`: those of the record; `modelled`
+    (C, S): up to `furthest`. `force` and `dte` (C, S, E) over `force_unit` [N] and `dte_unit` [m]; of lines that are
+    modelled and not valid, dte is there as far as the record goes, for comparison;
     `weight` (C,): 1, or 1/sqrt(2) for classes that are their own mirror image and hold every equation twice.
     `omega` (C, S): angular frequency over `omega_unit` [rad/s]. `excited`: highest excited line. `equations`: complex
     ones, each counted once.
@@ -28,6 +33,7 @@ class ClassData:
 
     lines: NDArray[np.int64]
     valid: NDArray[np.bool_]
+    modelled: NDArray[np.bool_]
     force: Complexes
     dte: Complexes
     weight: Floats
@@ -50,9 +56,19 @@ class ClassData:
         return np.asarray(self.lines / self.top, dtype=float)
 
     @property
+    def furthest(self) -> int:
+        """Highest line of sidebands that the model has."""
+        return furthest_line(self.top, self.mesh_lines)
+
+    @property
     def stiffness_unit(self) -> float:
         """Unit of stiffness [N/m]."""
         return self.force_unit / self.dte_unit
+
+
+def furthest_line(top: int, mesh_lines: int) -> int:
+    """Highest line of sidebands that a model has whose record ends with the line `top`."""
+    return min(2 * top, top + BEYOND * mesh_lines)
 
 
 def fewer_classes(data: ClassData, equations: int) -> ClassData:
@@ -62,7 +78,7 @@ def fewer_classes(data: ClassData, equations: int) -> ClassData:
     if kept == count:
         return data
     chosen = np.unique(np.round((np.arange(kept) + 0.5) * count / kept - 0.5).astype(int))
-    parts = {name: getattr(data, name)[chosen] for name in ("lines", "valid", "force", "dte", "weight")}
+    parts = {name: getattr(data, name)[chosen] for name in ("lines", "valid", "modelled", "force", "dte", "weight")}
     return replace(data, **parts, equations=_equations(parts["valid"], parts["dte"], parts["weight"]))
 
 
@@ -75,22 +91,25 @@ def class_data(spectra: Spectra, excited: int) -> ClassData:
     d = spectra.mesh_lines
     top = min(spectra.highest, max(int((1.0 + MARGIN) * excited), excited + SIDEBANDS * d))
     classes = np.arange(d // 2 + 1)
-    reach = top // d + 1
+    furthest = furthest_line(top, d)
+    reach = furthest // d + 1
     position = np.arange(-reach, reach + 1)
     lines = classes[:, None] + position * d
-    valid = np.abs(lines) <= top
+    valid, modelled = np.abs(lines) <= top, np.abs(lines) <= furthest
     at = np.clip(position + regression.origin, 0, regression.force.shape[2] - 1)
+    known = np.abs(lines) <= min(furthest, spectra.highest)
     force, dte = (
-        np.where(valid[:, :, None], source[classes][:, :, at].transpose(0, 2, 1), 0.0)
-        for source in (regression.force, regression.dte)
+        np.where(kept[:, :, None], source[classes][:, :, at].transpose(0, 2, 1), 0.0)
+        for kept, source in ((valid, regression.force), (known, regression.dte))
     )
     weight = np.where((2 * classes) % d == 0, np.sqrt(0.5), 1.0)
     force_unit, dte_unit = (
-        float(np.sqrt(np.sum(np.abs(x) ** 2) / max(np.count_nonzero(x), 1))) or 1.0 for x in (force, dte)
+        float(np.sqrt(np.sum(np.abs(x[valid]) ** 2) / max(np.count_nonzero(x[valid]), 1))) or 1.0 for x in (force, dte)
     )
     return ClassData(
-        np.where(valid, lines, 0),
+        np.where(modelled, lines, 0),
         valid,
+        modelled,
         np.asarray(force / force_unit, dtype=complex),
         np.asarray(dte / dte_unit, dtype=complex),
         weight,

@@ -66,7 +66,7 @@ def mesh_feedback(
     """
     report = progress or (lambda part, message: None)
     data = class_data(spectra, excited)
-    count = min(harmonics if harmonics is not None else HARMONICS, data.lines.shape[1] - 1)
+    count = min(harmonics if harmonics is not None else HARMONICS, data.valid.sum(axis=1).max() - 1)
     intervals = int(np.clip(data.equations / SUPPORT, FEWEST_INTERVALS, INTERVALS))
     unknowns = 4 * (intervals + 3) + 4 * count
     if data.equations < unknowns:

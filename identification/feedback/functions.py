@@ -21,7 +21,11 @@ LEAST_DAMPING = 2e-3
 
 @dataclass(frozen=True)
 class Splines:
-    """Cubic splines, real and imaginary parts apart, on `intervals` equal intervals from position 0 to 1."""
+    """Cubic splines, real and imaginary parts apart, on `intervals` equal intervals from position 0 to 1.
+
+    Beyond, where no line is measured, they go on like a mass and a damper: their last values times the square of the
+    position and the position.
+    """
 
     intervals: int
 
@@ -30,7 +34,10 @@ class Splines:
         knots = np.arange(-3, self.intervals + 4) / self.intervals
         flat = np.clip(np.abs(position).ravel(), 0.0, 1.0)
         values = BSpline.design_matrix(flat, knots, 3).toarray().reshape(*position.shape, -1)
-        return np.concatenate([values + 0j, values * (1j * np.sign(position))[..., None]], axis=-1)
+        further = np.maximum(np.abs(position), 1.0)[..., None]
+        return np.concatenate(
+            [values * further**2 + 0j, values * (1j * np.sign(position))[..., None] * further], axis=-1
+        )
 
     @property
     def pairs(self) -> Floats:

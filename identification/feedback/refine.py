@@ -33,8 +33,9 @@ GAUGE = 1e3
 
 @dataclass(frozen=True)
 class Refined:
-    """Model, the residual of its response (C, S, E) in units of the data, `noise` variance per complex equation,
-    `covariance` (P, P) of the real parameters, and `freedom`: complex equations less parameters."""
+    """Model, the residual of its response (C, S, E) in units of the data, on all lines that dte is known on, `noise`
+    variance per complex equation, `covariance` (P, P) of the real parameters, and `freedom`: complex equations less
+    parameters."""
 
     model: Model
     left: Complexes
@@ -45,14 +46,14 @@ class Refined:
 
 def response(model: Model, data: ClassData, operator: Operator | None = None) -> Complexes:
     """Y^ = A^-1 N U (C, S, E)."""
-    operator = operator or Operator(model, data.omega, data.valid)
+    operator = operator or Operator(model, data.omega, data.modelled)
     source = operator.n[:, :, None] * data.force
     return np.stack([operator.solve(index, source[index]) for index in range(source.shape[0])])
 
 
 def refined(model: Model, data: ClassData, settled: float = SETTLED) -> Refined:
     """The model of least output error, from a first one; rounds end at a relative decrease of the cost by `settled`."""
-    operator = Operator(model, data.omega, data.valid)
+    operator = Operator(model, data.omega, data.modelled)
     predicted = response(model, data, operator)
     cost = _cost(data, predicted)
     prior = _prior(model, None)
@@ -70,7 +71,7 @@ def refined(model: Model, data: ClassData, settled: float = SETTLED) -> Refined:
         model, operator, predicted, prior = trial, operator_of, of_trial, _prior(trial, covariance)
         if before - cost < settled * before:
             break
-    left = (data.dte - predicted) * data.valid[:, :, None]
+    left = np.where(data.dte != 0, data.dte - predicted, 0.0)
     return Refined(model, left, cost / _freedom(data, model), covariance, _freedom(data, model))
 
 
@@ -84,7 +85,7 @@ def settled_covariance(fit: Refined, data: ClassData) -> Refined:
 
 def linearised(model: Model, data: ClassData) -> tuple[Floats, Floats]:
     """J^T J and J^T r of the output error of a model."""
-    operator = Operator(model, data.omega, data.valid)
+    operator = Operator(model, data.omega, data.modelled)
     return _normal(model, data, operator, response(model, data, operator))
 
 
@@ -95,7 +96,7 @@ def _damped(
     the next step begins with."""
     for _ in range(TRIALS):
         trial = gauged(model.moved(model.vector() + system.step(damping)), data)
-        operator = Operator(trial, data.omega, data.valid)
+        operator = Operator(trial, data.omega, data.modelled)
         predicted = response(trial, data, operator)
         found = _cost(data, predicted)
         if found < cost * (1 + SETTLED):
@@ -137,16 +138,16 @@ def _normal(model: Model, data: ClassData, operator: Operator, predicted: Comple
     count = model.vector().size
     gram, right = np.zeros((count, count)), np.zeros(count)
     for index in range(data.lines.shape[0]):
-        omega, valid = data.omega[index], data.valid[index]
+        omega, valid, modelled = data.omega[index], data.valid[index], data.modelled[index]
         values = model.basis.at(omega)
         for experiment in range(data.dte.shape[2]):
             measured = data.dte[index, :, experiment]
             if not measured.any():
                 continue
-            y = predicted[index, :, experiment] * valid
+            y = predicted[index, :, experiment] * modelled
             u = data.force[index, :, experiment]
             columns = -model.columns(values, omega, y, u)
-            columns = operator.solve(index, columns * valid[:, None]) * data.weight[index]
+            columns = operator.solve(index, columns * modelled[:, None]) * data.weight[index]
             own = valid & (omega >= 0) if 2 * data.weight[index] ** 2 <= 1.01 else valid
             columns, left = columns[own], ((measured - predicted[index, :, experiment]) * data.weight[index])[own]
             if own is not valid:

@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 
 from gearbench.identification.feedback.data import ClassData
 from gearbench.identification.feedback.estimate import Feedback
-from gearbench.identification.feedback.functions import Fractions
 from gearbench.identification.feedback.model import Model, Operator
 from gearbench.identification.feedback.start import gauged
 from gearbench.identification.spectra.joint import Complexes, Floats
@@ -18,21 +17,21 @@ DRAWS = 16
 # steps would lead through poles at zero frequency and functions that vanish.
 STEP = 1e-3
 FOLLOWED = 40
+# Lines beyond those of the fit that suffice to tell how well it goes on.
+FEWEST_HELD = 100
 # Equations of a window in which residuals are compared with the inputs.
 COMPARED = 80
-# Sidebands beyond the record's lines that a rational D is trusted with.
-BEYOND = 24
 # A part of the response that no mesh force explains, beyond this and twice what chance makes, speaks against it.
 UNEXPLAINED = 0.03
 
 
 def htf_on(model: Model, data: ClassData, lines: NDArray[np.int64], harmonics: int, ratio: float = 1.0) -> Complexes:
-    """HTF (2H+1, F) [m/N], l = -H..H, on lines of the record by harmonic balance; 0 beyond `furthest_line`.
+    """HTF (2H+1, F) [m/N], l = -H..H, on lines of the record by harmonic balance; 0 beyond `data.furthest`.
 
     `ratio`: mesh frequency over that of the record, which D, N, k and c do not depend on.
     """
     result = np.zeros((2 * harmonics + 1, lines.size), dtype=complex)
-    step, furthest = data.mesh_lines * ratio, furthest_line(model, data)
+    step, furthest = data.mesh_lines * ratio, data.furthest
     for residue in np.unique(np.round(lines % step, 9)):
         chosen = np.flatnonzero(np.abs(np.round(lines % step, 9) - residue) < 1e-8)
         first = int(np.ceil((-furthest - residue) / step))
@@ -50,25 +49,23 @@ def htf_on(model: Model, data: ClassData, lines: NDArray[np.int64], harmonics: i
     return result
 
 
-def furthest_line(model: Model, data: ClassData) -> int:
-    """Highest line of sidebands in the harmonic balance: partial fractions reach beyond those of the record."""
-    if not isinstance(model.basis, Fractions):
-        return data.top
-    return min(2 * data.top, data.top + BEYOND * data.mesh_lines)
-
-
 def doubt_beyond(found: Feedback) -> float:
-    """Part of the power of sidebands beyond the record's lines that may be wrong.
+    """Part of the power of sidebands beyond the lines of the fit that may be wrong, apart from noise's part in it.
 
-    The lines above the excited band hold sidebands only, as those beyond do: what the model leaves of their power,
-    noise included, is what its extrapolation is not trusted with. 1 where the record has no such lines.
+    What the model leaves of the lines that the record has beyond those (if they are too few: of the lines above the
+    excited band, which hold sidebands only, too), less what noise of the level of the fit does and plus one deviation
+    of that, over their power less that of noise. 1 where the record has no such lines.
     """
     data = found.data
-    above = data.valid & (np.abs(data.lines) > data.excited)
-    counted = (np.abs(data.dte) > 0) & above[:, :, None]
-    power = float(np.sum(np.abs(data.dte[counted]) ** 2))
-    left = float(np.sum(np.abs(found.refined.left[counted]) ** 2))
-    return min(left / power, 1.0) if power > 0 else 1.0
+    has = np.abs(data.dte) > 0
+    counted = has & ~data.valid[:, :, None]
+    if np.count_nonzero(counted) < FEWEST_HELD:
+        counted = has & (np.abs(data.lines) > data.excited)[:, :, None]
+    number, level = np.count_nonzero(counted), found.refined.noise
+    power = float(np.sum(np.abs(data.dte[counted]) ** 2)) - number * level
+    left = float(np.sum(np.abs(found.refined.left[counted]) ** 2)) - number * level
+    deviation = float(np.sqrt(number)) * level
+    return min((max(left, 0.0) + deviation) / power, 1.0) if power > deviation else 1.0
 
 
 def followed(lines: NDArray[np.int64]) -> NDArray[np.int64]:

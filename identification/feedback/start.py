@@ -74,7 +74,7 @@ def _gram(data: ClassData, model: Model, weights: Floats) -> Floats:
         weight = weights[index] * data.weight[index]
         values = model.basis.at(omega)
         for experiment in range(data.dte.shape[2]):
-            y, u = data.dte[index, :, experiment], data.force[index, :, experiment]
+            y, u = data.dte[index, :, experiment] * data.valid[index], data.force[index, :, experiment]
             if not y.any():
                 continue
             matrix = model.columns(values, omega, y, u) * weight[:, None]

@@ -153,8 +153,8 @@ def _draws(found: Varying, about: ClassData) -> list[Model]:
 def _as_data(signals: Signals, spectra: Spectra) -> ClassData:
     """What the functions of a model ask of its data: units and lines, without the response."""
     lines = np.arange(signals.lowest, signals.excited + 1)[None]
-    ones = np.ones((*lines.shape, 1), dtype=complex)
+    ones, all_of_them = np.ones((*lines.shape, 1), dtype=complex), np.ones(lines.shape, dtype=bool)
     return ClassData(
-        lines, np.ones(lines.shape, dtype=bool), ones, ones, np.ones(1), spectra.mesh_lines, spectra.spacing,
+        lines, all_of_them, all_of_them, ones, ones, np.ones(1), spectra.mesh_lines, spectra.spacing,
         signals.excited, signals.top, signals.force_unit, signals.dte_unit, float(lines.size),
     )  # fmt: skip
