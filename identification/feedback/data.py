@@ -56,6 +56,11 @@ class ClassData:
         return np.asarray(self.lines / self.top, dtype=float)
 
     @property
+    def lowest(self) -> int:
+        """Lowest excited line."""
+        return int(np.abs(self.lines[np.abs(self.force).max(axis=2) > 0]).min())
+
+    @property
     def furthest(self) -> int:
         """Highest line of sidebands that the model has."""
         return furthest_line(self.top, self.mesh_lines)

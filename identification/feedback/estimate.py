@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from gearbench.identification.feedback.data import ClassData, class_data, fewer_classes
 from gearbench.identification.feedback.functions import Fractions, Splines, common_pairs
 from gearbench.identification.feedback.model import Model
-from gearbench.identification.feedback.refine import Refined, linearised, refined, settled_covariance
+from gearbench.identification.feedback.poles import linear_models
+from gearbench.identification.feedback.refine import Refined, linearised, output_error, refined, settled_covariance
 from gearbench.identification.feedback.start import first_model
 from gearbench.identification.lpm.local_solve import LpmError
 from gearbench.identification.spectra.joint import Complexes, Spectra
@@ -76,18 +77,34 @@ def mesh_feedback(
         )
     report(0.0, "mesh feedback: first model")
     part = fewer_classes(data, SEARCHED)
-    best = refined(first_model(part, Splines(intervals), count), part, ROUGH_SETTLED)
-    splines = best
+    first = first_model(part, Splines(intervals), count)
+    best = splines = refined(first, part, ROUGH_SETTLED)
     for pairs in range(1, PAIRS + 1):
         report(pairs / (PAIRS + 1), f"mesh feedback: {pairs} pair(s) of poles")
         found = isinstance(best.model.basis, Fractions)
-        trial = refined(extended(best.model, part) if found else rational(splines, part, pairs), part, COMPARED)
+        trial = refined(further(best.model, part) if found else begin(first, splines, part, pairs), part, COMPARED)
         if criterion(trial, part) < criterion(best, part) - GAIN:
             best = trial
         elif found:
             break
     report(1.0, "mesh feedback: last rounds")
     return Feedback(data, settled_covariance(refined(best.model, data), data))
+
+
+def begin(first: Model, splines: Refined, data: ClassData, pairs: int) -> Model:
+    """The model with `pairs` pairs of poles of least output error, of those that follow from the refined `splines` and
+    from the equations with the harmonics of these or of the `first` model."""
+    begun = [rational(splines, data, pairs)]
+    for model in (splines.model, first):
+        begun += linear_models(model, data, pairs)
+    return min(begun, key=lambda model: output_error(model, data))
+
+
+def further(model: Model, data: ClassData) -> Model:
+    """The model with one more pair of poles of least output error: one added to its own, or all of them from the
+    equations with its harmonics."""
+    begun = [*extended(model, data), *linear_models(model, data, model.basis.pairs.shape[0] + 1)]
+    return min(begun, key=lambda model: output_error(model, data))
 
 
 def criterion(fit: Refined, data: ClassData) -> float:
@@ -104,8 +121,7 @@ def rational(fit: Refined, data: ClassData, pairs: int) -> Model:
     """The model with partial fractions of `pairs` common poles fitted to the D and N of another one, where it knows
     them."""
     model = fit.model
-    lowest = int(np.abs(data.lines[np.abs(data.force).max(axis=2) > 0]).min())
-    position: NDArray[np.float64] = np.linspace(max(lowest, 1), data.excited, FITTED_POINTS) / data.top
+    position: NDArray[np.float64] = np.linspace(max(data.lowest, 1), data.excited, FITTED_POINTS) / data.top
     values = model.basis.at(position)
     weights = []
     for first, coefficients in ((0, model.d), (model.d.size, model.n)):
@@ -113,18 +129,19 @@ def rational(fit: Refined, data: ClassData, pairs: int) -> Model:
         variance = np.einsum("fi,ij,fj->f", values, fit.covariance[own, own], values.conj(), optimize=True).real
         weights.append(1.0 / np.sqrt(np.maximum(variance, 0.0) + (ROUGH * np.abs(values @ coefficients)) ** 2))
     d, n = model.functions(position)
-    basis = Fractions(common_pairs(position, [d, n], weights, pairs))
+    basis = Fractions.limited(common_pairs(position, [d, n], weights, pairs), float(position[0]))
     fractions = basis.at(position)
     of_d, of_n = (_fitted(fractions, f, weight) for f, weight in zip((d, n), weights, strict=True))
     return Model(basis, of_d, of_n, model.k, model.c)
 
 
-def extended(model: Model, data: ClassData) -> Model:
-    """The model with one more pair of poles where, of PLACES, it lowers the output error most to first order."""
-    known, count = model.basis.pairs, len(PLACES)
+def extended(model: Model, data: ClassData) -> list[Model]:
+    """The model with one more pair of poles where, of PLACES, it lowers the output error most to first order; and the
+    same without residues, which the first refining step finds with everything else, should these lead too far."""
+    known, least, count = model.basis.pairs, max(data.lowest, 1) / data.top, len(PLACES)
     kept, size_of = known.shape[0], np.array(PLACES) * data.excited / data.top
     placed = np.stack([2 * np.array(PLACED_DAMPING) * size_of, size_of**2], axis=1)
-    basis = Fractions(np.concatenate([known, placed]))
+    basis = Fractions.limited(np.concatenate([known, placed]), least)
     wide_d, wide_n = (_spread(x, kept, count) for x in (model.d, model.n))
     start = Model(basis, wide_d, wide_n, model.k, model.c)
     gram, right = linearised(start, data)
@@ -144,10 +161,13 @@ def extended(model: Model, data: ClassData) -> Model:
         gain = float(step @ (right[own] / scale))
         if gain > best:
             best, chosen, residues = gain, place, (step / scale)[-4:]
-    d, n = (_spread(x, kept, 1) for x in (model.d, model.n))
-    for coefficients, (constant, slope) in ((d, residues[:2]), (n, residues[2:])):
-        coefficients[3 + kept], coefficients[4 + 2 * kept] = constant, slope
-    return Model(Fractions(np.concatenate([known, placed[chosen : chosen + 1]])), d, n, model.k, model.c)
+    one, models = Fractions.limited(np.concatenate([known, placed[chosen : chosen + 1]]), least), []
+    for part in (1.0, 0.0):
+        d, n = (_spread(x, kept, 1) for x in (model.d, model.n))
+        for coefficients, (constant, slope) in ((d, part * residues[:2]), (n, part * residues[2:])):
+            coefficients[3 + kept], coefficients[4 + 2 * kept] = constant, slope
+        models.append(Model(one, d, n, model.k, model.c))
+    return models
 
 
 def _spread(coefficients: NDArray[np.float64], kept: int, more: int) -> NDArray[np.float64]:

@@ -105,7 +105,7 @@ def _doubts(found: Feedback, spectra: Spectra, natural: Floats, variance: float,
     notes = doubt_of(apart, variance)
     if not spectra.steady:
         notes.append("the steady state is not verified, and mesh-feedback assumes it")
-    lowest = int(np.abs(found.data.lines[np.abs(found.data.force).max(axis=2) > 0]).min()) * spectra.spacing
+    lowest = found.data.lowest * spectra.spacing
     if natural.size and np.isfinite(natural[0]).any() and lowest > GAUGED * float(np.nanmin(natural[0])):
         notes.append(
             f"the excitation begins at {lowest:g} Hz, not far below the first mode: mesh stiffness and damping are"

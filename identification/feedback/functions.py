@@ -44,15 +44,42 @@ class Splines:
         """No poles."""
         return np.empty((0, 2))
 
+    @property
+    def parameters(self) -> Floats:
+        """No free parameters."""
+        return np.empty(0)
+
 
 @dataclass(frozen=True)
 class Fractions:
     """1, s, s^2, and 1/q and s/q for each q = s^2 + a s + b of `pairs` (m, 2), a and b positive; s = j position.
 
     A pair of poles so written passes from complex to real ones, as those of over-damped supports, without a seam.
+
+    No pole is slower than the position `least`, that of the lowest line: a slower one is not told from 1/s by any line,
+    and may make anything of frequency 0, by which sidebands pass. Hence the free parameters of a pair are a and r in
+    b = least a + r^2.
     """
 
     pairs: Floats
+    least: float = 0.0
+
+    @staticmethod
+    def limited(pairs: Floats, least: float) -> Fractions:
+        """Fractions of `pairs` (m, 2), of which those that are too slow come to the limit."""
+        a = pairs[:, 0]
+        return Fractions(np.stack([a, np.maximum(pairs[:, 1], least * a + least**2)], axis=1), least)
+
+    @property
+    def parameters(self) -> Floats:
+        """Free parameters (2 m,): a of all pairs, then r."""
+        a, b = self.pairs.T
+        return np.concatenate([a, np.sqrt(np.maximum(b - self.least * a, 0.0))])
+
+    def with_parameters(self, parameters: Floats) -> Fractions:
+        """The same with other free parameters; their signs do not count."""
+        a, r = np.abs(parameters.reshape(2, -1))
+        return Fractions(np.stack([a, self.least * a + r**2], axis=1), self.least)
 
     def at(self, position: Floats) -> Complexes:
         """Values (..., 3 + 2 m)."""
@@ -61,11 +88,12 @@ class Fractions:
         return np.concatenate([s**0, s, s**2, fraction, s * fraction], axis=-1)
 
     def slopes(self, position: Floats, coefficients: Floats) -> Complexes:
-        """Derivatives (..., 2 m) of sum coefficients phi with respect to a and b of each pair."""
+        """Derivatives (..., 2 m) of sum coefficients phi with respect to the free parameters."""
         s = 1j * np.asarray(position)[..., None]
         count = self.count
         change = -(coefficients[3 : 3 + count] + coefficients[3 + count :] * s) / self._squares(s) ** 2
-        return np.concatenate([s * change, change], axis=-1)
+        r = self.parameters[count:]
+        return np.concatenate([(s + self.least) * change, 2 * r * change], axis=-1)
 
     @property
     def count(self) -> int:
@@ -90,8 +118,7 @@ def common_pairs(position: Floats, responses: list[Complexes], weights: list[Flo
     Vector fitting (Gustavsen and Semlyen 1999): sigma = 1 + sum c_i phi_i times each response is fitted with the same
     poles; the zeros of sigma are the next poles.
     """
-    imaginary = np.linspace(position[0], position[-1], pairs + 2)[1:-1]
-    found = pairs_of(imaginary * (1j - 0.02))
+    found = spread_pairs(position[0], position[-1], pairs)
     for _ in range(FITTING_ROUNDS):
         values = Fractions(found).at(position)
         size = values.shape[1]
@@ -102,12 +129,22 @@ def common_pairs(position: Floats, responses: list[Complexes], weights: list[Flo
             row[:, len(responses) * size :] = -values[:, 3:] * response[:, None]
             blocks.append(row * weight[:, None])
             right.append(response * weight)
-        matrix, target = np.concatenate(blocks), np.concatenate(right)
-        stacked = np.concatenate([matrix.real, matrix.imag])
-        scale = np.maximum(np.linalg.norm(stacked, axis=0), np.finfo(float).tiny)
-        solution = np.linalg.lstsq(stacked / scale, np.concatenate([target.real, target.imag]), rcond=1e-12)[0] / scale
-        found = _zeros(found, solution[len(responses) * size :])
+        found = relocated(found, np.concatenate(blocks), np.concatenate(right))
     return found
+
+
+def relocated(pairs: Floats, matrix: Complexes, target: Complexes) -> Floats:
+    """Pairs of the zeros of sigma = 1 + sum c_i phi_i, whose c are the last unknowns of `matrix` x = `target`."""
+    stacked = np.concatenate([matrix.real, matrix.imag])
+    scale = np.maximum(np.linalg.norm(stacked, axis=0), np.finfo(float).tiny)
+    solution = np.linalg.lstsq(stacked / scale, np.concatenate([target.real, target.imag]), rcond=1e-12)[0] / scale
+    return _zeros(pairs, solution[-2 * pairs.shape[0] :])
+
+
+def spread_pairs(lowest: float, highest: float, pairs: int) -> Floats:
+    """Pairs of poles of little damping, spread between two positions: where fitting begins."""
+    poles: Complexes = np.linspace(lowest, highest, pairs + 2)[1:-1] * (1j - 0.02)
+    return pairs_of(poles)
 
 
 def _zeros(pairs: Floats, coefficients: Floats) -> Floats:

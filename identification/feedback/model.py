@@ -39,9 +39,9 @@ class Model:
         return self.d.size + self.n.size + self.basis.pairs.size
 
     def vector(self) -> Floats:
-        """All parameters as real numbers: d, n, a and b of the pairs, k, c, of complex ones real parts first."""
+        """All parameters as real numbers: d, n, those of the pairs, k, c, of complex ones real parts first."""
         mesh = [part for x in (self.k, self.c) for part in (x.real, x.imag)]
-        return np.concatenate([self.d, self.n, self.basis.pairs.T.ravel(), *mesh])
+        return np.concatenate([self.d, self.n, self.basis.parameters, *mesh])
 
     def scaled(self, factor: float) -> Model:
         """D, N, k, c times a real number: the same response."""
@@ -59,7 +59,7 @@ class Model:
         d, n, pairs, k, kj, c, cj = np.split(vector, np.cumsum(sizes)[:-1])
         basis = self.basis
         if isinstance(basis, Fractions):
-            basis = Fractions(np.abs(pairs.reshape(2, -1).T))
+            basis = basis.with_parameters(pairs)
         return Model(basis, d, n, k + 1j * kj, c + 1j * cj)
 
     def functions(self, position: Floats) -> tuple[Complexes, Complexes]:

@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import cho_factor, cho_solve, solve_triangular
 
 from gearbench.identification.feedback.data import ClassData
 from gearbench.identification.feedback.model import Model, Operator
@@ -34,14 +34,19 @@ GAUGE = 1e3
 @dataclass(frozen=True)
 class Refined:
     """Model, the residual of its response (C, S, E) in units of the data, on all lines that dte is known on, `noise`
-    variance per complex equation, `covariance` (P, P) of the real parameters, and `freedom`: complex equations less
-    parameters."""
+    variance per complex equation, `root` (P, P) of the covariance of the real parameters, and `freedom`: complex
+    equations less parameters."""
 
     model: Model
     left: Complexes
     noise: float
-    covariance: Floats
+    root: Floats
     freedom: float
+
+    @property
+    def covariance(self) -> Floats:
+        """Covariance (P, P) of the real parameters: root root^T."""
+        return np.asarray(self.root @ self.root.T)
 
 
 def response(model: Model, data: ClassData, operator: Operator | None = None) -> Complexes:
@@ -63,24 +68,29 @@ def refined(model: Model, data: ClassData, settled: float = SETTLED) -> Refined:
         freedom = _freedom(data, model)
         noise = cost / freedom
         system = _System(model, gram, right, noise, prior)
-        covariance = system.covariance()
+        root = system.root()
         trial, operator_of, of_trial, cost_of, damping = _damped(model, system, data, cost, damping)
         if cost_of > cost * (1 + SETTLED):
             break  # no step along this direction helps
         before, cost = cost, cost_of
-        model, operator, predicted, prior = trial, operator_of, of_trial, _prior(trial, covariance)
+        model, operator, predicted, prior = trial, operator_of, of_trial, _prior(trial, np.sum(root**2, axis=1))
         if before - cost < settled * before:
             break
     left = np.where(data.dte != 0, data.dte - predicted, 0.0)
-    return Refined(model, left, cost / _freedom(data, model), covariance, _freedom(data, model))
+    return Refined(model, left, cost / _freedom(data, model), root, _freedom(data, model))
 
 
 def settled_covariance(fit: Refined, data: ClassData) -> Refined:
     """The same with the covariance at the model itself; that of `refined` belongs to the model before its last step,
     which is another one where a pole comes near zero frequency."""
     gram, right = linearised(fit.model, data)
-    system = _System(fit.model, gram, right, fit.noise, _prior(fit.model, fit.covariance))
-    return replace(fit, covariance=system.covariance())
+    system = _System(fit.model, gram, right, fit.noise, _prior(fit.model, np.sum(fit.root**2, axis=1)))
+    return replace(fit, root=system.root())
+
+
+def output_error(model: Model, data: ClassData) -> float:
+    """Weighted sum of the squared residuals of the response; infinite for a model that has none."""
+    return _cost(data, response(model, data))
 
 
 def linearised(model: Model, data: ClassData) -> tuple[Floats, Floats]:
@@ -117,13 +127,13 @@ def _freedom(data: ClassData, model: Model) -> float:
     return max(data.equations - 0.5 * model.vector().size, 1.0)
 
 
-def _prior(model: Model, covariance: Floats | None) -> Floats:
-    """Prior precision of each real parameter; 0 for those of D and N."""
+def _prior(model: Model, variance: Floats | None) -> Floats:
+    """Prior precision of each real parameter, 0 for those of D and N, from their values and `variance` (P,)."""
     harmonics = model.harmonics
     order = np.arange(1, harmonics + 1)
     free = model.free
     precision = np.zeros(free + 4 * harmonics)
-    spread = np.zeros(4 * harmonics) if covariance is None else np.diagonal(covariance)[free:]
+    spread = np.zeros(4 * harmonics) if variance is None else variance[free:]
     for first, values in ((0, model.k), (2 * harmonics, model.c)):
         own = spread[first : first + 2 * harmonics].reshape(2, harmonics)
         size = np.mean(order**2 * (values.real**2 + values.imag**2 + own[0] + own[1])) / 2
@@ -177,7 +187,12 @@ class _System:
         total = self.total + damping * np.eye(self.size.size)
         return np.asarray(cho_solve(cho_factor(total, lower=True), self.pull) / self.size)
 
-    def covariance(self) -> Floats:
-        """Covariance of all parameters."""
-        inverse = cho_solve(cho_factor(self.total, lower=True), np.eye(self.size.size))
-        return np.asarray(inverse / self.size / self.size[:, None])
+    def root(self) -> Floats:
+        """R of the covariance R R^T of all parameters.
+
+        A factor's inverse, not the inverse's factor: where parameters stand in for each other the inverse loses what
+        the lines know well, and draws from it leave the record by many deviations.
+        """
+        lower = np.linalg.cholesky(self.total)
+        inverse = solve_triangular(lower, np.eye(self.size.size), lower=True, trans="T")
+        return np.asarray(inverse / self.size[:, None])

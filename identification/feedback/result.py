@@ -14,8 +14,9 @@ from gearbench.identification.spectra.joint import Complexes, Floats
 # Draws of the parameters from their covariance, and output lines on which they are followed.
 DRAWS = 16
 # Part of their deviation that parameters are drawn by: variances are those of a response that is linear in them. Whole
-# steps would lead through poles at zero frequency and functions that vanish.
-STEP = 1e-3
+# steps would lead through poles at zero frequency and functions that vanish; parameters that stand in for each other
+# have deviations of many times their size, along which a thousandth of it is not linear yet.
+STEP = 1e-6
 FOLLOWED = 40
 # Lines beyond those of the fit that suffice to tell how well it goes on.
 FEWEST_HELD = 100
@@ -79,7 +80,7 @@ def followed(lines: NDArray[np.int64]) -> NDArray[np.int64]:
 def drawn_models(found: Feedback) -> list[Model]:
     """Models with parameters drawn by STEP of their covariance's root, each with the common factor of its own N."""
     model = found.model
-    steps = drawn_steps(found.refined.covariance)
+    steps = steps_of(found.refined.root)
     return [gauged(model.moved(model.vector() + step), found.data) for step in steps]
 
 
@@ -91,8 +92,12 @@ def drawn_steps(covariance: Floats) -> Floats:
     """
     size = np.sqrt(np.maximum(np.diagonal(covariance), np.finfo(float).tiny))
     values, vectors = np.linalg.eigh(covariance / size / size[:, None])
-    root = size[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
-    return np.asarray(STEP * np.random.default_rng(0).standard_normal((DRAWS, size.size)) @ root.T)
+    return steps_of(size[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
+
+
+def steps_of(root: Floats) -> Floats:
+    """The same of covariance = `root` root^T."""
+    return np.asarray(STEP * np.random.default_rng(0).standard_normal((DRAWS, root.shape[1])) @ root.T)
 
 
 def along_phase(model: Model, data: ClassData, phases: int) -> tuple[Floats, Floats]:
@@ -102,7 +107,7 @@ def along_phase(model: Model, data: ClassData, phases: int) -> tuple[Floats, Flo
     of a shaft to ground as the mesh's.
     """
     turn = np.exp(2j * np.pi * np.outer(np.arange(phases) / phases, np.arange(1, model.harmonics + 1)))
-    lowest = int(np.abs(data.lines[np.abs(data.force).max(axis=2) > 0]).min())
+    lowest = data.lowest
     position = np.linspace(lowest, lowest + 0.05 * (data.excited - lowest), 16) / data.top
     d, _ = model.functions(position)
     # D = k_0 + j w c_0 - w^2 m + ..: straight lines through its parts.

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.linalg import eigh, solve
 
 from gearbench.identification.feedback.data import ClassData
-from gearbench.identification.feedback.functions import Splines
+from gearbench.identification.feedback.functions import Basis
 from gearbench.identification.feedback.model import Model
 from gearbench.identification.spectra.joint import Floats
 
@@ -27,9 +27,9 @@ QUIET = 30.0
 LOWEST = 3
 
 
-def first_model(data: ClassData, basis: Splines, harmonics: int) -> Model:
-    """Model from weighted equations, N = 1 at the lowest excited lines."""
-    weights, quiet = _weights(data)
+def first_model(data: ClassData, basis: Basis, harmonics: int) -> Model:
+    """Model from weighted equations, N = 1 at the lowest excited lines; poles of the basis stay."""
+    weights, quiet = equation_weights(data)
     size = basis.at(np.zeros(1)).shape[1]
     none = np.zeros(harmonics, dtype=complex)
     model = Model(basis, np.zeros(size), np.zeros(size), none, none)
@@ -47,10 +47,11 @@ def first_model(data: ClassData, basis: Splines, harmonics: int) -> Model:
     vector = np.empty(gram.shape[0])
     vector[chosen] = vectors[:, 0]
     vector[~chosen] = -others @ vectors[:, 0]
+    vector[free - basis.pairs.size : free] = basis.parameters
     return gauged(model.moved(vector), data)
 
 
-def _weights(data: ClassData) -> tuple[Floats, float]:
+def equation_weights(data: ClassData) -> tuple[Floats, float]:
     """Rms of response over rms of force around each line, which makes errors those of the response; less where the
     response is near its lowest level and 0 beyond the excited lines."""
     bins = np.clip((np.abs(data.omega) * BINS).astype(int), 0, BINS - 1)
@@ -88,7 +89,7 @@ def gauged(model: Model, data: ClassData) -> Model:
 
     All of D, N, k, c may be multiplied by one real number without a change of the response.
     """
-    lowest = int(np.abs(data.lines[np.abs(data.force).max(axis=2) > 0]).min())
+    lowest = data.lowest
     position = np.linspace(lowest, lowest + 0.05 * (data.excited - lowest), 16) / data.top
     scale = 1.0 / float(model.functions(position)[1].real.mean())
     return model.scaled(scale)
