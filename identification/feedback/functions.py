@@ -143,8 +143,8 @@ def relocated(pairs: Floats, matrix: Complexes, target: Complexes) -> Floats:
 
 def spread_pairs(lowest: float, highest: float, pairs: int) -> Floats:
     """Pairs of poles of little damping, spread between two positions: where fitting begins."""
-    poles: Complexes = np.linspace(lowest, highest, pairs + 2)[1:-1] * (1j - 0.02)
-    return pairs_of(poles)
+    size = np.linspace(lowest, highest, pairs + 2)[1:-1]
+    return pairs_of(np.asarray((1j - 0.02) * size, dtype=complex))
 
 
 def _zeros(pairs: Floats, coefficients: Floats) -> Floats:
