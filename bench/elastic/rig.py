@@ -122,7 +122,8 @@ def linearised(machine: Machine, torque: float, phase: float) -> Linearised:
     """The rig about static equilibrium under a driver torque [N m] at a mesh phase [cycles]."""
     law, hubs = machine.law, machine.hubs
     factor = stiffness_factor(machine.correction, phase, 0.0)
-    dte = static_cycle(law, np.array([phase]), torque=[torque / factor]).transmission_error[0, 0]
+    cycle = static_cycle(law, np.array([phase]), torque=[torque / factor], key="experiment.torque_mean_nm")
+    dte = cycle.transmission_error[0, 0]
     theta1 = phase * law.driver.pitch + dte / law.driver.rb
     theta2 = phase * law.driven.pitch
     found = position(law, theta1, theta2, 0.0, 0.0, 0.0, 0.0, np.zeros(PAIRS))

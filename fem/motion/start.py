@@ -110,8 +110,8 @@ def _yielding(machine: Machine, hub: Array, torque: float, error: ContactError) 
     if moved == 0.0:
         return error
     return ContactError(
-        f"torque_mean_nm = {torque:g} moves a gear's centre by {1e6 * moved:.4g} um on its support (rig.support), where"
-        " the flanks find no rest: lower it, or raise the support's stiffness_n_per_m"
+        f"experiment.torque_mean_nm = {torque:g} moves a gear's centre by {1e6 * moved:.4g} um on its support"
+        " (rig.support), where the flanks find no rest: lower it, or raise the support's stiffness_n_per_m"
     )
 
 
