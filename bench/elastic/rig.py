@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import ceil, pi
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -105,11 +106,24 @@ def slowest_decay(machine: Machine, torque: float, phase: float, highest: float)
     return float(-values[np.abs(values) <= 2 * pi * highest].real.max(initial=-np.inf))
 
 
-def eigenvalues(machine: Machine, torque: float, phase: float) -> NDArray[np.complex128]:
-    """Eigenvalues [1/s] of the rig about static equilibrium under a driver torque [N m] at a mesh phase [cycles]."""
+class Linearised(NamedTuple):
+    """Equations of motion (n, n) of what moves about static equilibrium; `rows` (pairs, n): how its rigid hubs move the
+    gaps of the pairs that carry, and `opened` (n,): the forces [N] and moments that opening all of them by 1 m makes.
+    """
+
+    mass: Array
+    damping: Array
+    stiffness: Array
+    rows: Array
+    opened: Array
+
+
+def linearised(machine: Machine, torque: float, phase: float) -> Linearised:
+    """The rig about static equilibrium under a driver torque [N m] at a mesh phase [cycles]."""
     law, hubs = machine.law, machine.hubs
     factor = stiffness_factor(machine.correction, phase, 0.0)
-    dte = static_cycle(law, np.array([phase]), torque=[torque / factor]).transmission_error[0, 0]
+    cycle = static_cycle(law, np.array([phase]), torque=[torque / factor], key="experiment.torque_mean_nm")
+    dte = cycle.transmission_error[0, 0]
     theta1 = phase * law.driver.pitch + dte / law.driver.rb
     theta2 = phase * law.driven.pitch
     found = position(law, theta1, theta2, 0.0, 0.0, 0.0, 0.0, np.zeros(PAIRS))
@@ -124,14 +138,33 @@ def eigenvalues(machine: Machine, torque: float, phase: float) -> NDArray[np.com
     moving[:hubs] = ~machine.held
     keep = np.ix_(moving, moving)
     mass, damping = mass_matrix(machine, theta1, theta2)[keep], damping_matrix(machine)[keep]
-    size = len(mass)
+    opened = (rows.T @ np.linalg.solve(residual, np.ones(len(rows))))[moving]
+    rows[:, hubs:] = 0.0
+    return Linearised(mass, damping, stiffness[keep], rows[:, moving], opened)
+
+
+def eigenvalues(machine: Machine, torque: float, phase: float) -> NDArray[np.complex128]:
+    """Eigenvalues [1/s] of the rig about static equilibrium under a driver torque [N m] at a mesh phase [cycles]."""
+    about = linearised(machine, torque, phase)
+    size = len(about.mass)
     system = np.block(
         [
             [np.zeros((size, size)), np.eye(size)],
-            [-np.linalg.solve(mass, stiffness[keep]), -np.linalg.solve(mass, damping)],
+            [-np.linalg.solve(about.mass, about.stiffness), -np.linalg.solve(about.mass, about.damping)],
         ]
     )
     return np.asarray(np.linalg.eigvals(system))
+
+
+def beside_rest(machine: Machine, torque: float, phase: float, frequency: float) -> float:
+    """How far the mesh's answer to errors of its teeth that come at a frequency [Hz] departs from that at rest, over
+    that at rest: little where all vibrations that the mesh takes part in are faster."""
+    about, omega = linearised(machine, torque, phase), 2 * pi * frequency
+    dynamic = about.stiffness + 1j * omega * about.damping - omega**2 * about.mass
+    moved = about.rows @ np.linalg.solve(dynamic, about.opened)
+    # Gears that turn freely together open nothing: of all answers at rest the least one.
+    still = about.rows @ np.linalg.lstsq(about.stiffness, about.opened)[0]
+    return float(abs(moved.mean() / still.mean() - 1.0))
 
 
 def choose_substeps(machine: Machine, case: Case, plan: Schedule) -> int:

@@ -92,9 +92,10 @@ def touching_point(slave: Tooth, master: Tooth, xi: float, a: float) -> Touch:
     c = xi / slave.rb + phi - slave.psi
     if xi < slave.corner:
         s = slave.s_form
-    elif xi <= slave.rho_end:
+    elif xi < slave.rho_end or (xi == slave.rho_end and master.corner < 0.0):
         s = xi * xi / (2 * slave.rb)
     else:
+        # Below a master's undercut the line of action may have ended before: the edge then touches beside it.
         moved = edge_contact(slave, master, c, 0.0, a, 0.0).moved
         s = min(slave.s_end + slave.edge_radius * max(moved, 0.0), slave.s_tip)
     reference, _ = gap_to_master(slave, master, c, a, s)

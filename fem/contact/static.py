@@ -88,11 +88,13 @@ def static_cycle(
     torque: Sequence[float] | None = None,
     dte: Sequence[float] | None = None,
     progress: Callable[[float], None] | None = None,
+    key: str = "torque_nm",
 ) -> StaticCycle:
     """Static response at the mesh phases [cycles], at given driver torques [N m] or given DTE values [m].
 
     The driven gear stands at its nominal angle; the driver is turned until the torque, or the DTE, is reached.
-    Raises ContactError where contact leaves the modelled flank or equilibrium is not found.
+    Raises ContactError where contact leaves the modelled flank or equilibrium is not found; `key` is what it calls a
+    torque.
     """
     if (torque is None) == (dte is None):
         raise ContactError("give either torques or transmission errors for the static cycle")
@@ -106,7 +108,7 @@ def static_cycle(
     guess = 0.0
     unloaded = np.array([unloaded_dte(law, float(phase)) for phase in phases])
     for i, load in enumerate(loads):
-        named = f"torque_nm = {load:g}" if kind == "torque" else f"dte_um = {1e6 * load:g}"
+        named = f"{key} = {load:g}" if kind == "torque" else f"dte_um = {1e6 * load:g}"
         for j, phase in enumerate(phases):
             if kind == "torque":
                 guess = solve_torque(law, float(phase), float(load), guess)

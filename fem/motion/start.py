@@ -73,7 +73,10 @@ def initial_state(machine: Machine, torque: float, t: float = 0.0) -> State:
     hub, dte = np.zeros(machine.hubs), 0.0
     phase = machine.speed2 * t / law.driven.pitch
     for _ in range(50):
-        mesh = _pressed(machine, phase, torque, dte, hub, t)
+        try:
+            mesh = _pressed(machine, phase, torque, dte, hub, t)
+        except ContactError as error:
+            raise _yielding(machine, hub, torque, error) from None
         dte = mesh.dte
         rows = contact_rows(machine, mesh.pairs)
         push = rows.T @ mesh.force
@@ -97,6 +100,19 @@ def initial_state(machine: Machine, torque: float, t: float = 0.0) -> State:
     residual = np.where(mesh.force > 0.0, -mesh.pairs["gap"], mesh.yielded) - modal
     still, force, again = np.zeros(len(d)), mesh.force, residual.copy()
     return State(t, d, still, still, load, mesh.pairs, force, force, residual, again, lately=0.0, torque=torque)
+
+
+def _yielding(machine: Machine, hub: Array, torque: float, error: ContactError) -> ContactError:
+    """The error of a mesh at rest whose gears' centres have moved so far on their supports."""
+    at = machine.at
+    centres = [at.y1, at.y2] + ([at.x1, at.x2] if at.x1 != ABSENT else [])
+    moved = float(np.abs(hub[centres]).max())
+    if moved == 0.0:
+        return error
+    return ContactError(
+        f"experiment.torque_mean_nm = {torque:g} moves a gear's centre by {1e6 * moved:.4g} um on its support"
+        " (rig.support), where the flanks find no rest: lower it, or raise the support's stiffness_n_per_m"
+    )
 
 
 def _mesh_phase(machine: Machine, phase: float, turned: float, push: Array, torque: float, t: float) -> float:

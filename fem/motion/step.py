@@ -28,6 +28,8 @@ Array = NDArray[np.float64]
 
 
 PASSES = 20  # in which forces that are not linear are linearised
+LOOKS = 3  # for the tooth pairs near contact, the first one where old rates and accelerations lead
+STRAYED = 1e-3  # of the base pitch: how far the step may take the flanks from there for contact to stay as found there
 
 
 class Torques(NamedTuple):
@@ -299,8 +301,8 @@ def torques(machine: Machine, new: Stage, n: int, torque: float, nominal: Pace, 
 
 @compiled(fastmath=ROUNDING, **INLINED)
 def seek(machine: Machine, new: Stage, theta1: float, theta2: float, nominal: Pace, room: Room) -> int:
-    """Find the tooth pairs near contact at the unknowns of the new stage; returns how many."""
-    apart = centres(machine, new.d)
+    """Find the tooth pairs near contact where they are sought; returns how many."""
+    apart = centres(machine, room.sought)
     pitch = machine.law.driven.pitch
     excess = common_excess(machine.correction, theta2 / pitch)
     n = meet(machine.law, theta1, theta2, apart.x, apart.y, MARGIN + excess.value, new.pairs)
@@ -310,9 +312,20 @@ def seek(machine: Machine, new: Stage, theta1: float, theta2: float, nominal: Pa
     lean(machine, new.pairs, n, room.lean)
     if rubs(machine):
         write_slides(machine, new, n, apart, nominal, room)
-    for i in range(machine.hubs):
-        room.sought[i] = new.d[i]
     return n
+
+
+@compiled(fastmath=ROUNDING, **INLINED)
+def strayed(machine: Machine, new: Stage, room: Room) -> bool:
+    """Whether the step led so far from where tooth pairs were sought that others touch, or the same elsewhere."""
+    at, law, d, sought = machine.at, machine.law, new.d, room.sought
+    turned = law.driver.rb * (d[at.driver] - sought[at.driver])
+    if at.driven >= 0:
+        turned -= law.driven.rb * (d[at.driven] - sought[at.driven])
+    moved = abs(turned) + abs(d[at.y1] - sought[at.y1] - d[at.y2] + sought[at.y2])
+    if at.x1 >= 0:
+        moved += abs(d[at.x1] - sought[at.x1] - d[at.x2] + sought[at.x2])
+    return bool(moved > STRAYED * law.driver.rb * law.driver.pitch)
 
 
 @compiled(fastmath=ROUNDING, **INLINED)
@@ -346,24 +359,39 @@ def try_step(
     if len(machine.course.time) > 0:
         lag(machine, nominal, room.outer)
     predict(machine, scheme, old, room)
-    n, gain, soft, found = 0, 1.0, 1.0, False
-    # The first pass finds the pairs; where forces are not linear others follow until they are linearised where the step
-    # leads. Each helper is called at one place: every other one would be compiled once more.
-    for turn in range(PASSES):
+    n, gain, soft, found, looks, look, fresh = 0, 1.0, 1.0, False, 0, True, True
+    # The first pass finds the pairs, and another one where the step led far from there; where forces are not linear
+    # others follow until they are linearised where it leads. Each helper is called at one place: every other one would
+    # be compiled once more.
+    for _ in range(PASSES):
         if yields(machine):
-            if turn == 0 or (turn == 1 and rubs(machine)):
+            if fresh:
                 expect(machine, scheme, old, n, room)
+                fresh = False
             linearise(machine, scheme, new, n, room)
         let_go(machine, scheme, new, room)
-        if turn == 0:
-            theta1, theta2 = angles(machine, new.d, t + h)
+        if look:
+            if looks == 0:
+                for i in range(machine.hubs):
+                    room.sought[i] = old.d[i] + h * old.v[i] + 0.5 * h * h * old.a[i]
+            look, looks = False, looks + 1
+            theta1, theta2 = angles(machine, room.sought, t + h)
             soft = 1.0 / stiffness_factor(machine.correction, theta2 / machine.law.driven.pitch, t + h)
             n = seek(machine, new, theta1, theta2, nominal, room)
             gain = recall(old, known, new, n, machine, h, lately, room)
             if rubs(machine):
+                fresh = True
                 continue
         found = press(machine, scheme, new, n, gain, soft, room)
         conclude(machine, scheme, new, n, gain, room)
+        if found and strayed(machine, new, room):
+            found = False
+            if looks == LOOKS:
+                break
+            look = True
+            for i in range(machine.hubs):
+                room.sought[i] = new.d[i]
+            continue
         if not found or not yields(machine) or settled(machine, new, n, room):
             break
         found = False

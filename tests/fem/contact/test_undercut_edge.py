@@ -5,12 +5,13 @@ from __future__ import annotations
 from math import acos
 from typing import Any
 
+import numpy as np
 import pytest
 
 from gearbench.fem.contact.curve import edge_reach, lone_approach
 from gearbench.fem.contact.kinematics import EDGE1, Contact, edge_contact, teeth_of
 from gearbench.fem.contact.law import EDGE_SEPARATION, elastic_pair, make_law
-from gearbench.fem.contact.line import line_contact
+from gearbench.fem.contact.line import gap_to_master, line_contact, touching_point
 from gearbench.fem.gear.body import condense
 
 
@@ -30,6 +31,19 @@ def test_it_is_followed_until_it_has_left_the_line_of_action(rig: Any, gear: Any
     turned = slave.edge_radius * edge.moved >= slave.s_tip - slave.s_end - 1e-6
     assert edge.gap == pytest.approx(separation, rel=0.01) or turned
     assert edge.gap > 0.1 * separation and edge.foot > master.corner
+
+
+def test_it_touches_where_it_is_nearest_from_its_beginning_on(rig: Any, gear: Any) -> None:
+    """Also at the very end of the involute: where the line of action has ended before, the edge touches beside it."""
+    meshing = elastic_pair(rig(gear(30, hub_radius=5e-3), gear(10, hub_radius=5e-3)))
+    slave, master = teeth_of(meshing)
+    a = meshing.centre_distance
+    assert slave.rho_end > meshing.line_of_action
+    for beyond in (0.0, 1e-6, 2e-5):
+        touch = touching_point(slave, master, slave.rho_end + beyond, a)
+        near = np.linspace(slave.s_end - 20e-6, slave.s_tip, 400)
+        gaps = [gap_to_master(slave, master, touch.angle, a, s)[0] for s in near]
+        assert min(gaps) == pytest.approx(touch.reference, abs=1e-9)
 
 
 @pytest.mark.validation

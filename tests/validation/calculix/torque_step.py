@@ -22,9 +22,11 @@ from typing import Any
 
 import numpy as np
 
+from gearbench.bench.elastic.rig import elastic_rig
 from gearbench.bench.export import calculix
 from gearbench.geometry import body
-from gearbench.geometry.export.calculix import deck_text
+from gearbench.geometry.export.calculix import Deck, Touch, deck_text
+from gearbench.geometry.mesh.assembly import outline_sides
 from gearbench.geometry.mesh.grading import Grading
 from gearbench.geometry.mesh.values import GearMesh
 from gearbench.geometry.tooth.profile import profile
@@ -66,13 +68,42 @@ def _coarsen(across: float, size: float) -> None:
     calculix.FAR_GRADING = Grading(growth=1.0, bend=1.2, cut_edges=cuts, fine_tips=False)
 
 
+def on_meshes(deck: Deck, met: tuple[calculix.Meeting, ...], meshes: tuple[GearMesh, GearMesh]) -> Deck:
+    """The deck with other meshes of the same gears, the whole flanks of the pairs `met` as surfaces that may touch, and
+    the penalty of their elements' size."""
+    one, two = (replace(placed, mesh=mesh) for placed, mesh in zip(deck.gears, meshes, strict=True))
+    touches = []
+    for pair in met:
+        slave = int(pair.own_end(1) < pair.own_end(0))
+        flanks, sizes = [], []
+        for gear, number in ((0, -pair.tooth), (1, pair.tooth)):
+            mesh, shape = meshes[gear], pair.shapes[gear]
+            sides = outline_sides(mesh, number % mesh.teeth)
+            radius = np.hypot(*mesh.points[mesh.middles[sides[:, 0], sides[:, 1]]].T)
+            flank = sides[(radius > shape.base_radius) & (radius < shape.tip_radius - shape.edge_radius)]
+            flanks.append(flank)
+            sizes.append((shape.tip_radius - shape.base_radius) / len(flank))
+        touches.append(Touch(slave, flanks[slave], flanks[1 - slave], max(sizes)))
+    return replace(deck, gears=(one, two), touches=tuple(touches))
+
+
 def dynamic_deck(
-    case: Case, across: float, size: float, penalty: float, steps: int, alpha: float
+    case: Case,
+    across: float,
+    size: float,
+    penalty: float,
+    steps: int,
+    alpha: float,
+    meshes: tuple[GearMesh, GearMesh] | None = None,
 ) -> tuple[str, float, int]:
-    """The input of CalculiX, the static transmission error [m] of the torque, and the number of nodes."""
+    """The input of CalculiX, the static transmission error [m] of the torque, and the number of nodes; `meshes` of both
+    gears in place of those made here."""
     _coarsen(across, size)
     model = calculix.contact_model(case, 0.0, torque=TORQUE)
     deck = replace(model.deck, head=("A step of torque on a pair in contact.",))
+    if meshes is not None:
+        met = calculix.meetings(elastic_rig(case.rig, case.simulation), 0.0, model.dte)
+        deck = on_meshes(deck, met, meshes)
     text = deck_text(deck)
     gear, density = case.rig.driver, case.rig.material.density
     inertia = body(profile(gear), gear, density, "rig.driver").inertia
@@ -118,10 +149,12 @@ def angles_in(text: str) -> tuple[list[float], list[float]]:
     return times, found
 
 
-def run(work: Path, case: Case, settings: dict[str, Any]) -> dict[str, Any]:
+def run(
+    work: Path, case: Case, settings: dict[str, Any], meshes: tuple[GearMesh, GearMesh] | None = None
+) -> dict[str, Any]:
     """One run of CalculiX. Raises RuntimeError where it fails."""
     work.mkdir(parents=True, exist_ok=True)
-    text, dte, nodes = dynamic_deck(case, **settings)
+    text, dte, nodes = dynamic_deck(case, **settings, meshes=meshes)
     (work / "step.inp").write_text(text)
     before = time.perf_counter()
     done = subprocess.run(["ccx", "step"], cwd=work, capture_output=True, text=True, check=False)
