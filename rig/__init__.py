@@ -12,7 +12,7 @@ from gearbench.rig.neutral import effects_in, sound_gear
 from gearbench.rig.rig import Damping, Material, Rig
 from gearbench.rig.sensors import Sensors
 from gearbench.rig.study import Study
-from gearbench.rig.support import Across, Housing, Support, Supports
+from gearbench.rig.support import Across, Housing, Rocking, Support, Supports
 
 __all__ = [
     "Across",
@@ -35,6 +35,7 @@ __all__ = [
     "OutputShaft",
     "Rig",
     "Ripple",
+    "Rocking",
     "Sensors",
     "Simulation",
     "SpeedTable",

@@ -35,6 +35,12 @@ class MeshCorrection(Value):
     )
     stiffness_cos: tuple[float, ...] = quantity((), doc="relative cosine amplitudes at mesh orders 1, 2, ..")
     stiffness_sin: tuple[float, ...] = quantity((), doc="relative sine amplitudes at mesh orders 1, 2, ..")
+    exponent: float = quantity(
+        0.0, gt=-0.5, le=1.0, doc="e of the force F (F / reference_force)^e, F being that of the teeth; 0: F"
+    )
+    reference_force: float = quantity(
+        1000.0, "n", gt=0.0, le=1e9, doc="normal force at which the exponent leaves the mesh force as it is"
+    )
     error_mean: float = quantity(
         0.0, "um", ge=-_LARGEST_ERROR, le=_LARGEST_ERROR, doc="excess material of every pair, mean"
     )

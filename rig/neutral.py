@@ -8,7 +8,7 @@ from gearbench.rig.rig import Rig
 from gearbench.rig.value import Value, fields_of, key_of
 
 # Fields that only shape an effect whose size another field gives: alone they change nothing.
-_SHAPES = {"transition_speed", "encoder_runout_driver_phase", "encoder_runout_driven_phase"}
+_SHAPES = {"transition_speed", "reference_force", "encoder_runout_driver_phase", "encoder_runout_driven_phase"}
 _GEAR_SHAPES = {
     "tip_relief_start_diameter",
     "tip_relief_shape",

@@ -93,9 +93,30 @@ class Supports(Value):
         return self.driver.across is not None or self.driven.across is not None
 
 
+class Rocking(Value):
+    """A second motion of the housing: with its own shares 1 and -1 it rocks about the middle between both gears.
+
+    `mass`, `stiffness` and `damping` belong to the motion of a support with share 1.
+    """
+
+    mass: float = quantity(unit="kg", gt=0.0, le=1e7, doc="mass that rocks, seen where the share is 1")
+    stiffness: float = quantity(unit="n_per_m", gt=0.0, doc="stiffness against it, seen where the share is 1")
+    damping: float = quantity(0.0, "n_s_per_m", ge=0.0, doc="damping of it, seen where the share is 1")
+    driver_share: float = quantity(1.0, ge=-100.0, le=100.0, doc="part of it that the driver's support moves by")
+    driven_share: float = quantity(-1.0, ge=-100.0, le=100.0, doc="part of it that the driven gear's support moves by")
+
+
 class Housing(Value):
-    """One rigid body between both supports and the ground, which moves along the supports' direction."""
+    """One rigid body between both supports and the ground, which moves along the supports' direction, and may rock.
+
+    It takes each support along by a share of its own motion h: shares 1 and 1 are a body that moves along, 1 and 0.3
+    one that stands softer at the driver. `mass`, `stiffness` and `damping` belong to h. The mesh pushes both supports
+    apart: a body that moves along hardly feels it, one that rocks feels all of it.
+    """
 
     mass: float = quantity(unit="kg", gt=0.0, le=1e7, doc="mass of the housing")
     stiffness: float = quantity(unit="n_per_m", gt=0.0, doc="stiffness of the housing to the ground")
     damping: float = quantity(0.0, "n_s_per_m", ge=0.0, doc="damping of the housing to the ground")
+    driver_share: float = quantity(1.0, ge=-100.0, le=100.0, doc="part of its motion that the driver's support makes")
+    driven_share: float = quantity(1.0, ge=-100.0, le=100.0, doc="part of it that the driven gear's support makes")
+    rocking: Rocking | None = quantity(None, doc="absent: it does not rock")

@@ -20,7 +20,7 @@ from gearbench.fem.contact.store import stored_law
 from gearbench.fem.gear.body import CondensedGear
 from gearbench.fem.gear.store import stored_gear
 from gearbench.fem.motion.hubs import ABSENT, hubs_at_rest, spring_tangent
-from gearbench.fem.motion.imposed import stiffness_factor
+from gearbench.fem.motion.imposed import hardening, stiffness_factor
 from gearbench.fem.motion.machine import (
     STEADY,
     Machine,
@@ -122,6 +122,7 @@ def linearised(machine: Machine, torque: float, phase: float) -> Linearised:
     """The rig about static equilibrium under a driver torque [N m] at a mesh phase [cycles]."""
     law, hubs = machine.law, machine.hubs
     factor = stiffness_factor(machine.correction, phase, 0.0)
+    factor *= hardening(machine.correction, torque / law.driver.rb / factor)
     cycle = static_cycle(law, np.array([phase]), torque=[torque / factor], key="experiment.torque_mean_nm")
     dte = cycle.transmission_error[0, 0]
     theta1 = phase * law.driver.pitch + dte / law.driver.rb
@@ -129,7 +130,8 @@ def linearised(machine: Machine, torque: float, phase: float) -> Linearised:
     found = position(law, theta1, theta2, 0.0, 0.0, 0.0, 0.0, np.zeros(PAIRS))
     rows = contact_rows(machine, found.pairs)[found.active]
     # Modes are unknowns of their own here, so the pairs keep only the residual's flexibility.
-    residual = found.flexibility[np.ix_(found.active, found.active)] / factor - modal_flexibility(machine, rows)
+    stiffer = factor * (1.0 + machine.correction.exponent)
+    residual = found.flexibility[np.ix_(found.active, found.active)] / stiffer - modal_flexibility(machine, rows)
     stiffness = stiffness_matrix(machine) + rows.T @ np.linalg.solve(residual, rows)
     push = factor * found.force[found.active] @ rows[:, :hubs]
     rest = hubs_at_rest(machine.hub_stiffness, machine.springs, machine.at, machine.held, push)

@@ -36,7 +36,8 @@ class Moving(NamedTuple):
 @dataclass(frozen=True)
 class Along:
     """A steady motion on the half-step grid (entries,) of one repetition: mesh phase [cycles], elastic force of the
-    mesh [N], rate of its deflection [m/s], the law of its force, and of the coordinates u1, y1, y2, u2 their motion.
+    mesh [N], rate of its deflection [m/s], the law of its force, the force that the teeth would have without an
+    exponent over the one where that changes nothing, and of the coordinates u1, y1, y2, u2 their motion.
     `drive` is the coordinate that the driver's torque acts on; `early` steps let free vibrations die out.
     """
 
@@ -44,6 +45,7 @@ class Along:
     elastic: Array
     rate: Array
     law: MeshLaw
+    level: Array
     tangent: Tangent
     substeps: int
     early: int
@@ -94,6 +96,7 @@ def along(steady: Steady) -> Along:
     speed = resampled(rate, entries) + table.excess_rate[:entries]
     phase = table.position[:entries] / model.law.phases
     force, slope = model.law.evaluate(depth, phase)
+    level = (np.abs(force) / model.rig.mesh.reference_force) ** (1.0 / (1.0 + model.rig.mesh.exponent))
     force, slope = force * table.gain[:entries], np.maximum(slope, 0.0) * table.gain[:entries]
     damping = c.damping_factor * np.sqrt(slope)
     tangents = tuple(
@@ -118,7 +121,7 @@ def along(steady: Steady) -> Along:
         return Moving(resampled(signal, entries), *(resampled(one, entries) for one in rates))
 
     coordinates = tuple(moving(signal) for signal in (out.u1, out.y1, out.y2, out.u2))
-    return Along(cycles, force, speed, model.law, tangent, substeps, early, model.factor, drive, coordinates)
+    return Along(cycles, force, speed, model.law, level, tangent, substeps, early, model.factor, drive, coordinates)
 
 
 def _substeps(steady: Steady) -> int:

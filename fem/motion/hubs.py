@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.geometry.tooth.body import Body
-from gearbench.rig import Rig, Support
+from gearbench.rig import Housing, Rig, Rocking, Support
 
 Array = NDArray[np.float64]
 ABSENT = -1
@@ -21,7 +21,7 @@ ABSENT = -1
 class Unknowns(NamedTuple):
     """Numbers of the hubs' unknowns, ABSENT where a rig has none: departures of the gears' rotations, of those of the
     outer ends of drive and load from the nominal ones [rad]; motions of the centres along the supports and across them,
-    and of the housing [m]."""
+    and both of the housing [m]."""
 
     driver: int
     driven: int
@@ -32,6 +32,7 @@ class Unknowns(NamedTuple):
     drive_end: int
     load_end: int
     housing: int
+    rocking: int
 
 
 class Springs(NamedTuple):
@@ -74,6 +75,7 @@ def unknowns_of(rig: Rig) -> tuple[Unknowns, int]:
         "drive_end": rig.drive.twists and rig.drive.boundary != "speed",
         "load_end": rig.load.twists and rig.load.boundary != "speed",
         "housing": rig.housing is not None,
+        "rocking": rig.housing is not None and rig.housing.rocking is not None,
     }
     present = [name for name, there in wanted.items() if there]
     return Unknowns(*(present.index(name) if there else ABSENT for name, there in wanted.items())), len(present)
@@ -101,10 +103,13 @@ def hubs_of(rig: Rig, bodies: tuple[Body, Body]) -> Hubs:
         if end != ABSENT and coupling is not None:
             mass[end] = coupling.inertia
         shafts.append(shaft)
+    moves = _moves(rig, at)
     supports = ((at.y1, at.x1, rig.support.driver, bodies[0]), (at.y2, at.x2, rig.support.driven, bodies[1]))
-    for y, x, support, body in supports:
+    for number, (y, x, support, body) in enumerate(supports):
         mass[y], holds, damps = support.holding(body.mass)
-        row = _row(count, y, at.housing)
+        row = _row(count, y)
+        for place, move in moves:
+            row[place] = -(move.driver_share, move.driven_share)[number]
         if support.exponent:
             springs.append((row, holds, support.exponent, support.reference_deflection))
         _between(stiffness, damping, row, (0.0 if support.exponent else holds, damps))
@@ -112,9 +117,9 @@ def hubs_of(rig: Rig, bodies: tuple[Body, Body]) -> Hubs:
             mass[x] = body.mass
             held[x] = support.across is None
             _across(stiffness, damping, row, x, support)
-    if rig.housing is not None:
-        mass[at.housing] = rig.housing.mass
-        _between(stiffness, damping, _row(count, at.housing), (rig.housing.stiffness, rig.housing.damping))
+    for place, move in moves:
+        mass[place] = move.mass
+        _between(stiffness, damping, _row(count, place), (move.stiffness, move.damping))
     return Hubs(
         unknowns=at,
         mass=mass,
@@ -127,6 +132,14 @@ def hubs_of(rig: Rig, bodies: tuple[Body, Body]) -> Hubs:
         drive_shaft=shafts[0],
         load_shaft=shafts[1],
     )
+
+
+def _moves(rig: Rig, at: Unknowns) -> list[tuple[int, Housing | Rocking]]:
+    """The housing's motions and their unknowns."""
+    if rig.housing is None:
+        return []
+    rocking = rig.housing.rocking
+    return [(at.housing, rig.housing), *([(at.rocking, rocking)] if rocking is not None else [])]
 
 
 def _row(count: int, one: int, two: int = ABSENT) -> Array:
@@ -176,7 +189,7 @@ def hubs_at_rest(
     stiffness: Array, springs: Springs, at: Unknowns, held: NDArray[np.bool_], push: Array
 ) -> Array:
     """Unknowns (hubs,) of centres and housing at rest under generalised forces (hubs,); rotations stay zero."""
-    moving = [k for k in (at.y1, at.y2, at.x1, at.x2, at.housing) if k != ABSENT and not held[k]]
+    moving = [k for k in (at.y1, at.y2, at.x1, at.x2, at.housing, at.rocking) if k != ABSENT and not held[k]]
     d = np.zeros(len(push))
     # Each non-linear spring is solved in closed form under what the others leave to it, in turn with those.
     secant = springs.stiffness.copy()

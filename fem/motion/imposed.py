@@ -14,6 +14,8 @@ from gearbench.kernels.compiled import INLINED, compiled
 
 Array = NDArray[np.float64]
 
+LEAST_LEVEL = 1e-4  # of the reference force: below it the exponent's factor stays, or flanks that part would have none
+
 
 @compiled(**INLINED)
 def load_torque(machine: Machine, torque: float) -> float:
@@ -70,6 +72,16 @@ def stiffness_factor(correction: Correction, phase: float, t: float) -> float:
         series += correction.stiffness_cos[n] * cos(angle) + correction.stiffness_sin[n] * sin(angle)
     passed = min(max(t / correction.duration, 0.0), 1.0)
     return correction.scale * series * (1.0 + correction.drift * passed)
+
+
+@compiled(forceinline=True)
+def hardening(correction: Correction, force: float) -> float:
+    """Further factor on the mesh force where it has an exponent, at the force [N] that the teeth press with in all,
+    over the other factor: with F = G (G/reference)^e the one on G is (F/reference)^(e/(1 + e))."""
+    if correction.exponent == 0.0:
+        return 1.0
+    level = max(force / correction.reference, LEAST_LEVEL)
+    return level ** (correction.exponent / (1.0 + correction.exponent))
 
 
 @compiled(forceinline=True)

@@ -44,13 +44,16 @@ class Waves(NamedTuple):
 
 class Correction(NamedTuple):
     """What is common to all pairs: factor on the mesh force, its relative drift over `duration` [s] from time 0 on, its
-    series in mesh orders 1, 2, ...; excess of the working flanks [m], its mean and series."""
+    series in mesh orders 1, 2, ..., and its exponent over a force [N]; excess of the working flanks [m], its mean and
+    series."""
 
     scale: float
     drift: float
     duration: float
     stiffness_cos: Array
     stiffness_sin: Array
+    exponent: float
+    reference: float
     error_mean: float
     error_cos: Array
     error_sin: Array
@@ -165,7 +168,8 @@ def make_machine(
         rubbing=Rubbing(friction.coefficient, 1.0 / friction.transition_speed),
         ripple=_waves(rig),
         correction=Correction(
-            mesh.stiffness_scale, mesh.stiffness_drift, duration, one, two, mesh.error_mean, three, four
+            mesh.stiffness_scale, mesh.stiffness_drift, duration, one, two, mesh.exponent, mesh.reference_force,
+            mesh.error_mean, three, four,
         ),
         balance=Balance(
             follow=1.0 if free and rig.load.boundary == "torque" else 0.0,

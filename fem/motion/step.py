@@ -12,17 +12,36 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.fem.contact.coupling import couple, find_places
+from gearbench.fem.contact.coupling import find_places
 from gearbench.fem.contact.law import meet
-from gearbench.fem.contact.sharing import share
 from gearbench.fem.contact.static import MARGIN
-from gearbench.fem.motion.imposed import common_excess, impose, lag, lean, load_torque, stiffness_factor, thicken
+from gearbench.fem.motion.effective import accelerate, factorise
+from gearbench.fem.motion.imposed import (
+    common_excess,
+    hardening,
+    impose,
+    lag,
+    lean,
+    load_torque,
+    stiffness_factor,
+    thicken,
+)
 from gearbench.fem.motion.machine import Machine, Pace, angles, centres, pace, write_hub_coupling, write_rows
+from gearbench.fem.motion.pressed import press
 from gearbench.fem.motion.scheme import Scheme
 from gearbench.fem.motion.stage import Room, Stage
-from gearbench.fem.motion.yielding import expect, linearise, rubs, settled, write_slides, yield_to, yields
+from gearbench.fem.motion.yielding import (
+    SETTLED,
+    expect,
+    linearise,
+    pressing,
+    rubs,
+    settled,
+    write_slides,
+    yield_to,
+    yields,
+)
 from gearbench.kernels.compiled import INLINED, ROUNDING, compiled
-from gearbench.kernels.small import invert
 
 Array = NDArray[np.float64]
 
@@ -77,62 +96,6 @@ def predict(machine: Machine, scheme: Scheme, old: Stage, room: Room) -> None:
 
 
 @compiled(fastmath=ROUNDING, **INLINED)
-def factorise(machine: Machine, scheme: Scheme, room: Room) -> None:
-    """The effective mass, ready to be solved: soft, spread and inverse of the room."""
-    h, keep, hubs = scheme.step, 1.0 - scheme.alpha_m, machine.hubs
-    viscous = (1.0 - scheme.alpha_f) * h * scheme.gamma
-    elastic = (1.0 - scheme.alpha_f) * h * h * scheme.beta
-    corner, spread, soft, block, mass = room.corner, room.spread, room.soft, room.block, machine.mass[hubs:]
-    for k in range(len(soft)):
-        soft[k] = 1.0 / (keep * mass[k] + (viscous * machine.beta + elastic) * machine.squares[k])
-    for i in range(hubs):
-        for k in range(len(soft)):
-            spread[i, k] = keep * corner[i, k] * soft[k]
-    for i in range(hubs):
-        for j in range(i + 1):
-            shared = 0.0
-            for k in range(len(soft)):
-                shared += spread[i, k] * corner[j, k]
-            block[i, j] = block[j, i] = -keep * shared
-        block[i, i] += keep * machine.mass[i]
-    for i in range(hubs):
-        for j in range(hubs):
-            total = viscous * machine.hub_damping[i, j] + elastic * machine.hub_stiffness[i, j]
-            block[i, j] += total + room.extra_block[i, j]
-    for i in range(hubs):
-        if machine.held[i]:
-            for j in range(hubs):
-                block[i, j] = block[j, i] = 0.0
-            block[i, i] = 1.0
-    invert(block, room.inverse)
-    for i in range(hubs):
-        if machine.held[i]:
-            room.inverse[i, i] = 0.0
-
-
-@compiled(fastmath=ROUNDING, **INLINED)
-def accelerate(room: Room, push: Array, out: Array) -> None:
-    """Accelerations (d,) by generalised forces (d,)."""
-    hubs, modes = room.corner.shape
-    spread, soft, inverse = room.spread, room.soft, room.inverse
-    push_modes, out_modes = push[hubs:], out[hubs:]
-    for i in range(hubs):
-        out[i] = 0.0
-    for j in range(hubs):
-        head = push[j]
-        for k in range(modes):
-            head -= spread[j, k] * push_modes[k]
-        for i in range(hubs):
-            out[i] += inverse[i, j] * head
-    for k in range(modes):
-        out_modes[k] = push_modes[k] * soft[k]
-    for i in range(hubs):
-        moved = out[i]
-        for k in range(modes):
-            out_modes[k] -= spread[i, k] * moved
-
-
-@compiled(fastmath=ROUNDING, **INLINED)
 def recall(old: Stage, known: int, new: Stage, n: int, machine: Machine, h: float, lately: float, room: Room) -> float:
     """What the last step left of the n pairs of the new stage, of which it knew `known`: forces to expect and what they
     were, held and memory; returns the part of a residual that follows the force at once.
@@ -160,80 +123,6 @@ def recall(old: Stage, known: int, new: Stage, n: int, machine: Machine, h: floa
                 room.arrived[p] = False
                 break
     return gain
-
-
-@compiled(fastmath=ROUNDING, **INLINED)
-def soften(
-    machine: Machine, scheme: Scheme, new: Stage, n: int, q: int, gain: float, soft: float, room: Room
-) -> None:
-    """Fill column q of cross and flexibility for n pairs; soft: one over the factor on the mesh force."""
-    late, hubs = 1.0 - scheme.alpha_f, machine.hubs
-    rows, moved = room.rows, room.moved
-    couple(machine.law, new.pairs, n, room.places, q, room.cross)
-    for i in range(rows.shape[1]):
-        room.push[i] = rows[q, i]
-    if machine.loaded_at >= 0:
-        room.push[machine.loaded_at] -= room.lean[q]
-    if rubs(machine):
-        for i in range(hubs):
-            room.push[i] += room.turned[q] * room.rub[q, i]
-    accelerate(room, room.push, moved[q])
-    pushed = rows[q, hubs:]
-    for p in range(n):
-        modal, pressed = 0.0, rows[p, hubs:]
-        for k in range(len(room.ease)):
-            modal += pressed[k] * pushed[k] * room.ease[k]
-        room.cross[p, q] = room.cross[p, q] * soft - modal
-        shift = 0.0
-        for i in range(rows.shape[1]):
-            shift += rows[p, i] * moved[q, i]
-        room.flexibility[p, q] = gain * room.cross[p, q] + scheme.beta * scheme.step * scheme.step * late * shift
-    room.desk.known[q] = True
-
-
-@compiled(fastmath=ROUNDING, **INLINED)
-def overlap(machine: Machine, new: Stage, n: int, gain: float, room: Room) -> None:
-    """Overlaps of n pairs that rigid motion, modes and what the residual carries over leave to new forces."""
-    slow, moved = 1.0 - gain, new.d[machine.hubs :]
-    for p in range(n):
-        if room.arrived[p]:
-            # A pair that is new comes with the residual that its neighbours' forces hold it at.
-            room.held[p] = 0.0
-            for q in range(n):
-                if new.before[q] > 0.0:
-                    room.held[p] += room.cross[p, q] * new.before[q]
-            room.memory[p] = slow * room.held[p]
-        over = -new.pairs[p].gap - room.memory[p]
-        for i in range(machine.hubs):
-            over -= room.rows[p, i] * (new.d[i] - room.sought[i])
-        row = room.rows[p, machine.hubs :]
-        for k in range(len(moved)):
-            over -= row[k] * moved[k]
-        room.over[p] = over
-
-
-@compiled(fastmath=ROUNDING, **INLINED)
-def press(machine: Machine, scheme: Scheme, new: Stage, n: int, gain: float, soft: float, room: Room) -> bool:
-    """The forces of n pairs; whether they were found. Only the columns of the flexibility that forces need are made:
-    first those of the forces to expect."""
-    column = 0
-    while True:
-        while column < n and not new.force[column] > 0.0:
-            column += 1
-        wanted = column
-        if column >= n:
-            if column == n:
-                overlap(machine, new, n, gain, room)
-                column += 1
-            shared = share(
-                machine.law.curves, new.pairs, n, room.over, room.flexibility, gain, soft, new.force, room.desk
-            )
-            if shared.wanted < 0:
-                return shared.found
-            wanted = shared.wanted
-        else:
-            column += 1
-        soften(machine, scheme, new, n, wanted, gain, soft, room)
 
 
 @compiled(fastmath=ROUNDING, **INLINED)
@@ -359,7 +248,7 @@ def try_step(
     if len(machine.course.time) > 0:
         lag(machine, nominal, room.outer)
     predict(machine, scheme, old, room)
-    n, gain, soft, found, looks, look, fresh = 0, 1.0, 1.0, False, 0, True, True
+    n, gain, soft, factor, found, looks, look, fresh = 0, 1.0, 1.0, 1.0, False, 0, True, True
     # The first pass finds the pairs, and another one where the step led far from there; where forces are not linear
     # others follow until they are linearised where it leads. Each helper is called at one place: every other one would
     # be compiled once more.
@@ -376,7 +265,8 @@ def try_step(
                     room.sought[i] = old.d[i] + h * old.v[i] + 0.5 * h * h * old.a[i]
             look, looks = False, looks + 1
             theta1, theta2 = angles(machine, room.sought, t + h)
-            soft = 1.0 / stiffness_factor(machine.correction, theta2 / machine.law.driven.pitch, t + h)
+            factor = stiffness_factor(machine.correction, theta2 / machine.law.driven.pitch, t + h)
+            soft = 1.0 / (factor * hardening(machine.correction, pressing(old, known) / factor))
             n = seek(machine, new, theta1, theta2, nominal, room)
             gain = recall(old, known, new, n, machine, h, lately, room)
             if rubs(machine):
@@ -392,7 +282,12 @@ def try_step(
             for i in range(machine.hubs):
                 room.sought[i] = new.d[i]
             continue
-        if not found or not yields(machine) or settled(machine, new, n, room):
+        if not found or not yields(machine):
+            break
+        last, done = soft, settled(machine, new, n, room)
+        if machine.correction.exponent != 0.0:
+            soft = 1.0 / (factor * hardening(machine.correction, pressing(new, n) / factor))
+        if done and abs(soft - last) <= SETTLED * last:
             break
         found = False
         for p in range(n):

@@ -1,5 +1,5 @@
-"""Forces on the hubs that are not linear: friction between the flanks and non-linear supports, linearised anew in every
-pass of a step.
+"""Forces that are not linear: friction between the flanks and non-linear supports, linearised anew in every pass of a
+step, and what the flanks press with, on which an exponent of the mesh force depends.
 
 Friction of a pair opposes the sliding velocity of its flanks at that instant, vibration included, by F mu tanh(v/v0).
 On the common normal n, with the arms of both gears from the feet of their base circles' tangents to the contact,
@@ -37,8 +37,17 @@ def rubs(machine: Machine) -> bool:
 
 @compiled(**INLINED)
 def yields(machine: Machine) -> bool:
-    """Whether forces on the hubs are not linear."""
-    return machine.rubbing.coefficient > 0.0 or len(machine.springs.stiffness) > 0
+    """Whether forces are not linear, on the hubs or by the exponent of the mesh."""
+    return rubs(machine) or len(machine.springs.stiffness) > 0 or machine.correction.exponent != 0.0
+
+
+@compiled(**INLINED)
+def pressing(stage: Stage, n: int) -> float:
+    """What n pairs press with in all [N]."""
+    total = 0.0
+    for p in range(n):
+        total += stage.force[p]
+    return total
 
 
 @compiled(fastmath=ROUNDING, **INLINED)

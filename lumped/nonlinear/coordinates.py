@@ -22,11 +22,12 @@ class Coordinates(NamedTuple):
 
 
 class Further(NamedTuple):
-    """Those of rigs with more structure: outer end of the load's shaft on the driven base circle, housing, and centres
-    across their supports."""
+    """Those of rigs with more structure: outer end of the load's shaft on the driven base circle, both motions of the
+    housing, and centres across their supports."""
 
     load: float
     housing: float
+    rocking: float
     x1: float
     x2: float
 
@@ -37,5 +38,5 @@ NAMES = (*Coordinates._fields, *Further._fields)
 
 
 def parted(values: Array) -> tuple[Coordinates, Further | tuple[()]]:
-    """Coordinates of one half of a state (5,) or (9,); the further ones are empty in the shorter."""
+    """Coordinates of one half of a state (5,) or (10,); the further ones are empty in the shorter."""
     return Coordinates(*values[:COORDINATES]), Further(*values[COORDINATES:]) if len(values) > COORDINATES else ()

@@ -89,9 +89,13 @@ def _structured(
     reaction = twist + s.rigid_load * (f + rubbed.driven)
     load = s.held * reaction + s.follow * force + s.constant * mean + s.balance * (rubbed.driven - rubbed.driver)
     along, across = p.factor * f + rubbed.along, s.slide * f - rubbed.across
-    y1, y2 = q.y1 - e.housing, q.y2 - e.housing
-    one = p.damping1 * (v.y1 - r.housing) + spring(y1, p.stiffness1, p.exponent1, p.reference1) + s.coupling1 * e.x1
-    two = p.damping2 * (v.y2 - r.housing) + spring(y2, p.stiffness2, p.exponent2, p.reference2) + s.coupling2 * e.x2
+    h, k = s.housing, s.rocking
+    y1 = q.y1 - h.share1 * e.housing - k.share1 * e.rocking
+    y2 = q.y2 - h.share2 * e.housing - k.share2 * e.rocking
+    u1 = v.y1 - h.share1 * r.housing - k.share1 * r.rocking
+    u2 = v.y2 - h.share2 * r.housing - k.share2 * r.rocking
+    one = p.damping1 * u1 + spring(y1, p.stiffness1, p.exponent1, p.reference1) + s.coupling1 * e.x1
+    two = p.damping2 * u2 + spring(y2, p.stiffness2, p.exponent2, p.reference2) + s.coupling2 * e.x2
     acceleration = Coordinates(
         u1=p.inverse_u1 * (p.rigid * felt.drive + felt.shaft - f - rubbed.driver),
         y1=p.inverse_y1 * (-along - one),
@@ -101,7 +105,8 @@ def _structured(
     )
     further = Further(
         load=s.inverse_load * (twist - load),
-        housing=s.inverse_housing * (one + two - s.housing_damping * r.housing - s.housing_stiffness * e.housing),
+        housing=h.inverse * (h.share1 * one + h.share2 * two - h.damping * r.housing - h.stiffness * e.housing),
+        rocking=k.inverse * (k.share1 * one + k.share2 * two - k.damping * r.rocking - k.stiffness * e.rocking),
         x1=s.inverse_x1 * (-across - s.damping1 * r.x1 - s.stiffness1 * e.x1 - s.coupling1 * y1),
         x2=s.inverse_x2 * (across - s.damping2 * r.x2 - s.stiffness2 * e.x2 - s.coupling2 * y2),
     )
@@ -140,7 +145,8 @@ def _behind(further: Any, pull: float, pushed: float, s: Any) -> Any:
     if len(further) == 0:
         return ()
     lag = pull if s.inverse_load > 0.0 else 0.0
-    return Further(further.load - lag + s.inverse_load * pushed, further.housing, further.x1, further.x2)
+    load = further.load - lag + s.inverse_load * pushed
+    return Further(load, further.housing, further.rocking, further.x1, further.x2)
 
 
 @compiled(fastmath=ROUNDING)

@@ -10,7 +10,7 @@ deflection: exact where the mesh is linear, and dense near zero deflection, wher
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -62,6 +62,15 @@ class MeshLaw:
                 raise LumpedError(f"{name} of a mesh law has shape {getattr(self, name).shape}, not {shape}")
         if self.bending.shape != (*shape, 2):
             raise LumpedError(f"bending of a mesh law has shape {self.bending.shape}, not {(*shape, 2)}")
+
+    def hardened(self, exponent: float, reference: float) -> MeshLaw:
+        """The law F (F / reference)^exponent of the force F of this one; `reference` [N] > 0."""
+        if exponent == 0.0:
+            return self
+        # Force over deflection is tabulated from the first node on: at none there is no force.
+        force = self.force.copy()
+        force[:, 1:] *= (force[:, 1:] / reference) ** exponent
+        return replace(self, force=force)
 
     @property
     def phases(self) -> int:

@@ -57,6 +57,7 @@ from gearbench.lumped.nonlinear.coordinates import Coordinates, Further
 from gearbench.lumped.nonlinear.law import MeshLaw
 from gearbench.lumped.nonlinear.rest import (
     centre_at_rest,
+    housing_at_rest,
     inverse_masses,
     mesh_direction,
     pressed_by,
@@ -226,18 +227,20 @@ class NonLinear:
 
     def equilibrium(self, force: float, excess: float, gain: float, phase: float) -> Array:
         """State (2 size,) at rest under the force T1/rb1 > 0 [N], without friction and ripple: all coordinates, then
-        their rates. The housing is at rest where it is without load: both gears push it alike."""
+        their rates. A housing that takes both supports along alike is where it is without load."""
         (y1, x1), (y2, x2) = self.centres(force)
+        structure = self.structure
+        housed, lifted = housing_at_rest(structure, self.factor * force)
+        y1, y2 = y1 + lifted[0], y2 + lifted[1]
         apart = pressed_by(self.law, force, gain, phase) - excess - self.factor * (y1 - y2)
         twist = force / self.shaft[0] if self.elastic_shaft else 0.0
-        structure = self.structure
         if structure is None:
             return np.array([*Coordinates(apart, y1, y2, 0.0, apart + twist), *(0.0 for _ in Coordinates._fields)])
         apart -= self.slide * (x1 - x2)
         out = force / structure.load_stiffness if self.rig.load.twists else 0.0
         # The end whose speed is prescribed is where it would be in steady rotation.
         u2 = -twist - apart if self.rig.drive.boundary == "speed" else structure.held * out
-        place = Coordinates(u2 + apart, y1, y2, u2, u2 + apart + twist), Further(u2 - out, 0.0, x1, x2)
+        place = Coordinates(u2 + apart, y1, y2, u2, u2 + apart + twist), Further(u2 - out, *housed, x1, x2)
         return np.array([*place[0], *place[1], *np.zeros(self.size)])
 
     def linearised(self, stiffness: float, force: float) -> Array:
@@ -289,7 +292,7 @@ class NonLinear:
 
 
 def nonlinear_model(rig: Rig, meshing: Pair, law: MeshLaw) -> NonLinear:
-    """The model of a rig whose mesh follows `law`. Raises LumpedError."""
+    """The model of a rig whose teeth follow `law`. Raises LumpedError."""
     density = rig.material.density
     one = body(meshing.driver, rig.driver, density, "rig.driver")
     two = body(meshing.driven, rig.driven, density, "rig.driven")
@@ -306,7 +309,7 @@ def nonlinear_model(rig: Rig, meshing: Pair, law: MeshLaw) -> NonLinear:
     turning = one.inertia + (0.0 if elastic else rotor), two.inertia + (0.0 if twists else output)
     return NonLinear(
         rig=rig,
-        law=law,
+        law=law.hardened(rig.mesh.exponent, rig.mesh.reference_force),
         base_radii=(r1, r2),
         working_pressure_angle=meshing.working_pressure_angle,
         factor=cos(meshing.working_pressure_angle) if rig.support.direction == "tangential" else 1.0,

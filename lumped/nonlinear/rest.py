@@ -82,16 +82,29 @@ def _along_less(support: Support, stiffness: float, push: float, softer: float) 
     return float(np.sign(push)) * high
 
 
+def housing_at_rest(s: Structure | None, push: float) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Both motions of the housing [m], and those of driver's and driven support with them, where the mesh pushes the
+    supports apart: the driver's by -push [N], the driven gear's by push."""
+    if s is None:
+        return (0.0, 0.0), (0.0, 0.0)
+    moves = s.housing, s.rocking
+    one, two = (push * (move.share2 - move.share1) / move.stiffness if move.inverse else 0.0 for move in moves)
+    first, second = moves
+    return (one, two), (first.share1 * one + second.share1 * two, first.share2 * one + second.share2 * two)
+
+
 def inverse_masses(c: Constants, s: Structure | None) -> Array:
-    """Inverse masses [1/kg] of all coordinates, 0 for those that do not move; (5,) or (9,)."""
+    """Inverse masses [1/kg] of all coordinates, 0 for those that do not move; (5,) or (10,)."""
     plain = [c.inverse_u1, c.inverse_y1, c.inverse_y2, c.inverse_u2, c.inverse_w]
-    return np.array(plain if s is None else [*plain, s.inverse_load, s.inverse_housing, s.inverse_x1, s.inverse_x2])
+    if s is None:
+        return np.array(plain)
+    return np.array([*plain, s.inverse_load, s.housing.inverse, s.rocking.inverse, s.inverse_x1, s.inverse_x2])
 
 
 def mesh_direction(c: Constants, s: Structure | None) -> Array:
-    """What each coordinate contributes to the DTE; (5,) or (9,)."""
+    """What each coordinate contributes to the DTE; (5,) or (10,)."""
     plain = [1.0, c.factor, -c.factor, -1.0, 0.0]
-    return np.array(plain if s is None else [*plain, 0.0, 0.0, s.slide, -s.slide])
+    return np.array(plain if s is None else [*plain, 0.0, 0.0, 0.0, s.slide, -s.slide])
 
 
 def springs_and_dampers(c: Constants, s: Structure | None, tangents: tuple[float, float]) -> tuple[Array, Array]:
@@ -106,18 +119,21 @@ def springs_and_dampers(c: Constants, s: Structure | None, tangents: tuple[float
             springs[row, row] += k
             dampers[row, row] += d
         return springs, dampers
-    load, housing, x1, x2 = one[COORDINATES:]
+    load, housing, rocking, x1, x2 = one[COORDINATES:]
+    first = y1 - s.housing.share1 * housing - s.rocking.share1 * rocking
+    second = y2 - s.housing.share2 * housing - s.rocking.share2 * rocking
     pairs = (
         (u2 - load, s.load_stiffness, s.load_damping),
-        (housing, s.housing_stiffness, s.housing_damping),
-        (y1 - housing, tangents[0], c.damping1),
-        (y2 - housing, tangents[1], c.damping2),
+        (housing, s.housing.stiffness, s.housing.damping),
+        (rocking, s.rocking.stiffness, s.rocking.damping),
+        (first, tangents[0], c.damping1),
+        (second, tangents[1], c.damping2),
         (x1, s.stiffness1, s.damping1),
         (x2, s.stiffness2, s.damping2),
     )
     for seen, k, d in pairs:
         springs += k * np.outer(seen, seen)
         dampers += d * np.outer(seen, seen)
-    for along, across, k in ((y1 - housing, x1, s.coupling1), (y2 - housing, x2, s.coupling2)):
+    for along, across, k in ((first, x1, s.coupling1), (second, x2, s.coupling2)):
         springs += k * (np.outer(along, across) + np.outer(across, along))
     return springs, dampers

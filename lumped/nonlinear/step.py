@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 
 class Outputs(NamedTuple):
-    """What is seen at the start of each sample; arrays (samples,), the last five empty for a rig without structure."""
+    """What is seen at the start of each sample; arrays (samples,), the last six empty for a rig without structure."""
 
     u1: Array  # coordinates [m]
     y1: Array
@@ -34,6 +34,7 @@ class Outputs(NamedTuple):
     load_force: Array  # at the load's base circle [N]
     load: Array  # further coordinates [m]
     housing: Array
+    rocking: Array
     x1: Array
     x2: Array
     drive_force: Array  # at the driver's base circle [N]
@@ -128,7 +129,13 @@ def _moved_further(e: Any, h: float, r: Any) -> Any:
     """e + h r."""
     if len(e) == 0:
         return ()
-    return Further(e.load + h * r.load, e.housing + h * r.housing, e.x1 + h * r.x1, e.x2 + h * r.x2)
+    return Further(
+        load=e.load + h * r.load,
+        housing=e.housing + h * r.housing,
+        rocking=e.rocking + h * r.rocking,
+        x1=e.x1 + h * r.x1,
+        x2=e.x2 + h * r.x2,
+    )
 
 
 @compiled(fastmath=ROUNDING)
@@ -139,6 +146,7 @@ def _stepped_further(e: Any, h: float, one: Any, two: Any, three: Any, four: Any
     return Further(
         e.load + _mean(h, one.load, two.load, three.load, four.load),
         e.housing + _mean(h, one.housing, two.housing, three.housing, four.housing),
+        e.rocking + _mean(h, one.rocking, two.rocking, three.rocking, four.rocking),
         e.x1 + _mean(h, one.x1, two.x1, three.x1, four.x1),
         e.x2 + _mean(h, one.x2, two.x2, three.x2, four.x2),
     )
@@ -148,7 +156,7 @@ def _stepped_further(e: Any, h: float, one: Any, two: Any, three: Any, four: Any
 def _tell_further(out: Outputs, sample: int, e: Any, one: Answer) -> None:
     """Write what only a rig with structure has."""
     if len(e) != 0:
-        out.load[sample], out.housing[sample], out.x1[sample], out.x2[sample] = e
+        out.load[sample], out.housing[sample], out.rocking[sample], out.x1[sample], out.x2[sample] = e
         out.drive_force[sample] = one.drive_force
 
 

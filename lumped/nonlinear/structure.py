@@ -2,19 +2,34 @@
 supports, supports across, and other boundaries than those of the plain model.
 
     M_l o''  = S_l (u2 - o) + D_l (u2' - o') - T2/rb2       the driven gear then feels S_l (o - u2) + D_l (o' - u2')
-    m_h h''  = P_1 + P_2 - c_h h' - k_h h
-    m_i x_i'' = -+ (sin(a) f - mu f s cos(a)) - c_xi x_i' - k_xi x_i - k_ci (y_i - h)         - driver, + driven gear
-    P_i      = c_i (y_i' - h') + k_i (y_i - h) |(y_i - h)/y_ref|^e + k_ci x_i                what the supports pull with
+    m_h h''  = b_1 P_1 + b_2 P_2 - c_h h' - k_h h                                            and r with d_i likewise
+    m_i x_i'' = -+ (sin(a) f - mu f s cos(a)) - c_xi x_i' - k_xi x_i - k_ci z_i              - driver, + driven gear
+    P_i      = c_i z_i' + k_i z_i |z_i/y_ref|^e + k_ci x_i,   z_i = y_i - b_i h - d_i r      what the supports pull with
 
-a is the angle from the supports' direction to the line of action: the working pressure angle where they are tangential,
-else 0. To the deflection of the mesh x adds sin(a) (x1 - x2), and to the sliding velocity -cos(a) (x1' - x2').
+h and r are the housing's motions, b_i and d_i the shares of them that a support makes. a is the angle from the
+supports' direction to the line of action: the working pressure angle where they are tangential, else 0. To the
+deflection of the mesh x adds sin(a) (x1 - x2), and to the sliding velocity -cos(a) (x1' - x2').
 """
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
-from gearbench.rig import Rig
+from gearbench.rig import Housing, Rig, Rocking
+
+
+class Moves(NamedTuple):
+    """A motion of the housing: stiffness [N/m], damping [N s/m], inverse mass [1/kg], 0 where there is none, and the
+    shares of it that the supports of driver and driven gear make."""
+
+    stiffness: float
+    damping: float
+    inverse: float
+    share1: float
+    share2: float
+
+
+STANDS = Moves(0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class Structure(NamedTuple):
@@ -28,9 +43,8 @@ class Structure(NamedTuple):
     follow: float  # part of the driver's torque that the load balances at any time
     constant: float  # part of the mean torque that it balances
     balance: float  # part of the friction that it makes up for
-    housing_stiffness: float
-    housing_damping: float
-    inverse_housing: float
+    housing: Moves
+    rocking: Moves
     slide: float  # sin(a)
     inverse_x1: float
     inverse_x2: float
@@ -72,9 +86,8 @@ def structure_of(
         follow=1.0 if rig.load.boundary == "torque" and rig.turns_freely else 0.0,
         constant=1.0 if rig.load.boundary == "inertia" or rig.drive.boundary == "speed" else 0.0,
         balance=1.0 if rig.turns_freely else 0.0,
-        housing_stiffness=housing.stiffness if housing is not None else 0.0,
-        housing_damping=housing.damping if housing is not None else 0.0,
-        inverse_housing=1.0 / housing.mass if housing is not None else 0.0,
+        housing=_moves(housing),
+        rocking=_moves(housing.rocking if housing is not None else None),
         slide=slide,
         inverse_x1=1.0 / masses[0] if one is not None else 0.0,
         inverse_x2=1.0 / masses[1] if two is not None else 0.0,
@@ -85,3 +98,9 @@ def structure_of(
         coupling1=one.coupling if one is not None else 0.0,
         coupling2=two.coupling if two is not None else 0.0,
     )
+
+
+def _moves(one: Housing | Rocking | None) -> Moves:
+    if one is None:
+        return STANDS
+    return Moves(one.stiffness, one.damping, 1.0 / one.mass, one.driver_share, one.driven_share)

@@ -50,6 +50,8 @@ _EXAMPLES: dict[str, str] = {
     "rig.load.coupling.stiffness_nm_per_rad": "5e4",
     "rig.housing.mass_kg": "40.0",
     "rig.housing.stiffness_n_per_m": "1e9",
+    "rig.housing.rocking.mass_kg": "20.0",
+    "rig.housing.rocking.stiffness_n_per_m": "2e9",
     "rig.sensors.filter_hz": "3500.0",
     "rig.drive.ripple.orders": "[6, 12]",
     "rig.drive.ripple.amplitude_nm": "[0.6, 0.3]",

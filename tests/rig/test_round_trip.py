@@ -102,6 +102,8 @@ SERIES = st.lists(st.tuples(number(-0.1, 0.1), number(-0.1, 0.1)), max_size=5)
 
 def mesh_of(scale: float, stiffness: list[tuple[float, float]], error: list[tuple[float, float]]) -> MeshCorrection:
     return MeshCorrection(
+        exponent=0.1 * scale,
+        reference_force=100.0 * scale,
         stiffness_scale=scale,
         stiffness_cos=tuple(c for c, _ in stiffness),
         stiffness_sin=tuple(s for _, s in stiffness),

@@ -18,8 +18,9 @@ Array = NDArray[np.float64]
 NORMAL, FLANK = np.array([sin(ALPHA), cos(ALPHA)]), np.array([-cos(ALPHA), sin(ALPHA)])
 # From the gears' centres to where the line of action touches their base circles.
 FOOT1, FOOT2 = RADII[0] * np.array([cos(ALPHA), -sin(ALPHA)]), RADII[1] * np.array([-cos(ALPHA), sin(ALPHA)])
-# Rotor, driver, driven gear, load [rad]; housing, then driver and driven gear along and across their supports [m].
-UNKNOWNS = ("rotor", "driver", "driven", "load", "housing", "y1", "x1", "y2", "x2")
+# Rotor, driver, driven gear, load [rad]; housing, then driver and driven gear along and across their supports, and the
+# housing as it rocks [m].
+UNKNOWNS = ("rotor", "driver", "driven", "load", "housing", "y1", "x1", "y2", "x2", "rocking")
 
 
 def turned(point: Array) -> Array:
@@ -42,6 +43,16 @@ def pull(support: Support, y: float, vy: float, x: float, vx: float) -> tuple[fl
     along = support.stiffness * y * (abs(y) / support.reference_deflection) ** support.exponent + support.damping * vy
     a = support.across
     return (along, 0.0) if a is None else (along + a.coupling * x, a.stiffness * x + a.damping * vx + a.coupling * y)
+
+
+def lift(rig: Rig, d: Array) -> tuple[float, float]:
+    """How far the housing carries both supports."""
+    one = two = 0.0
+    if rig.housing is not None:
+        for k, part in ((4, rig.housing), (9, rig.housing.rocking)):
+            if part is not None:
+                one, two = one + part.driver_share * d[k], two + part.driven_share * d[k]
+    return one, two
 
 
 def plain_rates(rig: Rig, frequency: float, torque: Callable[[float], float], mean: float) -> Callable[..., Array]:
@@ -87,11 +98,12 @@ def plain_rates(rig: Rig, frequency: float, torque: Callable[[float], float], me
         return total, with1 - lost1, with2 + lost2, lost1, lost2
 
     def rates(t: float, q: Array) -> Array:
-        d, v = q[:9], q[9:]
+        d, v = q[:10], q[10:]
         force, with1, with2, lost1, lost2 = flanks(t, d, v)
         first, second = twist(rotor, d[0] - d[1], v[0] - v[1]), twist(brake, d[2] - d[3], v[2] - v[3])
-        one = pull(rig.support.driver, d[5] - d[4], v[5] - v[4], d[6], v[6])
-        two = pull(rig.support.driven, d[7] - d[4], v[7] - v[4], d[8], v[8])
+        carried = lift(rig, d), lift(rig, v)
+        one = pull(rig.support.driver, d[5] - carried[0][0], v[5] - carried[1][0], d[6], v[6])
+        two = pull(rig.support.driven, d[7] - carried[0][1], v[7] - carried[1][1], d[8], v[8])
         driving = torque(t)
         # What both ends leave free is held in the mean by the load, which makes up for the losses.
         load = r2 / r1 * (driving if rig.load.boundary == "torque" else mean)
@@ -99,7 +111,7 @@ def plain_rates(rig: Rig, frequency: float, torque: Callable[[float], float], me
             load = r2 / r1 * mean
         else:
             load += lost2 - r2 / r1 * lost1
-        a = np.zeros(9)
+        a = np.zeros(10)
         if rig.drive.boundary != "speed":
             a[0] = (driving - first) / rotor.inertia if loose[0] and rotor else 0.0
         if loose[0] or rig.drive.boundary != "speed":
@@ -109,8 +121,10 @@ def plain_rates(rig: Rig, frequency: float, torque: Callable[[float], float], me
         if loose[1] and rig.load.boundary != "speed" and brake:
             a[3] = (second - load) / brake.inertia
         if rig.housing is not None:
-            ground = rig.housing.stiffness * d[4] + rig.housing.damping * v[4]
-            a[4] = (one[0] + two[0] - ground) / rig.housing.mass
+            for k, part in ((4, rig.housing), (9, rig.housing.rocking)):
+                if part is not None:
+                    push = part.driver_share * one[0] + part.driven_share * two[0]
+                    a[k] = (push - part.stiffness * d[k] - part.damping * v[k]) / part.mass
         for k, support, sign, mass, held in (
             (5, rig.support.driver, -1, MASSES[0], one),
             (7, rig.support.driven, 1, MASSES[1], two),

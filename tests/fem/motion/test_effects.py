@@ -40,6 +40,7 @@ from gearbench.rig import (
     OutputShaft,
     Rig,
     Ripple,
+    Rocking,
     Support,
     Supports,
 )
@@ -58,6 +59,7 @@ EFFECTS: dict[str, dict[str, Any]] = {
     "ripple": {"drive": Drive(ripple=Ripple(orders=(20, 60), amplitude=(9.0, 5.0), phase=(0.3, 1.0)))},
     "shaft": {"load": Load(coupling=OutputShaft(stiffness=1e5, damping=5.0))},
     "housing": {"housing": Housing(mass=3.0, stiffness=1e8, damping=1e3), "one": {"damping": 2e3}},
+    "rocking": {"housing": Housing(mass=3.0, stiffness=1e8, rocking=Rocking(mass=2.0, stiffness=2e8, damping=1e3))},
     "scale": {"mesh": MeshCorrection(stiffness_scale=0.8)},
     "free": {
         "load": Load(boundary="torque", coupling=OutputShaft(inertia=3e-3, stiffness=1e5, damping=5.0)),

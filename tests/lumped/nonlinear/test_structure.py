@@ -28,6 +28,7 @@ from gearbench.rig import (
     MeshCorrection,
     OutputShaft,
     Rig,
+    Rocking,
     Support,
     Supports,
 )
@@ -57,7 +58,10 @@ def supports(across: float | None = 1.0, direction: str = "tangential", exponent
 
 ROTOR = Coupling(inertia=2e-3, stiffness=9e3, damping=0.6)
 SHAFT = OutputShaft(inertia=6e-3, stiffness=2e4, damping=1.1)
-HOUSING = Housing(mass=25.0, stiffness=6e8, damping=4e3)
+HOUSING = Housing(
+    mass=25.0, stiffness=6e8, damping=4e3, driven_share=0.7,
+    rocking=Rocking(mass=12.0, stiffness=9e8, damping=3e3, driven_share=-0.8),
+)  # fmt: skip
 
 
 def full_rig(**fields: Any) -> Rig:
@@ -80,7 +84,7 @@ def in_radians(state: Array) -> Array:
     (r1, r2), out = RADII, []
     for end in ("", "'"):
         turns = (place[f"w{end}"] / r1, place[f"u1{end}"] / r1, place[f"u2{end}"] / r2, place[f"load{end}"] / r2)
-        out += [*turns, *(place[f"{name}{end}"] for name in ("housing", "y1", "x1", "y2", "x2"))]
+        out += [*turns, *(place[f"{name}{end}"] for name in ("housing", "y1", "x1", "y2", "x2", "rocking"))]
     return np.array(out)
 
 
@@ -88,7 +92,7 @@ def motions(out: Outputs) -> Array:
     """Outputs (samples, unknowns) in the unknowns of the plain equations."""
     (r1, r2) = RADII
     turns = (out.w / r1, out.u1 / r1, out.u2 / r2, out.load / r2)
-    return np.stack([*turns, out.housing, out.y1, out.x1, out.y2, out.x2], axis=1)
+    return np.stack([*turns, out.housing, out.y1, out.x1, out.y2, out.x2, out.rocking], axis=1)
 
 
 def excited(rig: Rig, constant: bool = False, steps: int = 6400, cycles: int = 2) -> tuple[Array, Outputs, Array]:
@@ -113,12 +117,12 @@ EVERY = set(UNKNOWNS)
         pytest.param({"load": Load(boundary="inertia", coupling=SHAFT)}, EVERY, marks=pytest.mark.validation),
         pytest.param(
             {"load": Load(boundary="inertia", coupling=SHAFT), "housing": None},
-            EVERY - {"housing"},
+            EVERY - {"housing", "rocking"},
             marks=pytest.mark.validation,
         ),
         (
             {"drive": Drive(), "load": Load(boundary="inertia", coupling=OutputShaft(inertia=6e-3))},
-            {"driver", "driven", "housing", *CENTRES},
+            {"driver", "driven", "housing", "rocking", *CENTRES},
         ),
         (
             {"drive": Drive(boundary="speed", coupling=ROTOR), "load": Load(boundary="torque", coupling=SHAFT)},
@@ -126,7 +130,7 @@ EVERY = set(UNKNOWNS)
         ),
         (
             {"drive": Drive(boundary="speed"), "load": Load(boundary="torque"), "support": supports(None)},
-            {"driven", "housing", "y1", "y2"},
+            {"driven", "housing", "rocking", "y1", "y2"},
         ),
     ],
 )
@@ -212,6 +216,11 @@ def test_energy_is_balanced(load: str) -> None:
     assert one.across is not None and two.across is not None
     bodies = (("rotor", ROTOR.inertia), ("driver", GEARS[0]), ("driven", GEARS[1]), ("housing", house.mass))
     bodies += (("y1", MASSES[0]), ("x1", MASSES[0]), ("y2", MASSES[1]), ("x2", MASSES[1]), ("load", SHAFT.inertia))
+    rocks = house.rocking
+    assert rocks is not None
+    bodies += (("rocking", rocks.mass),)
+    along = {"y1": place["y1"] - house.driver_share * place["housing"] - rocks.driver_share * place["rocking"]}
+    along["y2"] = place["y2"] - house.driven_share * place["housing"] - rocks.driven_share * place["rocking"]
     kinetic = sum(0.5 * mass * rate[name] ** 2 for name, mass in bodies)
     deflection = RADII[0] * place["driver"] - RADII[1] * place["driven"]
     deflection = deflection + cos(ALPHA) * (place["y1"] - place["y2"]) + sin(ALPHA) * (place["x1"] - place["x2"])
@@ -220,15 +229,16 @@ def test_energy_is_balanced(load: str) -> None:
         (place["rotor"] - place["driver"], 9e3, ROTOR.damping),
         (place["driven"] - place["load"], 2e4, SHAFT.damping),
         (place["housing"], house.stiffness, house.damping),
-        (place["y1"] - place["housing"], one.stiffness, one.damping),
-        (place["y2"] - place["housing"], two.stiffness, two.damping),
+        (place["rocking"], rocks.stiffness, rocks.damping),
+        (along["y1"], one.stiffness, one.damping),
+        (along["y2"], two.stiffness, two.damping),
         (place["x1"], one.across.stiffness, one.across.damping),
         (place["x2"], two.across.stiffness, two.across.damping),
     ]
     potential = sum(0.5 * k * d**2 for d, k, _ in springs)
     for name, support in (("1", one), ("2", two)):
         assert support.across is not None
-        potential = potential + support.across.coupling * (place[f"y{name}"] - place["housing"]) * place[f"x{name}"]
+        potential = potential + support.across.coupling * along[f"y{name}"] * place[f"x{name}"]
     lost = sum(c * np.gradient(d, step) ** 2 for d, _, c in springs)
     power = torque(time) * rate["rotor"] - out.load_force * RADII[1] * rate["load"]
     stored = kinetic + potential
