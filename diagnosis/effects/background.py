@@ -14,7 +14,6 @@ from gearbench.diagnosis.forces.nominal import NominalModel
 from gearbench.diagnosis.forces.unknowns import Group, group
 
 OFFSET = 0.8  # excess material of all pairs over the deflection of the mesh: the zero of the angles is not known better
-CURVATURE = 0.05  # exponent of the mesh force over its level: teeth stiffen a little as their contacts widen
 SHAPE = 0.04  # of the stiffness, at each mesh order: tables of finite elements against a meshed rig
 PROFILE = 0.08  # at each mesh order, over the deflection of the mesh: flanks of a good gear
 # Compliance of webs and shafts over that of the mesh: little at low frequencies, where it cannot be told from the
@@ -22,7 +21,7 @@ PROFILE = 0.08  # at each mesh order, over the deflection of the mesh: flanks of
 YIELDING = 0.01 + 0.07 * np.minimum(1.0, (np.array(KNOTS) / 0.4) ** 2)
 RADIAL = 0.6  # logarithm, of stiffness and damping of radial supports: nothing is stated about them
 # Bounds, of logarithms and exponents: beyond them no rig is like the nominal one.
-RATIO_BOUND, SCALE_BOUND, CURVATURE_BOUND, RADIAL_BOUND = 3.0, 0.5, 0.3, 2.5
+RATIO_BOUND, SCALE_BOUND, RADIAL_BOUND = 3.0, 0.5, 2.5
 
 
 def background(model: NominalModel) -> tuple[Group, ...]:
@@ -37,7 +36,6 @@ def background(model: NominalModel) -> tuple[Group, ...]:
         _bounded("scale", ("mesh",), model.sd_scale, SCALE_BOUND),
         _bounded("mesh-ratio", ("mesh",), model.sd_mesh_ratio, RATIO_BOUND),
         group("offset", "m", ("excess",), OFFSET * model.deflection, slot="offset"),
-        _bounded("curvature", ("mesh",), CURVATURE, CURVATURE_BOUND),
         group("shape", "1", 2 * SHAPE_ORDERS, SHAPE, slot="shape"),
         group("profile", "m", 2 * SHAPE_ORDERS, PROFILE * model.deflection, slot="profile"),
         group("compliance", "1", complex_knots, np.tile(YIELDING, 2), slot="yielding"),

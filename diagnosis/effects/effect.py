@@ -22,6 +22,8 @@ Array = NDArray[np.float64]
 
 SIDES = ("driver", "driven")
 SUPPORT_PLACES: dict[str, Place] = {"driver": "driver-support", "driven": "driven-support"}
+# Standard deviations of a number of the nominal rig within which no cause is needed: a contract of the verdict's names.
+BEYOND = 3.0
 # Relative error that the simplicity of the model leaves at least: four rigs of each effect do not tell less.
 LEAST_MODEL_ERROR = 0.02
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from gearbench.diagnosis.effects.background import background
 from gearbench.diagnosis.effects.backlash import BACKLASH
 from gearbench.diagnosis.effects.bearing_nonlinearity import BEARING_NONLINEARITY
+from gearbench.diagnosis.effects.contact_nonlinearity import CONTACT_NONLINEARITY
 from gearbench.diagnosis.effects.coupling import COUPLING
 from gearbench.diagnosis.effects.eccentricity import ECCENTRICITY
 from gearbench.diagnosis.effects.effect import Effect, Hypothesis
@@ -35,6 +36,7 @@ LIBRARY: tuple[Effect, ...] = (
     BACKLASH,
     SUPPORT_STIFFNESS,
     MESH_DAMPING,
+    CONTACT_NONLINEARITY,
 )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import exp, log
 
-from gearbench.diagnosis.effects.effect import Added, Effect, Estimate, Fitted, Hypothesis, Wide, changed
+from gearbench.diagnosis.effects.effect import BEYOND, Added, Effect, Estimate, Fitted, Hypothesis, Wide, changed
 from gearbench.diagnosis.effects.recalibrated import MOST_RATIO
 from gearbench.diagnosis.forces.nominal import NominalModel
 from gearbench.rig import Rig
@@ -14,8 +14,6 @@ KEY = "mesh-ratio"  # of the background: logarithm of the factor on the damping 
 # about the usual 0.07; at least five standard deviations of the nominal one, or the prior would not be a wider
 # one.
 WIDE, WIDER = log(2.0), 5.0
-# Standard deviations of the nominal ratio within which no cause is needed (a contract of the verdict's names).
-BEYOND = 3.0
 
 
 def hypotheses(model: NominalModel) -> tuple[Hypothesis, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import exp, log
 
 from gearbench.diagnosis.effects.effect import (
+    BEYOND,
     SIDES,
     SUPPORT_PLACES,
     Added,
@@ -23,8 +24,6 @@ KEY = "stiffness"  # of the background: logarithms of the factors on both suppor
 # Logarithm: a wrong bearing, a loose foot or a missing preload changes a support by a factor of two or so; at least
 # five standard deviations of the nominal one, or the prior would not be a wider one.
 WIDE, WIDER = log(2.0), 5.0
-# Standard deviations of the nominal stiffness within which no cause is needed (a contract of the verdict's names).
-BEYOND = 3.0
 
 
 def hypotheses(model: NominalModel) -> tuple[Hypothesis, ...]:

@@ -130,7 +130,7 @@ def _force(model: NominalModel, spectra: Mapping[str, Complex], omega: Array) ->
 
 def _stiffness(model: NominalModel, force: float) -> float:
     """Secant stiffness [N/m] of the mesh at a force [N], mean over the cycle."""
-    mean = model.law.force.mean(axis=0)
+    mean = model.hardened.force.mean(axis=0)
     return force / float(np.interp(force, mean, model.law.approach))
 
 

@@ -126,7 +126,7 @@ def _mesh_slots(at: _Point) -> Iterator[tuple[str, dict[int, Array]]]:
     """Derivatives (N,) of the mesh force in time to the elements of every slot that moves it."""
     state, condition = at.mesh, at.condition
     viscous = state.viscosity * state.rate * state.touching
-    level = np.maximum(np.abs(state.elastic), 1e-3 * condition.force_level) / condition.force_level
+    level = np.maximum(np.abs(state.elastic), 1e-3 * condition.force_level) / at.model.reference_force
     yield "scale", {0: state.elastic + 0.5 * viscous}
     yield "mesh_ratio", {0: viscous}
     yield "dissipation", {0: np.abs(state.rate) * state.rate * state.touching}

@@ -93,7 +93,7 @@ def mesh(model: NominalModel, condition: Condition, departures: Departures, spec
     common = departures.offset + departures.excess + departures.profile @ condition.waves
     delta = np.fft.irfft(filtered, n) * n + common
     rate = np.fft.irfft(1j * condition.omega * dte, n) * n
-    law = replace(model.law, backlash=max(model.law.backlash + departures.backlash, 0.0))
+    law = replace(model.hardened, backlash=max(model.law.backlash + departures.backlash, 0.0))
     modulated = stiffness_factor(condition, departures)
     factor = model.scale * modulated
     # The errors of all pairs in contact act together, each by its part of the stiffness.
@@ -102,8 +102,8 @@ def mesh(model: NominalModel, condition: Condition, departures: Departures, spec
     delta = delta + (weight * _pitch_excess(condition, departures)).sum(axis=-1)
     force, slope = law.evaluate(delta, condition.phase)
     if departures.curvature:
-        level = np.maximum(np.abs(force), 1e-3 * condition.force_level) / condition.force_level
-        factor = factor * level**departures.curvature
+        level = np.maximum(np.abs(force), 1e-3 * condition.force_level) / model.reference_force
+        factor = factor * level ** (departures.curvature / (1.0 + model.hardening))
     elastic, tangent = factor * force, factor * slope
     touching = force != 0.0
     ratio = model.mesh_ratio * np.exp(departures.mesh_ratio)

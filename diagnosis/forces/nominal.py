@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from math import cos, lcm, pi, sin, sqrt, tan
 
 import numpy as np
@@ -52,6 +53,8 @@ class NominalModel:
     mesh_mass: float
     mesh_ratio: float
     scale: float
+    hardening: float  # exponent of the mesh force
+    reference_force: float  # [N] at which an exponent leaves the mesh force as it is
     friction: float
     transition: float  # sliding speed at which friction has changed its direction [m/s]
     law: MeshLaw
@@ -70,10 +73,16 @@ class NominalModel:
         """Teeth that pass until the same two meet again."""
         return lcm(*self.teeth)
 
+    @cached_property
+    def hardened(self) -> MeshLaw:
+        """The law of the mesh force with the nominal exponent."""
+        return self.law.hardened(self.hardening, self.reference_force)
+
     @property
     def mesh_stiffness(self) -> float:
         """Mean stiffness [N/m] of the mesh at the largest load of its table."""
-        _, tangent = self.law.evaluate(self.law.approach[-1], np.arange(self.law.phases) / self.law.phases)
+        law = self.hardened
+        _, tangent = law.evaluate(law.approach[-1], np.arange(law.phases) / law.phases)
         return self.scale * float(tangent.mean())
 
     @property
@@ -131,6 +140,8 @@ def nominal_model(nominal: Case, load: float, mean: float) -> NominalModel:
         mesh_mass=equivalent_mass(radii, (inertias[0] + rotor, inertias[1]), rig.load.boundary),
         mesh_ratio=rig.damping.mesh_ratio,
         scale=rig.mesh.stiffness_scale,
+        hardening=rig.mesh.exponent,
+        reference_force=rig.mesh.reference_force if rig.mesh.exponent else abs(mean) / radii[0],
         friction=rig.friction.coefficient,
         transition=rig.friction.transition_speed,
         law=mesh_law(rig, nominal.simulation, load),

@@ -12,24 +12,32 @@ is not seen.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
+from math import exp
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from gearbench.diagnosis.effects.effect import SIDES
+from gearbench.diagnosis.effects.sensor_delay import KEYS as DELAYS
 from gearbench.diagnosis.forces.condition import Condition
 from gearbench.diagnosis.forces.covariance import KINDS, kinds_of
+from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.output.layout import Layout
-from gearbench.diagnosis.output.structure import CROSS, HOUSING, LEAST_HOUSING, MODE
-from gearbench.geometry import pair
+from gearbench.diagnosis.output.structure import ACROSS, CROSS, GAIN, HOUSING, MODE, MOTIONS, SHAPE, moving
+from gearbench.lumped.nonlinear.coordinates import COORDINATES
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+Integers = NDArray[np.int64]
 
 # What is found, beside whatever else is held.
-KEYS = ("stiffness", "damping", "mass", "inertia", CROSS, HOUSING, MODE)
+KEYS = ("stiffness", "damping", "mass", "inertia", ACROSS, CROSS, GAIN, *DELAYS.values())
+HOUSED = (HOUSING, MODE, SHAPE)
 # Channels, and the coordinate that each is; the reaction is the force itself.
 COORDINATE = {"angle_driver": 0, "y_driver": 1, "y_driven": 2}
 REACTION = "torque_driven"
@@ -38,8 +46,15 @@ LINES = 200  # of each record, excited and operating, that are enough
 LEVELS = (0.1, 0.01)
 SMOOTHED = 12  # parts of the band over which the level is taken
 EVALUATIONS = 25
-HOUSING_AT = (-1.0, 0.0)  # logarithms of a housing's frequency over the supports', where to begin
-HOUSING_FROM = 0.04
+# Where a motion of the housing is looked for: compliances over the supports', logarithms of its frequency over theirs.
+HOUSING_FROM = (0.004, 0.012, 0.04)
+HOUSING_AT = tuple(np.linspace(-1.2, 0.8, 21))
+# Where a gear's resonance across its support is looked for, which its cross-coupling shows.
+ACROSS_AT = tuple(np.geomspace(0.08, 0.6, 19))
+CROSS_AT = (-0.15, -0.06, 0.06, 0.15)
+FAINT_AT, FAINT_EVALUATIONS = (-1.0, -0.7, -0.4, 0.0), 10
+ROUNDS = 2  # looks for each beside the others
+WORTH = 3.0  # nats by which a resonance must explain more
 
 
 @dataclass(frozen=True)
@@ -54,6 +69,19 @@ class _Lines:
     level: Array
 
 
+class _System(NamedTuple):
+    """A rig without its mesh: numbers of its free coordinates, springs, dampers and masses between them, what forces of
+    the mesh and of the drive do (n, 2), the gain of the reaction's sensor, and delays of the others by channel [s]."""
+
+    free: Integers
+    springs: Array
+    dampers: Array
+    mass: Array
+    forces: Array
+    gain: float
+    late: Mapping[str, float]
+
+
 def around(layout: Layout, conditions: Sequence[Condition], held: Array) -> Array | None:
     """Unknowns (size,): `held` with those of supports, masses and housing that the records show; None where records
     have no displacement of the gears or no line, or no rig answers."""
@@ -63,50 +91,124 @@ def around(layout: Layout, conditions: Sequence[Condition], held: Array) -> Arra
     lines = [found for found in (_lines_of(one, (*COORDINATE, *reaction)) for one in conditions) if found is not None]
     if not lines:
         return None
-    unknowns, found = layout.unknowns, []
-    for frequency in HOUSING_AT if HOUSING in unknowns.slices else (0.0,):
-        begin = held.copy()
-        if HOUSING in unknowns.slices:
-            begin[unknowns[HOUSING]], begin[unknowns[MODE].start] = HOUSING_FROM, frequency
-        try:
-            found.append(_fitted(layout, lines, begin))
-        except ValueError:  # no rig there
-            continue
-    return min(found, key=lambda one: one[0])[1] if found else None
+    try:
+        return _found(layout, lines, held)
+    except ValueError:  # no rig there
+        return None
 
 
-def _fitted(layout: Layout, lines: Sequence[_Lines], begin: Array) -> tuple[float, Array]:
+def _found(layout: Layout, lines: Sequence[_Lines], held: Array) -> Array:
+    """The rig without a housing first, then with each motion of it that is seen best beside the other."""
     unknowns = layout.unknowns
-    at = np.concatenate([np.arange(*unknowns[key].indices(unknowns.size)) for key in KEYS if key in unknowns.slices])
+    motions = range(len(MOTIONS)) if HOUSING in unknowns.slices else ()
+    held = held.copy()
+    held[unknowns[CROSS]] = 0.0
+    for motion in motions:
+        held[unknowns[HOUSING].start + motion] = 0.0
+    cost, best = _fitted(layout, lines, held, KEYS, LEVELS[:1])
+    for _ in range(ROUNDS):
+        begin = best
+        for side in range(len(SIDES)):
+            begin = _looked(layout, lines, begin, _crossing(unknowns, begin, side))
+        for motion in motions:
+            begin = _looked(layout, lines, begin, _moving(unknowns, begin, motion))
+        value, p = _fitted(layout, lines, begin, (*KEYS, *HOUSED), LEVELS)
+        if value >= cost:
+            break
+        cost, best = value, p
+    if not motions:
+        return best
+    # The mesh pushes both gears apart: a housing that moves along answers faintly, and is imitated from afar.
+    trials = [moving(unknowns, best, 0, at, HOUSING_FROM[-1]) for at in FAINT_AT]
+    tried = [_fitted(layout, lines, trial, (*KEYS, *HOUSED), LEVELS[1:], FAINT_EVALUATIONS) for trial in trials]
+    value, p = min(tried, key=lambda one: one[0])
+    return _fitted(layout, lines, p, (*KEYS, *HOUSED), LEVELS[1:])[1] if value < cost else best
+
+
+def _looked(layout: Layout, lines: Sequence[_Lines], p: Array, trials: Sequence[Array]) -> Array:
+    """The one of `trials` (size,) that explains most, if that is more than without (the first) and more than `p`."""
+    here, *costs = (_misfit(layout, lines, trial) for trial in (p, *trials))
+    best = int(np.argmin(costs))
+    if here < min(costs[0] - WORTH, costs[best] + WORTH):
+        return p
+    return trials[best] if costs[best] < costs[0] - WORTH else trials[0]
+
+
+def _crossing(unknowns: Unknowns, p: Array, side: int) -> list[Array]:
+    """`p` (size,) without cross-coupling of a support, then with it where its gear might resonate across."""
+    out = []
+    for soft, coupled in ((p[unknowns[ACROSS]][side], 0.0), *product(ACROSS_AT, CROSS_AT)):
+        trial = p.copy()
+        trial[unknowns[ACROSS].start + side] = soft
+        trial[unknowns[CROSS].start + side] = coupled
+        out.append(trial)
+    return out
+
+
+def _moving(unknowns: Unknowns, p: Array, motion: int) -> list[Array]:
+    """`p` (size,) without a motion of the housing, then with it where it might resonate."""
+    without = p.copy()
+    without[unknowns[HOUSING].start + motion] = 0.0
+    return [without, *(moving(unknowns, p, motion, at, part) for part, at in product(HOUSING_FROM, HOUSING_AT))]
+
+
+def _misfit(layout: Layout, lines: Sequence[_Lines], p: Array) -> float:
+    """Nats that the lines cost: those of the wide level, which see a resonance from afar, and a tenth of those of the
+    narrow one, which see a weak one."""
+    system = _system(layout, p)
+    total = 0.0
+    for level in LEVELS:
+        for one in lines:
+            left = np.log1p(np.abs(_left_over(layout, system, one, level)) ** 2)
+            total += level / LEVELS[0] * float(left.sum())
+    return total
+
+
+def _fitted(
+    layout: Layout, lines: Sequence[_Lines], begin: Array, keys: Sequence[str], levels: Sequence[float],
+    evaluations: int = EVALUATIONS,
+) -> tuple[float, Array]:  # fmt: skip
+    """Misfit, and `begin` (size,) with the unknowns of these keys where it is least."""
+    unknowns = layout.unknowns
+    at = np.concatenate([np.arange(*unknowns[key].indices(unknowns.size)) for key in keys if key in unknowns.slices])
     sd = unknowns.prior()[at]
-    at, sd = at[sd > 0.0], sd[sd > 0.0]
+    # Without cross-coupling nothing shows how a support yields across.
+    unseen = np.zeros(unknowns.size, dtype=bool)
+    for key in (ACROSS, CROSS):
+        unseen[unknowns[key]] = begin[unknowns[CROSS]] == 0.0
+    kept = (sd > 0.0) & ~unseen[at]
+    at, sd = at[kept], sd[kept]
     low, high = (bound[at] for bound in unknowns.bounds())
-    if HOUSING in unknowns.slices:
-        low = np.where(at == unknowns[HOUSING].start, LEAST_HOUSING, low)
 
     def whole(values: Array) -> Array:
         p = begin.copy()
         p[at] = values
         return p
 
-    values, cost = np.clip(begin[at], low, high), np.inf
-    for level in LEVELS:
+    values = np.clip(begin[at], low, high)
+    for level in levels:
 
         def misfit(trial: Array, level: float = level) -> Array:
-            left = np.concatenate([left_over(layout, whole(trial), one, level) for one in lines])
+            system = _system(layout, whole(trial))
+            left = np.concatenate([_left_over(layout, system, one, level) for one in lines])
             parts = np.concatenate([left.real, left.imag])
             # A line that nothing explains counts by the logarithm of its size.
             robust = np.sign(parts) * np.sqrt(np.log1p(parts**2))
             return np.concatenate([robust, trial / sd])
 
-        fit = least_squares(misfit, values, bounds=(low, high), x_scale=sd, max_nfev=EVALUATIONS)
-        values, cost = fit.x, float(fit.cost)
-    return cost, whole(values)
+        fit = least_squares(misfit, values, bounds=(low, high), x_scale=sd, max_nfev=evaluations, tr_solver="lsmr")
+        values = fit.x
+    p = whole(values)
+    return _misfit(layout, lines, p), p
 
 
 def left_over(layout: Layout, p: Array, lines: _Lines, level: float) -> Complex:
     """What no force in the mesh explains of the channels (K * C,), over their noise and a part of their level."""
-    answer = _answers(layout, p, lines)
+    return _left_over(layout, _system(layout, p), lines, level)
+
+
+def _left_over(layout: Layout, system: _System, lines: _Lines, level: float) -> Complex:
+    answer = _answers(layout, system, lines)
     weight = 1.0 / np.sqrt(lines.noise + level**2 * lines.level)
     driven = lines.channels - answer[:, :, 1] * (lines.torque / layout.model.base_radius[0])[:, None]
     along = answer[:, :, 0] * weight
@@ -115,32 +217,37 @@ def left_over(layout: Layout, p: Array, lines: _Lines, level: float) -> Complex:
     return np.asarray((seen - along * (along.conj() * seen).sum(axis=1, keepdims=True)).ravel())
 
 
-def _answers(layout: Layout, p: Array, lines: _Lines) -> Complex:
-    """Channels (K, C, 2) per unit of force in the mesh, and of force of the drive at its base circle."""
+def _system(layout: Layout, p: Array) -> _System:
     # The model's time loop is compiled on import, which not every user of this module wants.
     from gearbench.lumped.nonlinear.model import nonlinear_model
     from gearbench.lumped.nonlinear.rest import inverse_masses, mesh_direction, springs_and_dampers
 
-    rig = layout.case(p).rig
-    model = nonlinear_model(rig, pair(rig), layout.model.law)
+    model = nonlinear_model(layout.case(p).rig, layout.meshing, layout.model.law)
     c, s = model.constants(), model.structure
     springs, dampers = springs_and_dampers(c, s, (c.stiffness1, c.stiffness2))
     inverse, mesh = inverse_masses(c, s), mesh_direction(c, s)
     free = np.flatnonzero(inverse > 0.0)
     inside = np.ix_(free, free)
-    omega = lines.omega[:, None, None]
-    stiffness = springs[inside] + 1j * omega * dampers[inside] - omega**2 * np.diag(1.0 / inverse[free])
     forces = np.zeros((len(free), 2))
     forces[:, 0] = -mesh[free]
-    forces[np.flatnonzero(free == (0 if c.rigid else 4)), 1] = 1.0
-    moved = np.zeros((len(lines.omega), len(inverse), 2), dtype=complex)
-    moved[:, free] = np.linalg.solve(stiffness, np.broadcast_to(forces.astype(complex), (len(omega), *forces.shape)))
+    forces[np.flatnonzero(free == (0 if c.rigid else COORDINATES - 1)), 1] = 1.0
+    gain = exp(float(p[layout.unknowns[GAIN]][0]))
+    late = {channel: float(p[layout.unknowns[key]][0]) for channel, key in DELAYS.items()}
+    return _System(free, springs[inside], dampers[inside], np.diag(1.0 / inverse[free]), forces, gain, late)
+
+
+def _answers(layout: Layout, system: _System, lines: _Lines) -> Complex:
+    """Channels (K, C, 2) per unit of force in the mesh, and of force of the drive at its base circle."""
+    omega = lines.omega[:, None, None]
+    stiffness = system.springs + 1j * omega * system.dampers - omega**2 * system.mass
+    moved = np.linalg.solve(stiffness, np.broadcast_to(system.forces + 0j, (len(omega), *system.forces.shape)))
     answer = np.zeros((len(lines.omega), len(lines.names), 2), dtype=complex)
     for column, name in enumerate(lines.names):
         if name == REACTION:
-            answer[:, column, 0] = layout.model.base_radius[1]
+            answer[:, column, 0] = layout.model.base_radius[1] * system.gain
         else:
-            answer[:, column] = moved[:, COORDINATE[name]]
+            late = np.exp(-1j * lines.omega * system.late[name])[:, None]
+            answer[:, column] = moved[:, list(system.free).index(COORDINATE[name])] * late
     return answer
 
 

@@ -61,6 +61,7 @@ def mesh_forces(layout: Layout, along: Along, chosen: Flags) -> tuple[Array, Int
     damped = (along.tangent.damping * along.rate)[:, None]
     put("scale", along.elastic[:, None] + 0.5 * damped)
     put("mesh-ratio", damped)
+    put("curvature", (along.elastic * np.log(np.maximum(along.level, SMALLEST)))[:, None])
     put("shape", (along.elastic[:, None] + 0.5 * damped) * wave)
     put("offset", along.of_excess(np.ones((len(phase), 1))))
     put("profile", along.of_excess(wave))

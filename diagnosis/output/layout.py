@@ -27,7 +27,7 @@ from gearbench.diagnosis.forces.condition import Condition
 from gearbench.diagnosis.forces.nominal import NominalModel
 from gearbench.diagnosis.forces.unknowns import Group, Unknowns, unknowns_of
 from gearbench.diagnosis.output.structure import held, sensed, structure_groups
-from gearbench.geometry import pair
+from gearbench.geometry import Pair, pair
 from gearbench.lumped.nonlinear.law import MeshLaw
 from gearbench.rig import Case, Rig
 from gearbench.rig.gear import Crack
@@ -35,7 +35,7 @@ from gearbench.rig.gear import Crack
 Array = NDArray[np.float64]
 
 # Of the background those that no field of a rig holds.
-FORCES_ONLY = ("curvature", "compliance", "radial")
+FORCES_ONLY = ("compliance", "radial")
 NEARLY_RIGID = 1e-3  # compliance of a coupling below this part of its prior is left out of the rig
 LEAST_LOSS = 1e-6
 
@@ -61,6 +61,11 @@ class Layout:
         return Fitted(self.model, self.unknowns, p, np.zeros(p.size) if std is None else std, self.torque_mean)
 
     @cached_property
+    def meshing(self) -> Pair:
+        """The geometry of the nominal pair."""
+        return pair(self.nominal.rig)
+
+    @cached_property
     def mesh_stiffness(self) -> float:
         """Mean stiffness [N/m] of the nominal mesh at the largest load of its table."""
         return self.model.mesh_stiffness
@@ -76,7 +81,7 @@ class Layout:
         case = recalibrated(self.nominal, fitted)
         rig = case.rig
         for effect in LIBRARY:
-            if effect.name in ("friction", "eccentricity", "pitch-error", "backlash"):
+            if effect.name in ("friction", "eccentricity", "pitch-error", "backlash", "contact-nonlinearity"):
                 rig = effect.add(rig, _all_of(effect.name), fitted)[0]
         rig = _cracked(rig, self, p)
         rig = held(_supports(rig, self, p), self.model, self.unknowns, p, self.mesh_stiffness)

@@ -8,29 +8,23 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.bench.plan.workers import side_by_side
 from gearbench.diagnosis.effects.eccentricity import KEYS as RUNOUTS
 from gearbench.diagnosis.effects.pitch_error import KEYS as PITCHES
 from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
 from gearbench.diagnosis.effects.torque_ripple import KEY as RIPPLE
 from gearbench.diagnosis.forces.unknowns import Unknowns
+from gearbench.diagnosis.output.beginning import MESH, Around, levelled
 from gearbench.diagnosis.output.fit import SETTLED, Optimum, fit, sensitivity_of
 from gearbench.diagnosis.output.simulator import Simulator
-from gearbench.diagnosis.output.structure import ACROSS, ENCODER, otherwise
+from gearbench.diagnosis.output.structure import ENCODER, otherwise
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Report = Callable[[str], None]
-# From unknowns (size,) that are held: the same with the rig around the mesh as the records show it.
-Around = Callable[[Array], Array | None]
 
 RENEWALS = 3
 # Nats an independent line that are left, in the median block, below which no other structure is tried.
 CLOSE = 0.2
-# What the answer of the rig to the force in the mesh does not show: compliance across over along, and the stiffness of
-# the mesh, in standard deviations of the nominal one, that goes with it.
-MESH = (ACROSS, "scale")
-LEVELS = ((0.2, 0.5), (0.1, 0.0), (0.3, 0.0), (0.2, -0.5))
 # What moves the rotation's lines alone: it waits until the structure is found.
 ROTATION = (*RUNOUTS.values(), *PITCHES.values(), CRACK, RIPPLE, ENCODER)
 
@@ -67,30 +61,14 @@ def _from_around(simulator: Simulator, found: Optimum, around: Around | None, re
     chosen = widened | ~_of(unknowns, ROTATION)
     # Effects stay; what was fitted around the wrong structure goes.
     held = np.where(widened, found.p, 0.0)
-    begins = []
-    for across, stiffer in LEVELS:
-        p = held.copy()
-        p[unknowns[ACROSS]] = across
-        p[unknowns["scale"]] = stiffer * unknowns.prior()[unknowns["scale"]]
-        begins.append(p)
-    seen = around(begins[0])
+    seen = around(held)
     if seen is None:
         return None
-    for p in begins:
-        mesh = _of(unknowns, MESH)
-        p[~mesh] = seen[~mesh]
-
-    def fitted(p: Array) -> Optimum | None:
-        sensitivity = sensitivity_of(simulator, p, unknowns.prior(), chosen)
-        return fit(simulator, p, found.sd, sensitivity, renewals=RENEWALS, chosen=chosen) if sensitivity else None
-
-    best: Optimum | None = None
-    for first in range(0, len(begins), 2):  # two at a time: most often the first ones do
-        for one in side_by_side(fitted, begins[first : first + 2]):
-            if one is not None and (best is None or one.cost < best.cost):
-                best = one
-        if best is not None and (best.cost > found.cost or is_close(simulator, best)):
-            break  # no way from there, or there already
+    begin = levelled(simulator, seen, held, found.sd)
+    sensitivity = sensitivity_of(simulator, begin, unknowns.prior(), chosen)
+    if sensitivity is None:
+        return None
+    best = fit(simulator, begin, found.sd, sensitivity, renewals=RENEWALS, chosen=chosen)
     if best is None or best.cost > found.cost:
         return None
     return _fitted(simulator, best.p, found.sd)

@@ -14,17 +14,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.bench.plan.workers import side_by_side
-from gearbench.diagnosis.effects.effect import Hypothesis
+from gearbench.diagnosis.effects.effect import BEYOND, Hypothesis, Wide
 from gearbench.diagnosis.forces.unknowns import Unknowns
+from gearbench.diagnosis.output.beginning import Around, beginning
 from gearbench.diagnosis.output.fit import SETTLED, Optimum, Sensitivity, cost_of, fit, sensitivity_of
-from gearbench.diagnosis.output.restructured import Around, restructured
+from gearbench.diagnosis.output.restructured import restructured
 from gearbench.diagnosis.output.simulator import Simulator
-from gearbench.diagnosis.output.structure import housings
 
 Array = NDArray[np.float64]
 Report = Callable[[str], None]
 
 LIMIT = 8.0  # nats from which an effect enters
+# Of a number of the nominal rig, whose stated uncertainty is the measure: four of its standard deviations are worth no
+# more than this and a prior's width, and only beyond three it is named at all.
+LIMIT_NUMBER = 3.0
 TRIED = 4  # hypotheses that are simulated, at each step
 BY_FORCES = 2  # of them at least, by the force residuals' ranking
 MOST = 3  # effects
@@ -32,7 +35,7 @@ LOOKED_AT = 8  # hypotheses whose quadratic is followed to its minimum
 WORTH = 2.0  # nats promised from which a hypothesis is simulated
 # Renewals of the Jacobian: of the background, of each hypothesis, and of what entered in the end, whose structure has
 # been found beside a gap that the effects now close.
-RENEWALS_BASE, RENEWALS, RENEWALS_LAST = 2, 0, 2
+RENEWALS_BASE, RENEWALS, RENEWALS_LAST = 4, 0, 2
 
 
 @dataclass(frozen=True)
@@ -81,8 +84,7 @@ def select(
     sd = prior_of(simulator, unknowns.prior())
     chosen = np.ones(unknowns.size, dtype=bool)
     report("simulating: background")
-    begin = min(background, key=lambda p: cost_of(simulator, p, sd))
-    begin = min(housings(unknowns, begin), key=lambda p: cost_of(simulator, p, sd))
+    begin = beginning(simulator, background, around, sd)
     first = sensitivity_of(simulator, begin, unknowns.prior(), chosen)
     base = fit(simulator, begin, sd, first, renewals=RENEWALS_BASE, chosen=chosen) if first else None
     if base is None:
@@ -96,7 +98,7 @@ def select(
         found = weigh(simulator, best, rest, starts, report)
         weighed = found if weighed is None else weighed
         winner = found[0] if found else None
-        if winner is None or winner.optimum is None or winner.log_bayes_factor < LIMIT:
+        if winner is None or winner.optimum is None or winner.log_bayes_factor < limit_of(unknowns, winner.hypothesis):
             break
         entered.append(winner)
         best = winner.optimum
@@ -262,14 +264,25 @@ def taken_out(simulator: Simulator, selection: Selection, hypothesis: Hypothesis
 
 
 def _without(simulator: Simulator, base: Optimum, effects: Sequence[Hypothesis], chosen: NDArray[np.bool_]) -> Optimum:
-    """The background's optimum with the unknowns of these effects held at zero, but for numbers of the nominal rig,
-    which recalibration moves; itself where that is no rig."""
+    """The background's optimum with the unknowns of these effects held at zero, and numbers of the nominal rig where
+    its uncertainty ends, within which recalibration moves them; itself where that is no rig."""
     sd, p, unknowns = base.sd.copy(), base.p.copy(), simulator.layout.unknowns
     for wide in (wide for one in effects for wide in one.wide):
-        group, at = unknowns.group(wide.key), wide.entries(unknowns)
-        if (group.wide > group.sd).any():  # the effect's own, and no number of the nominal rig
-            sd[at] = p[at] = 0.0
+        at = wide.entries(unknowns)
+        edge = 0.0 if _is_own(unknowns, wide) else BEYOND * unknowns.prior()[at]
+        sd[at], p[at] = 0.0, np.clip(p[at], -edge, edge)
     return (fit(simulator, p, sd, base.sensitivity, renewals=0, chosen=chosen) or base) if effects else base
+
+
+def limit_of(unknowns: Unknowns, one: Hypothesis) -> float:
+    """Nats from which a hypothesis enters."""
+    return LIMIT if any(_is_own(unknowns, wide) for wide in one.wide) else LIMIT_NUMBER
+
+
+def _is_own(unknowns: Unknowns, wide: Wide) -> bool:
+    """Whether a prior belongs to the effect's own unknowns, and not to a number of the nominal rig."""
+    group = unknowns.group(wide.key)
+    return bool((group.wide > group.sd).any())
 
 
 def _needed(simulator: Simulator, best: Optimum, entered: Sequence[Weighed]) -> tuple[Optimum, tuple[Weighed, ...]]:
@@ -284,7 +297,7 @@ def _needed(simulator: Simulator, best: Optimum, entered: Sequence[Weighed]) -> 
         _, cost, information = quadratic.best(best.p, sd, _bounds_at(unknowns, p, best.p, sd))
         worth = best.evidence - quadratic.evidence(cost, information, sd)
         kept.append(replace(one, log_bayes_factor=float(worth) if len(entered) > 1 else one.log_bayes_factor))
-    return best, tuple(one for one in kept if one.log_bayes_factor > LIMIT)
+    return best, tuple(one for one in kept if one.log_bayes_factor > limit_of(unknowns, one.hypothesis))
 
 
 def _bounds_at(unknowns: Unknowns, wanted: Array, here: Array, sd: Array) -> tuple[Array, Array]:

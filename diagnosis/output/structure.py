@@ -8,7 +8,8 @@ of the supports), so that priors hold for rigs of any size.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import exp, sqrt
+from itertools import product
+from math import cos, exp, pi, sin, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,7 @@ from gearbench.diagnosis.effects.effect import SIDES, changed
 from gearbench.diagnosis.forces.nominal import NominalModel
 from gearbench.diagnosis.forces.unknowns import Group, Unknowns, group
 from gearbench.diagnosis.verdict import NINE_OF_TEN, Found
-from gearbench.rig import Across, Housing, OutputShaft, Rig
+from gearbench.rig import Across, Housing, OutputShaft, Rig, Rocking
 
 Array = NDArray[np.float64]
 
@@ -29,6 +30,11 @@ CROSS, CROSS_SD, CROSS_LARGEST = "cross", 0.1, 0.7
 # that of a gear on its support, and of its damping ratio over a twentieth.
 HOUSING, HOUSING_SD, HOUSING_LARGEST = "housing", 0.04, 0.5
 MODE, MODE_SD, MODE_LARGEST, HOUSING_RATIO = "housing-mode", 0.7, 2.0, 0.05
+# It moves along both supports, and it rocks, which is what the mesh pushes at. The angle whose cosine and sine are to
+# each other as the shares of driver's and driven support: an eighth of a turn where they are equal, and what departs.
+MOTIONS = ("along", "rocking")
+SHAPE, SHAPE_SD, SHAPE_LARGEST = "housing-shape", 0.4, pi / 4
+EQUAL = (pi / 4, -pi / 4)
 # Shaft behind the driven gear: compliance over that of the mesh, both at the base circle.
 SHAFT, SHAFT_SD, SHAFT_LARGEST, SHAFT_RATIO = "shaft", 0.3, 10.0, 0.03
 # Gain of the reaction's sensor: torque sensors are good to a few tenths of a per cent, their mounting to one.
@@ -43,9 +49,8 @@ SHAFT_FELT, SHAFT_STIFFEST = 0.03, 0.06
 # without it would never find it.
 LEAST_STEP: Mapping[str, float] = {ACROSS: STIFFEST, SHAFT: SHAFT_STIFFEST}
 NONE = 1e-4  # compliance of a housing below which there is none
-LEAST_HOUSING = 1e-3  # and the least that is looked for
 # Moved and simulated: no small force at an unchanged motion stands for them.
-STRUCTURE_MOVED = (ACROSS, CROSS, HOUSING, MODE, SHAFT)
+STRUCTURE_MOVED = (ACROSS, CROSS, HOUSING, MODE, SHAPE, SHAFT)
 # What is told of the structure that was found.
 NAMES = (
     (ACROSS, "support compliance across over along", "1"),
@@ -68,12 +73,15 @@ def structure_groups(rig: Rig, model: NominalModel) -> list[Group]:
               ENCODER_SD * model.deflection, slot="structure", first=6),
     ]  # fmt: skip
     if rig.housing is None:
-        groups.append(group(HOUSING, "1", ("compliance",), HOUSING_SD, slot="structure", first=10, low=0.0,
+        groups.append(group(HOUSING, "1", MOTIONS, HOUSING_SD, slot="structure", first=10, low=0.0,
                             high=HOUSING_LARGEST))  # fmt: skip
-        groups.append(group(MODE, "1", ("frequency", "damping"), MODE_SD, slot="structure", first=11,
-                            low=-MODE_LARGEST, high=MODE_LARGEST))  # fmt: skip
+        modes = [f"{one}.{part}" for one in MOTIONS for part in ("frequency", "damping")]
+        groups.append(group(MODE, "1", modes, MODE_SD, slot="structure", first=12, low=-MODE_LARGEST,
+                            high=MODE_LARGEST))  # fmt: skip
+        groups.append(group(SHAPE, "rad", MOTIONS, SHAPE_SD, slot="structure", first=16, low=-SHAPE_LARGEST,
+                            high=SHAPE_LARGEST))  # fmt: skip
     if rig.load.boundary == "speed" and not rig.load.twists:
-        groups.append(group(SHAFT, "1", ("compliance",), SHAFT_SD, slot="structure", first=13, low=0.0,
+        groups.append(group(SHAFT, "1", ("compliance",), SHAFT_SD, slot="structure", first=18, low=0.0,
                             high=SHAFT_LARGEST))  # fmt: skip
     return groups
 
@@ -104,14 +112,22 @@ def otherwise(unknowns: Unknowns, p: Array) -> Array | None:
 
 
 def housings(unknowns: Unknowns, p: Array) -> list[Array]:
-    """`p` (size,), and the same with housings of several frequencies."""
+    """`p` (size,), and the same with one more motion of the housing, at several frequencies."""
     out = [p]
-    if HOUSING in unknowns.slices:
-        for frequency in (-1.0, -0.5, 0.0, 0.5):
-            trial = p.copy()
-            trial[unknowns[HOUSING]] = HOUSING_BEGIN
-            trial[unknowns[MODE].start] = frequency
-            out.append(trial)
+    if HOUSING not in unknowns.slices:
+        return out
+    for motion, frequency in product(range(len(MOTIONS)), (-1.0, -0.5, 0.0, 0.5)):
+        if p[unknowns[HOUSING]][motion] <= NONE:
+            out.append(moving(unknowns, p, motion, frequency, HOUSING_BEGIN))
+    return out
+
+
+def moving(unknowns: Unknowns, p: Array, motion: int, frequency: float, compliance: float) -> Array:
+    """`p` (size,) with a motion of the housing of that compliance and logarithm of the frequency, its shares equal."""
+    out = p.copy()
+    out[unknowns[HOUSING].start + motion] = compliance
+    out[unknowns[MODE].start + 2 * motion] = frequency
+    out[unknowns[SHAPE].start + motion] = 0.0
     return out
 
 
@@ -131,9 +147,9 @@ def held(rig: Rig, model: NominalModel, unknowns: Unknowns, p: Array, stiffness:
             support = support.model_copy(update={"across": across})
         supports[side] = support
     rig = changed(rig, "support", **supports)
-    if HOUSING in unknowns.slices and p[unknowns[HOUSING]][0] > NONE:
-        housing = housing_of(model, np.concatenate([p[unknowns[HOUSING]], p[unknowns[MODE]]]))
-        rig = rig.model_copy(update={"housing": housing})
+    if HOUSING in unknowns.slices and p[unknowns[HOUSING]].max() > NONE:
+        values = (p[unknowns[key]] for key in (HOUSING, MODE, SHAPE))
+        rig = rig.model_copy(update={"housing": housing_of(model, *values)})
     if SHAFT in unknowns.slices and p[unknowns[SHAFT]][0] > SHAFT_FELT:
         soft_shaft = max(float(p[unknowns[SHAFT]][0]), SHAFT_STIFFEST)
         twist = stiffness * model.base_radius[1] ** 2 / soft_shaft
@@ -144,14 +160,26 @@ def held(rig: Rig, model: NominalModel, unknowns: Unknowns, p: Array, stiffness:
     return rig
 
 
-def housing_of(model: NominalModel, values: Array) -> Housing:
-    """The housing of compliance, frequency and damping as unknowns."""
-    compliance, frequency, damping = (float(value) for value in values)
+def housing_of(model: NominalModel, compliance: Array, modes: Array, shapes: Array) -> Housing:
+    """The housing of compliances (2,), frequencies and dampings (4,) and shapes (2,) as unknowns, one compliance at
+    least above `NONE`."""
     mean = 2.0 / (1.0 / model.stiffness[0] + 1.0 / model.stiffness[1])
-    stiffness = mean / compliance
-    omega = sqrt(mean / (0.5 * (model.mass[0] + model.mass[1]))) * exp(frequency)
-    mass = stiffness / omega**2
-    return Housing(mass=mass, stiffness=stiffness, damping=2 * HOUSING_RATIO * exp(damping) * omega * mass)
+    pace = sqrt(mean / (0.5 * (model.mass[0] + model.mass[1])))
+    motions = []
+    for number in np.flatnonzero(compliance > NONE):
+        frequency, damping = (float(value) for value in modes[2 * number : 2 * number + 2])
+        stiffness, omega = mean / float(compliance[number]), pace * exp(frequency)
+        mass, angle = stiffness / omega**2, EQUAL[number] + float(shapes[number])
+        motions.append(
+            {
+                "mass": mass,
+                "stiffness": stiffness,
+                "damping": 2 * HOUSING_RATIO * exp(damping) * omega * mass,
+                "driver_share": sqrt(2) * cos(angle),
+                "driven_share": sqrt(2) * sin(angle),
+            }
+        )
+    return Housing(**motions[0], rocking=Rocking(**motions[1]) if len(motions) > 1 else None)
 
 
 def sensed(rig: Rig, model: NominalModel, unknowns: Unknowns, p: Array, delays: Mapping[str, str]) -> Rig:
@@ -181,6 +209,6 @@ def structure_found(unknowns: Unknowns, p: Array, std: Array) -> tuple[Found, ..
             at = unknowns[key].start + index
             if abs(p[at]) > 2.0 * std[at] > 0.0:
                 reach = NINE_OF_TEN * std[at]
-                out.append(Found(name=f"{part}.{name}" if part in SIDES else name, value=float(p[at]),
+                out.append(Found(name=f"{part}.{name}" if part in (*SIDES, *MOTIONS) else name, value=float(p[at]),
                                  low=float(p[at] - reach), high=float(p[at] + reach), unit=unit))  # fmt: skip
     return tuple(out)

@@ -69,8 +69,8 @@ def test_a_housing_is_found_with_the_supports(rig: tuple[Layout, Condition], fre
     assert found is not None
     unknowns, model = layout.unknowns, layout.model
     assert found[unknowns["stiffness"]] == pytest.approx(np.log([K1, K2] / np.array(model.stiffness)), abs=0.005)
-    assert found[unknowns[HOUSING]] == pytest.approx(HOUSED, rel=0.05)
-    assert found[unknowns[MODE]] == pytest.approx([frequency, 0.0], abs=0.1)
+    assert found[unknowns[HOUSING]] == pytest.approx([HOUSED, 0.0], abs=0.05 * HOUSED)
+    assert found[unknowns[MODE]][:2] == pytest.approx([frequency, 0.0], abs=0.1)
 
 
 def test_inertia_is_read_from_the_driver(rig: tuple[Layout, Condition]) -> None:
@@ -85,7 +85,7 @@ def test_inertia_is_read_from_the_driver(rig: tuple[Layout, Condition]) -> None:
 def test_no_housing_is_hardly_any(rig: tuple[Layout, Condition]) -> None:
     layout, like = rig
     found = around(layout, [recorded(layout, like, None)], np.zeros(layout.size))
-    assert found is not None and found[layout.unknowns[HOUSING]] < 0.005
+    assert found is not None and found[layout.unknowns[HOUSING]].max() < 0.005
     assert found[layout.unknowns["stiffness"]] == pytest.approx(np.log([K1 / 1e8, K2 / 1e8]), abs=0.005)
 
 

@@ -109,6 +109,7 @@ def test_structure_that_the_rig_shows_around_its_mesh_is_begun_from() -> None:
             group("scale", "1", ("mesh",), 0.06, slot="scale"),
             group("housing-mode", "1", ("frequency",), 0.7, slot="structure", high=0.0),
             group("across", "1", ("driver", "driven"), 0.15, slot="structure", low=0.0, high=1.0),
+            group("cross", "1", ("driver", "driven"), 0.1, slot="structure"),
             group("friction", "1", ("coefficient",), 0.01, 0.5, slot="friction"),
             group("crack", "1", 2, 0.02, 0.35, slot="loss", low=0.0),
         ],
@@ -121,7 +122,7 @@ def test_structure_that_the_rig_shows_around_its_mesh_is_begun_from() -> None:
         bent[3] = p[3] * (p[3] + 0.8)
         return np.concatenate([bent, np.zeros(len(MATRIX))])[: len(MATRIX)] @ MATRIX
 
-    true = np.array([0.08, -0.1, 0.02, -1.0, 0.23, 0.21, 0.0, 0.0, 0.0])
+    true = np.array([0.08, -0.1, 0.02, -1.0, 0.23, 0.21, 0.0, 0.0, 0.0, 0.0, 0.0])
     lines = lines_of(true)
     simulator = FakeSimulator(lines_of, target(lines), layout=SimpleNamespace(unknowns=unknowns))
 
@@ -130,7 +131,7 @@ def test_structure_that_the_rig_shows_around_its_mesh_is_begun_from() -> None:
         out[[0, 1, 3]] = true[[0, 1, 3]] + 0.01
         return out
 
-    without, found = (select(simulator, (), [np.zeros(9)], {}, around=around) for around in (None, read))
+    without, found = (select(simulator, (), [np.zeros(11)], {}, around=around) for around in (None, read))
     assert without is not None and abs(without.base.p[3] + 1.0) > 0.3
     assert found is not None
     assert found.base.p[[0, 1, 2, 3]] == pytest.approx(true[:4], abs=0.01)

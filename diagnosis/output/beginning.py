@@ -1,0 +1,106 @@
+"""Where the fit of a rig without effects begins: the records' own account of what is around the mesh, with supports
+that yield across as a simulation of the excited lines would have them.
+
+Effects change the lines at rest, of teeth and of shafts far more than the answer to the excitation: that shows a rig's
+structure beside whatever is wrong with its gears.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+
+from gearbench.diagnosis.output.fit import cost_of, prior_cost
+from gearbench.diagnosis.output.simulator import Simulator
+from gearbench.diagnosis.output.structure import ACROSS, CROSS, HOUSING, MOTIONS, housings
+
+Array = NDArray[np.float64]
+# From unknowns (size,) that are held: the same with the rig around the mesh as the records show it.
+Around = Callable[[Array], Array | None]
+
+# What the answer of the rig to the force in the mesh does not show: compliance across over along, and the stiffness of
+# the mesh, in standard deviations of the nominal one, that goes with it.
+MESH = (ACROSS, "scale")
+SOFT, STIFFER = (0.05, 0.1, 0.15, 0.2, 0.27, 0.35), (-0.8, 0.0, 0.8)
+EVALUATIONS = 14  # simulated for each of them beyond the levels
+COUPLED = 0.03  # cross-coupling by which a support shows how soft it is across
+
+
+def beginning(simulator: Simulator, background: Sequence[Array], around: Around | None, sd: Array) -> Array:
+    """The unknowns (size,) that come closest under the prior `sd` (size,), of those of the `background` and of what
+    `around` says."""
+    unknowns = simulator.layout.unknowns
+    begin = min(background, key=lambda p: cost_of(simulator, p, sd))
+    seen = around(_yielding(simulator, begin)) if around is not None and ACROSS in unknowns.slices else None
+    if seen is None:
+        for _ in MOTIONS:
+            begin = min(housings(unknowns, begin), key=lambda p: cost_of(simulator, p, sd))
+        return begin
+    found = levelled(simulator, seen, begin, sd)
+    return min((begin, found), key=lambda p: linear_cost(simulator, p, sd))
+
+
+def levelled(simulator: Simulator, seen: Array, p: Array, sd: Array) -> Array:
+    """The rig around the mesh as it was `seen` (size,), with supports across and a mesh whose stiffnesses go together:
+    along a narrow valley, which one step of a fit does not follow."""
+    unknowns = simulator.layout.unknowns
+    best = min(levels(simulator, seen, p), key=lambda trial: linear_cost(simulator, trial, sd))
+    soft = unknowns[ACROSS].start + np.flatnonzero(~_known(simulator, seen))
+    at = np.append(soft, unknowns["scale"].start)
+    spread = np.append(np.full(len(soft), np.log(1.2)), 0.4 * unknowns.prior()[unknowns["scale"]])
+
+    def moved(steps: Array) -> Array:
+        out = best.copy()
+        out[soft] *= np.exp(steps[:-1] * spread[:-1])
+        out[at[-1]] += steps[-1] * spread[-1]
+        return np.clip(out, *unknowns.bounds())
+
+    simplex = np.vstack([np.zeros(len(at)), np.eye(len(at))])
+    options = {"maxfev": EVALUATIONS * len(at), "initial_simplex": simplex, "xatol": 0.05, "fatol": 1.0}
+    found = minimize(lambda steps: linear_cost(simulator, moved(steps), sd), simplex[0], method="Nelder-Mead",
+                     options=options)  # fmt: skip
+    return moved(found.x)
+
+
+def levels(simulator: Simulator, seen: Array, p: Array) -> list[Array]:
+    """The rig around the mesh as it was `seen` (size,), with supports across and meshes of several stiffnesses around
+    that of `p` (size,); where a gear's resonance across its support was seen, that support stays."""
+    unknowns, out = simulator.layout.unknowns, []
+    spread = unknowns.prior()[unknowns["scale"]]
+    known = _known(simulator, seen)
+    for soft, stiffer in product(SOFT if not known.all() else SOFT[:1], STIFFER):
+        trial = seen.copy()
+        trial[unknowns[ACROSS]] = np.where(known, seen[unknowns[ACROSS]], soft)
+        trial[unknowns["scale"]] = p[unknowns["scale"]] + stiffer * spread
+        out.append(trial)
+    return out
+
+
+def _known(simulator: Simulator, seen: Array) -> NDArray[np.bool_]:
+    """Which gears (2,) were seen to resonate across their supports."""
+    return np.asarray(np.abs(seen[simulator.layout.unknowns[CROSS]]) > COUPLED)
+
+
+def _yielding(simulator: Simulator, p: Array) -> Array:
+    """`p` (size,) without a housing, its supports yielding across."""
+    unknowns, out = simulator.layout.unknowns, p.copy()
+    out[unknowns[ACROSS]] = SOFT[2]
+    if HOUSING in unknowns.slices:
+        out[unknowns[HOUSING]] = 0.0
+    return out
+
+
+def linear_cost(simulator: Simulator, p: Array, sd: Array) -> float:
+    """Cost of unknowns under priors by the excited lines alone, by all of them where nothing is excited; infinite where
+    no rig has them."""
+    lines, target = simulator.lines(p), simulator.target
+    if lines is None:
+        return np.inf
+    excited = np.array([block.kind == "excited" for block in target.blocks])
+    counts = np.where(excited, target.counts, 0.0) if excited.any() else target.counts
+    left = target.energies(target.lines - lines)
+    return float(np.sum(counts * np.log1p(left / target.floors))) + prior_cost(p, sd)
