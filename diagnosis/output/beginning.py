@@ -26,7 +26,7 @@ Around = Callable[[Array], Array | None]
 # the mesh, in standard deviations of the nominal one, that goes with it.
 MESH = (ACROSS, "scale")
 SOFT, STIFFER = (0.05, 0.1, 0.15, 0.2, 0.27, 0.35), (-0.8, 0.0, 0.8)
-EVALUATIONS = 14  # simulated for each of them beyond the levels
+VALLEYS, EVALUATIONS = 3, 10  # followed from the best levels, with so many simulations for each of both
 COUPLED = 0.03  # cross-coupling by which a support shows how soft it is across
 
 
@@ -46,15 +46,26 @@ def beginning(simulator: Simulator, background: Sequence[Array], around: Around 
 
 def levelled(simulator: Simulator, seen: Array, p: Array, sd: Array) -> Array:
     """The rig around the mesh as it was `seen` (size,), with supports across and a mesh whose stiffnesses go together:
-    along a narrow valley, which one step of a fit does not follow."""
+    along narrow valleys, between which no fit walks."""
     unknowns = simulator.layout.unknowns
-    best = min(levels(simulator, seen, p), key=lambda trial: linear_cost(simulator, trial, sd))
+    trials = levels(simulator, seen, p)
+    costs = np.array([linear_cost(simulator, trial, sd) for trial in trials])
+    # The best of each stiffness across.
+    rows = costs.reshape(-1, len(STIFFER))
+    numbers = [len(STIFFER) * row + int(np.argmin(rows[row])) for row in np.argsort(rows.min(axis=1))[:VALLEYS]]
     soft = unknowns[ACROSS].start + np.flatnonzero(~_known(simulator, seen))
+    found = [_followed(simulator, trials[number], soft, sd) for number in numbers]
+    return min(found, key=lambda one: one[0])[1]
+
+
+def _followed(simulator: Simulator, p: Array, soft: NDArray[np.int64], sd: Array) -> tuple[float, Array]:
+    """Linear cost, and `p` (size,) with what is `soft` of supports across and the mesh's stiffness where it is least."""
+    unknowns = simulator.layout.unknowns
     at = np.append(soft, unknowns["scale"].start)
     spread = np.append(np.full(len(soft), np.log(1.2)), 0.4 * unknowns.prior()[unknowns["scale"]])
 
     def moved(steps: Array) -> Array:
-        out = best.copy()
+        out = p.copy()
         out[soft] *= np.exp(steps[:-1] * spread[:-1])
         out[at[-1]] += steps[-1] * spread[-1]
         return np.clip(out, *unknowns.bounds())
@@ -63,7 +74,7 @@ def levelled(simulator: Simulator, seen: Array, p: Array, sd: Array) -> Array:
     options = {"maxfev": EVALUATIONS * len(at), "initial_simplex": simplex, "xatol": 0.05, "fatol": 1.0}
     found = minimize(lambda steps: linear_cost(simulator, moved(steps), sd), simplex[0], method="Nelder-Mead",
                      options=options)  # fmt: skip
-    return moved(found.x)
+    return float(found.fun), moved(found.x)
 
 
 def levels(simulator: Simulator, seen: Array, p: Array) -> list[Array]:

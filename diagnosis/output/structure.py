@@ -209,6 +209,12 @@ def structure_found(unknowns: Unknowns, p: Array, std: Array) -> tuple[Found, ..
             at = unknowns[key].start + index
             if abs(p[at]) > 2.0 * std[at] > 0.0:
                 reach = NINE_OF_TEN * std[at]
-                out.append(Found(name=f"{part}.{name}" if part in (*SIDES, *MOTIONS) else name, value=float(p[at]),
+                out.append(Found(name=_named(part, name), value=float(p[at]),
                                  low=float(p[at] - reach), high=float(p[at] + reach), unit=unit))  # fmt: skip
     return tuple(out)
+
+
+def _named(part: str, name: str) -> str:
+    if part in MOTIONS:
+        return f"{name}, where it {'rocks' if part == 'rocking' else 'moves along'}"
+    return f"{part}.{name}" if part in SIDES else name
