@@ -103,7 +103,9 @@ def mesh(model: NominalModel, condition: Condition, departures: Departures, spec
     force, slope = law.evaluate(delta, condition.phase)
     if departures.curvature:
         level = np.maximum(np.abs(force), 1e-3 * condition.force_level) / model.reference_force
-        factor = factor * level ** (departures.curvature / (1.0 + model.hardening))
+        stiffer = departures.curvature / (1.0 + model.hardening)
+        factor = factor * level**stiffer
+        slope = (1.0 + stiffer) * slope
     elastic, tangent = factor * force, factor * slope
     touching = force != 0.0
     ratio = model.mesh_ratio * np.exp(departures.mesh_ratio)

@@ -59,7 +59,7 @@ def levelled(simulator: Simulator, seen: Array, p: Array, sd: Array) -> Array:
 
 
 def _followed(simulator: Simulator, p: Array, soft: NDArray[np.int64], sd: Array) -> tuple[float, Array]:
-    """Linear cost, and `p` (size,) with what is `soft` of supports across and the mesh's stiffness where it is least."""
+    """Linear cost, and `p` (size,) with supports across (those of the entries `soft`) and mesh where it is least."""
     unknowns = simulator.layout.unknowns
     at = np.append(soft, unknowns["scale"].start)
     spread = np.append(np.full(len(soft), np.log(1.2)), 0.4 * unknowns.prior()[unknowns["scale"]])
