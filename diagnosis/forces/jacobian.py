@@ -1,11 +1,10 @@
 """Jacobian of the force residuals: derivatives to the departures by hand, taken to the unknowns that move them.
 
 Departures are linear in the unknowns, so no effect has a derivative of its own. Left out are friction's and the
-filters' modulation of a column, the change of the damping with the stiffness, and what the law's curvature does to its
-tangent: below 3 % of a column at the background's size, up to 40 % for a strongly bent law. Steps that do not help are
-refused, so that this costs steps, not truth. With all of it in, descents went further, into optima where supports and
-filters absorb friction, and verdicts on the calibration family became worse: differences of the residuals, which have
-all of it in, are what the tests compare with, not what the search uses.
+filters' modulation of a column and the change of the damping with the stiffness: below 3 % of a column at the
+background's size. Steps that do not help are refused, so that this costs steps, not truth. With all of it in, descents
+went further, into optima where supports and filters absorb friction, and verdicts on the calibration family became
+worse: differences of the residuals, which have all of it in, are what the tests compare with, not what the search uses.
 """
 
 from __future__ import annotations
