@@ -14,7 +14,7 @@ from gearbench.diagnosis.forces.condition import Condition
 from gearbench.diagnosis.intake.measurements import measurement
 from gearbench.diagnosis.output.around import around
 from gearbench.diagnosis.output.layout import Layout, layout_of
-from gearbench.diagnosis.output.structure import HOUSING, MODE
+from gearbench.diagnosis.output.structure import HOUSING, MODE, SHAPE
 from gearbench.rig import read_case
 
 K1, K2, HOUSED, RATIO = 0.93e8, 1.08e8, 0.06, 0.05  # stiffness of the supports, compliance of the housing, damping
@@ -28,8 +28,16 @@ def rig() -> tuple[Layout, Condition]:
     return layout_of(nominal, problem.model, problem.conditions, ()), problem.conditions[0]
 
 
-def recorded(layout: Layout, like: Condition, frequency: float | None, heavier: float = 1.0) -> Condition:
-    """A condition whose rig has a housing of that logarithm of frequency (None: none) and any force in the mesh."""
+def recorded(
+    layout: Layout,
+    like: Condition,
+    frequency: float | None,
+    heavier: float = 1.0,
+    shares: tuple[float, float] = (1.0, 1.0),
+    late: float = 0.0,
+) -> Condition:
+    """A condition whose rig has a housing of that logarithm of frequency (None: none), of which the supports make these
+    shares, a late sensor of the driver's displacement [s], and any force in the mesh."""
     m = layout.model
     rng = np.random.default_rng(3)
     omega = like.omega[: like.bins]
@@ -44,11 +52,12 @@ def recorded(layout: Layout, like: Condition, frequency: float | None, heavier: 
     turning = (torque / m.base_radius[0] - force) / (mass * s**2 + (omega == 0))
     one, two = (k + s * c for k, c in zip((K1, K2), m.damping, strict=True))
     housing = big + s * damped + s**2 * heavy
+    a, b = shares
     rows = np.array(
         [
-            [m.mass[0] * s**2 + one, 0 * s, -one],
-            [0 * s, m.mass[1] * s**2 + two, -two],
-            [-one, -two, housing + one + two],
+            [m.mass[0] * s**2 + one, 0 * s, -a * one],
+            [0 * s, m.mass[1] * s**2 + two, -b * two],
+            [-a * one, -b * two, housing + a**2 * one + b**2 * two],
         ]
     )
     push = np.array([-m.support_factor * force, m.support_factor * force, 0 * force])
@@ -56,13 +65,16 @@ def recorded(layout: Layout, like: Condition, frequency: float | None, heavier: 
         y = np.array([push[0] / rows[0, 0], push[1] / rows[1, 1]])
     else:
         y = np.linalg.solve(np.moveaxis(rows, 2, 0), push.T[..., None])[:, :2, 0].T
-    spectra = {"torque_driver": like.spectra["torque_driver"], "angle_driver": turning, "y_driver": y[0],
-               "y_driven": y[1], "torque_driven": m.base_radius[1] * force}  # fmt: skip
+    spectra = {"torque_driver": like.spectra["torque_driver"], "angle_driver": turning,
+               "y_driver": y[0] * np.exp(-s * late), "y_driven": y[1],
+               "torque_driven": m.base_radius[1] * force}  # fmt: skip
     noise = {name: 1e-8 * float(np.median(np.abs(values[1 : like.bins]) ** 2)) for name, values in spectra.items()}
     return replace(like, spectra=spectra, noise=noise)
 
 
-@pytest.mark.parametrize("frequency", [-1.0, -0.3, 0.4])
+@pytest.mark.parametrize(
+    "frequency", [-1.0, *(pytest.param(one, marks=pytest.mark.validation) for one in (-0.3, 0.4))]
+)
 def test_a_housing_is_found_with_the_supports(rig: tuple[Layout, Condition], frequency: float) -> None:
     layout, like = rig
     found = around(layout, [recorded(layout, like, frequency)], np.zeros(layout.size))
@@ -71,6 +83,18 @@ def test_a_housing_is_found_with_the_supports(rig: tuple[Layout, Condition], fre
     assert found[unknowns["stiffness"]] == pytest.approx(np.log([K1, K2] / np.array(model.stiffness)), abs=0.005)
     assert found[unknowns[HOUSING]] == pytest.approx([HOUSED, 0.0], abs=0.05 * HOUSED)
     assert found[unknowns[MODE]][:2] == pytest.approx([frequency, 0.0], abs=0.1)
+
+
+def test_a_housing_that_rocks_is_found_and_a_late_sensor(rig: tuple[Layout, Condition]) -> None:
+    layout, like = rig
+    shares, late = (1.0, -0.8), 6e-6
+    found = around(layout, [recorded(layout, like, 0.3, shares=shares, late=late)], np.zeros(layout.size))
+    assert found is not None
+    unknowns, size = layout.unknowns, (shares[0] ** 2 + shares[1] ** 2) / 2
+    assert found[unknowns[HOUSING]] == pytest.approx([0.0, size * HOUSED], abs=0.03 * HOUSED)
+    assert found[unknowns[MODE]][2] == pytest.approx(0.3, abs=0.01)
+    assert np.tan(found[unknowns[SHAPE]][1] - np.pi / 4) == pytest.approx(shares[1] / shares[0], abs=0.02)
+    assert found[unknowns["delay-y_driver"]][0] == pytest.approx(late, rel=0.05)
 
 
 def test_inertia_is_read_from_the_driver(rig: tuple[Layout, Condition]) -> None:
