@@ -54,6 +54,7 @@ STAGE_WORDS = {
     "floor": "noise floor",
 }
 # A gap counts as explained when this part of it, or this multiple of the noise floor, is left.
+BESIDE = 0.1  # part of the gap, by energy, below which what an effect closes is the smaller matter
 LEFT_OF_GAP, LEFT_OF_FLOOR = 0.1, 2.0
 
 
@@ -86,7 +87,9 @@ def headline(verdict: Verdict) -> str:
         words = effects_in_words([effect.name for effect in verdict.effects])
         one = len(verdict.effects) == 1
         said = f"{'explains' if one else 'explain'} the gap"
-        if not explained(verdict):
+        if _beside(verdict):
+            said = f"{'is' if one else 'are'} at work, beside a recalibration that explains most of the gap"
+        elif not explained(verdict):
             said = f"{'is' if one else 'are'} at work, and a part of the gap remains"
         return f"{words[:1].upper()}{words[1:]} {said}."
     if verdict.verdict == "none":
@@ -97,6 +100,15 @@ def headline(verdict: Verdict) -> str:
         return "No known effect is called for, and recalibration leaves the gap much as it was."
     where = f" It arises {place}." if verdict.place != "none" else ""
     return f"None of the known effects explains the gap.{where}"
+
+
+def _beside(verdict: Verdict) -> bool:
+    """Whether what is named closes only a small part of a gap that recalibration closes."""
+    for one in whole_band(verdict.gap):
+        if one.channel == "dte" and one.with_effect is not None:
+            closed = one.recalibrated.value**2 - one.with_effect.value**2
+            return closed < BESIDE * one.nominal.value**2 and one.recalibrated.value < 0.5 * one.nominal.value
+    return False
 
 
 def confidence(verdict: Verdict) -> str:

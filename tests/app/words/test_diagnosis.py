@@ -121,6 +121,11 @@ def test_the_sentences_of_a_verdict() -> None:
         "1.00 um with the effect (noise floor 0.0500 um). What remains is 20 times the floor: the rig's own structure,"
         " or another cause."
     )
+    small = gaps[1].model_copy(update={"recalibrated": Range(value=5e-7, low=5e-7, high=5e-7)})
+    beside = partly.model_copy(update={"gap": (small,)})
+    assert headline(beside) == (
+        "An elastic coupling is at work, beside a recalibration that explains most of the gap."
+    )
     refused = Verdict(
         verdict="unknown", probability=Probabilities(effect=0.1, none=0.0, unknown=0.9), place="none", held_out="r",
         gap=(gap("dte", (0.0, 3000.0), 4e-6, None),),
