@@ -7,6 +7,7 @@ from math import pi
 
 import numpy as np
 import pytest
+from shared.rectangular import ONE_SPRING
 
 from gearbench.bench import BenchError
 from gearbench.bench.statics import static
@@ -14,17 +15,7 @@ from gearbench.bench.sweep import CYCLES, sweep
 from gearbench.cases import case_path
 from gearbench.rig import Case, read_case
 
-# Rectangular stiffness and stiff supports along the line of action: one mass on one spring, and no finite elements.
-SETTINGS = (
-    'simulation.mesh_stiffness="rectangular"',
-    "simulation.stiffness_single_n_per_m=2.5e8",
-    "simulation.stiffness_double_n_per_m=3.5e8",
-    "simulation.stiffness_edge=0.1",
-    "rig.mesh.stiffness_scale=1.0001",
-    "rig.support.stiffness_n_per_m=1e10",
-    "rig.support.damping_n_s_per_m=1e4",
-    'rig.support.direction="line-of-action"',
-)
+SETTINGS = (*ONE_SPRING, "rig.support.damping_n_s_per_m=1e4")
 MESH_MASS = 3.6025e-3 / (0.062 * np.cos(pi / 9)) ** 2 / 2
 
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from shared.rectangular import ONE_SPRING, SUPPORT
 
 from gearbench.bench.record.attributes import bodies_of
 from gearbench.bench.statics import static
@@ -17,18 +18,8 @@ from gearbench.rig import read_case
 
 Array = NDArray[np.float64]
 
-SUPPORT, DAMPER, RATIO = 1e10, 1e3, 0.008
-SETTINGS = (
-    'simulation.mesh_stiffness="rectangular"',
-    "simulation.stiffness_single_n_per_m=2.5e8",
-    "simulation.stiffness_double_n_per_m=3.5e8",
-    "simulation.stiffness_edge=0.1",
-    "rig.mesh.stiffness_scale=1.0001",
-    f"rig.support.stiffness_n_per_m={SUPPORT}",
-    f"rig.support.damping_n_s_per_m={DAMPER}",
-    f"rig.damping.mesh_ratio={RATIO}",
-    'rig.support.direction="line-of-action"',
-)
+DAMPER, RATIO = 1e3, 0.008
+SETTINGS = (*ONE_SPRING, f"rig.support.damping_n_s_per_m={DAMPER}", f"rig.damping.mesh_ratio={RATIO}")
 STEPS = 400  # a mesh period
 WAIT, LOOK = 600, 64  # mesh periods
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import exp
 
 import pytest
+from shared.rectangular import NONLINEAR
 
 from gearbench.bench import sweep as sweep_module
 from gearbench.bench.sweep import CYCLES, SAMPLES, TRANSIENT, sweep, waiting
@@ -12,10 +13,7 @@ from gearbench.cases import case_path
 from gearbench.rig import read_case
 
 SETTINGS = (
-    'simulation.mesh_stiffness="rectangular"',
-    "simulation.stiffness_single_n_per_m=2.5e8",
-    "simulation.stiffness_double_n_per_m=3.5e8",
-    "rig.mesh.stiffness_scale=1.0001",
+    *NONLINEAR,
     "rig.support.stiffness_n_per_m=1e9",
 )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from shared.rectangular import NONLINEAR
 
 from gearbench.bench import BenchError
 from gearbench.bench import sweep as sweep_module
@@ -12,10 +13,7 @@ from gearbench.cases import case_path
 from gearbench.rig import read_case
 
 SETTINGS = (
-    'simulation.mesh_stiffness="rectangular"',
-    "simulation.stiffness_single_n_per_m=2.5e8",
-    "simulation.stiffness_double_n_per_m=3.5e8",
-    "rig.mesh.stiffness_scale=1.0001",
+    *NONLINEAR,
     "rig.support.stiffness_n_per_m=1e9",
     "rig.support.damping_n_s_per_m=2e4",
     "rig.damping.mesh_ratio=0.1",

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
+from shared.rectangular import RECTANGULAR
 
 from gearbench.bench import BenchError, simulate
 from gearbench.bench.nonlinear.run import make_setup
@@ -21,9 +22,7 @@ from gearbench.rig import Case, read_case
 Array = NDArray[np.float64]
 
 SETTINGS = (
-    'simulation.mesh_stiffness="rectangular"',
-    "simulation.stiffness_single_n_per_m=2.5e8",
-    "simulation.stiffness_double_n_per_m=3.5e8",
+    *RECTANGULAR,
     "simulation.stiffness_edge=0.3",
     "rig.support.stiffness_n_per_m=1e9",
     "rig.support.damping_n_s_per_m=1e4",

@@ -7,18 +7,12 @@ from pathlib import Path
 
 import pytest
 from shared.pages import fetched
+from shared.rectangular import NONLINEAR
 
 from gearbench.cli import run_command_line
 from gearbench.records import read_dataset
 
-# A mesh that needs no finite elements, on the non-linear model.
-SETTINGS = (
-    'simulation.mesh_stiffness="rectangular"',
-    "simulation.stiffness_single_n_per_m=2.5e8",
-    "simulation.stiffness_double_n_per_m=3.5e8",
-    "rig.mesh.stiffness_scale=1.0001",
-    "rig.damping.mesh_ratio=0.1",
-)
+SETTINGS = (*NONLINEAR, "rig.damping.mesh_ratio=0.1")
 
 
 def test_the_command_writes_numbers_and_pictures(tmp_path: Path) -> None:
