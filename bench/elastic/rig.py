@@ -20,7 +20,7 @@ from gearbench.fem.contact.store import stored_law
 from gearbench.fem.gear.body import CondensedGear
 from gearbench.fem.gear.store import stored_gear
 from gearbench.fem.motion.hubs import ABSENT, hubs_at_rest, spring_tangent
-from gearbench.fem.motion.imposed import hardening, stiffness_factor
+from gearbench.fem.motion.imposed import hardened, stiffness_factor
 from gearbench.fem.motion.machine import (
     STEADY,
     Machine,
@@ -122,7 +122,7 @@ def linearised(machine: Machine, torque: float, phase: float) -> Linearised:
     """The rig about static equilibrium under a driver torque [N m] at a mesh phase [cycles]."""
     law, hubs = machine.law, machine.hubs
     factor = stiffness_factor(machine.correction, phase, 0.0)
-    factor *= hardening(machine.correction, torque / law.driver.rb / factor)
+    factor = hardened(machine.correction, factor, torque / law.driver.rb)
     cycle = static_cycle(law, np.array([phase]), torque=[torque / factor], key="experiment.torque_mean_nm")
     dte = cycle.transmission_error[0, 0]
     theta1 = phase * law.driver.pitch + dte / law.driver.rb

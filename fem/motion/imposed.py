@@ -75,13 +75,13 @@ def stiffness_factor(correction: Correction, phase: float, t: float) -> float:
 
 
 @compiled(forceinline=True)
-def hardening(correction: Correction, force: float) -> float:
-    """Further factor on the mesh force where it has an exponent, at the force [N] that the teeth press with in all,
-    over the other factor: with F = G (G/reference)^e the one on G is (F/reference)^(e/(1 + e))."""
+def hardened(correction: Correction, factor: float, force: float) -> float:
+    """The factor on the mesh force with the exponent, if there is one, where the teeth press with a force [N] in all:
+    with F = factor G (G/reference)^e that on G has (F/(factor reference))^(e/(1 + e)) besides."""
     if correction.exponent == 0.0:
-        return 1.0
-    level = max(force / correction.reference, LEAST_LEVEL)
-    return level ** (correction.exponent / (1.0 + correction.exponent))
+        return factor
+    level = max(force / factor / correction.reference, LEAST_LEVEL)
+    return factor * level ** (correction.exponent / (1.0 + correction.exponent))
 
 
 @compiled(forceinline=True)

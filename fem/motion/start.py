@@ -11,7 +11,7 @@ from gearbench.fem.contact.coupling import coupling
 from gearbench.fem.contact.law import PAIRS, Meetings
 from gearbench.fem.contact.static import ContactError, position, solve_torque
 from gearbench.fem.motion.hubs import ABSENT, hubs_at_rest, spring_force
-from gearbench.fem.motion.imposed import common_excess, hardening, stiffness_factor
+from gearbench.fem.motion.imposed import common_excess, hardened, stiffness_factor
 from gearbench.fem.motion.machine import Machine, contact_rows, modal_flexibility
 
 Array = NDArray[np.float64]
@@ -57,7 +57,7 @@ def _pressed(machine: Machine, phase: float, torque: float, guess: float, hub: A
     across = hub[[at.x1, at.x2]] if at.x1 != ABSENT else np.zeros(2)
     x, y = machine.axis_x * along + machine.axis_y * across, machine.axis_y * along - machine.axis_x * across
     factor = stiffness_factor(machine.correction, phase, t)
-    factor *= hardening(machine.correction, torque / law.driver.rb / factor)
+    factor = hardened(machine.correction, factor, torque / law.driver.rb)
     # A factor on the mesh force is a law under so much smaller a load; an excess turns the driver back.
     dte = solve_torque(law, phase, torque / factor, guess, x, y)
     theta1 = phase * law.driver.pitch + dte / law.driver.rb

@@ -18,7 +18,7 @@ from gearbench.fem.contact.static import MARGIN
 from gearbench.fem.motion.effective import accelerate, factorise
 from gearbench.fem.motion.imposed import (
     common_excess,
-    hardening,
+    hardened,
     impose,
     lag,
     lean,
@@ -266,7 +266,7 @@ def try_step(
             look, looks = False, looks + 1
             theta1, theta2 = angles(machine, room.sought, t + h)
             factor = stiffness_factor(machine.correction, theta2 / machine.law.driven.pitch, t + h)
-            soft = 1.0 / (factor * hardening(machine.correction, pressing(old, known) / factor))
+            soft = 1.0 / hardened(machine.correction, factor, pressing(old, known))
             n = seek(machine, new, theta1, theta2, nominal, room)
             gain = recall(old, known, new, n, machine, h, lately, room)
             if rubs(machine):
@@ -286,7 +286,7 @@ def try_step(
             break
         last, done = soft, settled(machine, new, n, room)
         if machine.correction.exponent != 0.0:
-            soft = 1.0 / (factor * hardening(machine.correction, pressing(new, n) / factor))
+            soft = 1.0 / hardened(machine.correction, factor, pressing(new, n))
         if done and abs(soft - last) <= SETTLED * last:
             break
         found = False
