@@ -44,6 +44,7 @@ the phase by a thousandth of a cycle. With a prescribed driven speed the phase i
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from math import cos, inf, pi, sin
 
 import numpy as np
@@ -95,13 +96,18 @@ class NonLinear:
     M_r (0: rigid or none), m_1, m_2; outer: M_l beyond an elastic shaft of the load (0: none that turns)."""
 
     rig: Rig
-    law: MeshLaw
+    teeth: MeshLaw
     base_radii: tuple[float, float]
     working_pressure_angle: float
     factor: float
     masses: tuple[float, float, float, float, float]
     mesh_mass: float  # m_e [kg]
     outer: float = 0.0
+
+    @cached_property
+    def law(self) -> MeshLaw:
+        """That of the mesh: of its teeth, with the rig's exponent."""
+        return self.teeth.hardened(self.rig.mesh.exponent, self.rig.mesh.reference_force)
 
     @property
     def free(self) -> bool:
@@ -184,9 +190,9 @@ class NonLinear:
             reference1=one.reference_deflection,
             reference2=two.reference_deflection,
             damping_factor=2 * self.rig.damping.mesh_ratio * float(np.sqrt(self.mesh_mass)),
-            backlash=self.law.backlash,
-            root=(len(self.law.approach) - 1) / float(np.sqrt(self.law.approach[-1])),
-            mirror=self.law.mirror * self.law.phases,
+            backlash=self.teeth.backlash,
+            root=(len(self.teeth.approach) - 1) / float(np.sqrt(self.teeth.approach[-1])),
+            mirror=self.teeth.mirror * self.teeth.phases,
         )
 
     def rubbing(self, mesh_frequency: float) -> Rubbing | None:
@@ -309,7 +315,7 @@ def nonlinear_model(rig: Rig, meshing: Pair, law: MeshLaw) -> NonLinear:
     turning = one.inertia + (0.0 if elastic else rotor), two.inertia + (0.0 if twists else output)
     return NonLinear(
         rig=rig,
-        law=law.hardened(rig.mesh.exponent, rig.mesh.reference_force),
+        teeth=law,
         base_radii=(r1, r2),
         working_pressure_angle=meshing.working_pressure_angle,
         factor=cos(meshing.working_pressure_angle) if rig.support.direction == "tangential" else 1.0,
