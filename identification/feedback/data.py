@@ -61,6 +61,17 @@ class ClassData:
         return int(np.abs(self.lines[np.abs(self.force).max(axis=2) > 0]).min())
 
     @property
+    def least(self) -> float:
+        """Position of that line, or of the first one: what a pole may be as slow as."""
+        return max(self.lowest, 1) / self.top
+
+    @property
+    def begins(self) -> Floats:
+        """Positions (16,) over the lowest twentieth of the excited band."""
+        lowest = self.lowest
+        return np.asarray(np.linspace(lowest, lowest + 0.05 * (self.excited - lowest), 16) / self.top)
+
+    @property
     def furthest(self) -> int:
         """Highest line of sidebands that the model has."""
         return furthest_line(self.top, self.mesh_lines)

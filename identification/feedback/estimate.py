@@ -129,7 +129,7 @@ def rational(fit: Refined, data: ClassData, pairs: int) -> Model:
         variance = np.einsum("fi,ij,fj->f", values, fit.covariance[own, own], values.conj(), optimize=True).real
         weights.append(1.0 / np.sqrt(np.maximum(variance, 0.0) + (ROUGH * np.abs(values @ coefficients)) ** 2))
     d, n = model.functions(position)
-    basis = Fractions.limited(common_pairs(position, [d, n], weights, pairs), float(position[0]))
+    basis = Fractions.limited(common_pairs(position, [d, n], weights, pairs), data.least)
     fractions = basis.at(position)
     of_d, of_n = (_fitted(fractions, f, weight) for f, weight in zip((d, n), weights, strict=True))
     return Model(basis, of_d, of_n, model.k, model.c)
@@ -138,7 +138,7 @@ def rational(fit: Refined, data: ClassData, pairs: int) -> Model:
 def extended(model: Model, data: ClassData) -> list[Model]:
     """The model with one more pair of poles where, of PLACES, it lowers the output error most to first order; and the
     same without residues, which the first refining step finds with everything else, should these lead too far."""
-    known, least, count = model.basis.pairs, max(data.lowest, 1) / data.top, len(PLACES)
+    known, least, count = model.basis.pairs, data.least, len(PLACES)
     kept, size_of = known.shape[0], np.array(PLACES) * data.excited / data.top
     placed = np.stack([2 * np.array(PLACED_DAMPING) * size_of, size_of**2], axis=1)
     basis = Fractions.limited(np.concatenate([known, placed]), least)

@@ -43,7 +43,7 @@ class Equations:
 def equations_of(model: Model, data: ClassData) -> Equations:
     """Equations of all excited lines with the harmonics of `model`."""
     weights, _ = equation_weights(data)
-    mesh = np.concatenate([part for x in (model.k, model.c) for part in (x.real, x.imag)])
+    mesh = model.vector()[model.free :]
     rows = []
     for index, omega in enumerate(data.omega):
         used = weights[index] > 0
@@ -60,14 +60,13 @@ def equations_of(model: Model, data: ClassData) -> Equations:
 
 def linear_models(model: Model, data: ClassData, pairs: int) -> list[Model]:
     """Models of `pairs` pairs of poles that begin with the harmonics of `model`: one after each turn."""
-    least = max(data.lowest, 1) / data.top
-    found, turns = spread_pairs(least, data.excited / data.top, pairs), []
+    found, turns = spread_pairs(data.least, data.excited / data.top, pairs), []
     for _ in range(TURNS):
         equations = equations_of(model, data)
         for _ in range(FITTING_ROUNDS):
             found = equations.next_pairs(found)
         if not np.all(np.isfinite(found)) or found.max() > FAR**2:
             break
-        model = first_model(data, Fractions.limited(found, least), model.harmonics)
+        model = first_model(data, Fractions.limited(found, data.least), model.harmonics)
         turns.append(model)
     return turns

@@ -73,7 +73,7 @@ def refined(model: Model, data: ClassData, settled: float = SETTLED) -> Refined:
         if cost_of > cost * (1 + SETTLED):
             break  # no step along this direction helps
         before, cost = cost, cost_of
-        model, operator, predicted, prior = trial, operator_of, of_trial, _prior(trial, np.sum(root**2, axis=1))
+        model, operator, predicted, prior = trial, operator_of, of_trial, _prior(trial, root)
         if before - cost < settled * before:
             break
     left = np.where(data.dte != 0, data.dte - predicted, 0.0)
@@ -84,7 +84,7 @@ def settled_covariance(fit: Refined, data: ClassData) -> Refined:
     """The same with the covariance at the model itself; that of `refined` belongs to the model before its last step,
     which is another one where a pole comes near zero frequency."""
     gram, right = linearised(fit.model, data)
-    system = _System(fit.model, gram, right, fit.noise, _prior(fit.model, np.sum(fit.root**2, axis=1)))
+    system = _System(fit.model, gram, right, fit.noise, _prior(fit.model, fit.root))
     return replace(fit, root=system.root())
 
 
@@ -127,13 +127,13 @@ def _freedom(data: ClassData, model: Model) -> float:
     return max(data.equations - 0.5 * model.vector().size, 1.0)
 
 
-def _prior(model: Model, variance: Floats | None) -> Floats:
-    """Prior precision of each real parameter, 0 for those of D and N, from their values and `variance` (P,)."""
+def _prior(model: Model, root: Floats | None) -> Floats:
+    """Prior precision of each real parameter, 0 for those of D and N, from their values and their covariance's root."""
     harmonics = model.harmonics
     order = np.arange(1, harmonics + 1)
     free = model.free
     precision = np.zeros(free + 4 * harmonics)
-    spread = np.zeros(4 * harmonics) if variance is None else variance[free:]
+    spread = np.zeros(4 * harmonics) if root is None else np.sum(root[free:] ** 2, axis=1)
     for first, values in ((0, model.k), (2 * harmonics, model.c)):
         own = spread[first : first + 2 * harmonics].reshape(2, harmonics)
         size = np.mean(order**2 * (values.real**2 + values.imag**2 + own[0] + own[1])) / 2

@@ -107,8 +107,7 @@ def along_phase(model: Model, data: ClassData, phases: int) -> tuple[Floats, Flo
     of a shaft to ground as the mesh's.
     """
     turn = np.exp(2j * np.pi * np.outer(np.arange(phases) / phases, np.arange(1, model.harmonics + 1)))
-    lowest = data.lowest
-    position = np.linspace(lowest, lowest + 0.05 * (data.excited - lowest), 16) / data.top
+    position = data.begins
     d, _ = model.functions(position)
     # D = k_0 + j w c_0 - w^2 m + ..: straight lines through its parts.
     k_0 = float(np.polyfit(position**2, d.real, 1)[1])

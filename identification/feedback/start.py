@@ -85,11 +85,9 @@ def _gram(data: ClassData, model: Model, weights: Floats) -> Floats:
 
 
 def gauged(model: Model, data: ClassData) -> Model:
-    """The same response with N real and 1 on average over the lowest excited tenth of the band.
+    """The same response with N real and 1 on average over the lowest twentieth of the excited band.
 
     All of D, N, k, c may be multiplied by one real number without a change of the response.
     """
-    lowest = data.lowest
-    position = np.linspace(lowest, lowest + 0.05 * (data.excited - lowest), 16) / data.top
-    scale = 1.0 / float(model.functions(position)[1].real.mean())
+    scale = 1.0 / float(model.functions(data.begins)[1].real.mean())
     return model.scaled(scale)
