@@ -54,8 +54,8 @@ STAGE_WORDS = {
     "floor": "noise floor",
 }
 # A gap counts as explained when this part of it, or this multiple of the noise floor, is left.
-BESIDE = 0.1  # part of the gap, by energy, below which what an effect closes is the smaller matter
 LEFT_OF_GAP, LEFT_OF_FLOOR = 0.1, 2.0
+BESIDE = 0.1  # part of the gap, by energy, below which what an effect closes is the smaller matter
 
 
 def effects_in_words(names: Sequence[str]) -> str:

@@ -192,7 +192,7 @@ def _of_teeth(condition: Condition, weights: Array) -> Array:
 
 
 def _backlash(at: _Point) -> Array:
-    law, state, phase = at.model.law, at.mesh, at.condition.phase
+    law, state, phase = at.model.hardened, at.mesh, at.condition.phase
     present = max(law.backlash + at.departures.backlash, 0.0)
     if not np.any(state.delta < -present):
         return np.zeros(at.condition.samples)

@@ -28,7 +28,7 @@ from gearbench.diagnosis.forces.condition import Condition
 from gearbench.diagnosis.forces.covariance import KINDS, kinds_of
 from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.output.layout import Layout
-from gearbench.diagnosis.output.structure import ACROSS, CROSS, GAIN, HOUSING, MODE, MOTIONS, SHAPE, moving
+from gearbench.diagnosis.output.structure import ACROSS, CROSS, GAIN, HOUSING, MODE, MOTIONS, SHAPE, with_motion
 from gearbench.lumped.nonlinear.coordinates import COORDINATES
 
 Array = NDArray[np.float64]
@@ -102,9 +102,9 @@ def _found(layout: Layout, lines: Sequence[_Lines], held: Array) -> Array:
     unknowns = layout.unknowns
     motions = range(len(MOTIONS)) if HOUSING in unknowns.slices else ()
     held = held.copy()
-    held[unknowns[CROSS]] = 0.0
-    for motion in motions:
-        held[unknowns[HOUSING].start + motion] = 0.0
+    for key in (CROSS, HOUSING):
+        if key in unknowns.slices:
+            held[unknowns[key]] = 0.0
     cost, best = _fitted(layout, lines, held, KEYS, LEVELS[:1])
     for _ in range(ROUNDS):
         begin = best
@@ -119,7 +119,7 @@ def _found(layout: Layout, lines: Sequence[_Lines], held: Array) -> Array:
     if not motions:
         return best
     # The mesh pushes both gears apart: a housing that moves along answers faintly, and is imitated from afar.
-    trials = [moving(unknowns, best, 0, at, HOUSING_FROM[-1]) for at in FAINT_AT]
+    trials = [with_motion(unknowns, best, 0, at, HOUSING_FROM[-1]) for at in FAINT_AT]
     tried = [_fitted(layout, lines, trial, (*KEYS, *HOUSED), LEVELS[1:], FAINT_EVALUATIONS) for trial in trials]
     value, p = min(tried, key=lambda one: one[0])
     return _fitted(layout, lines, p, (*KEYS, *HOUSED), LEVELS[1:])[1] if value < cost else best
@@ -149,7 +149,7 @@ def _moving(unknowns: Unknowns, p: Array, motion: int) -> list[Array]:
     """`p` (size,) without a motion of the housing, then with it where it might resonate."""
     without = p.copy()
     without[unknowns[HOUSING].start + motion] = 0.0
-    return [without, *(moving(unknowns, p, motion, at, part) for part, at in product(HOUSING_FROM, HOUSING_AT))]
+    return [without, *(with_motion(unknowns, p, motion, at, part) for part, at in product(HOUSING_FROM, HOUSING_AT))]
 
 
 def _misfit(layout: Layout, lines: Sequence[_Lines], p: Array) -> float:
@@ -202,12 +202,8 @@ def _fitted(
     return _misfit(layout, lines, p), p
 
 
-def left_over(layout: Layout, p: Array, lines: _Lines, level: float) -> Complex:
-    """What no force in the mesh explains of the channels (K * C,), over their noise and a part of their level."""
-    return _left_over(layout, _system(layout, p), lines, level)
-
-
 def _left_over(layout: Layout, system: _System, lines: _Lines, level: float) -> Complex:
+    """What no force in the mesh explains of the channels (K * C,), over their noise and a part of their level."""
     answer = _answers(layout, system, lines)
     weight = 1.0 / np.sqrt(lines.noise + level**2 * lines.level)
     driven = lines.channels - answer[:, :, 1] * (lines.torque / layout.model.base_radius[0])[:, None]

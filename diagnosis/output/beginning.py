@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
+from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.output.fit import cost_of, prior_cost
 from gearbench.diagnosis.output.simulator import Simulator
-from gearbench.diagnosis.output.structure import ACROSS, CROSS, HOUSING, MOTIONS, housings
+from gearbench.diagnosis.output.structure import ACROSS, CROSS, MOTIONS, housings
 
 Array = NDArray[np.float64]
 # From unknowns (size,) that are held: the same with the rig around the mesh as the records show it.
@@ -24,7 +25,6 @@ Around = Callable[[Array], Array | None]
 
 # What the answer of the rig to the force in the mesh does not show: compliance across over along, and the stiffness of
 # the mesh, in standard deviations of the nominal one, that goes with it.
-MESH = (ACROSS, "scale")
 SOFT, STIFFER = (0.05, 0.1, 0.15, 0.2, 0.27, 0.35), (-0.8, 0.0, 0.8)
 VALLEYS, EVALUATIONS = 3, 10  # followed from the best levels, with so many simulations for each of both
 COUPLED = 0.03  # cross-coupling by which a support shows how soft it is across
@@ -35,13 +35,21 @@ def beginning(simulator: Simulator, background: Sequence[Array], around: Around 
     `around` says."""
     unknowns = simulator.layout.unknowns
     begin = min(background, key=lambda p: cost_of(simulator, p, sd))
-    seen = around(_yielding(simulator, begin)) if around is not None and ACROSS in unknowns.slices else None
+    yielding = begin.copy()
+    if ACROSS in unknowns.slices:
+        yielding[unknowns[ACROSS]] = SOFT[2]
+    seen = seen_by(around, unknowns, yielding)
     if seen is None:
         for _ in MOTIONS:
             begin = min(housings(unknowns, begin), key=lambda p: cost_of(simulator, p, sd))
         return begin
     found = levelled(simulator, seen, begin, sd)
     return min((begin, found), key=lambda p: linear_cost(simulator, p, sd))
+
+
+def seen_by(around: Around | None, unknowns: Unknowns, held: Array) -> Array | None:
+    """What `around` makes of `held` (size,); None without one, or for rigs that are no question to it."""
+    return around(held) if around is not None and ACROSS in unknowns.slices else None
 
 
 def levelled(simulator: Simulator, seen: Array, p: Array, sd: Array) -> Array:
@@ -96,22 +104,10 @@ def _known(simulator: Simulator, seen: Array) -> NDArray[np.bool_]:
     return np.asarray(np.abs(seen[simulator.layout.unknowns[CROSS]]) > COUPLED)
 
 
-def _yielding(simulator: Simulator, p: Array) -> Array:
-    """`p` (size,) without a housing, its supports yielding across."""
-    unknowns, out = simulator.layout.unknowns, p.copy()
-    out[unknowns[ACROSS]] = SOFT[2]
-    if HOUSING in unknowns.slices:
-        out[unknowns[HOUSING]] = 0.0
-    return out
-
-
 def linear_cost(simulator: Simulator, p: Array, sd: Array) -> float:
     """Cost of unknowns under priors by the excited lines alone, by all of them where nothing is excited; infinite where
     no rig has them."""
     lines, target = simulator.lines(p), simulator.target
     if lines is None:
         return np.inf
-    excited = np.array([block.kind == "excited" for block in target.blocks])
-    counts = np.where(excited, target.counts, 0.0) if excited.any() else target.counts
-    left = target.energies(target.lines - lines)
-    return float(np.sum(counts * np.log1p(left / target.floors))) + prior_cost(p, sd)
+    return target.excited_cost(target.lines - lines) + prior_cost(p, sd)

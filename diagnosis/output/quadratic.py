@@ -41,7 +41,7 @@ class Quadratic:
 
     def cost(self, step: Array) -> float:
         """Nats of the data after a step (q,)."""
-        return float(np.sum(self.target.counts * np.log1p(self._energies(step) / self.target.floors)))
+        return float(np.sum(self.target.counts * self.target.nats(self._energies(step))))
 
     def _energies(self, step: Array) -> Array:
         whole = self.energy - 2 * self.slopes @ step + np.einsum("bij,i,j->b", self.squares, step, step, optimize=True)

@@ -13,7 +13,7 @@ from gearbench.diagnosis.effects.pitch_error import KEYS as PITCHES
 from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
 from gearbench.diagnosis.effects.torque_ripple import KEY as RIPPLE
 from gearbench.diagnosis.forces.unknowns import Unknowns
-from gearbench.diagnosis.output.beginning import MESH, Around, levelled
+from gearbench.diagnosis.output.beginning import Around, levelled, seen_by
 from gearbench.diagnosis.output.fit import SETTLED, Optimum, fit, sensitivity_of
 from gearbench.diagnosis.output.simulator import Simulator
 from gearbench.diagnosis.output.structure import ENCODER, otherwise
@@ -46,24 +46,21 @@ def _better(found: Optimum, other: Optimum | None) -> Optimum:
 def is_close(simulator: Simulator, found: Optimum) -> bool:
     """Whether the median block is left with little beside its noise."""
     target = simulator.target
-    noise = np.log1p(target.noise / target.floors)
-    left = np.log1p(target.energies(target.lines - found.lines) / target.floors) - noise
+    left = target.nats(target.energies(target.lines - found.lines)) - target.nats(target.noise)
     return bool(np.median(left) < CLOSE)
 
 
 def _from_around(simulator: Simulator, found: Optimum, around: Around | None, report: Report) -> Optimum | None:
-    """The best of several fits from what the records show of the rig around its mesh."""
+    """The fit begun with what the records show of the rig around its mesh, beside the effects that were widened."""
     unknowns = simulator.layout.unknowns
-    if around is None or any(key not in unknowns.slices for key in MESH):
-        return None
-    report("simulating: the rig around its mesh")
     widened = found.sd > unknowns.prior()
     chosen = widened | ~_of(unknowns, ROTATION)
     # Effects stay; what was fitted around the wrong structure goes.
     held = np.where(widened, found.p, 0.0)
-    seen = around(held)
+    seen = seen_by(around, unknowns, held)
     if seen is None:
         return None
+    report("simulating: the rig around its mesh")
     begin = levelled(simulator, seen, held, found.sd)
     sensitivity = sensitivity_of(simulator, begin, unknowns.prior(), chosen)
     if sensitivity is None:

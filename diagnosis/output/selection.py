@@ -78,8 +78,8 @@ def select(
     around: Around | None = None,
 ) -> Selection | None:
     """The effects of the hypotheses that the records call for; `background`: where to begin without any (size,),
-    `starts`: by a hypothesis' name; `around`: the rig around its mesh, asked for where a fit is led astray. None where
-    no start is a rig."""
+    `starts`: by a hypothesis' name; `around`: the rig around its mesh, as the records show it. None where no start is
+    a rig."""
     unknowns = simulator.layout.unknowns
     sd = prior_of(simulator, unknowns.prior())
     chosen = np.ones(unknowns.size, dtype=bool)

@@ -118,11 +118,11 @@ def housings(unknowns: Unknowns, p: Array) -> list[Array]:
         return out
     for motion, frequency in product(range(len(MOTIONS)), (-1.0, -0.5, 0.0, 0.5)):
         if p[unknowns[HOUSING]][motion] <= NONE:
-            out.append(moving(unknowns, p, motion, frequency, HOUSING_BEGIN))
+            out.append(with_motion(unknowns, p, motion, frequency, HOUSING_BEGIN))
     return out
 
 
-def moving(unknowns: Unknowns, p: Array, motion: int, frequency: float, compliance: float) -> Array:
+def with_motion(unknowns: Unknowns, p: Array, motion: int, frequency: float, compliance: float) -> Array:
     """`p` (size,) with a motion of the housing of that compliance and logarithm of the frequency, its shares equal."""
     out = p.copy()
     out[unknowns[HOUSING].start + motion] = compliance

@@ -78,9 +78,19 @@ class Target:
         found = np.bincount(self.of_line, np.abs(residual) ** 2, len(self.floors))
         return np.asarray(found / self.sizes)
 
+    def nats(self, energies: Array) -> Array:
+        """What mean squares (blocks,) cost a line [nats] (blocks,)."""
+        return np.asarray(np.log1p(energies / self.floors))
+
     def cost(self, residual: Complex) -> float:
         """Nats that a residual costs."""
-        return float(np.sum(self.counts * np.log1p(self.energies(residual) / self.floors)))
+        return float(np.sum(self.counts * self.nats(self.energies(residual))))
+
+    def excited_cost(self, residual: Complex) -> float:
+        """Nats that a residual costs on the excited lines, or on all where nothing is excited."""
+        excited = np.array([block.kind == "excited" for block in self.blocks])
+        counts = np.where(excited, self.counts, 0.0) if excited.any() else self.counts
+        return float(np.sum(counts * self.nats(self.energies(residual))))
 
 
 def target_of(measurements: Sequence[Measurement], conditions: Sequence[Condition]) -> Target:
