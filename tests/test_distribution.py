@@ -70,7 +70,7 @@ def wheel(tree: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_wheel_holds_the_package_the_cases_and_nothing_else(wheel: Path) -> None:
     names = zipfile.ZipFile(wheel).namelist()
-    command = ["git", "ls-files", "*.py", "cases/*.toml", "app/py.typed"]
+    command = ["git", "ls-files", "*.py", "cases/*.toml", "app/py.typed", "app/report/*.js"]
     tracked = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout.split()
     outside = ("tests/", "benchmarks/", "tools/", "docs/", "examples/", ".")
     expected = {"gearbench/" + name.removeprefix("app/") for name in tracked if not name.startswith(outside)}
