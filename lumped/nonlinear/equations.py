@@ -1,7 +1,8 @@
 """The equations of motion at an instant, compiled; `lumped.nonlinear.model` and `structure` have them in words.
 
-Further coordinates e, their rates r and the structure are empty tuples for a rig without structure, and friction is
-None for one without: the compiler knows both, so that the plain model costs nothing for what it does not have. They are
+Further coordinates e, their rates r and the structure are empty tuples for a rig without structure, so are the pairs of
+teeth that are alike, and friction is None for a rig without: the compiler knows, so that the plain model costs nothing
+for what it does not have. They are
 typed Any where mypy cannot follow the lengths of tuples.
 """
 
@@ -26,7 +27,7 @@ class Equations(NamedTuple):
     gears together; mean: that of the driver's torque over its base radius [N]."""
 
     secant: Array
-    apart: Apart
+    apart: Apart | tuple[()]
     constants: Constants
     rubbing: Rubbing | None
     structure: Structure | tuple[()]

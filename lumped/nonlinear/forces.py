@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from gearbench.kernels.compiled import ROUNDING, compiled
 from gearbench.lumped.nonlinear.constants import Constants, Rubbing
 from gearbench.lumped.nonlinear.coordinates import Coordinates
+from gearbench.lumped.nonlinear.law import MeshLaw
 from gearbench.lumped.nonlinear.tables import Table
 
 Array = NDArray[np.float64]
@@ -18,10 +19,9 @@ Array = NDArray[np.float64]
 
 class Apart(NamedTuple):
     """What pairs whose teeth differ have of their own: excess [m] and gain at the entries of the table (entries + 1,
-    n_o), and their secants (phases + 1, n_d, n_o) [N/m]; without columns where all teeth are alike."""
+    n_o, 2), and their secants (phases + 1, n_d, n_o) [N/m]."""
 
-    excess: Array
-    gain: Array
+    own: Array
     secant: Array
 
 
@@ -47,6 +47,13 @@ class Rubbed(NamedTuple):
     along: float
     across: float
     driven: float
+
+
+def apart_of(table: Table, law: MeshLaw) -> Apart | tuple[()]:
+    """The pairs of a table and its law; empty where all teeth are alike."""
+    if table.pair_excess.shape[1] == 0:
+        return ()
+    return Apart(np.stack([table.pair_excess, table.pair_gain], axis=2), law.pair_secants)
 
 
 @compiled(fastmath=ROUNDING)
@@ -91,8 +98,8 @@ def _pressed_apart(travel: float, rate: float, at: Entry, apart: Apart, p: Const
     weight = at.position - row
     elastic, tangent = 0.0, 0.0
     for o in range(apart.secant.shape[2]):
-        depth = travel + apart.excess[at.number, o]
-        if depth <= 0.0:
+        depth = travel + apart.own[at.number, o, 0]
+        if depth <= 0.0 or apart.secant[row, last, o] + apart.secant[row + 1, last, o] == 0.0:
             continue
         root = p.root * sqrt(depth)
         node = min(int(root), last - 1)
@@ -101,17 +108,17 @@ def _pressed_apart(travel: float, rate: float, at: Entry, apart: Apart, p: Const
         high = apart.secant[row, node, o] + weight * (apart.secant[row + 1, node, o] - apart.secant[row, node, o])
         rise = high - low
         stiffness = low + (root - node + 1) * rise
-        gain = apart.gain[at.number, o]
+        gain = apart.own[at.number, o, 1]
         elastic += gain * depth * stiffness
         tangent += gain * max(stiffness + 0.5 * root * rise, 0.0)
     return max(at.gain * elastic + p.damping_factor * sqrt(at.gain * tangent) * rate, 0.0)
 
 
 @compiled(fastmath=ROUNDING)
-def mesh(travel: float, rate: float, at: Entry, secant: Array, apart: Apart, p: Constants) -> float:
+def mesh(travel: float, rate: float, at: Entry, secant: Array, apart: Any, p: Constants) -> float:
     """Mesh force [N] at dte `travel` [m] and its rate [m/s]; negative on the back flanks."""
     depth = travel + at.excess
-    if apart.secant.shape[2] > 0:
+    if len(apart) != 0:
         force = _pressed_apart(depth, rate + at.excess_rate, at, apart, p)
         if force > 0.0:
             return force

@@ -15,7 +15,7 @@ from gearbench.kernels.compiled import ROUNDING, compiled
 from gearbench.lumped.errors import LumpedError
 from gearbench.lumped.nonlinear.coordinates import Coordinates, Further, parted
 from gearbench.lumped.nonlinear.equations import Answer, Equations, answer
-from gearbench.lumped.nonlinear.forces import Apart, entry
+from gearbench.lumped.nonlinear.forces import apart_of, entry
 from gearbench.lumped.nonlinear.model import NonLinear
 from gearbench.lumped.nonlinear.tables import Table
 
@@ -41,7 +41,6 @@ class Outputs(NamedTuple):
 
 
 PLAIN = 7  # columns of a rig without structure
-ALIKE = np.empty((0, 0, 0))  # secants of pairs whose teeth do not differ
 
 
 def integrate(
@@ -72,10 +71,9 @@ def integrate(
     width = PLAIN if structure is None else len(Outputs._fields)
     # Columns lie in one piece however many samples there are: the loop is compiled anew for every other layout.
     samples = np.empty((width, entries // (2 * substeps))).T
-    differ = table.pair_excess.shape[1] > 0
     equations = Equations(
         secant=np.ascontiguousarray(model.law.secant),
-        apart=Apart(table.pair_excess, table.pair_gain, model.law.pair_secants if differ else ALIKE),
+        apart=apart_of(table, model.law),
         constants=model.constants(),
         rubbing=model.rubbing(mesh_frequency),
         structure=structure or (),
