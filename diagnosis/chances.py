@@ -17,13 +17,15 @@ class Chances(NamedTuple):
 
 
 def chances_of(judged: Judged, decided: Decided, known: Calibration, lines: float) -> Chances:
-    """The chances of what was named, and of the best candidate, named or not. Evidence is that over the background
-    alone, as the candidates have it."""
+    """The chances of what was named, and of the best candidate, named or not, that the judged record did not speak
+    against. Evidence is that over the background alone, as the candidates have it."""
+    dropped = {one.hypothesis.effect.name for one in judged.dropped if one.hypothesis.effect is not None}
     alone: dict[str, float] = {}
     for one in judged.found.selection.weighed:
         assert one.hypothesis.effect is not None
         alone.setdefault(one.hypothesis.effect.name, one.log_bayes_factor)
-    named, all_signs = {}, [effect_signs(max(alone.values(), default=0.0), lines, False, 0.0)]
+    left = max((evidence for name, evidence in alone.items() if name not in dropped), default=0.0)
+    named, all_signs = {}, [effect_signs(left, lines, False, 0.0)]
     for one in decided.named:
         assert one.hypothesis.effect is not None
         share = judged.share(judged.closings[one.hypothesis.name].without)

@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 from gearbench.bench.nonlinear.replay import Steady, resampled
 from gearbench.lumped.nonlinear.coordinates import COORDINATES
 from gearbench.lumped.nonlinear.law import MeshLaw
+from gearbench.lumped.nonlinear.pressing import Pressed, of_pairs, pressed
 from gearbench.lumped.nonlinear.rest import inverse_masses, mesh_direction, springs_and_dampers
 from gearbench.lumped.nonlinear.step import columns
+from gearbench.lumped.nonlinear.tables import instants
 from gearbench.lumped.nonlinear.tangent import Tangent, departures
 
 Array = NDArray[np.float64]
@@ -36,13 +38,15 @@ class Moving(NamedTuple):
 @dataclass(frozen=True)
 class Along:
     """A steady motion on the half-step grid (entries,) of one repetition: mesh phase [cycles], elastic force of the
-    mesh [N], rate of its deflection [m/s], the law of its force, the force that the teeth would have without an
-    exponent over the one where that changes nothing, and of the coordinates u1, y1, y2, u2 their motion.
+    mesh [N], what each pair has of it on the working flanks, force and tangent (entries, n_o), rate of the deflection
+    [m/s], the law of its force, the force that the teeth would have without an exponent over the one where that changes
+    nothing, and of the coordinates u1, y1, y2, u2 their motion.
     `drive` is the coordinate that the driver's torque acts on; `early` steps let free vibrations die out.
     """
 
     phase: Array
     elastic: Array
+    pairs: Pressed
     rate: Array
     law: MeshLaw
     level: Array
@@ -92,12 +96,11 @@ def along(steady: Steady) -> Along:
     spectrum = np.fft.rfft(travel)
     rate = np.fft.irfft(2j * np.pi * np.fft.rfftfreq(samples, 1 / setup.sampling_rate) * spectrum, samples)
     table = replace(setup, substeps=substeps, table=None).table_for(0, samples)
-    depth = resampled(travel, entries) + table.excess[:entries]
-    speed = resampled(rate, entries) + table.excess_rate[:entries]
-    phase = table.position[:entries] / model.law.phases
-    force, slope = model.law.evaluate(depth, phase)
-    level = (np.abs(force) / model.rig.mesh.reference_force) ** (1.0 / (1.0 + model.rig.mesh.exponent))
-    force, slope = force * table.gain[:entries], np.maximum(slope, 0.0) * table.gain[:entries]
+    at = instants(table, table.position[:entries] / model.law.phases, end=entries)
+    fine = resampled(travel, entries)
+    force, slope = pressed(model.law, at, fine)
+    level = (np.abs(force / at.gain) / model.rig.mesh.reference_force) ** (1.0 / (1.0 + model.rig.mesh.exponent))
+    slope = np.maximum(slope, 0.0)
     damping = c.damping_factor * np.sqrt(slope)
     tangents = tuple(
         stiffness * (1 + exponent) * (max(abs(float(y.mean())), 1e-9) / reference) ** exponent
@@ -121,7 +124,20 @@ def along(steady: Steady) -> Along:
         return Moving(resampled(signal, entries), *(resampled(one, entries) for one in rates))
 
     coordinates = tuple(moving(signal) for signal in (out.u1, out.y1, out.y2, out.u2))
-    return Along(cycles, force, speed, model.law, level, tangent, substeps, early, model.factor, drive, coordinates)
+    return Along(
+        phase=cycles,
+        elastic=force,
+        pairs=of_pairs(model.law, at, fine),
+        rate=resampled(rate, entries) + table.excess_rate[:entries],
+        law=model.law,
+        level=level,
+        tangent=tangent,
+        substeps=substeps,
+        early=early,
+        factor=model.factor,
+        drive=drive,
+        coordinates=coordinates,
+    )
 
 
 def _substeps(steady: Steady) -> int:

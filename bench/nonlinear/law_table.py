@@ -60,12 +60,12 @@ def mesh_law(rig: Rig, simulation: Simulation, load_max_nm: float) -> MeshLaw:
         "source": _source(),
     }
     arrays = cached(key_for("mesh-law", values), lambda: _solve(elastic_rig(sound, simulation), load))
-    return _assemble(sound, meshing, arrays["approach"], arrays["force"], arrays["share"])
+    return _assemble(sound, meshing, arrays["approach"], arrays["force"], arrays["share"], arrays["parts"])
 
 
 def linear_law(rig: Rig, simulation: Simulation) -> MeshLaw:
-    """Law linear in the deflection, F = k(phase) delta; every pair within its path of contact shares alike, weighted
-    with its own stiffness by the potential energy method."""
+    """Law linear in the deflection, F = k(phase) delta; every pair within its path of contact carries the part that its
+    own stiffness by the potential energy method has in the sum of them."""
     meshing = pair(rig)
     phase = np.arange(PHASES) / PHASES
     k = mesh_stiffness(rig, meshing, simulation).at(phase, finest=2.0 / PHASES)
@@ -73,7 +73,8 @@ def linear_law(rig: Rig, simulation: Simulation) -> MeshLaw:
     one, two, hertz, inside = _compliances(rig, meshing, _travel(meshing, phase))
     share = np.where(inside, 1.0 / (one + two + hertz), 0.0)
     share /= share.sum(axis=1, keepdims=True)
-    return _assemble(rig, meshing, approach, k[:, None] * approach, share)
+    force = k[:, None] * approach
+    return _assemble(rig, meshing, approach, force, share, force[..., None] * share[:, None])
 
 
 def _bare(gear: Gear) -> Gear:
@@ -101,8 +102,9 @@ def _source() -> str:
 
 
 @compiled
-def _force_table(law: Law, phases: Array, dte: Array, force: Array) -> int:
-    """Fill force (phases, dte) [N]; returns the number of positions that did not converge."""
+def _force_table(law: Law, phases: Array, dte: Array, first: int, force: Array, parts: Array) -> int:
+    """Fill force (phases, dte) [N] and what each pair carries of it (phases, dte, offsets), the first of them number
+    `first`; returns the number of positions that did not converge."""
     failed = 0
     for i in range(len(phases)):
         guess = np.zeros(PAIRS)
@@ -110,6 +112,10 @@ def _force_table(law: Law, phases: Array, dte: Array, force: Array) -> int:
             theta1 = phases[i] * law.driver.pitch + dte[j] / law.driver.rb
             found = position(law, theta1, phases[i] * law.driven.pitch, 0.0, 0.0, 0.0, 0.0, guess)
             force[i, j] = found.torque_driver / law.driver.rb
+            for p in range(len(found.pairs)):
+                column = found.pairs[p].tooth - first
+                if found.pairs[p].side == 0 and 0 <= column < parts.shape[2]:
+                    parts[i, j, column] += found.pairs[p].lever1 * found.force[p] / law.driver.rb
             failed += 0 if found.converged else 1
     return failed
 
@@ -138,8 +144,8 @@ def _solve(elastic: ElasticRig, load: float) -> dict[str, Array]:
     deepest = float(static_cycle(law, coarse, torque=[load]).transmission_error.max())
     deepest = min(1.02 * deepest, EDGE_SEPARATION * elastic.pair.driver.module)
     approach = approach_grid(deepest, NODES)
-    force = np.zeros((PHASES, NODES))
-    failed = _force_table(law, phase, approach[1:], force[:, 1:])
+    force, parts = np.zeros((PHASES, NODES)), np.zeros((PHASES, NODES, 2 * OFFSETS + 1))
+    failed = _force_table(law, phase, approach[1:], -OFFSETS, force[:, 1:], parts[:, 1:])
     if failed:
         raise BenchError(f"{failed} of {force.size} positions of the mesh law found no static equilibrium")
     # The deflection that carries the reference load, between the nodes of the table.
@@ -147,7 +153,7 @@ def _solve(elastic: ElasticRig, load: float) -> dict[str, Array]:
     dte = np.array([np.interp(reference, row, approach) for row in force])
     share = np.zeros((PHASES, 2 * OFFSETS + 1))
     _tangent_shares(law, phase, dte, -OFFSETS, share)
-    return {"approach": approach, "force": force, "share": share}
+    return {"approach": approach, "force": force, "share": share, "parts": parts}
 
 
 def _travel(meshing: Pair, phase: Array) -> Array:
@@ -174,7 +180,7 @@ def _compliances(rig: Rig, meshing: Pair, travel: Array) -> tuple[Array, Array, 
     )
 
 
-def _assemble(rig: Rig, meshing: Pair, approach: Array, force: Array, share: Array) -> MeshLaw:
+def _assemble(rig: Rig, meshing: Pair, approach: Array, force: Array, share: Array, parts: Array) -> MeshLaw:
     """The law with roll lengths, bending parts, backlash and mirror phase; columns that no pair uses left out.
 
     The bending part is that of tooth and body below it by the potential energy method, in the sum of both and their
@@ -184,7 +190,7 @@ def _assemble(rig: Rig, meshing: Pair, approach: Array, force: Array, share: Arr
     travel = _travel(meshing, phase)
     one, two, hertz, _ = _compliances(rig, meshing, travel)
     total = one + two + hertz
-    used = np.flatnonzero(share.any(axis=0))
+    used = np.flatnonzero(parts.any(axis=(0, 1)))
     # One more on either side: a pair passes from one column to the next where the cycle ends.
     keep = slice(max(int(used[0]) - 1, 0), int(used[-1]) + 2)
     rolled = involute(meshing.working_pressure_angle)
@@ -194,6 +200,7 @@ def _assemble(rig: Rig, meshing: Pair, approach: Array, force: Array, share: Arr
         force=force,
         offsets=np.arange(-OFFSETS, OFFSETS + 1)[keep],
         share=share[:, keep],
+        parts=parts[..., keep],
         rho1=(meshing.rho_pitch[0] + travel)[:, keep],
         rho2=(meshing.rho_pitch[1] - travel)[:, keep],
         bending=np.stack([one / total, two / total], axis=-1)[:, keep],

@@ -28,7 +28,7 @@ from gearbench.geometry import Pair, pair
 from gearbench.lumped.nonlinear.law import MeshLaw
 from gearbench.lumped.nonlinear.model import NonLinear, nonlinear_model
 from gearbench.lumped.nonlinear.step import Outputs, columns, integrate
-from gearbench.lumped.nonlinear.tables import Motion, Table, Varied, tables
+from gearbench.lumped.nonlinear.tables import Motion, Table, Varied, instants, tables
 from gearbench.lumped.stiffness.potential_energy import outside_foundation_fit
 from gearbench.rig import Case, Experiment
 
@@ -230,7 +230,7 @@ class Setup:
         """Static equilibrium under the mean force [N] at a sample."""
         table = self.table_for(sample, 1)
         phase = self.phase_at(sample)
-        state = self.model.equilibrium(mean_force, float(table.excess[0]), float(table.gain[0]), phase)
+        state = self.model.equilibrium(mean_force, instants(table, phase, end=1))
         return State(sample, state + under_ripple(self.model, self.mesh_frequency, phase), begins=True)
 
 

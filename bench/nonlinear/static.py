@@ -13,10 +13,10 @@ from gearbench.bench.refusals.effects import refuse_unknown
 from gearbench.bench.refusals.load_range import check_dte
 from gearbench.fem.limits import LOAD_RANGE
 from gearbench.geometry import Pair, pair
-from gearbench.lumped.nonlinear.law import MeshLaw
 from gearbench.lumped.nonlinear.model import NonLinear, nonlinear_model
+from gearbench.lumped.nonlinear.pressing import pressed, travel_under
 from gearbench.lumped.nonlinear.rest import inverse_masses, mesh_direction
-from gearbench.lumped.nonlinear.tables import Motion, tables
+from gearbench.lumped.nonlinear.tables import Motion, instants, tables
 from gearbench.rig import Case
 from gearbench.rig.neutral import sound_gear
 
@@ -24,22 +24,7 @@ Array = NDArray[np.float64]
 
 _U1, _Y1, _Y2, _U2, _W, _LOAD, _HOUSING = range(7)  # among lumped.nonlinear.coordinates.NAMES
 
-BISECTIONS = 60
 STIFFEST = 20e9  # stiffness of the stiffest imaginable teeth per face width [N/m^2]
-
-
-def deflection(law: MeshLaw, force: Array, phase: Array) -> Array:
-    """Deflection [m] at which the law gives the forces > 0 [N] at the phases (shapes broadcast), by bisection."""
-    force, phase = np.broadcast_arrays(force, phase)
-    high = np.full(force.shape, law.approach[-1])
-    while np.any(short := law.evaluate(high, phase)[0] < force):
-        high = np.where(short, 2 * high, high)
-    low = np.zeros_like(high)
-    for _ in range(BISECTIONS):
-        middle = 0.5 * (low + high)
-        below = law.evaluate(middle, phase)[0] < force
-        low, high = np.where(below, middle, low), np.where(below, high, middle)
-    return 0.5 * (low + high)
 
 
 def static_nonlinear(case: Case, loads: Loads, phase: Array) -> xr.Dataset:
@@ -57,15 +42,13 @@ def static_nonlinear(case: Case, loads: Loads, phase: Array) -> xr.Dataset:
     law = mesh_law(case.rig, case.simulation, most)
     model = nonlinear_model(case.rig, meshing, law)
     table = tables(model, Motion(cycles=1.0, entries=len(phase), step=1.0))
-    excess, gain = table.excess[:-1], table.gain[:-1]
+    at = instants(table, phase, end=-1)
     shape = (len(values), len(phase))
     if unit == "N m":
-        force = np.broadcast_to(values[:, None] / radius, shape)
-        dte = deflection(law, force / gain, phase) - excess
+        dte = travel_under(model.law, at, np.broadcast_to(values[:, None] / radius, shape))
     else:
         dte = np.broadcast_to(values[:, None], shape)
-        force = gain * law.evaluate(dte + excess, phase)[0]
-    tangent = gain * law.evaluate(dte + excess, phase)[1]
+    force, tangent = pressed(model.law, at, dte)
     return static_dataset(
         loads,
         phase,
@@ -87,9 +70,8 @@ def linearised_matrices(case: Case, meshing: Pair, phases: int) -> tuple[Array, 
     force = case.experiment.torque_mean / meshing.driver.base_radius
     law = mesh_law(rig, case.simulation, 2 * case.experiment.torque_mean)
     model = nonlinear_model(rig, meshing, law)
-    gain = tables(model, Motion(cycles=1.0, entries=phases, step=1.0)).gain[:-1]
-    phase = np.arange(phases) / phases
-    tangent = gain * law.evaluate(deflection(law, force / gain, phase), phase)[1]
+    at = instants(tables(model, Motion(cycles=1.0, entries=phases, step=1.0)), np.arange(phases) / phases, end=-1)
+    tangent = pressed(model.law, at, travel_under(model.law, at, np.array(force))).tangent
     seen = _relative(model)
     back = np.linalg.pinv(seen)
     size, n = model.size, len(seen)

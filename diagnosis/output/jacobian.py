@@ -56,7 +56,7 @@ def mesh_forces(layout: Layout, along: Along, chosen: Flags) -> tuple[Array, Int
         parts.append(columns[:, keep])
         at.extend(indices[keep])
 
-    numbers, share = law.pairs(phase)
+    numbers, bending = law.pairs(phase)[0], law.bending_of(phase)
     wave = waves(phase).T
     damped = (along.tangent.damping * along.rate)[:, None]
     put("scale", along.elastic[:, None] + 0.5 * damped)
@@ -68,17 +68,16 @@ def mesh_forces(layout: Layout, along: Along, chosen: Flags) -> tuple[Array, Int
     for side, key in enumerate(RUNOUTS.values()):
         turn = 2 * np.pi * phase / (z1, z2)[side]
         put(key, along.of_excess(np.stack([np.cos(turn), np.sin(turn)], axis=1)))
-    bending = law.bending_of(phase)
     for side, key in enumerate(PITCHES.values()):
         tooth = numbers % (z1, z2)[side]
         indices = np.arange(*unknowns[key].indices(unknowns.size))
         if chosen[indices].any():
-            put(key, along.of_excess(_by_tooth(tooth, share, (z1, z2)[side])))
+            put(key, _by_tooth(tooth, along.pairs.tangent, (z1, z2)[side]))
     soft = []
     for one in layout.teeth:
         side, number = (0, one) if one < z1 else (1, one - z1)
         meant = numbers % (z1, z2)[side] == number
-        soft.append(-along.elastic * (meant * share * bending[..., side]).sum(axis=1))
+        soft.append(-(meant * along.pairs.force * bending[..., side]).sum(axis=1))
     if soft:
         indices = unknowns[CRACK].start + np.array(layout.teeth)
         keep = chosen[indices]
@@ -87,12 +86,12 @@ def mesh_forces(layout: Layout, along: Along, chosen: Flags) -> tuple[Array, Int
     return np.concatenate(parts, axis=1), np.array(at)
 
 
-def _by_tooth(tooth: NDArray[np.int64], share: Array, count: int) -> Array:
-    """Part (entries, count) of the load that each tooth of a gear carries."""
+def _by_tooth(tooth: NDArray[np.int64], stiffness: Array, count: int) -> Array:
+    """Stiffness (entries, count) [N/m] that each tooth of a gear has in the mesh."""
     out = np.zeros((len(tooth), count))
     rows = np.arange(len(tooth))
     for column in range(tooth.shape[1]):
-        np.add.at(out, (rows, tooth[:, column]), share[:, column])
+        np.add.at(out, (rows, tooth[:, column]), stiffness[:, column])
     return out
 
 

@@ -28,6 +28,7 @@ LIMIT = 8.0  # nats from which an effect enters
 # Of a number of the nominal rig, whose stated uncertainty is the measure: four of its standard deviations are worth no
 # more than this and a prior's width, and only beyond three it is named at all.
 LIMIT_NUMBER = 3.0
+NOTHING = 1e-3  # of a number's nominal value: as good as none
 TRIED = 4  # hypotheses that are simulated, at each step
 BY_FORCES = 2  # of them at least, by the force residuals' ranking
 MOST = 3  # effects
@@ -269,9 +270,16 @@ def _without(simulator: Simulator, base: Optimum, effects: Sequence[Hypothesis],
     sd, p, unknowns = base.sd.copy(), base.p.copy(), simulator.layout.unknowns
     for wide in (wide for one in effects for wide in one.wide):
         at = wide.entries(unknowns)
-        edge = 0.0 if _is_own(unknowns, wide) else BEYOND * unknowns.prior()[at]
-        sd[at], p[at] = 0.0, np.clip(p[at], -edge, edge)
+        low, high = (0.0, 0.0) if _is_own(unknowns, wide) else known_within(unknowns.prior()[at])
+        sd[at], p[at] = 0.0, np.clip(p[at], low, high)
     return (fit(simulator, p, sd, base.sensitivity, renewals=0, chosen=chosen) or base) if effects else base
+
+
+def known_within(sd: Array) -> tuple[Array, Array]:
+    """Least and largest logarithm of a number over its nominal value within BEYOND of its standard deviations (relative
+    ones): of a number known to a third of itself or worse, nothing is too small."""
+    edge = BEYOND * sd
+    return np.log(np.maximum(1.0 - edge, NOTHING)), edge
 
 
 def limit_of(unknowns: Unknowns, one: Hypothesis) -> float:

@@ -1,7 +1,8 @@
 """The equations of motion at an instant, compiled; `lumped.nonlinear.model` and `structure` have them in words.
 
-Further coordinates e, their rates r and the structure are empty tuples for a rig without structure, and friction is
-None for one without: the compiler knows both, so that the plain model costs nothing for what it does not have. They are
+Further coordinates e, their rates r and the structure are empty tuples for a rig without structure, so are the pairs of
+teeth that are alike, and friction is None for a rig without: the compiler knows, so that the plain model costs nothing
+for what it does not have. They are
 typed Any where mypy cannot follow the lengths of tuples.
 """
 
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 from gearbench.kernels.compiled import ROUNDING, compiled
 from gearbench.lumped.nonlinear.constants import Constants, Rubbing
 from gearbench.lumped.nonlinear.coordinates import Coordinates, Further
-from gearbench.lumped.nonlinear.forces import Entry, Rubbed, friction, mesh, spring
+from gearbench.lumped.nonlinear.forces import Apart, Entry, Rubbed, friction, mesh, spring
 from gearbench.lumped.nonlinear.structure import Structure
 
 Array = NDArray[np.float64]
@@ -26,6 +27,7 @@ class Equations(NamedTuple):
     gears together; mean: that of the driver's torque over its base radius [N]."""
 
     secant: Array
+    apart: Apart | tuple[()]
     constants: Constants
     rubbing: Rubbing | None
     structure: Structure | tuple[()]
@@ -170,7 +172,7 @@ def answer(q: Coordinates, v: Coordinates, e: Any, r: Any, at: Entry, force: flo
     """Accelerations and forces at the coordinates q and e and their rates v and r, under T1/rb1 = force [N]."""
     p, s = of.constants, of.structure
     travel = _seen(q.u1 - q.u2 + p.factor * (q.y1 - q.y2), e, s)
-    f = mesh(travel, _seen(v.u1 - v.u2 + p.factor * (v.y1 - v.y2), r, s), at, of.secant, p)
+    f = mesh(travel, _seen(v.u1 - v.u2 + p.factor * (v.y1 - v.y2), r, s), at, of.secant, of.apart, p)
     felt = Felt(
         mesh=f,
         shaft=p.shaft_stiffness * (q.w - q.u1) + p.shaft_damping * (v.w - v.u1),

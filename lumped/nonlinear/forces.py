@@ -11,14 +11,24 @@ from numpy.typing import NDArray
 from gearbench.kernels.compiled import ROUNDING, compiled
 from gearbench.lumped.nonlinear.constants import Constants, Rubbing
 from gearbench.lumped.nonlinear.coordinates import Coordinates
+from gearbench.lumped.nonlinear.law import MeshLaw
 from gearbench.lumped.nonlinear.tables import Table
 
 Array = NDArray[np.float64]
 
 
+class Apart(NamedTuple):
+    """What pairs whose teeth differ have of their own: excess [m] and gain at the entries of the table (entries + 1,
+    n_o, 2), and their secants (phases + 1, n_d, n_o) [N/m]."""
+
+    own: Array
+    secant: Array
+
+
 class Entry(NamedTuple):
     """One entry of a `Table`."""
 
+    number: int
     position: float
     excess: float
     excess_rate: float
@@ -39,11 +49,19 @@ class Rubbed(NamedTuple):
     driven: float
 
 
+def apart_of(table: Table, law: MeshLaw) -> Apart | tuple[()]:
+    """The pairs of a table and its law; empty where all teeth are alike."""
+    if table.pair_excess.shape[1] == 0:
+        return ()
+    return Apart(np.stack([table.pair_excess, table.pair_gain], axis=2), law.pair_secants)
+
+
 @compiled(fastmath=ROUNDING)
 def entry(table: Table, i: int) -> Entry:
     """Entry i of the table."""
     changes = len(table.pull) > 0
     return Entry(
+        number=i,
         position=table.position[i],
         excess=table.excess[i],
         excess_rate=table.excess_rate[i],
@@ -72,10 +90,39 @@ def _pressed(depth: float, rate: float, position: float, gain: float, secant: Ar
 
 
 @compiled(fastmath=ROUNDING)
-def mesh(travel: float, rate: float, at: Entry, secant: Array, p: Constants) -> float:
+def _pressed_apart(travel: float, rate: float, at: Entry, apart: Apart, p: Constants) -> float:
+    """Force [N] of pairs that each have an excess of their own over the deflection `travel` [m], closing at rate [m/s];
+    never negative."""
+    last = apart.secant.shape[1] - 1
+    row = int(at.position)
+    weight = at.position - row
+    elastic, tangent = 0.0, 0.0
+    for o in range(apart.secant.shape[2]):
+        depth = travel + apart.own[at.number, o, 0]
+        if depth <= 0.0 or apart.secant[row, last, o] + apart.secant[row + 1, last, o] == 0.0:
+            continue
+        root = p.root * sqrt(depth)
+        node = min(int(root), last - 1)
+        low = apart.secant[row, node, o] + weight * (apart.secant[row + 1, node, o] - apart.secant[row, node, o])
+        node += 1
+        high = apart.secant[row, node, o] + weight * (apart.secant[row + 1, node, o] - apart.secant[row, node, o])
+        rise = high - low
+        stiffness = low + (root - node + 1) * rise
+        gain = apart.own[at.number, o, 1]
+        elastic += gain * depth * stiffness
+        tangent += gain * max(stiffness + 0.5 * root * rise, 0.0)
+    return max(at.gain * elastic + p.damping_factor * sqrt(at.gain * tangent) * rate, 0.0)
+
+
+@compiled(fastmath=ROUNDING)
+def mesh(travel: float, rate: float, at: Entry, secant: Array, apart: Any, p: Constants) -> float:
     """Mesh force [N] at dte `travel` [m] and its rate [m/s]; negative on the back flanks."""
     depth = travel + at.excess
-    if depth > 0.0:
+    if len(apart) != 0:
+        force = _pressed_apart(depth, rate + at.excess_rate, at, apart, p)
+        if force > 0.0:
+            return force
+    elif depth > 0.0:
         return _pressed(depth, rate + at.excess_rate, at.position, at.gain, secant, p)
     depth = at.back - travel - p.backlash
     if depth > 0.0:

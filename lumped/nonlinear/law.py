@@ -34,15 +34,17 @@ class MeshLaw:
     approach (n_d,) [m]: an `approach_grid`. force (n_p, n_d) [N] along the line of action, driver torque over base
     radius, at phases k/n_p. offsets (n_o,): successive whole numbers; the last column of `share` is zero at phase 0.
     share (n_p, n_o): part of the tangent stiffness that pair floor(phase) + offset carries at the reference load; adds
-    up to 1. rho1, rho2 (n_p, n_o): roll lengths [m] of those pairs' contacts. bending (n_p, n_o, 2): part that the
-    driver's and the driven tooth's flexibility, without their local contact, has in their pair's. backlash [m]: along
-    the line of action. base_pitch [m]. mirror: phase at which a pair's back flanks pass the pitch point.
+    up to 1. parts (n_p, n_d, n_o) [N]: what each pair carries of the force; they add up to it. rho1, rho2 (n_p, n_o):
+    roll lengths [m] of those pairs' contacts. bending (n_p, n_o, 2): part that the driver's and the driven tooth's
+    flexibility, without their local contact, has in their pair's. backlash [m]: along the line of action.
+    base_pitch [m]. mirror: phase at which a pair's back flanks pass the pitch point.
     """
 
     approach: Array
     force: Array
     offsets: Integers
     share: Array
+    parts: Array
     rho1: Array
     rho2: Array
     bending: Array
@@ -60,6 +62,8 @@ class MeshLaw:
         for name in ("share", "rho1", "rho2"):
             if getattr(self, name).shape != shape:
                 raise LumpedError(f"{name} of a mesh law has shape {getattr(self, name).shape}, not {shape}")
+        if self.parts.shape != (*self.force.shape, len(self.offsets)):
+            raise LumpedError(f"parts of a mesh law have shape {self.parts.shape}, not (phases, {nodes}, offsets)")
         if self.bending.shape != (*shape, 2):
             raise LumpedError(f"bending of a mesh law has shape {self.bending.shape}, not {(*shape, 2)}")
 
@@ -68,9 +72,9 @@ class MeshLaw:
         if exponent == 0.0:
             return self
         # Force over deflection is tabulated from the first node on: at none there is no force.
-        force = self.force.copy()
-        force[:, 1:] *= (force[:, 1:] / reference) ** exponent
-        return replace(self, force=force)
+        level = np.ones_like(self.force)
+        level[:, 1:] = (self.force[:, 1:] / reference) ** exponent
+        return replace(self, force=self.force * level, parts=self.parts * level[..., None])
 
     @property
     def phases(self) -> int:
@@ -82,9 +86,16 @@ class MeshLaw:
         """Force over deflection [N/m] (phases + 1, n_d), the first phase repeated at the end; at zero deflection the
         line through the next two nodes."""
         table = np.empty((self.phases + 1, len(self.approach)))
-        table[:-1, 1:] = self.force[:, 1:] / self.approach[1:]
-        table[:-1, 0] = np.maximum(2 * table[:-1, 1] - table[:-1, 2], 0.0)
+        table[:-1] = _over(self.force, self.approach)
         table[-1] = table[0]
+        return table
+
+    @cached_property
+    def pair_secants(self) -> Array:
+        """Those of the pairs (phases + 1, n_d, n_o); where the cycle ends every pair has moved on by one offset."""
+        table = np.zeros((self.phases + 1, *self.parts.shape[1:]))
+        table[:-1] = np.moveaxis(_over(np.moveaxis(self.parts, 1, 2), self.approach), 2, 1)
+        table[-1, :, 1:] = table[0, :, :-1]
         return table
 
     @property
@@ -109,17 +120,28 @@ class MeshLaw:
         force, tangent = self._pressed(np.maximum(delta, 0.0), phase)
         return force, np.where(delta > 0, tangent, 0.0)
 
+    def of_pairs(self, delta: Array, phase: Array) -> tuple[Array, Array]:
+        """Force [N] and tangent stiffness [N/m] of every pair (..., n_o) at deflections (..., n_o) [m] of its own and
+        phases (...) [cycles]; none where its working flanks are apart."""
+        force, tangent = self._on(self.pair_secants.ravel(), np.maximum(delta, 0.0), phase[..., None], delta.shape[-1])
+        return force, np.where(delta > 0.0, np.maximum(tangent, 0.0), 0.0)
+
     def _pressed(self, depth: Array, phase: Array) -> tuple[Array, Array]:
         """Force and tangent at deflections >= 0."""
+        return self._on(self.secant.ravel(), depth, phase, 1)
+
+    def _on(self, table: Array, depth: Array, phase: Array, wide: int) -> tuple[Array, Array]:
+        """Force and tangent at deflections >= 0 of secants that lie in rows of `wide` columns."""
         row, weight = place_phase(phase, self.phases)
         last = len(self.approach) - 1
         root = last * np.sqrt(depth / self.approach[-1])
         node = np.minimum(root.astype(np.int64), last - 1)
-        table = self.secant.ravel()
-        at = row * (last + 1) + node
-        low = table[at] + weight * (table[at + last + 1] - table[at])
-        at = at + 1
-        rise = table[at] + weight * (table[at + last + 1] - table[at]) - low
+        at, next_row = (row * (last + 1) + node) * wide, (last + 1) * wide
+        if wide > 1:
+            at = at + np.arange(wide)
+        low = table[at] + weight * (table[at + next_row] - table[at])
+        at = at + wide
+        rise = table[at] + weight * (table[at + next_row] - table[at]) - low
         stiffness = low + (root - node) * rise
         return depth * stiffness, stiffness + 0.5 * root * rise
 
@@ -164,6 +186,15 @@ class MeshLaw:
         total = weight.sum(axis=-1)
         spread = (weight * travel).sum(axis=-1)
         return centre1 * total + spread, total, centre2 * total - spread
+
+
+def _over(force: Array, approach: Array) -> Array:
+    """Secants (..., n_d) [N/m] of forces (..., n_d) [N] at the nodes of an approach_grid; at zero deflection the line
+    through the next two nodes."""
+    table = np.empty(force.shape)
+    table[..., 1:] = force[..., 1:] / approach[1:]
+    table[..., 0] = np.maximum(2 * table[..., 1] - table[..., 2], 0.0)
+    return table
 
 
 def place_phase(phase: ArrayLike, phases: int) -> tuple[Integers, Array]:

@@ -5,14 +5,15 @@ that the linear model leaves out.
     M_2 u2'' = f + mu f m2/rb2 - T2/rb2                            (u2 = 0 where the driven speed is prescribed)
     m_1 y1'' + c_1 y1' + k_1 y1 |y1/y_ref|^e = -g f - mu f s sin(a_w)
     m_2 y2'' + c_2 y2' + k_2 y2 |y2/y_ref|^e = +g f + mu f s sin(a_w)
-    delta = u1 - u2 + g (y1 - y2) + a,   f = max(0, F(delta, phase) G + 2 zeta sqrt(G dF/d delta m_e) delta')
+    delta = u1 - u2 + g (y1 - y2) + a,   f = max(0, G F(delta, phase) + 2 zeta sqrt(G dF/d delta m_e) delta')
+    F = sum over pairs of F_n(delta + e_n, phase) / (1 + b_n)
 
-u_i = rb_i (theta_i - Omega_i t); g, signs and zeros as in `lumped.model`. a is the excess material of the pairs in
-contact, weighted with their shares in the mesh stiffness: pitch errors, run-out of both gears, errors common to all
-pairs. G is scale and series of the mesh correction times what a cracked tooth leaves: the tangent compliance of its
-pair grows by (bending part) (1/(1 - loss) - 1). f is zero while the flanks are apart and pulls the other way, without
-friction, once the back flanks touch; on both sides damping acts only in contact and never holds the flanks together.
-T_r is the torque ripple.
+u_i = rb_i (theta_i - Omega_i t); g, signs and zeros as in `lumped.model`. a is the excess material common to all pairs:
+run-out of both gears, errors over the mesh cycle. F_n is what pair n carries of the force of sound teeth at a
+deflection, e_n its own excess, the pitch errors of its two teeth, and b_n what a crack adds to its compliance: (bending
+part) (1/(1 - loss) - 1). G is scale and series of the mesh correction. f is zero while the flanks are apart and pulls
+the other way, without friction, once the back flanks touch; on both sides damping acts only in contact and never holds
+the flanks together. T_r is the torque ripple.
 
 Friction of every pair acts against its own sliding velocity at that instant, vibration included (sin(a_w) only where
 supports are tangential; Omega1, Omega2 the steady speeds, rho1 and rho2 the roll lengths):
@@ -56,12 +57,12 @@ from gearbench.lumped.linear.model import equivalent_mass
 from gearbench.lumped.nonlinear.constants import Constants, Rubbing
 from gearbench.lumped.nonlinear.coordinates import Coordinates, Further
 from gearbench.lumped.nonlinear.law import MeshLaw
+from gearbench.lumped.nonlinear.pressing import Instants, travel_under
 from gearbench.lumped.nonlinear.rest import (
     centre_at_rest,
     housing_at_rest,
     inverse_masses,
     mesh_direction,
-    pressed_by,
     springs_and_dampers,
 )
 from gearbench.lumped.nonlinear.structure import (
@@ -83,7 +84,7 @@ UNSEEN = 0.5
 
 LIMITS = (
     "forces of unbalance, also of eccentric gears, are left out",
-    "errors act through one spring, weighted with the pairs' shares at a reference load, not pair by pair",
+    "a pair deflects as between sound neighbours: what the neighbours of an uneven tooth carry does not bend it",
     "back flanks are free of friction, pitch errors and cracks",
     "mesh phase is that of the steady rotation",
 )
@@ -231,14 +232,14 @@ class NonLinear:
         along, across = self.factor * force, self.slide * force
         return centre_at_rest(one, -along, -across), centre_at_rest(two, along, across)
 
-    def equilibrium(self, force: float, excess: float, gain: float, phase: float) -> Array:
-        """State (2 size,) at rest under the force T1/rb1 > 0 [N], without friction and ripple: all coordinates, then
-        their rates. A housing that takes both supports along alike is where it is without load."""
+    def equilibrium(self, force: float, at: Instants) -> Array:
+        """State (2 size,) at rest at one instant under the force T1/rb1 > 0 [N], without friction and ripple: all
+        coordinates, then their rates. A housing that takes both supports along alike is where it is without load."""
         (y1, x1), (y2, x2) = self.centres(force)
         structure = self.structure
         housed, lifted = housing_at_rest(structure, self.factor * force)
         y1, y2 = y1 + lifted[0], y2 + lifted[1]
-        apart = pressed_by(self.law, force, gain, phase) - excess - self.factor * (y1 - y2)
+        apart = float(travel_under(self.law, at, np.array([force]))[0]) - self.factor * (y1 - y2)
         twist = force / self.shaft[0] if self.elastic_shaft else 0.0
         if structure is None:
             return np.array([*Coordinates(apart, y1, y2, 0.0, apart + twist), *(0.0 for _ in Coordinates._fields)])

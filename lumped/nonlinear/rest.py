@@ -8,25 +8,12 @@ from numpy.typing import NDArray
 from gearbench.lumped.errors import LumpedError
 from gearbench.lumped.nonlinear.constants import Constants
 from gearbench.lumped.nonlinear.coordinates import COORDINATES, FURTHER
-from gearbench.lumped.nonlinear.law import MeshLaw
 from gearbench.lumped.nonlinear.structure import Structure
 from gearbench.rig import Support
 
 Array = NDArray[np.float64]
 
 BISECTIONS = 100
-
-
-def pressed_by(law: MeshLaw, force: float, gain: float, phase: float) -> float:
-    """Deflection [m] at which the mesh carries the force > 0 [N]."""
-    high = law.approach[-1]
-    while gain * float(law.evaluate(high, phase)[0]) < force:
-        high *= 2
-    low = 0.0
-    for _ in range(BISECTIONS):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if gain * float(law.evaluate(middle, phase)[0]) < force else (low, middle)
-    return float(high)
 
 
 def centre_at_rest(support: Support, push: float, aside: float) -> tuple[float, float]:

@@ -15,7 +15,7 @@ from gearbench.kernels.compiled import ROUNDING, compiled
 from gearbench.lumped.errors import LumpedError
 from gearbench.lumped.nonlinear.coordinates import Coordinates, Further, parted
 from gearbench.lumped.nonlinear.equations import Answer, Equations, answer
-from gearbench.lumped.nonlinear.forces import entry
+from gearbench.lumped.nonlinear.forces import apart_of, entry
 from gearbench.lumped.nonlinear.model import NonLinear
 from gearbench.lumped.nonlinear.tables import Table
 
@@ -73,6 +73,7 @@ def integrate(
     samples = np.empty((width, entries // (2 * substeps))).T
     equations = Equations(
         secant=np.ascontiguousarray(model.law.secant),
+        apart=apart_of(table, model.law),
         constants=model.constants(),
         rubbing=model.rubbing(mesh_frequency),
         structure=structure or (),

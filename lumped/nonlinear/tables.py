@@ -11,17 +11,22 @@ from math import cos, floor, pi, sin
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from gearbench.kernels.compiled import compiled
 from gearbench.lumped.nonlinear.model import NonLinear
+from gearbench.lumped.nonlinear.pressing import Instants
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 
 class Table(NamedTuple):
-    """What the mesh is at each half step; arrays (entries + 1,), pace and pull empty where the speed is constant."""
+    """What the mesh is at each half step; arrays (entries + 1,), pace and pull empty where the speed is constant.
+
+    What pairs have of their own lies in pair_excess and pair_gain (entries + 1, n_o), without columns where all teeth
+    are alike; excess, its rate and gain are common to all pairs.
+    """
 
     position: Array  # in rows of the force table, which are phases
     excess: Array  # a [m]
@@ -29,6 +34,8 @@ class Table(NamedTuple):
     gain: Array  # of the force
     ripple: Array  # [N]
     back: Array  # excess on the back flanks [m]
+    pair_excess: Array
+    pair_gain: Array
     pace: Array = np.empty(0)  # speed of the nominal rotation over the one that friction is told of
     pull: Array = np.empty(0)  # acceleration of the nominal rotation along the line of action [m/s^2]
 
@@ -107,6 +114,11 @@ class Teeth(NamedTuple):
     growth1: Array
     growth2: Array
 
+    @property
+    def differ(self) -> bool:
+        """Whether there is anything that not all teeth of a gear have."""
+        return any(bool(values.any()) for values in self)
+
 
 def teeth_of(model: NonLinear) -> Teeth:
     """Errors and cracks of all teeth."""
@@ -121,11 +133,16 @@ def teeth_of(model: NonLinear) -> Teeth:
     return Teeth(excess[0], excess[1], growth[0], growth[1])
 
 
+def instants(table: Table, phase: ArrayLike, first: int = 0, end: int | None = None) -> Instants:
+    """The mesh at the table's entries from `first` to before `end`; phase [cycles] of each."""
+    columns = (table.excess, table.gain, table.pair_excess, table.pair_gain)
+    return Instants(np.atleast_1d(np.asarray(phase, dtype=float)), *(column[first:end] for column in columns))
+
+
 def tables(model: NonLinear, motion: Motion) -> Table:
     """The table of a model in a motion."""
     rig, law = model.rig, model.law
-    share, bending = law.closed
-    mesh = rig.mesh
+    bending, teeth, mesh = law.closed[1], teeth_of(model), rig.mesh
     correction = Correction(
         mesh.stiffness_scale,
         _series(mesh.stiffness_cos, mesh.stiffness_sin),
@@ -133,19 +150,18 @@ def tables(model: NonLinear, motion: Motion) -> Table:
         _series(mesh.error_cos, mesh.error_sin),
     )
     # One entry before and one behind, for the rate of the excess.
-    table = Table(*np.empty((len(Table._fields), motion.entries + 3)))
+    entries, columns = motion.entries + 3, len(law.offsets) if teeth.differ else 0
+    common, own = np.empty((len(Table._fields) - 4, entries)), np.empty((2, entries, columns))
+    table = Table(*common, pair_excess=own[0], pair_gain=own[1])
     varied = motion.varied
     if varied is None:
         phase = motion.first_phase + np.arange(-1.0, motion.entries + 2) * (motion.cycles / motion.entries)
     else:
         phase = varied.phase
-    _fill(
-        table, phase, law.offsets, share, bending,
-        teeth_of(model), correction, _runout(model), _waves(model),
-    )  # fmt: skip
+    _fill(table, phase, law.offsets, bending, teeth, correction, _runout(model), _waves(model))
     rate = (table.excess[2:] - table.excess[:-2]) / motion.step
     pace, pull = (np.empty(0), np.empty(0)) if varied is None else varied[1:]
-    return Table(*(column[1:-1] for column in table))._replace(excess_rate=rate, pace=pace, pull=pull)
+    return Table(*(column[1:-1] for column in table[:-2]), pace=pace, pull=pull)._replace(excess_rate=rate)
 
 
 def _runout(model: NonLinear) -> Runout:
@@ -203,11 +219,11 @@ def _rippled(waves: Waves, phase: float) -> float:
 
 @compiled
 def _fill(
-    out: Table, phases: Array, offsets: Integers, share: Array, bending: Array,
-    teeth: Teeth, correction: Correction, runout: Runout, waves: Waves,
+    out: Table, phases: Array, offsets: Integers, bending: Array, teeth: Teeth, correction: Correction,
+    runout: Runout, waves: Waves,
 ) -> None:  # fmt: skip
     """Fill the table but for `excess_rate`, pace and pull; entry n belongs to the n-th of `phases` [cycles]."""
-    rows = share.shape[0] - 1
+    rows = bending.shape[0] - 1
     z1, z2 = len(teeth.excess1), len(teeth.excess2)
     for n in range(len(out.position)):
         phase = phases[n]
@@ -216,19 +232,15 @@ def _fill(
         position = min(cycle * rows, rows * (1.0 - 1e-16))
         row = int(position)
         weight = position - row
-        excess, softness = 0.0, 0.0
-        for o in range(len(offsets)):
-            part = share[row, o] + weight * (share[row + 1, o] - share[row, o])
-            if part == 0.0:
-                continue
+        for o in range(out.pair_excess.shape[1]):
             tooth = int(whole) + offsets[o]
             one, two = tooth % z1, tooth % z2
-            excess += part * (teeth.excess1[one] + teeth.excess2[two])
+            out.pair_excess[n, o] = teeth.excess1[one] + teeth.excess2[two]
+            out.pair_gain[n, o] = 1.0
             if teeth.growth1[one] != 0.0 or teeth.growth2[two] != 0.0:
                 b1 = bending[row, o, 0] + weight * (bending[row + 1, o, 0] - bending[row, o, 0])
                 b2 = bending[row, o, 1] + weight * (bending[row + 1, o, 1] - bending[row, o, 1])
-                grown = b1 * teeth.growth1[one] + b2 * teeth.growth2[two]
-                softness += part * grown / (1.0 + grown)
+                out.pair_gain[n, o] = 1.0 / (1.0 + b1 * teeth.growth1[one] + b2 * teeth.growth2[two])
         turned, turned_back = 0.0, 0.0
         for i in range(2):
             if runout.cosine[i] != 0.0 or runout.sine[i] != 0.0:
@@ -241,7 +253,7 @@ def _fill(
             first, second = cos(2 * pi * cycle), sin(2 * pi * cycle)
         every = correction.mean_error + _wave(correction.error, first, second) + turned
         out.position[n] = position
-        out.excess[n] = excess + every
-        out.gain[n] = correction.scale * (1.0 + _wave(correction.stiffness, first, second)) * (1.0 - softness)
+        out.excess[n] = every
+        out.gain[n] = correction.scale * (1.0 + _wave(correction.stiffness, first, second))
         out.ripple[n] = _rippled(waves, phase)
         out.back[n] = turned_back

@@ -14,6 +14,7 @@ from shared.hat_mesh import ALPHA, BASE_PITCH, PHASES, PITCH_ROLL, RADII, hat, h
 
 from gearbench.lumped.nonlinear.coordinates import COORDINATES, Coordinates
 from gearbench.lumped.nonlinear.model import NonLinear
+from gearbench.lumped.nonlinear.pressing import alike
 from gearbench.lumped.nonlinear.step import columns, integrate
 from gearbench.lumped.nonlinear.tables import Motion, tables
 from gearbench.rig import Friction, Load, Rig
@@ -28,7 +29,7 @@ def test_friction_takes_what_its_sliding_dissipates(boundary: str) -> None:
     mu, v0, frequency = 0.08, 20e-3, 50.0
     rig = make_rig(friction=Friction(coefficient=mu, transition_speed=v0), load=Load(boundary=boundary))
     model = make_model(rig, hat_law(swing=0.0, bend=0.0))
-    state = model.equilibrium(FORCE, 0.0, 1.0, 0.0)
+    state = model.equilibrium(FORCE, alike(0.0))
     _, out = run(model, lambda t: np.full(t.shape, FORCE), state, mesh_frequency=frequency, cycles=60.0, steps=60000)
     speeds = 2 * pi * frequency / 20, 2 * pi * frequency / 30
     power = speeds[0] * FORCE * RADII[0] - speeds[1] * RADII[1] * out.load_force[-30000:].mean()
@@ -110,7 +111,7 @@ def reaction(model: NonLinear, swing: float, frequency: float, line: float) -> t
     time, out = run(
         model,
         lambda t: FORCE + swing * np.sin(2 * pi * line * t),
-        model.equilibrium(FORCE, 0.0, 1.0, 0.0),
+        model.equilibrium(FORCE, alike(0.0)),
         mesh_frequency=frequency,
         cycles=4.0,
         steps=max(4 * 4000, round(8e5 / frequency)),
@@ -148,7 +149,7 @@ def test_vibration_turns_dry_friction_into_a_smaller_mean_force(away: float) -> 
     step = 1 / line / steps
     motion = Motion(cycles=frequency * swings / line, entries=2 * swings * steps, step=step, first_phase=away)
     force = FORCE + 700 * np.sin(2 * pi * np.arange(2 * steps) / (2 * steps))
-    state = model.equilibrium(FORCE, 0.0, 1.0, away)
+    state = model.equilibrium(FORCE, alike(away))
     _, out = integrate(model, tables(model, motion), force, state, step=step, substeps=1, mesh_frequency=frequency)
     last = columns(out[swings // 2 * steps :])
     assert last.mesh_force.min() > 0

@@ -13,8 +13,9 @@ from shared.hat_mesh import ALPHA, RADII, hat_law
 from gearbench.lumped import equivalent_mass
 from gearbench.lumped.nonlinear.law import MeshLaw
 from gearbench.lumped.nonlinear.model import NonLinear
+from gearbench.lumped.nonlinear.pressing import Instants
 from gearbench.lumped.nonlinear.step import Outputs, columns, integrate
-from gearbench.lumped.nonlinear.tables import Motion, tables
+from gearbench.lumped.nonlinear.tables import Motion, instants, tables
 from gearbench.rig import Coupling, Damping, Gear, Rig, Support, Supports
 
 Array = NDArray[np.float64]
@@ -69,13 +70,12 @@ def run(
 def steady_dte(rig: Rig, *, frequency: float = 4.0, swing: float = 0.0) -> tuple[Array, Array]:
     """Mesh phase and DTE over one hunting period at constant torque, turning so slowly that the rig follows."""
     model = make_model(rig, hat_law(swing=swing, bend=0.0))
-    state = model.equilibrium(FORCE, *first_entry(model), 0.0)
+    state = model.equilibrium(FORCE, first_entry(model))
     steps = 60 * 8000
     time, out = run(model, lambda t: np.full(t.shape, FORCE), state, mesh_frequency=frequency, cycles=60.0, steps=steps)
     dte = out.u1 - out.u2 + cos(ALPHA) * (out.y1 - out.y2)
     return time[::40] * frequency, dte[::40]
 
 
-def first_entry(model: NonLinear) -> tuple[float, float]:
-    table = tables(model, Motion(1.0, 2, 1.0))
-    return float(table.excess[0]), float(table.gain[0])
+def first_entry(model: NonLinear) -> Instants:
+    return instants(tables(model, Motion(1.0, 2, 1.0)), 0.0, end=1)

@@ -50,11 +50,13 @@ def hat_law(*, swing: float = SWING, bend: float = BEND, backlash: float = BACKL
     approach = approach_grid(TOP, 9)
     offsets = np.arange(-1, 3)
     away = phase[:, None] - offsets
+    total = force(approach, phase[:, None], swing, bend)
     return MeshLaw(
         approach=approach,
-        force=force(approach, phase[:, None], swing, bend),
+        force=total,
         offsets=offsets,
         share=hat(away),
+        parts=total[..., None] * hat(away)[:, None],
         rho1=PITCH_ROLL[0] + away * BASE_PITCH,
         rho2=PITCH_ROLL[1] - away * BASE_PITCH,
         bending=np.broadcast_to(np.array(BENDING), (PHASES, len(offsets), 2)).copy(),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from gearbench.bench import simulate
 from gearbench.bench.nonlinear.along import along
@@ -13,6 +14,8 @@ from gearbench.cases import case_files
 from gearbench.lumped.nonlinear.step import columns
 from gearbench.rig import read_case
 
+Array = NDArray[np.float64]
+
 SMALL = 1e-7  # [m]
 
 
@@ -20,24 +23,23 @@ def test_an_error_of_one_tooth_does_what_two_simulations_differ_by() -> None:
     case = read_case(case_files()["gap_demo"])
     record = simulate(case.under(case.conditions[0]))
     law = mesh_law(case.rig, case.simulation, 200.0)
-    plain = steady_motion(case, record, law)
-    errors = np.zeros(case.rig.driver.teeth)
-    errors[3] = SMALL
-    gear = case.rig.driver.model_copy(update={"pitch_error": tuple(errors)})
-    moved = case.model_copy(update={"rig": case.rig.model_copy(update={"driver": gear})})
-    other = steady_motion(moved, record, law)
 
-    tangent = along(plain)
-    numbers, share = law.pairs(tangent.phase)
-    excess = SMALL * (share * (numbers % 20 == 3)).sum(axis=1, keepdims=True)
-    found = tangent.answers(tangent.of_excess(excess))
-    before, after = columns(plain.outputs), columns(other.outputs)
-    wanted = {
-        "dte": other.setup.dte(other.outputs) - plain.setup.dte(plain.outputs),
-        "angle_driver": after.u1 - before.u1,
-        "y_driver": after.y1 - before.y1,
-        "y_driven": after.y2 - before.y2,
-    }
+    def uneven(size: float) -> dict[str, Array]:
+        errors = np.zeros(case.rig.driver.teeth)
+        errors[3] = size
+        gear = case.rig.driver.model_copy(update={"pitch_error": tuple(errors)})
+        moved = case.model_copy(update={"rig": case.rig.model_copy(update={"driver": gear})})
+        steady = steady_motion(moved, record, law)
+        out = columns(steady.outputs)
+        channels = {"angle_driver": out.u1, "y_driver": out.y1, "y_driven": out.y2}
+        return {"dte": steady.setup.dte(steady.outputs), **channels}
+
+    tangent = along(steady_motion(case, record, law))
+    numbers, _ = law.pairs(tangent.phase)
+    force = SMALL * (tangent.pairs.tangent * (numbers % 20 == 3)).sum(axis=1, keepdims=True)
+    found = tangent.answers(force)
+    more, less = uneven(SMALL), uneven(-SMALL)
+    wanted = {channel: 0.5 * (more[channel] - less[channel]) for channel in more}
     for channel, change in wanted.items():
         assert np.linalg.norm(found[channel][0] - change) < 0.05 * np.linalg.norm(change), channel
 

@@ -10,7 +10,7 @@ from shared.fake_simulator import LINES, FakeSimulator, sensitivities, target
 
 from gearbench.diagnosis.effects.effect import Hypothesis, Wide
 from gearbench.diagnosis.forces.unknowns import group, unknowns_of
-from gearbench.diagnosis.output.selection import LIMIT, Selection, Start, select
+from gearbench.diagnosis.output.selection import LIMIT, Selection, Start, known_within, select
 
 MATRIX = sensitivities(3)
 FRICTION = Hypothesis("friction", "mesh", (Wide("friction"),))
@@ -140,3 +140,9 @@ def test_structure_that_the_rig_shows_around_its_mesh_is_begun_from() -> None:
 def test_no_rig_at_the_start_is_no_selection() -> None:
     simulator = FakeSimulator(lambda q: q @ MATRIX, target(MATRIX[0]), largest=0.1)
     assert select(simulator, LISTED, [np.ones(8)], {}) is None
+
+
+def test_a_number_known_to_a_third_or_worse_may_be_nothing() -> None:
+    low, high = known_within(np.array([0.1, 0.4]))
+    assert np.exp(low[0]) == pytest.approx(0.7) and np.exp(low[1]) < 0.01
+    np.testing.assert_allclose(high, [0.3, 1.2])

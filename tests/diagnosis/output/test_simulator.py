@@ -68,11 +68,12 @@ def test_a_derivative_is_what_two_simulations_differ_by(bench: Bench, key: str, 
     at = bench.layout.unknowns[key].start + entry
     step = part * bench.layout.unknowns.prior()[at]
     p = np.zeros(bench.layout.size)
+    p[at] = -step
     before = bench.simulator.lines(p)
     p[at] = step
     after = bench.simulator.lines(p)
     assert before is not None and after is not None
-    change, start, largest = (after - before) / step, 0, 0.0
+    change, start, largest = (after - before) / (2 * step), 0, 0.0
     for _, channel, bins in bench.simulator.target.plan:
         own = slice(start, start + len(bins))
         start += len(bins)

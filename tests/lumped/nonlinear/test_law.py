@@ -37,7 +37,8 @@ def test_flanks_apart_carry_nothing_and_back_flanks_are_a_mirror_image(law: Mesh
 
 def test_a_contact_that_stiffens_with_load_is_interpolated_closely() -> None:
     approach = approach_grid(TOP, 49)
-    law = replace(hat_law(), approach=approach, force=np.tile(4e9 * approach**1.11, (64, 1)))
+    force = np.tile(4e9 * approach**1.11, (64, 1))
+    law = replace(hat_law(), approach=approach, force=force, parts=force[..., None] * hat_law().share[:, None])
     delta = np.linspace(0.2e-6, TOP, 4001)
     found, tangent = law.evaluate(delta, 0.37)
     np.testing.assert_allclose(found, 4e9 * delta**1.11, rtol=2e-4, atol=1e-5 * found[-1])

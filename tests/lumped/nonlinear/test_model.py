@@ -19,7 +19,7 @@ from gearbench.lumped.linear.runge_kutta import integrate as integrate_linear
 from gearbench.lumped.linear.runge_kutta import tabulate
 from gearbench.lumped.nonlinear.coordinates import COORDINATES
 from gearbench.lumped.nonlinear.step import columns, integrate
-from gearbench.lumped.nonlinear.tables import Motion, tables
+from gearbench.lumped.nonlinear.tables import Motion, instants, tables
 from gearbench.rig import Coupling, Crack, Drive, Friction, Load, MeshCorrection, Rig, Ripple, Support, Supports
 
 Array = NDArray[np.float64]
@@ -57,6 +57,13 @@ def rich_rig(boundary: str) -> Rig:
     )
 
 
+def pair_stiffness(phase: float, n: int) -> float:
+    """That of pair n [N/m], between the phases of the law's tables as these are read."""
+    low, weight = divmod(phase * PHASES, 1.0)
+    ends = [float(stiffness(row / PHASES) * hat(row / PHASES - n)) for row in (low, low + 1)]
+    return ends[0] + weight * (ends[1] - ends[0])
+
+
 def plain_equations(rig: Rig, mesh_frequency: float, torque: Callable[[float], float]) -> Callable[..., list[float]]:
     """Right-hand side for u1, y1, y2, u2, w and their rates, written from the equations and nothing else."""
     (r1, r2), (m1, m2), (j1, j2) = RADII, MASSES, GEARS
@@ -75,8 +82,6 @@ def plain_equations(rig: Rig, mesh_frequency: float, torque: Callable[[float], f
         total = mesh.error_mean + mesh.error_cos[0] * cos(2 * pi * phase) + mesh.error_sin[0] * sin(2 * pi * phase)
         for gear, speed in ((rig.driver, speed1), (rig.driven, speed2)):
             total += gear.runout / 2 * cos(speed * t - gear.runout_phase)
-        for n in range(int(phase) - 1, int(phase) + 3):
-            total += float(hat(phase - n)) * (rig.driver.pitch_error[n % 20] + rig.driven.pitch_error[n % 30])
         return total
 
     def rates(t: float, q: Array) -> list[float]:
@@ -90,12 +95,15 @@ def plain_equations(rig: Rig, mesh_frequency: float, torque: Callable[[float], f
             + sum(c * cos(2 * pi * (n + 1) * phase) for n, c in enumerate(mesh.stiffness_cos))
             + sum(s * sin(2 * pi * (n + 1) * phase) for n, s in enumerate(mesh.stiffness_sin))
         )
-        levers = [0.0, 0.0, 0.0]
+        levers, elastic, tangent = [0.0, 0.0, 0.0], 0.0, 0.0
         for n in range(int(phase) - 1, int(phase) + 3):
             share = float(hat(phase - n))
+            k = pair_stiffness(phase, n) * gain
             if n % 30 == crack.tooth:
-                grown = 1 + BENDING[1] * (1 / (1 - crack.stiffness_loss) - 1)
-                gain *= 1 - share * (1 - 1 / grown)
+                k /= 1 + BENDING[1] * (1 / (1 - crack.stiffness_loss) - 1)
+            own = max(delta + rig.driver.pitch_error[n % 20] + rig.driven.pitch_error[n % 30], 0.0)
+            elastic += k * own * (1 + BEND * (own / TOP) ** 0.5)
+            tangent += k * (1 + 1.5 * BEND * (own / TOP) ** 0.5) * (own > 0)
             path = (phase - n) * BASE_PITCH
             roll1, roll2 = PITCH_ROLL[0] + path, PITCH_ROLL[1] - path
             sliding = path * (speed1 + speed2) + roll1 * v1 / r1 - roll2 * v2 / r2 + (vy1 - vy2) * sin(ALPHA)
@@ -104,11 +112,8 @@ def plain_equations(rig: Rig, mesh_frequency: float, torque: Callable[[float], f
             levers[1] += share * slides
             levers[2] += share * slides * roll2
         force = 0.0
-        if delta > 0:
-            k = float(stiffness(phase)) * gain
-            tangent = k * (1 + 1.5 * BEND * (delta / TOP) ** 0.5)
-            force = k * delta * (1 + BEND * (delta / TOP) ** 0.5) + 2 * ZETA * (tangent * m_e) ** 0.5 * closing
-            force = max(force, 0.0)
+        if elastic > 0:
+            force = max(elastic + 2 * ZETA * (tangent * m_e) ** 0.5 * closing, 0.0)
         rub = friction.coefficient * force
         drive = torque(t) + sum(
             a * cos(o * speed1 * t + p) for o, a, p in zip(ripple.orders, ripple.amplitude, ripple.phase, strict=True)
@@ -145,7 +150,7 @@ def test_a_rig_with_every_effect_follows_the_plain_equations(boundary: str) -> N
         return 100.0 + 20 * np.sin(2 * pi * 700 * t) + 10 * np.sin(2 * pi * 1900 * t + 1)
 
     first = tables(model, Motion(cycles=1.0, entries=2, step=1.0))
-    state = model.equilibrium(float(torque(0.0)) / RADII[0], float(first.excess[0]), float(first.gain[0]), 0.0)
+    state = model.equilibrium(float(torque(0.0)) / RADII[0], instants(first, 0.0, end=1))
     frequency, cycles, steps = 100.0, 3.0, 19200
     time, out = run(model, lambda t: torque(t) / RADII[0], state, mesh_frequency=frequency, cycles=cycles, steps=steps)
     assert out.mesh_force.min() > 0

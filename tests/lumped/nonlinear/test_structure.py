@@ -15,6 +15,7 @@ from shared.plain_structure import UNKNOWNS, plain_rates
 
 from gearbench.lumped import LumpedError
 from gearbench.lumped.nonlinear.coordinates import NAMES
+from gearbench.lumped.nonlinear.pressing import alike
 from gearbench.lumped.nonlinear.rest import centre_at_rest
 from gearbench.lumped.nonlinear.step import Outputs
 from gearbench.rig import (
@@ -98,7 +99,7 @@ def motions(out: Outputs) -> Array:
 def excited(rig: Rig, constant: bool = False, steps: int = 6400, cycles: int = 2) -> tuple[Array, Outputs, Array]:
     """Time, outputs of some mesh cycles and the state at rest from which they begin."""
     model = make_model(rig)
-    state = model.equilibrium(FORCE, 0.0, rig.mesh.stiffness_scale, 0.0)
+    state = model.equilibrium(FORCE, alike(0.0, gain=rig.mesh.stiffness_scale))
     push = (lambda t: np.full(t.shape, FORCE)) if constant else (lambda t: torque(t) / RADII[0])
     time, out = run(model, push, state, mesh_frequency=FREQUENCY, cycles=float(cycles), steps=cycles * steps)
     assert out.mesh_force.min() > 0
@@ -204,7 +205,7 @@ def test_energy_is_balanced(load: str) -> None:
     rig = full_rig(load=Load(boundary=load, coupling=SHAFT), friction=Friction(), support=supports(exponent=0.0))
     rig = rig.model_copy(update={"damping": Damping(mesh_ratio=0.0)})
     model = make_model(rig, hat_law(swing=0.0, bend=0.0))
-    state = model.equilibrium(FORCE, 0.0, 1.1, 0.0)
+    state = model.equilibrium(FORCE, alike(0.0, gain=1.1))
     steps, cycles = 60000, 1.0
     time, out = run(
         model, lambda t: torque(t) / RADII[0], state, mesh_frequency=FREQUENCY, cycles=cycles, steps=steps
@@ -266,7 +267,7 @@ def test_a_soft_support_gives_way_under_its_cross_coupling() -> None:
     soft = Support(stiffness=1e8, exponent=-0.6, across=Across(stiffness=1e8, coupling=0.9e8))
     model = make_model(make_rig(support=Supports(driver=soft, driven=soft)))
     with pytest.raises(LumpedError, match=r"gives way under its across\.coupling_n_per_m"):
-        model.equilibrium(FORCE, 0.0, 1.0, 0.0)
+        model.equilibrium(FORCE, alike(0.0))
 
 
 @pytest.mark.parametrize("exponent", [0.0, 0.4])

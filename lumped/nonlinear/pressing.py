@@ -1,0 +1,88 @@
+"""The mesh's elastic force at given deflections and the deflections under given forces, over arrays: what the
+integrator's mesh does at an instant, without vibration."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gearbench.lumped.errors import LumpedError
+from gearbench.lumped.nonlinear.law import MeshLaw
+
+Array = NDArray[np.float64]
+
+BISECTIONS = 100
+
+
+class Instants(NamedTuple):
+    """A mesh at instants (n,): mesh phase [cycles], excess [m] and gain common to all pairs, and those that pairs have
+    of their own (n, n_o), without columns where all teeth are alike."""
+
+    phase: Array
+    excess: Array
+    gain: Array
+    pair_excess: Array
+    pair_gain: Array
+
+    @property
+    def differ(self) -> bool:
+        """Whether the teeth differ."""
+        return self.pair_excess.shape[1] > 0
+
+
+class Pressed(NamedTuple):
+    """Elastic force [N] (negative on the back flanks) and its tangent stiffness [N/m]; arrays."""
+
+    force: Array
+    tangent: Array
+
+
+def alike(phase: ArrayLike, excess: ArrayLike = 0.0, gain: ArrayLike = 1.0) -> Instants:
+    """A mesh whose teeth do not differ."""
+    at, over, factor = np.broadcast_arrays(np.atleast_1d(np.asarray(phase, dtype=float)), excess, gain)
+    none = np.empty((at.size, 0))
+    return Instants(at, over, factor, none, none)
+
+
+def of_pairs(law: MeshLaw, at: Instants, travel: Array) -> Pressed:
+    """What every pair (..., n, n_o) carries on the working flanks at the DTE `travel` (..., n) [m]."""
+    excess, gain = at.excess[:, None], at.gain[:, None]
+    if at.differ:
+        excess, gain = excess + at.pair_excess, gain * at.pair_gain
+    delta = np.broadcast_to(travel[..., None] + excess, (*travel.shape, len(law.offsets)))
+    force, tangent = law.of_pairs(delta, at.phase)
+    return Pressed(gain * force, gain * tangent)
+
+
+def pressed(law: MeshLaw, at: Instants, travel: Array) -> Pressed:
+    """What all pairs carry at the DTE `travel` (..., n) [m]."""
+    depth = travel + at.excess
+    force, tangent = law.evaluate(depth, at.phase)
+    if not at.differ:
+        return Pressed(at.gain * force, at.gain * tangent)
+    pairs, back = of_pairs(law, at, travel), depth < -law.backlash
+    working, stiff = pairs.force.sum(axis=-1), pairs.tangent.sum(axis=-1)
+    back &= working == 0.0
+    return Pressed(np.where(back, at.gain * force, working), np.where(back, at.gain * tangent, stiff))
+
+
+def travel_under(law: MeshLaw, at: Instants, force: Array) -> Array:
+    """DTE (..., n) [m] at which the mesh carries the forces > 0 [N], by bisection. Raises LumpedError."""
+    force = np.broadcast_to(force, np.broadcast_shapes(np.shape(force), at.phase.shape))
+    reach = at.excess + (at.pair_excess.max(axis=1) if at.differ else 0.0)
+    low = np.broadcast_to(-reach, force.shape)
+    high = low + law.approach[-1]
+    for _ in range(BISECTIONS):
+        short = pressed(law, at, high).force < force
+        if not short.any():
+            break
+        high = np.where(short, low + 2 * (high - low), high)
+    else:
+        raise LumpedError(f"the mesh carries {force.max():.4g} N at no deflection")
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        below = pressed(law, at, middle).force < force
+        low, high = np.where(below, middle, low), np.where(below, high, middle)
+    return np.asarray(high)

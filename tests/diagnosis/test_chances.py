@@ -1,0 +1,30 @@
+"""How likely an effect is, where the judged record has spoken against one."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+from gearbench.diagnosis.chances import chances_of
+from gearbench.diagnosis.odds import effect_signs
+from gearbench.diagnosis.population import POPULATION
+
+LINES = 900.0
+
+
+def weighed(name: str, evidence: float) -> Any:
+    hypothesis = SimpleNamespace(name=name, effect=SimpleNamespace(name=name))
+    return SimpleNamespace(hypothesis=hypothesis, log_bayes_factor=evidence)
+
+
+def test_an_effect_that_closes_nothing_of_the_judged_record_makes_none_likely() -> None:
+    backlash, friction = weighed("backlash", 824.0), weighed("friction", 1.0)
+    selection = SimpleNamespace(weighed=(backlash, friction))
+    decided: Any = SimpleNamespace(named=())
+
+    def best(*dropped: Any) -> tuple[float, ...]:
+        judged: Any = SimpleNamespace(found=SimpleNamespace(selection=selection), dropped=dropped, closings={})
+        return chances_of(judged, decided, POPULATION, LINES).best
+
+    assert best() == effect_signs(824.0, LINES, False, 0.0)
+    assert best(backlash) == effect_signs(1.0, LINES, False, 0.0)
