@@ -151,8 +151,8 @@ def tables(model: NonLinear, motion: Motion) -> Table:
     )
     # One entry before and one behind, for the rate of the excess.
     entries, columns = motion.entries + 3, len(law.offsets) if teeth.differ else 0
-    common, own = np.empty((len(Table._fields) - 4, entries)), np.empty((2, entries, columns))
-    table = Table(*common, pair_excess=own[0], pair_gain=own[1])
+    common, own = np.empty((6, entries)), np.empty((2, entries, columns))
+    table = Table(*common, *own)
     varied = motion.varied
     if varied is None:
         phase = motion.first_phase + np.arange(-1.0, motion.entries + 2) * (motion.cycles / motion.entries)
@@ -161,7 +161,8 @@ def tables(model: NonLinear, motion: Motion) -> Table:
     _fill(table, phase, law.offsets, bending, teeth, correction, _runout(model), _waves(model))
     rate = (table.excess[2:] - table.excess[:-2]) / motion.step
     pace, pull = (np.empty(0), np.empty(0)) if varied is None else varied[1:]
-    return Table(*(column[1:-1] for column in table[:-2]), pace=pace, pull=pull)._replace(excess_rate=rate)
+    inner = Table(*(column[1:-1] for column in table))
+    return inner._replace(excess_rate=rate, pace=pace, pull=pull)
 
 
 def _runout(model: NonLinear) -> Runout:
