@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 from gearbench.bench.errors import BenchError
 from gearbench.bench.finish import begin_of, channel_attributes, record_attributes, shown
 from gearbench.bench.models import model_for
+from gearbench.bench.plan.damping import damping_advice
 from gearbench.bench.plan.memory import Work, check_disk, check_memory, check_work
 from gearbench.bench.plan.schedule import ProgressReport, schedule
-from gearbench.bench.plan.settling import kept_samples
+from gearbench.bench.plan.settling import check_settling, kept_samples
 from gearbench.bench.plan.workers import READY, processors
 from gearbench.bench.realisations import Ready, Realisation, raw_channels, realise, stretches
 from gearbench.bench.record.channels import Stretch
@@ -141,6 +142,8 @@ def _ready(case: Case, model: str | None, progress: ProgressReport | None, worke
     check_delays(case.rig, plan.wraps, plan.repeat_time, case.experiment.changes_speed)
     with READY:
         prepared = solver.prepare(case, plan, lambda note: report(0.0, note))
+    if plan.repeats or prepared.decay is None:
+        check_settling(plan, case.experiment, prepared.slowest, damping_advice(case))
     report(0.0, f"integrating with {prepared.substeps} steps a sample")
     return Ready(case, plan, prepared, report)
 

@@ -34,6 +34,7 @@ Keep = Literal["every", "mean", "one"]
 FEW = 4
 MOST = 10_000
 PATIENCE = 2
+ENDLESS = 1e8  # periods beyond which a rate is the rounding of a rig without damping
 
 
 @dataclass(frozen=True)
@@ -88,6 +89,20 @@ def waiting(plan: Schedule, experiment: Experiment, slowest: float | None, dampi
     if needed > MOST:
         return Wait(FEW, False, damping)
     return Wait(min(max(FEW, ceil(PATIENCE * needed)), MOST), True)
+
+
+def check_settling(plan: Schedule, experiment: Experiment, slowest: float | None, damping: str = "") -> None:
+    """Raise BenchError for a rig whose free vibrations die out, at that slowest rate [1/s], but later than is waited
+    for, unless the case says how long; of one that is not damped at all only the motion itself tells."""
+    if experiment.settling_periods_max or slowest is None or not slowest > 0.0:
+        return
+    needed = log(1 / experiment.settling_tolerance) / slowest * plan.sampling_rate / plan.samples_per_period
+    if MOST < needed < ENDLESS:
+        raise BenchError(
+            f"no steady state: free vibrations take about {needed:.3g} excitation periods to die out to"
+            f" experiment.settling_tolerance = {experiment.settling_tolerance:g} of their size, and at most {MOST} are"
+            f" waited for: damp the rig (raise one of {damping}), or set experiment.settling_periods_max"
+        )
 
 
 def steady_state(
