@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from gearbench.animation import animate
-    from gearbench.bench import Comparison, compare, convert, simulate, static
+    from gearbench.bench import Comparison, compare, convert, simulate, simulate_to, static
     from gearbench.cases import read_case
     from gearbench.diagnosis import diagnose
     from gearbench.identification import (
@@ -63,6 +63,7 @@ _HOMES = {
     "read_record": "gearbench.records",
     "run": "gearbench.pipeline",
     "simulate": "gearbench.bench",
+    "simulate_to": "gearbench.bench",
     "static": "gearbench.bench",
     "validate_record": "gearbench.records",
     "write_frf": "gearbench.identification",
@@ -103,6 +104,7 @@ __all__ = [
     "read_record",
     "run",
     "simulate",
+    "simulate_to",
     "static",
     "validate_record",
     "write_frf",

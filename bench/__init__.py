@@ -1,6 +1,7 @@
 """Where rig, solvers and records meet: experiments, static solutions, comparisons.
 
-`models`: the list of models; `protocol`: what a model is; `experiment`: one experiment, whatever the model. `plan`:
+`models`: the list of models; `protocol`: what a model is; `experiment`: one experiment, whatever the model;
+`realisations`, `finish`: its realisations and their record. `plan`:
 schedule, torque, settling and workers. `record`: what a record says of its rig, sensors. `refusals`: what cannot be
 asked for, found before work begins. `linear`, `nonlinear`, `elastic`, `full`: the models. `stress`: fields and root
 stress. `results`: frequency responses of cases, single numbers, comparisons. `export`: models for other programs.
@@ -17,12 +18,12 @@ from gearbench.files import names_on_use
 
 if TYPE_CHECKING:
     from gearbench.bench.conversion import convert
-    from gearbench.bench.experiment import simulate
+    from gearbench.bench.experiment import simulate, simulate_to
     from gearbench.bench.results.compare import Results, Row
     from gearbench.bench.results.comparison import Comparison, compare
     from gearbench.bench.statics import static
 
-__all__ = ["BenchError", "Comparison", "Results", "Row", "compare", "convert", "simulate", "static"]
+__all__ = ["BenchError", "Comparison", "Results", "Row", "compare", "convert", "simulate", "simulate_to", "static"]
 
 _HOMES = {
     "Comparison": "gearbench.bench.results.comparison",
@@ -31,6 +32,7 @@ _HOMES = {
     "compare": "gearbench.bench.results.comparison",
     "convert": "gearbench.bench.conversion",
     "simulate": "gearbench.bench.experiment",
+    "simulate_to": "gearbench.bench.experiment",
     "static": "gearbench.bench.statics",
 }
 

@@ -12,40 +12,58 @@ import shutil
 import threading
 import time
 import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.bench.plan.settling import Steady
+from gearbench.bench.plan.stored import Gather, Stored, in_file
 from gearbench.files import FileError, write_text, write_whole
 
 Array = NDArray[np.float64]
 State = TypeVar("State")
 
-# Seconds between two looks at the disk: what an interruption may cost.
+# Seconds between two looks at the disk: what an interruption may cost; bytes that wait for the next one.
 INTERVAL = 5.0
+WAITING = 2**26
 
 _ABOUT = "about.json"
 _BROKEN = (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, NotImplementedError, SyntaxError)
 
 
+class End(NamedTuple):
+    """What a realisation ended with: its steady state, and one period of its torque (n,) [N m] as recorded."""
+
+    steady: Steady
+    torque: Array
+
+    @property
+    def size(self) -> int:
+        """Bytes that it takes in memory."""
+        outputs = self.steady.outputs
+        return self.torque.nbytes + (outputs.nbytes if isinstance(outputs, np.ndarray) else 0)
+
+
 class Shelf:
     """A folder of what one simulation has done; `identity` is all that decides its course.
 
-    The folder appears with the first thing to keep, after `interval` seconds; that of another simulation is emptied,
-    and files of another origin are refused with FileError. A disk that takes no more costs the checkpoints, not the
-    simulation. Mutable and shared by threads: it is a recorder.
+    The folder appears with the first thing to keep, after `interval` seconds or when `waiting` bytes wait for the disk;
+    that of another simulation is emptied, and files of another origin are refused with FileError. A disk that takes no
+    more costs the checkpoints, not the simulation, unless the folder is `needed`: then it raises FileError. Mutable and
+    shared by threads: it is a recorder.
     """
 
-    def __init__(self, folder: Path, identity: str, interval: float = INTERVAL) -> None:
-        self.folder, self.interval = folder, interval
+    def __init__(
+        self, folder: Path, identity: str, interval: float = INTERVAL, waiting: int = WAITING, needed: bool = False
+    ) -> None:
+        self.folder, self.interval, self.waiting, self.needed = folder, interval, waiting, needed
         self._identity = identity
         self._lock = threading.Lock()
-        self._ended: dict[int, Steady] = {}
+        self._ended: dict[int, End] = {}
         self._flushed = time.monotonic()
         self._full = False
         if folder.exists() and (owner := _owner(folder)) != identity:
@@ -61,32 +79,58 @@ class Shelf:
         """The tape of that name; `start` is a state like those that it keeps."""
         return Tape(self, name, start)
 
-    def ended(self, number: int) -> Steady | None:
-        """What an earlier simulation ended realisation `number` with."""
+    def gather(self, number: int) -> Gather:
+        """Where the outputs of realisation `number` come together: in a file of the folder, where they are long."""
+
+        def gathered(stretches: Iterable[Array], samples: int) -> Array | Stored:
+            self._make()
+            return in_file(self._outputs(number), stretches, samples)
+
+        return gathered
+
+    def ended(self, number: int) -> End | None:
+        """What realisation `number` ended with, in this simulation or an earlier one."""
+        with self._lock:
+            if number in self._ended:
+                return self._ended[number]
         with suppress(*_BROKEN), np.load(self._end(number), allow_pickle=False) as kept:
             scatter = kept["scatter"] if "scatter" in kept.files else None
             residual, periods, first = float(kept["residual"]), int(kept["settling_periods"]), int(kept["first"])
-            return Steady(kept["outputs"], residual, periods, first, scatter)
+            outputs = self._stored(number, kept["shape"]) if "shape" in kept.files else kept["outputs"]
+            return End(Steady(outputs, residual, periods, first, scatter), kept["torque"])
         return None
 
-    def end(self, number: int, steady: Steady) -> None:
+    def _stored(self, number: int, shape: NDArray[np.int64]) -> Stored:
+        """Outputs in their own file. Raises ValueError where that is not whole."""
+        path, samples, columns = self._outputs(number), int(shape[0]), int(shape[1])
+        if path.stat().st_size != 8 * samples * columns:
+            raise ValueError(f"{path} is damaged")
+        return Stored(path, samples, columns)
+
+    def end(self, number: int, end: End) -> None:
         """Keep what a realisation ended with, on disk before long; its tapes are needed no more."""
         with self._lock:
-            self._ended[number] = steady
+            self._ended[number] = end
             due = time.monotonic() - self._flushed >= self.interval
+            due = due or sum(one.size for one in self._ended.values()) >= self.waiting
         if due:
             self.flush()
 
     def flush(self) -> None:
         """Write the ends that are not on disk yet."""
         with self._lock:
-            ended, self._ended = self._ended, {}
+            ended = dict(self._ended)
             self._flushed = time.monotonic()
-        for number, steady in ended.items():
+        for number, (steady, torque) in ended.items():
             arrays = {name: value for name, value in vars(steady).items() if value is not None}
-            self.write(self._end(number).name, arrays)
+            if isinstance(steady.outputs, Stored):
+                del arrays["outputs"]
+                arrays["shape"] = np.array([steady.outputs.samples, steady.outputs.columns])
+            self.write(self._end(number).name, {**arrays, "torque": torque})
             for path in self.folder.glob(f"tape-{number}-*.npz"):
                 path.unlink(missing_ok=True)
+            with self._lock:
+                self._ended.pop(number, None)
 
     def write(self, name: str, arrays: Mapping[str, Any]) -> None:
         """One file of arrays in the folder."""
@@ -94,16 +138,30 @@ class Shelf:
             if self._full:
                 return
             try:
-                if not self.folder.exists():
-                    self.folder.mkdir()
-                    write_text(self.folder / _ABOUT, json.dumps({"identity": self._identity}) + "\n")
+                self._made()
                 write_whole(self.folder / name, lambda path: np.savez(path, **arrays))
             except OSError:
+                if self.needed:
+                    raise
                 self._full = True
+
+    def _make(self) -> None:
+        with self._lock:
+            self._made()
+
+    def _made(self) -> None:
+        if not self.folder.exists():
+            try:
+                self.folder.mkdir()
+            except OSError as error:
+                raise FileError(f"{self.folder} cannot be made: {error.strerror or error}") from error
+            write_text(self.folder / _ABOUT, json.dumps({"identity": self._identity}) + "\n")
 
     def _end(self, number: int) -> Path:
         return self.folder / f"end-{number}.npz"
 
+    def _outputs(self, number: int) -> Path:
+        return self.folder / f"outputs-{number}.bin"
 
 
 def discard(folder: Path) -> None:
@@ -132,6 +190,7 @@ class Tape:
         self._segments = 0
         self._played: Array | None = None
         self._pending: list[Array] = []
+        self._size = 0
         self._flushed = time.monotonic()
 
     def take(self, count: int) -> Array | None:
@@ -146,8 +205,9 @@ class Tape:
     def put(self, state: Any, outputs: Array) -> None:
         """Keep outputs (samples, n) and the state at their end, on disk before long."""
         self._pending.append(outputs)
+        self._size += outputs.nbytes
         self.state = state
-        if time.monotonic() - self._flushed >= self._shelf.interval:
+        if time.monotonic() - self._flushed >= self._shelf.interval or self._size >= self._shelf.waiting:
             self.flush()
 
     def flush(self) -> None:
@@ -157,7 +217,7 @@ class Tape:
         arrays = {f"state{i}": leaf for i, leaf in enumerate(leaves(self.state))}
         self._shelf.write(self._file(self._segments), {"outputs": np.concatenate(self._pending), **arrays})
         self._segments += 1
-        self._pending = []
+        self._pending, self._size = [], 0
         self._flushed = time.monotonic()
 
     def _load(self) -> Array | None:

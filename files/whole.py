@@ -39,7 +39,7 @@ def write_whole(path: str | Path, write: Callable[[Path], object]) -> Path:
         os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
         write(temporary)
         os.replace(temporary, target)
-    except FileError:
+    except (FileError, InterruptedError):  # who is stopped by others: no system call is, since PEP 475
         raise
     except OSError as error:
         raise FileError(f"{target} cannot be written: {error.strerror or error}") from error

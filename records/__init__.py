@@ -1,7 +1,7 @@
 """What comes back from a rig: the record, its channels, its file and its provenance.
 
 `checks`: what a record alone tells of its own faults. `formats`: files of measuring programs, one importer each.
-`conversion`: from their columns to a record.
+`conversion`: from their columns to a record. `pieces`: a record written piece by piece.
 """
 
 from gearbench.records.channels import unit_of_channel
@@ -12,7 +12,7 @@ from gearbench.records.formats.importers import read_source
 from gearbench.records.formats.source import Source
 from gearbench.records.provenance import provenance, source_digest
 from gearbench.records.record import SCHEMA, make_record, validate_record
-from gearbench.records.storage import read_dataset, read_record, write_dataset, write_record
+from gearbench.records.storage import opened_record, read_dataset, read_record, write_dataset, write_record
 
 __all__ = [
     "SCHEMA",
@@ -24,6 +24,7 @@ __all__ = [
     "guess_map",
     "make_record",
     "map_text",
+    "opened_record",
     "provenance",
     "read_dataset",
     "read_map",

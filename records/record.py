@@ -12,7 +12,7 @@ unit.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 import numpy as np
@@ -57,7 +57,7 @@ def make_record(
     if not channels:
         raise RecordError("a record needs at least one channel")
     attrs = {"schema": SCHEMA, **{k: v for k, v in attributes.items() if v is not None}}
-    _check_sampling(attrs)
+    check_sampling(attrs)
     variables = {}
     samples = np.shape(next(iter(channels.values())))[-1:]
     for name, values in channels.items():
@@ -89,11 +89,7 @@ def validate_record(record: xr.Dataset) -> None:
     Traceback (most recent call last):
     gearbench.records.errors.RecordError: a record needs the coordinate time [s]
     """
-    schema = record.attrs.get("schema")
-    if not isinstance(schema, str) or schema != SCHEMA:
-        raise RecordError(f"schema is {schema!r}, but a record has schema {SCHEMA!r}")
-    _check_sampling(record.attrs)
-    _check_channel_sets(record)
+    check_description(record.attrs, [str(name) for name in record.data_vars])
     phases = np.size(record.attrs.get("mesh_phase", 0.0))
     if phases not in (1, record.sizes.get("realisation", 1)):
         raise RecordError(
@@ -107,15 +103,24 @@ def validate_record(record: xr.Dataset) -> None:
     _check_time(record)
 
 
-def _check_sampling(attrs: Mapping[str, Any]) -> None:
+def check_description(attrs: Mapping[str, Any], names: Collection[str]) -> None:
+    """Raise RecordError, in one sentence, unless these attributes and channels make a record."""
+    schema = attrs.get("schema")
+    if not isinstance(schema, str) or schema != SCHEMA:
+        raise RecordError(f"schema is {schema!r}, but a record has schema {SCHEMA!r}")
+    check_sampling(attrs)
+    _check_channel_sets(attrs, set(names))
+
+
+def check_sampling(attrs: Mapping[str, Any]) -> None:
+    """Raise RecordError where attributes are not of their kind, or too few to cut the record into periods."""
     for name in SAMPLING_ATTRIBUTES:
         if name not in attrs:
             raise RecordError(f"attribute {name} is missing; a record needs {', '.join(SAMPLING_ATTRIBUTES)}")
     check_attributes(attrs)
 
 
-def _check_channel_sets(record: xr.Dataset) -> None:
-    names = {str(name) for name in record.data_vars}
+def _check_channel_sets(attrs: Mapping[str, Any], names: set[str]) -> None:
     if names >= REDUCED_CHANNELS:
         return
     missing = sorted(RIG_CHANNELS - names)
@@ -124,13 +129,13 @@ def _check_channel_sets(record: xr.Dataset) -> None:
             f"channel {', '.join(missing)} is missing; a record needs {', '.join(sorted(RIG_CHANNELS))},"
             f" or else {' and '.join(sorted(REDUCED_CHANNELS))}"
         )
-    both_free = record.attrs.get("driven_boundary") not in (None, "speed")
+    both_free = attrs.get("driven_boundary") not in (None, "speed")
     for name in RIG_ATTRIBUTES + (INERTIA_ATTRIBUTES if both_free else ()):
-        if name not in record.attrs:
+        if name not in attrs:
             raise RecordError(f"attribute {name} is missing; without it dte and force cannot be computed")
     if both_free and "torque_driven" not in names:
         raise RecordError(
-            f"channel torque_driven is missing, which driven_boundary = {record.attrs['driven_boundary']!r} needs"
+            f"channel torque_driven is missing, which driven_boundary = {attrs['driven_boundary']!r} needs"
         )
 
 
@@ -150,12 +155,17 @@ def _check_channel(record: xr.Dataset, name: str) -> None:
 def require_finite(channel: xr.DataArray) -> None:
     """Raise RecordError if a channel (realisation, time) holds values that are not finite."""
     for row, values in enumerate(channel.values):
-        if not np.isfinite(values).all():
-            bad = np.flatnonzero(~np.isfinite(values))
-            raise RecordError(
-                f"channel {channel.name} holds {bad.size} value(s) that are not finite, first at realisation {row},"
-                f" sample {bad[0]}"
-            )
+        check_finite(str(channel.name), row, values)
+
+
+def check_finite(name: str, realisation: int, values: NDArray[np.float64], at: int = 0) -> None:
+    """Raise RecordError if a stretch (n,) of a channel, from sample `at` on, holds values that are not finite."""
+    if not np.isfinite(values).all():
+        bad = np.flatnonzero(~np.isfinite(values))
+        raise RecordError(
+            f"channel {name} holds {bad.size} value(s) that are not finite, first at realisation {realisation},"
+            f" sample {at + bad[0]}"
+        )
 
 
 def _check_time(record: xr.Dataset) -> None:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import gc
 import sys
 import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import xarray as xr
@@ -83,3 +85,13 @@ def read_record(path: str | Path) -> xr.Dataset:
     except RecordError as error:
         raise RecordError(f"{path}: {error}") from None
     return record
+
+
+@contextmanager
+def opened_record(path: str | Path) -> Iterator[xr.Dataset]:
+    """A record of ours that stays on disk: what is asked of it is read then. Raises RecordError for a missing file."""
+    source = Path(path)
+    if not source.is_file():
+        raise RecordError(f"record {source} does not exist")
+    with xr.open_dataset(source, engine="h5netcdf", decode_cf=False, cache=False) as record:
+        yield record

@@ -42,6 +42,7 @@ FUNCTIONS: dict[str, tuple[str, ...]] = {
     "read_record": ("path",),
     "run": ("case", "out", "force", "progress", "workers"),
     "simulate": ("case", "model", "progress", "checkpoints", "workers"),
+    "simulate_to": ("case", "path", "model", "progress", "checkpoints", "workers"),
     "static": ("case", "model", "torque", "dte", "positions", "cycles", "progress"),
     "validate_record": ("record",),
     "write_frf": ("dataset", "path"),

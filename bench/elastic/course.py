@@ -10,6 +10,7 @@ from gearbench.bench.plan.excitation import Torque
 from gearbench.bench.protocol import Drive
 from gearbench.fem.limits import EDGE_SEPARATION
 from gearbench.geometry import Pair
+from gearbench.rig.lengths import length_words
 
 Array = NDArray[np.float64]
 
@@ -54,6 +55,6 @@ def check_reach(dte: Array, meshing: Pair) -> None:
     most = reach_of(meshing)
     if dte.max() > most:
         raise BenchError(
-            f"the DTE reaches {1e6 * dte.max():.4g} um, beyond the {1e6 * most:.4g} um to which contact off the"
-            " line of action is modelled for this module: lower experiment.torque_mean_nm or the multisine"
+            f"the DTE reaches {length_words(float(dte.max()))}, beyond the {length_words(most)} to which contact off"
+            " the line of action is modelled for this module: lower experiment.torque_mean_nm or the multisine"
         )

@@ -16,6 +16,7 @@ from gearbench.fem.motion.hubs import ABSENT
 from gearbench.fem.motion.machine import Machine, angles, centres
 from gearbench.fem.motion.start import initial_state
 from gearbench.fem.motion.transient import CHANNELS, columns
+from gearbench.rig.lengths import length_words
 
 Array = NDArray[np.float64]
 Dte = Callable[[Array], Array]
@@ -46,10 +47,10 @@ def check_rest(machine: Machine, dte: Dte, torque: float, plan: Schedule, most: 
     for rest in _positions(machine, dte, torque, plan):
         where = f"experiment.torque_mean_nm = {torque:g} at rest, at mesh phase {rest.phase:.4g},"
         if not rest.modelled:
-            raise BenchError(f"{where} takes contact off the modelled flanks (DTE {1e6 * rest.dte:.4g} um): lower it")
+            raise BenchError(f"{where} takes contact off the modelled flanks (DTE {length_words(rest.dte)}): lower it")
         if rest.dte > most:
             raise BenchError(
-                f"{where} brings the DTE to {1e6 * rest.dte:.4g} um, beyond the {1e6 * most:.4g} um to which contact"
+                f"{where} brings the DTE to {length_words(rest.dte)}, beyond the {length_words(most)} to which contact"
                 " off the line of action is modelled for this module: lower it"
             )
 

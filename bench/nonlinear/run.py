@@ -66,8 +66,12 @@ class Setup:
     rotation: Rotation | None = None  # where the speed changes
 
     keep: ClassVar[Keep] = "one"
-    piece: ClassVar[int] = 0
     absolute: ClassVar[bool] = False
+
+    @property
+    def piece(self) -> int:
+        """Samples that are tabulated at once; 0 where one table serves all."""
+        return 0 if self.table is not None else max(MOST_ENTRIES // (2 * self.substeps), 1)
 
     @property
     def step(self) -> float:

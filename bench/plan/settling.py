@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from itertools import repeat
+from itertools import chain, islice, repeat
 from math import ceil, exp, log
 from typing import Literal, NamedTuple
 
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from gearbench.bench.errors import BenchError
 from gearbench.bench.plan.schedule import Schedule
+from gearbench.bench.plan.stored import Gather, Stored, in_memory, lengths_of
 from gearbench.rig import Experiment
 
 Array = NDArray[np.float64]
@@ -33,6 +34,7 @@ Keep = Literal["every", "mean", "one"]
 FEW = 4
 MOST = 10_000
 PATIENCE = 2
+ENDLESS = 1e8  # periods beyond which a rate is the rounding of a rig without damping
 
 
 @dataclass(frozen=True)
@@ -44,7 +46,7 @@ class Steady:
     what is kept; scatter (n,): rms departure of single blocks from their mean.
     """
 
-    outputs: Array
+    outputs: Array | Stored
     residual: float
     settling_periods: int
     first: int = 0
@@ -89,6 +91,20 @@ def waiting(plan: Schedule, experiment: Experiment, slowest: float | None, dampi
     return Wait(min(max(FEW, ceil(PATIENCE * needed)), MOST), True)
 
 
+def check_settling(plan: Schedule, experiment: Experiment, slowest: float | None, damping: str = "") -> None:
+    """Raise BenchError for a rig whose free vibrations die out, at that slowest rate [1/s], but later than is waited
+    for, unless the case says how long; of one that is not damped at all only the motion itself tells."""
+    if experiment.settling_periods_max or slowest is None or not slowest > 0.0:
+        return
+    needed = log(1 / experiment.settling_tolerance) / slowest * plan.sampling_rate / plan.samples_per_period
+    if MOST < needed < ENDLESS:
+        raise BenchError(
+            f"no steady state: free vibrations take about {needed:.3g} excitation periods to die out to"
+            f" experiment.settling_tolerance = {experiment.settling_tolerance:g} of their size, and at most {MOST} are"
+            f" waited for: damp the rig (raise one of {damping}), or set experiment.settling_periods_max"
+        )
+
+
 def steady_state(
     course: Course,
     plan: Schedule,
@@ -97,19 +113,22 @@ def steady_state(
     keep: Keep,
     decay: float | None,
     wait: Wait | None = None,
+    gather: Gather = in_memory,
+    piece: int = 0,
 ) -> Steady:
     """Run one realisation until it is steady, and on to the end of the record.
 
     decay: slowest rate [1/s] of free vibrations, where a record that does not repeat is to wait for it; wait: how long
-    (absent: as where that rate is unknown). Raises BenchError if that takes longer.
+    (absent: as where that rate is unknown); gather: where the stretches of a record of more than one block go; piece:
+    as in `Prepared`. Raises BenchError if settling takes longer.
     """
     wait = wait or waiting(plan, experiment, None)
     if not plan.repeats:
         if decay is None:
-            return _from_two_starts(course, plan, experiment, dte, wait)
-        return _after_decay(course, plan, experiment, decay, wait)
+            return _from_two_starts(course, plan, experiment, dte, wait, gather)
+        return _after_decay(course, plan, experiment, decay, wait, gather, piece)
     if keep == "every":
-        return _every_block(course, plan, experiment, dte, wait)
+        return _every_block(course, plan, experiment, dte, wait, gather)
     blocks = course(0, repeat(plan.block_samples))
     settled = _settle(blocks, plan, experiment, dte, wait)
     periods = (settled.earlier + 1) * plan.block_periods
@@ -155,7 +174,9 @@ def _settle(
         before = after
 
 
-def _every_block(course: Course, plan: Schedule, experiment: Experiment, dte: Dte, wait: Wait) -> Steady:
+def _every_block(
+    course: Course, plan: Schedule, experiment: Experiment, dte: Dte, wait: Wait, gather: Gather
+) -> Steady:
     """Settle for one block, then keep those that follow one another without change."""
     blocks = course(-plan.block_samples, repeat(plan.block_samples))
     next(blocks)
@@ -164,9 +185,9 @@ def _every_block(course: Course, plan: Schedule, experiment: Experiment, dte: Dt
     kept, earlier = [settled.before, settled.after], settled.earlier
     if plan.blocks == 1:
         kept, earlier = [settled.after], earlier + 1
-    kept += [next(blocks) for _ in range(plan.blocks - 2)]
+    rest = plan.blocks - len(kept)
     return Steady(
-        np.vstack(kept)[: plan.record_samples],
+        gather(chain(kept, islice(blocks, rest)), plan.record_samples),
         settled.residual,
         earlier * plan.block_periods,
         first=(earlier - 1) * plan.block_samples,
@@ -188,7 +209,15 @@ def _average(first: Array, blocks: Iterator[Array], count: int) -> tuple[Array, 
     return first + total, np.sqrt(np.maximum(variance, 0.0).mean(axis=0))
 
 
-def _after_decay(course: Course, plan: Schedule, experiment: Experiment, decay: float, wait: Wait) -> Steady:
+def _after_decay(
+    course: Course,
+    plan: Schedule,
+    experiment: Experiment,
+    decay: float,
+    wait: Wait,
+    gather: Gather,
+    piece: int,
+) -> Steady:
     """A record shorter than what repeats: it begins when free vibrations have died out by their slowest rate."""
     period = plan.samples_per_period / plan.sampling_rate
     wanted = log(1 / experiment.settling_tolerance) * plan.sampling_rate / plan.samples_per_period
@@ -207,11 +236,16 @@ def _after_decay(course: Course, plan: Schedule, experiment: Experiment, decay: 
     settling = periods * plan.samples_per_period
     if plan.rotation:  # an excitation period may be the whole record: the part of it that is needed is enough
         settling = max(ceil(wanted / decay * plan.samples_per_period), 1)
-    _, outputs = course(-settling, (settling, plan.record_samples))
-    return Steady(outputs, experiment.settling_tolerance, periods)
+    before = list(lengths_of(settling, piece))
+    stretches = course(-settling, chain(before, lengths_of(plan.record_samples, piece)))
+    for _ in before:
+        next(stretches)
+    return Steady(gather(stretches, plan.record_samples), experiment.settling_tolerance, periods)
 
 
-def _from_two_starts(course: Course, plan: Schedule, experiment: Experiment, dte: Dte, wait: Wait) -> Steady:
+def _from_two_starts(
+    course: Course, plan: Schedule, experiment: Experiment, dte: Dte, wait: Wait, gather: Gather
+) -> Steady:
     """A record shorter than what repeats, of a model that does not know how fast its vibrations die out.
 
     No period is like the one before, so the steady state shows in another way: two histories, one begun an excitation
@@ -240,8 +274,8 @@ def _from_two_starts(course: Course, plan: Schedule, experiment: Experiment, dte
             )
         further = settling + 1 if settling < FEW or experiment.settling_periods_max else 2 * settling
         before, settling = first, min(further, wait.most)
-    kept = [first, *(next(periods) for _ in range(plan.periods - 1))]
-    return Steady(np.vstack(kept), residual, settling)
+    kept = chain([first], islice(periods, plan.periods - 1))
+    return Steady(gather(kept, plan.record_samples), residual, settling)
 
 
 def _no_steady_state(found: str, experiment: Experiment, wait: Wait) -> BenchError:

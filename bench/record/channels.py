@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from math import cos, pi, sin
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.bench.plan.schedule import Schedule
 from gearbench.bench.record.attributes import turning_inertias
-from gearbench.bench.record.sensors import Signal, encoder_error, measured
+from gearbench.bench.record.sensors import Noise, Signal, encoder_error, measured
 from gearbench.geometry import Pair
 from gearbench.rig import Rig
 
@@ -75,18 +76,38 @@ def tooth_channels(forces: Mapping[str, Array]) -> dict[str, Array]:
     return {**{f"tooth_force_{name}": force for name, force in forces.items()}, **shares}
 
 
+class Stretch(NamedTuple):
+    """Where in a record channels lie: from its sample `at` on, which is sample `within` of what repeats; the noise of
+    its sensors, where it goes on from the stretch before."""
+
+    at: int = 0
+    within: int = 0
+    noise: Noise | None = None
+
+
+WHOLE = Stretch()
+
+
 def sensed(
-    swings: dict[str, Array], rig: Rig, meshing: Pair, plan: Schedule, *, samples: int, seed: int, first: float = 0.0
+    swings: dict[str, Array],
+    rig: Rig,
+    meshing: Pair,
+    plan: Schedule,
+    *,
+    samples: int,
+    seed: int,
+    first: float = 0.0,
+    stretch: Stretch = WHOLE,
 ) -> dict[str, Array]:
-    """Motions (realisations, n) that repeat, as the rig's sensors show them over `samples` samples from the mesh phase
-    `first` [cycles] on; DTE and force are those of the measured channels. Angles are without the steady rotation, but
-    with one whose speed changes."""
+    """Motions (realisations, n) that repeat, as the rig's sensors show them over `samples` samples of a record that
+    begins at the mesh phase `first` [cycles]; DTE and force are those of the measured channels. Angles are without the
+    steady rotation, but with one whose speed changes."""
     speeds = {"angle_driver": plan.speed_driver, "angle_driven": plan.speed_driven} if plan.rotation is None else {}
     signals = {name: Signal(swing, speeds.get(name, 0.0)) for name, swing in swings.items()}
     for gear, teeth in (("driver", rig.driver.teeth), ("driven", rig.driven.teeth)):
         if getattr(rig.sensors, f"encoder_runout_{gear}"):
             swing, ramp = signals[f"angle_{gear}"].swing, signals[f"angle_{gear}"].ramp
-            rotation = 2 * pi / teeth * mesh_phases(plan, swing.shape[-1], first)
+            rotation = 2 * pi / teeth * mesh_phases(plan, swing.shape[-1], first, stretch.within)
             signals[f"angle_{gear}"] = Signal(swing + encoder_error(rig.sensors, gear, rotation), ramp)
     found = measured(
         signals,
@@ -97,6 +118,8 @@ def sensed(
         samples_per_period=plan.samples_per_period,
         block=plan.block_samples if plan.wraps else 0,
         start=first / plan.cycles_per_sample / plan.sampling_rate,
+        at=stretch.at,
+        noise=stretch.noise,
     )
     out = {name: signal.swing for name, signal in found.items()}
     turned = turned_by(meshing, out["angle_driver"], out["angle_driven"])
@@ -106,23 +129,24 @@ def sensed(
     return out
 
 
-def mesh_phases(plan: Schedule, samples: int, first: float = 0.0) -> Array:
-    """Mesh phase (samples,) [cycles] from `first` on."""
+def mesh_phases(plan: Schedule, samples: int, first: float = 0.0, at: int = 0) -> Array:
+    """Mesh phase (samples,) [cycles] from sample `at` on, of a record that begins at `first`."""
+    number = np.arange(at, at + samples)
     if plan.rotation is not None:
-        return first + plan.rotation.cycles(np.arange(samples) / plan.sampling_rate)
-    return np.asarray(first + np.arange(samples) * plan.cycles_per_sample)
+        return first + plan.rotation.cycles(number / plan.sampling_rate)
+    return np.asarray(first + number * plan.cycles_per_sample)
 
 
 def with_rotation(
-    swings: dict[str, Array], plan: Schedule, first: float = 0.0, times: float = 1.0
+    swings: dict[str, Array], plan: Schedule, first: float = 0.0, times: float = 1.0, at: int = 0
 ) -> dict[str, Array]:
     """The channels with the nominal rotation of both gears, which turn by `first` [cycles] of the mesh before the first
-    sample; `times` -1 takes it off."""
+    sample of the record, of which the channels begin at sample `at`; `times` -1 takes it off."""
     count = swings["angle_driver"].shape[-1]
     if plan.rotation is not None:
-        cycles = mesh_phases(plan, count, first)
+        cycles = mesh_phases(plan, count, first, at)
         turned = {"angle_driver": plan.rotation.teeth, "angle_driven": plan.teeth_driven}
         return {**swings, **{name: swings[name] + times * 2 * pi / z * cycles for name, z in turned.items()}}
-    time = (np.arange(count) + first / plan.cycles_per_sample) / plan.sampling_rate
+    time = (np.arange(at, at + count) + first / plan.cycles_per_sample) / plan.sampling_rate
     speeds = {"angle_driver": plan.speed_driver, "angle_driven": plan.speed_driven}
     return {**swings, **{name: swings[name] + times * speed * time for name, speed in speeds.items()}}

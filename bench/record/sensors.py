@@ -115,14 +115,19 @@ def measured(
     samples_per_period: int,
     block: int = 0,
     start: float = 0.0,
+    at: int = 0,
+    noise: Noise | None = None,
 ) -> dict[str, Signal]:
     """Signals as the rig's sensors give them, `samples` long: delayed, filtered, repeated, with their gain, then noise
     of its own for every channel, realisation and excitation period, then in steps.
 
-    block: samples after which swings repeat (0: their length). start [s]: time of the first sample, since ramps began.
+    block: samples after which swings repeat (0: their length). start [s]: time of the record's first sample, since
+    ramps began. A stretch of a record begins at its sample `at`, with `noise` that goes on from one to the next; delays
+    and filters need the whole.
     """
     sensors, out = rig.sensors, {}
-    time = start + np.arange(samples) / sampling_rate
+    noise = noise or Noise(seed, samples_per_period)
+    time = start + np.arange(at, at + samples) / sampling_rate
     for number, (name, kind) in enumerate(CHANNELS.items()):
         if name not in signals:
             continue
@@ -135,7 +140,7 @@ def measured(
             swing = gain * swing
         level, step = getattr(sensors, f"noise_{kind}"), getattr(sensors, f"quantisation_{kind}")
         if level > 0.0:
-            swing = swing + level * _noise(seed, number, swing.shape, samples_per_period)
+            swing = swing + level * noise.take(number, swing.shape, at)
         if step > 0.0:
             swing = step * np.round((swing + ramp * time) / step) - ramp * time
         out[name] = Signal(swing, ramp)
@@ -160,15 +165,39 @@ def repeated(values: NDArray[Scalar], samples: int) -> NDArray[Scalar]:
     return values if length == samples else np.take(values, np.arange(samples) % length, axis=-1)
 
 
-def _noise(seed: int, channel: int, shape: tuple[int, int], samples_per_period: int) -> Array:
-    """Standard white noise (realisations, samples); its streams differ from those of the excitation."""
-    out = np.empty(shape)
-    for realisation in range(shape[0]):
-        for period, start in enumerate(range(0, shape[1], samples_per_period)):
-            stream = np.random.SeedSequence(seed, spawn_key=(realisation, channel, period))
-            stop = min(start + samples_per_period, shape[1])
-            out[realisation, start:stop] = np.random.default_rng(stream).standard_normal(stop - start)
-    return out
+class Noise:
+    """Standard white noise, a stream of its own for every channel, realisation and excitation period; they differ from
+    those of the excitation. The first row is that of `realisation`.
+
+    Mutable: streams stay where a stretch has ended, so that the next one need not draw it again.
+    """
+
+    def __init__(self, seed: int, samples_per_period: int, realisation: int = 0) -> None:
+        self._seed, self._length, self._first = seed, samples_per_period, realisation
+        self._streams: dict[tuple[int, int], tuple[int, np.random.Generator]] = {}
+
+    def take(self, channel: int, shape: tuple[int, int], at: int = 0) -> Array:
+        """Noise (realisations, samples) of a channel from sample `at` on."""
+        out = np.empty(shape)
+        for row, values in enumerate(out):
+            done = 0
+            while done < len(values):
+                count = min(self._length - (at + done) % self._length, len(values) - done)
+                stream = self._stream(self._first + row, channel, at + done)
+                values[done : done + count] = stream.standard_normal(count)
+                done += count
+                self._streams[self._first + row, channel] = at + done, stream
+        return out
+
+    def _stream(self, realisation: int, channel: int, at: int) -> np.random.Generator:
+        """The stream of the period of sample `at`, at that sample."""
+        period, inside = divmod(at, self._length)
+        there, stream = self._streams.get((realisation, channel), (-1, None))
+        if inside and stream is not None and there == at:
+            return stream
+        stream = np.random.default_rng(np.random.SeedSequence(self._seed, spawn_key=(realisation, channel, period)))
+        stream.standard_normal(inside)
+        return stream
 
 
 def sensor_attributes(rig: Rig, names: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
@@ -178,6 +207,12 @@ def sensor_attributes(rig: Rig, names: Mapping[str, Any]) -> dict[str, dict[str,
         return {}
     about = {"filter_hz": corner, "filter": f"Butterworth, order {FILTER_ORDER}", "delay": filter_delay(corner)}
     return {name: dict(about) for name in names if name in CHANNELS}
+
+
+def needs_whole(rig: Rig) -> bool:
+    """Whether a sensor's sample depends on all of the record: one that lags, or is filtered."""
+    delays = any(getattr(rig.sensors, f"delay_{name}", 0.0) for name in CHANNELS)
+    return delays or rig.sensors.filter is not None
 
 
 def check_delays(rig: Rig, repeats: bool, seconds: float, changes: bool = False) -> None:

@@ -62,13 +62,14 @@ def record_fields(case: Case, record: xr.Dataset, times: Sequence[float]) -> Ite
     rate = float(record.attrs["sampling_rate"])
     for time in times:
         k = min(max(round(time * rate), 0), record.sizes["time"] - 1)
-        yield Moment(float(record["time"].values[k]), fields_at(elastic, gears, stand_of(elastic, record, k)))
+        yield Moment(float(record["time"][k]), fields_at(elastic, gears, stand_of(elastic, record, k)))
 
 
 def stand_of(elastic: ElasticRig, record: xr.Dataset, sample: int) -> Stand:
     """Where both gears stand at a sample of a record's first realisation, and what each tooth pair carries."""
     law = elastic.law
-    seen = {str(name): float(record[name].values[0, sample]) for name in record.data_vars}
+    there = record.isel(realisation=0, time=sample)  # of a record that stays on disk, only that is read
+    seen = {str(name): float(there[name]) for name in record.data_vars}
     theta = seen["angle_driver"], seen["angle_driven"]
     centres = np.array([[0.0, 0.0], [law.centre, 0.0]]) + _moved(elastic, seen)
     apart = centres[1] - centres[0]

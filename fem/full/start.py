@@ -13,6 +13,7 @@ from gearbench.fem.full.contact import Met, met_pairs
 from gearbench.fem.full.machine import Machine
 from gearbench.fem.full.penalty import at_rest
 from gearbench.fem.full.transient import Motion, State, outer_load, residual_of
+from gearbench.fem.motion.start import yielding
 
 Array = NDArray[np.float64]
 
@@ -61,7 +62,10 @@ def _law_at_rest(machine: Machine, torque: float, t: float) -> Rest:
     for _ in range(30):
         x1, x2 = machine.axis[0] * y
         y1, y2 = machine.axis[1] * y
-        dte = solve_torque(law, phase, torque, dte, machine.axis[0] * y, machine.axis[1] * y)
+        try:
+            dte = solve_torque(law, phase, torque, dte, machine.axis[0] * y, machine.axis[1] * y)
+        except ContactError as error:
+            raise yielding(float(np.abs(y).max()), torque, error) from None
         theta1 = phase * law.driver.pitch + dte / law.driver.rb
         found = position(law, theta1, phase * law.driven.pitch, x1, y1, x2, y2, np.zeros(PAIRS))
         met = met_pairs(machine, found.pairs)

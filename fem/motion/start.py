@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 from gearbench.fem.contact.coupling import coupling
 from gearbench.fem.contact.law import PAIRS, Meetings
 from gearbench.fem.contact.static import ContactError, position, solve_torque
-from gearbench.fem.motion.hubs import ABSENT, hubs_at_rest, spring_force
+from gearbench.fem.motion.hubs import ABSENT, Unknowns, hubs_at_rest, spring_force
 from gearbench.fem.motion.imposed import common_excess, hardened, stiffness_factor
 from gearbench.fem.motion.machine import Machine, contact_rows, modal_flexibility
+from gearbench.rig.lengths import length_words
 
 Array = NDArray[np.float64]
 
@@ -77,7 +78,7 @@ def initial_state(machine: Machine, torque: float, t: float = 0.0) -> State:
         try:
             mesh = _pressed(machine, phase, torque, dte, hub, t)
         except ContactError as error:
-            raise _yielding(machine, hub, torque, error) from None
+            raise yielding(_moved(at, hub), torque, error) from None
         dte = mesh.dte
         rows = contact_rows(machine, mesh.pairs)
         push = rows.T @ mesh.force
@@ -103,15 +104,18 @@ def initial_state(machine: Machine, torque: float, t: float = 0.0) -> State:
     return State(t, d, still, still, load, mesh.pairs, force, force, residual, again, lately=0.0, torque=torque)
 
 
-def _yielding(machine: Machine, hub: Array, torque: float, error: ContactError) -> ContactError:
-    """The error of a mesh at rest whose gears' centres have moved so far on their supports."""
-    at = machine.at
+def _moved(at: Unknowns, hub: Array) -> float:
+    """Largest motion [m] of a gear's centre."""
     centres = [at.y1, at.y2] + ([at.x1, at.x2] if at.x1 != ABSENT else [])
-    moved = float(np.abs(hub[centres]).max())
+    return float(np.abs(hub[centres]).max())
+
+
+def yielding(moved: float, torque: float, error: ContactError) -> ContactError:
+    """The error of a mesh at rest of which a gear's centre has moved so far [m] on its support."""
     if moved == 0.0:
         return error
     return ContactError(
-        f"experiment.torque_mean_nm = {torque:g} moves a gear's centre by {1e6 * moved:.4g} um on its support"
+        f"experiment.torque_mean_nm = {torque:g} moves a gear's centre by {length_words(moved)} on its support"
         " (rig.support), where the flanks find no rest: lower it, or raise the support's stiffness_n_per_m"
     )
 

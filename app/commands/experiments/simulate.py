@@ -82,29 +82,22 @@ def write_records(
     workers: int | None,
     progress: Progress,
 ) -> list[dict[str, Any]]:
-    """Records of a case's experiments, side by side, each written when it has ended, with the fields at its times; what
+    """Records of a case's experiments, side by side, each straight into its file, with the fields at its times; what
     there is to say of each."""
-    from gearbench.bench.conditions import simulate_all
-    from gearbench.records import write_record
+    from gearbench.bench.conditions import simulate_all_to
 
     found = experiments(case, out)
     paths = [path for _, path in found]
     summaries: dict[int, dict[str, Any]] = {}
-    kept: dict[int, Any] = {}
-
-    def take(number: int, record: Any) -> None:
-        write_record(record, paths[number])
-        summaries[number] = record_summary(record, paths[number])
-        if times[paths[number]]:
-            kept[number] = record
-
     progress.step(paths[0].name if len(paths) == 1 else f"{len(paths)} conditions")
     with ExitStack() as folders:
         checkpoints = [folders.enter_context(checkpoints_of(path)) for path in paths]
         cases = [one for one, _ in found]
-        simulate_all(cases, take, model, progress, checkpoints=checkpoints, workers=workers)
-    for number, record in sorted(kept.items()):
-        write_fields(cases[number], record, times[paths[number]], paths[number], progress)
+        take = summaries.__setitem__
+        simulate_all_to(cases, paths, take, model, progress, checkpoints=checkpoints, workers=workers)
+    for one, path in found:
+        if times[path]:
+            write_fields(one, times[path], path, progress)
     return [summaries[number] for number in range(len(paths))]
 
 
@@ -133,13 +126,15 @@ def field_times(case: Case, model: str | None, fields: Sequence[float], every: f
     return sorted(times)
 
 
-def write_fields(case: Case, record: Any, times: Sequence[float], out: Path, progress: Progress) -> None:
-    """The fields of a record at some times, beside it."""
+def write_fields(case: Case, times: Sequence[float], out: Path, progress: Progress) -> None:
+    """The fields of the record `out` at some times, beside it."""
     from gearbench.bench.stress.series import record_fields, write_series
+    from gearbench.records import opened_record
 
     progress.step("stress fields")
-    moments = record_fields(case, record, times)
-    series, *_ = write_series(moments, out.parent, out.stem, lambda done: progress(done / len(times), "fields"))
+    with opened_record(out) as record:
+        moments = record_fields(case, record, times)
+        series, *_ = write_series(moments, out.parent, out.stem, lambda done: progress(done / len(times), "fields"))
     typer.echo(f"{series}: {len(times)} instants", err=True)
 
 
@@ -149,18 +144,3 @@ def experiments(case: Case, out: Path) -> list[tuple[Case, Path]]:
         (one, out.with_name(f"{out.stem}-{name}{out.suffix}") if name else out) for name, one in case.experiments()
     ]
 
-
-def record_summary(record: Any, path: Path) -> dict[str, Any]:
-    """Size of a record and of its transmission error."""
-    rate = float(record.attrs["sampling_rate"])
-    return {
-        "file": str(path),
-        "model": record.attrs.get("model", ""),
-        "realisations": int(record.sizes["realisation"]),
-        "duration_s": record.sizes["time"] / rate,
-        "sampling_rate_hz": rate,
-        "dte_peak_to_peak_um": float(record["dte"].max() - record["dte"].min()) * 1e6,
-        "torque_rms_nm": float(record["torque_driver"].std()),
-        "settling_residual": record.attrs.get("settling_residual"),
-        "warnings": record.attrs.get("warnings", ""),
-    }

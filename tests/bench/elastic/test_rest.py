@@ -50,6 +50,6 @@ def test_a_load_too_high_is_refused_before_it_is_integrated() -> None:
 
 def test_supports_that_give_way_are_named() -> None:
     soft = ["rig.support.driver.across.stiffness_n_per_m=1e4", "rig.support.driver.across.damping_n_s_per_m=10"]
-    sentence = r"^experiment.torque_mean_nm = 200 moves a gear's centre by [\d.e+]+ um on its support \(rig.support\)"
+    sentence = r"^experiment.torque_mean_nm = 200 moves a gear's centre by [\d.]+ mm on its support \(rig.support\)"
     with pytest.raises(ContactError, match=sentence):
         simulate(read_case(case_path("quick_fe"), [*soft, "experiment.torque_mean_nm=200"]))

@@ -10,7 +10,7 @@ import pytest
 
 from gearbench.bench import BenchError
 from gearbench.bench.plan.schedule import Schedule
-from gearbench.bench.plan.settling import FEW, MOST, Keep, Wait, change, steady_state, waiting
+from gearbench.bench.plan.settling import FEW, MOST, Keep, Wait, change, check_settling, steady_state, waiting
 from gearbench.bench.record.attributes import unsettled
 from gearbench.rig import Experiment
 
@@ -56,6 +56,17 @@ def test_the_wait_covers_what_vibrations_need() -> None:
     for rate in (None, 0.0, -1.0, log(1000) / period / (2 * MOST)):
         assert waiting(plan, experiment, rate) == Wait(FEW, False)
     assert waiting(plan, make_experiment(7), SLOW) == Wait(7, False)
+
+
+def test_what_takes_too_long_to_die_out_is_refused_before_it_runs() -> None:
+    """At twice the limit; not at half of it, nor where nothing damps, nor where the case says how long."""
+    plan, rate = make_plan(1), log(1000) / (SAMPLES / RATE) / MOST
+    words = r"take about 2e\+04 excitation periods to die out .* = 0\.001 .*raise one of a, b\), or set experiment\."
+    with pytest.raises(BenchError, match=words):
+        check_settling(plan, make_experiment(), rate / 2, "a, b")
+    for slowest in (2 * rate, 0.0, -1.0, 1e-9 * rate, None):
+        check_settling(plan, make_experiment(), slowest)
+    check_settling(plan, make_experiment(4), rate / 2)
 
 
 @pytest.mark.parametrize(("keep", "repeat"), [("every", 1), ("mean", 1), ("one", 1), ("every", 9)])

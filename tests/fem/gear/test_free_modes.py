@@ -1,5 +1,6 @@
-"""A free gear's modes: rigid hub and fixed-hub modes as the reduced model has them, against the whole mesh with a rigid
-hub that is free to move, solved on its own; and how many modes that takes."""
+"""A free gear's modes: rigid hub and the condensed gear's fixed-hub modes with their hold on the hub, as the reduced
+model has them, against the whole mesh with a rigid hub that is free to move, solved on its own; and how many modes that
+takes."""
 
 from __future__ import annotations
 
@@ -11,8 +12,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_matrix, diags, hstack
 from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
-from gearbench.fem.gear.body import _rigid_shapes
-from gearbench.fem.gear.ring import ring_modes
+from gearbench.fem.gear.body import condense
 from gearbench.rig import Material
 
 Array = NDArray[np.float64]
@@ -52,13 +52,12 @@ def test_frequencies_are_those_of_the_whole_mesh_once_enough_modes_are_kept(
 ) -> None:
     omega, rigid_mass = truth
     assert omega[:3].max() < 1e-3 * omega[3]  # two translations and the rotation
-    found = ring_modes(coarse.ring, DENSITY, THICKNESS, max(TABLE))
-    rigid = _rigid_shapes(coarse.sector.points, coarse.full.teeth)
-    coupling = np.array([[DENSITY * np.sum(r * (coarse.ring.mass @ m.shape.T).T) for r in rigid] for m in found])
+    found = condense(coarse.gear, Material(), coarse.gear.module / 3, max(TABLE))
+    width = coarse.gear.face_width / THICKNESS  # of masses and, in modes normed to mass, of its root
     for count, bound in TABLE.items():
-        kept = coupling[:count]
+        kept = found.mode_hub[:count] / np.sqrt(width)
         mass = np.block([[rigid_mass + np.diag(HUB), kept.T], [kept, np.eye(count)]])
-        stiffness = np.diag([0.0, 0.0, 0.0, *(m.omega**2 for m in found[:count])])
+        stiffness = np.diag([0.0, 0.0, 0.0, *found.omega[:count] ** 2])
         squares = np.sort(np.linalg.eigvals(np.linalg.solve(mass, stiffness)).real)
         error = np.sqrt(squares[3:9]) / omega[3:] - 1
         assert error.min() > -1e-6  # fewer unknowns are stiffer (Rayleigh)

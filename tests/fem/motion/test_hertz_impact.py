@@ -90,7 +90,9 @@ def discs(twins: Any) -> Any:
     two = tabulate(law.driven, law.driver, k2, k1, law.half_plane, a, law.reach2)
     curves = Curves(one, two, law.curves.end1, law.curves.end2)
     radius = twins.pair.line_of_action / 4  # both flanks' radii are half of that line at the pitch point
-    return SimpleNamespace(law=law._replace(k1=k1, k2=k2, curves=curves), hertz=Hertz(law.half_plane, radius))
+    steel = twins.rig.material  # plane stress: 1/E* = 2/E of two such discs
+    compliance = 4 / (np.pi * steel.youngs_modulus * twins.rig.driver.face_width)
+    return SimpleNamespace(law=law._replace(k1=k1, k2=k2, curves=curves), hertz=Hertz(compliance, radius))
 
 
 def build(twins: Any, law: Any, load: str, inertias: tuple[float, float]) -> Machine:
