@@ -16,7 +16,7 @@ from gearbench.identification.lpm.local_solve import LpmError
 from gearbench.identification.lpm.selection import LADDER
 from gearbench.identification.polynomials import by_polynomials, by_polynomials_at_varying_speed
 from gearbench.identification.spectra.course import course_spectra, speed_varies
-from gearbench.identification.spectra.joint import Spectra, require_mesh_periods
+from gearbench.identification.spectra.joint import Spectra, SpectraError, require_mesh_periods
 from gearbench.identification.spectra.records import record_spectra
 from gearbench.identification.task import IdentificationSettings, Progress, Task, attributes_of, output_lines
 from gearbench.records import RecordError

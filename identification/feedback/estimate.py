@@ -98,8 +98,8 @@ def _too_short(spectra: Spectra, excited: int, unknowns: int, equations: float) 
     return (
         f"under-determined: {runs} realisation(s) of {spectra.duration:.4g} s hold {d} mesh period(s) each,"
         f" {equations:.0f} equations beside the operating response for {unknowns} unknowns of the mesh-feedback model;"
-        f" about {needed} mesh periods ({needed * spectra.duration / d:.3g} s) are needed: record longer or more realisations, or give"
-        " fewer harmonics"
+        f" about {needed} mesh periods ({needed * spectra.duration / d:.3g} s) are needed: record longer or more"
+        " realisations, or give fewer harmonics"
     )
 
 
