@@ -15,7 +15,7 @@ from gearbench.identification.feedback.varying_frf import signals_of, varying_fr
 from gearbench.identification.lpm.local_solve import LpmError
 from gearbench.identification.lpm.selection import LADDER
 from gearbench.identification.polynomials import by_polynomials, by_polynomials_at_varying_speed
-from gearbench.identification.spectra.course import course_spectra, speed_varies
+from gearbench.identification.spectra.course import LOST, SIDEBANDS, VARIES, course_spectra, speed_varies
 from gearbench.identification.spectra.joint import Spectra, SpectraError, require_mesh_periods
 from gearbench.identification.spectra.records import record_spectra
 from gearbench.identification.task import IdentificationSettings, Progress, Task, attributes_of, output_lines
@@ -57,9 +57,10 @@ def identify(
     for record in records:
         for name in record.data_vars:
             require_finite(record[name])
-    if speed_varies(records):
-        by = _feedback_at_varying_speed if settings.method == "mesh-feedback" else _polynomials_at_varying_speed
-        return by(records, settings, report)
+    if settings.method == "mesh-feedback" and speed_varies(records):
+        return _feedback_at_varying_speed(records, settings, report)
+    if _not_averaged(records):
+        return _polynomials_at_varying_speed(records, settings, report)
     sidebands = settings.harmonics if settings.harmonics is not None else LADDER[-1]
     spectra, excited, notes = record_spectra(
         records, top=settings.band[1] if settings.band else None, sidebands=sidebands
@@ -148,12 +149,18 @@ def _feedback_at_varying_speed(
     return frf
 
 
+def _not_averaged(records: Sequence[xr.Dataset]) -> bool:
+    """Whether the speed varies, and more than averages over excitation periods bear if there are any."""
+    repeated = any(int(record.attrs.get("periods", 1)) > 1 for record in records)
+    return speed_varies(records, LOST if repeated else VARIES)
+
+
 def _polynomials_at_varying_speed(
     records: Sequence[xr.Dataset], settings: IdentificationSettings, report: Progress
 ) -> xr.Dataset:
     """The local polynomial method with the measured phase."""
     doubts, cost = _doubts(records)
-    spectra, course = course_spectra(records)
+    spectra, course = course_spectra(records, SIDEBANDS if settings.harmonics is None else settings.harmonics)
     excited = (course.lowest * spectra.spacing, course.excited * spectra.spacing)
     lines = output_lines(spectra, settings.band or excited, excited, settings.step)
     simulated = all("model" in record.attrs for record in records)

@@ -17,13 +17,16 @@ from scipy.interpolate import make_lsq_spline
 from gearbench.identification.spectra.joint import Floats, Spectra, SpectraError
 from gearbench.identification.spectra.transmission_error import dte, force
 
-# Departure of the mesh phase from constant speed [cycles] from which on a record counts as of varying speed.
-VARIES = 0.05
+# Departure of the mesh phase from constant speed [cycles] from which on a record counts as of varying speed, and beyond
+# which averages over excitation periods lose the branches.
+VARIES, LOST = 0.05, 0.25
 # Mesh periods for each interval of the splines of the phase, and most intervals.
 SMOOTHED, INTERVALS = 4, 64
 # Fewest mesh periods in a record, and a line counts as excited if its force exceeds this part of the strongest one's.
 FEWEST = 2
 EXCITED = 1e-2
+# Mesh harmonics beyond the excited band that are kept unless told otherwise.
+SIDEBANDS = 62
 
 
 @dataclass(frozen=True)
@@ -91,16 +94,14 @@ def excited_rows(records: Sequence[xr.Dataset]) -> tuple[list[tuple[Floats, Floa
     return rows, rate, max(int(excited[0]), 1), int(excited[-1])
 
 
-def course_spectra(records: Sequence[xr.Dataset], reach: float | None = None) -> tuple[Spectra, Course]:
-    """Spectra of whole records, without periods, and the course of their speed; lines up to the excited band's end and
-    `reach` [Hz] more (default: all). Raises SpectraError as `excited_rows`."""
+def course_spectra(records: Sequence[xr.Dataset], sidebands: int = SIDEBANDS) -> tuple[Spectra, Course]:
+    """Spectra of whole records, without periods, and the course of their speed; lines up to the excited band's end, a
+    quarter more, and `sidebands` mesh harmonics. Raises SpectraError as `excited_rows`."""
     rows, rate, lowest, excited = excited_rows(records)
     response, driving, cycles = (np.stack(part) for part in zip(*rows, strict=True))
     size = response.shape[1]
     d = round(float(np.mean(cycles[:, -1] - cycles[:, 0])) * size / (size - 1))
-    highest = (size - 1) // 2
-    if reach is not None:
-        highest = min(highest, int(excited + reach * size / rate))
+    highest = min((size - 1) // 2, int(1.25 * excited) + sidebands * d)
     spectra = Spectra(
         np.fft.rfft(driving, axis=1)[:, : highest + 1] / size,
         np.fft.rfft(response, axis=1)[:, : highest + 1] / size,
