@@ -11,11 +11,12 @@ import xarray as xr
 
 from gearbench.identification.feedback.estimate import mesh_feedback
 from gearbench.identification.feedback.frf import feedback_frf
-from gearbench.identification.feedback.varying_frf import LOST, signals_of, speed_varies, varying_frf
+from gearbench.identification.feedback.varying_frf import signals_of, varying_frf
 from gearbench.identification.lpm.local_solve import LpmError
 from gearbench.identification.lpm.selection import LADDER
-from gearbench.identification.polynomials import by_polynomials
-from gearbench.identification.spectra.joint import Spectra, SpectraError
+from gearbench.identification.polynomials import by_polynomials, by_polynomials_at_varying_speed
+from gearbench.identification.spectra.course import LOST, SIDEBANDS, VARIES, course_spectra, speed_varies
+from gearbench.identification.spectra.joint import Spectra, SpectraError, require_mesh_periods
 from gearbench.identification.spectra.records import record_spectra
 from gearbench.identification.task import IdentificationSettings, Progress, Task, attributes_of, output_lines
 from gearbench.records import RecordError
@@ -57,16 +58,14 @@ def identify(
         for name in record.data_vars:
             require_finite(record[name])
     if settings.method == "mesh-feedback" and speed_varies(records):
-        return _at_varying_speed(records, settings, report)
-    if speed_varies(records, LOST):
-        raise SpectraError(
-            f"the mesh phase departs from constant speed, which the local polynomial method needs, by more than"
-            f" {LOST:g} cycles; method mesh-feedback follows the measured phase"
-        )
+        return _feedback_at_varying_speed(records, settings, report)
+    if _not_averaged(records):
+        return _polynomials_at_varying_speed(records, settings, report)
     sidebands = settings.harmonics if settings.harmonics is not None else LADDER[-1]
     spectra, excited, notes = record_spectra(
         records, top=settings.band[1] if settings.band else None, sidebands=sidebands
     )
+    require_mesh_periods(spectra)
     report(0.05, "what the records say about themselves")
     doubts, cost = _doubts(records)
     simulated = all("model" in record.attrs for record in records)
@@ -125,7 +124,9 @@ def by_feedback(task: Task) -> xr.Dataset:
     )
 
 
-def _at_varying_speed(records: Sequence[xr.Dataset], settings: IdentificationSettings, report: Progress) -> xr.Dataset:
+def _feedback_at_varying_speed(
+    records: Sequence[xr.Dataset], settings: IdentificationSettings, report: Progress
+) -> xr.Dataset:
     """Mesh feedback with the measured phase."""
     doubts, cost = _doubts(records)
     signals, spectra = signals_of(records, ENOUGH)
@@ -142,8 +143,29 @@ def _at_varying_speed(records: Sequence[xr.Dataset], settings: IdentificationSet
         attributes=attributes_of(settings, spectra),
         progress=lambda part, message: report(0.1 + 0.6 * part, message),
     )
-    if frf.attrs["expected_error"] > SECOND_OPINION and not speed_varies(records, LOST):
+    if frf.attrs["expected_error"] > SECOND_OPINION:
         frf = _second_opinion(frf, lambda: identify(records, _as_polynomials(settings)))
+    report(1.0, "identified")
+    return frf
+
+
+def _not_averaged(records: Sequence[xr.Dataset]) -> bool:
+    """Whether the speed varies, and more than averages over excitation periods bear if there are any."""
+    repeated = any(int(record.attrs.get("periods", 1)) > 1 for record in records)
+    return speed_varies(records, LOST if repeated else VARIES)
+
+
+def _polynomials_at_varying_speed(
+    records: Sequence[xr.Dataset], settings: IdentificationSettings, report: Progress
+) -> xr.Dataset:
+    """The local polynomial method with the measured phase."""
+    doubts, cost = _doubts(records)
+    spectra, course = course_spectra(records, SIDEBANDS if settings.harmonics is None else settings.harmonics)
+    excited = (course.lowest * spectra.spacing, course.excited * spectra.spacing)
+    lines = output_lines(spectra, settings.band or excited, excited, settings.step)
+    simulated = all("model" in record.attrs for record in records)
+    task = Task(spectra, lines, settings, excited, tuple(doubts), cost, report, simulated)
+    frf = by_polynomials_at_varying_speed(task, course)
     report(1.0, "identified")
     return frf
 

@@ -8,13 +8,16 @@ import numpy as np
 import xarray as xr
 
 from gearbench.identification.lpm.accuracy import MISSING, Accuracy, RecordRule, expected_accuracy, record_rule
+from gearbench.identification.lpm.at_varying import polynomials_at_varying_speed
 from gearbench.identification.lpm.estimate import LpmResult, local_polynomial
 from gearbench.identification.lpm.limits import Limits, limits_of
+from gearbench.identification.lpm.local_solve import LpmError
 from gearbench.identification.lpm.regression import Window
 from gearbench.identification.lpm.selection import choose_window
 from gearbench.identification.response.frf import make_frf
 from gearbench.identification.response.mode_spread import natural_frequency_deviation
 from gearbench.identification.response.modes import itf_modes
+from gearbench.identification.spectra.course import Course
 from gearbench.identification.spectra.joint import Spectra
 from gearbench.identification.task import Task
 from gearbench.identification.truth.periodic import itf_from_htf
@@ -39,6 +42,31 @@ def by_polynomials(task: Task) -> xr.Dataset:
     result = local_polynomial(spectra, task.lines, window, progress=task.part(0.2, 0.7))
     task.report(0.9, "modes")
     return _dataset(task, window, result)
+
+
+def by_polynomials_at_varying_speed(task: Task, course: Course) -> xr.Dataset:
+    """The same of records whose speed varies, at the mean mesh frequency. Raises LpmError likewise."""
+    settings = task.settings
+    if settings.transient == "none":
+        raise LpmError("transient = 'none' belongs to a constant speed; at one that varies it is always estimated")
+    task.report(0.1, "choosing branches, order and window at a speed that varies")
+    result, window, free = polynomials_at_varying_speed(
+        task.spectra,
+        course,
+        task.lines,
+        harmonics=settings.harmonics,
+        order=settings.order,
+        half_width=settings.window,
+        progress=task.part(0.2, 0.7),
+    )
+    task.report(0.9, "modes")
+    speeds = (task.spectra.mesh_lines + np.array([course.shift.min(), course.shift.max()])) * task.spectra.spacing
+    return _dataset(task, window, result).assign_attrs(
+        speed="varying",
+        mesh_frequency_lowest=float(speeds[0]),
+        mesh_frequency_highest=float(speeds[1]),
+        operating_response="free" if free else "as noise",
+    )
 
 
 def _dataset(task: Task, window: Window, result: LpmResult) -> xr.Dataset:

@@ -71,10 +71,7 @@ def mesh_feedback(
     intervals = int(np.clip(data.equations / SUPPORT, FEWEST_INTERVALS, INTERVALS))
     unknowns = 4 * (intervals + 3) + 4 * count
     if data.equations < unknowns:
-        raise LpmError(
-            f"under-determined: {unknowns} unknowns of the mesh-feedback model against {data.equations:.0f} equations;"
-            " record longer or more realisations"
-        )
+        raise LpmError(_too_short(spectra, excited, unknowns, data.equations))
     report(0.0, "mesh feedback: first model")
     part = fewer_classes(data, SEARCHED)
     first = first_model(part, Splines(intervals), count)
@@ -89,6 +86,21 @@ def mesh_feedback(
             break
     report(1.0, "mesh feedback: last rounds")
     return Feedback(data, settled_covariance(refined(best.model, data), data))
+
+
+def _too_short(spectra: Spectra, excited: int, unknowns: int, equations: float) -> str:
+    """The sentence for a record of too few equations: its length, and about how many mesh periods would do.
+
+    Of E realisations of d mesh periods E d - 1 parts of d are left of the lines without the operating response.
+    """
+    d, runs = spectra.mesh_lines, spectra.realisations
+    needed = max(d + 1, int(np.ceil((unknowns * d / max(excited, 1) + 1) / runs)))
+    return (
+        f"under-determined: {runs} realisation(s) of {spectra.duration:.4g} s hold {d} mesh period(s) each,"
+        f" {equations:.0f} equations beside the operating response for {unknowns} unknowns of the mesh-feedback model;"
+        f" about {needed} mesh periods ({needed * spectra.duration / d:.3g} s) are needed: record longer or more"
+        " realisations, or give fewer harmonics"
+    )
 
 
 def begin(first: Model, splines: Refined, data: ClassData, pairs: int) -> Model:

@@ -19,58 +19,16 @@ from gearbench.identification.feedback.start import gauged
 from gearbench.identification.feedback.varying import Signals, Varying, unexplained_at, varying_feedback
 from gearbench.identification.response.frf import make_frf
 from gearbench.identification.response.modes import itf_modes
-from gearbench.identification.spectra.joint import Floats, Spectra, SpectraError
-from gearbench.identification.spectra.transmission_error import dte, force
+from gearbench.identification.spectra.course import excited_rows
+from gearbench.identification.spectra.joint import Spectra
 from gearbench.identification.truth.periodic import itf_from_htf
-
-# Departure of the mesh phase from constant speed [cycles] from which on a record counts as of varying speed.
-VARIES = 0.05
-# ... and beyond which no branch of the local polynomial method is left.
-LOST = 0.25
-# A line counts as excited if its force exceeds this part of the strongest one's.
-EXCITED = 1e-2
-
-
-def mesh_phase(record: xr.Dataset) -> Floats | None:
-    """Mesh phase (E, N) [cycles]: the channel `mesh_phase`, else teeth times the driver's turns, else None."""
-    if "mesh_phase" in record:
-        return np.asarray(record["mesh_phase"].values, dtype=float)
-    if "mesh_period" not in record.attrs and "angle_driver" in record and "teeth_driver" in record.attrs:
-        return np.asarray(record["angle_driver"].values * float(record.attrs["teeth_driver"]) / (2 * np.pi))
-    return None
-
-
-def speed_varies(records: Sequence[xr.Dataset], limit: float = VARIES) -> bool:
-    """Whether the mesh phase of a record departs from constant speed by more than `limit` [cycles]."""
-    for record in records:
-        phase = mesh_phase(record)
-        if phase is None:
-            continue
-        steps = np.arange(phase.shape[1])
-        for row in phase:
-            if np.abs(row - np.polyval(np.polyfit(steps, row, 1), steps)).max() > limit:
-                return True
-    return False
 
 
 def signals_of(records: Sequence[xr.Dataset], most: int) -> tuple[Signals, Spectra]:
     """Signals of all realisations, `most` lines of all at most, and their plain spectra: lines `d` to the mean mesh
     frequency. Raises SpectraError for records of different sampling or of a phase that does not rise."""
-    sampling = {(record.sizes["time"], float(record.attrs["sampling_rate"])) for record in records}
-    if len(sampling) != 1:
-        raise SpectraError("records of varying speed must have the same sampling_rate and number of samples")
-    ((size, rate),) = sampling
-    rows: list[tuple[Floats, Floats, Floats]] = []
-    for record in records:
-        phase = mesh_phase(record)
-        if phase is None or not (np.diff(phase, axis=1) > 0).all():
-            raise SpectraError("a varying speed needs a mesh_phase that rises from sample to sample in every record")
-        rows += zip(dte(record).values, force(record).values, phase, strict=True)
-    strength = np.sqrt(np.mean([np.abs(np.fft.rfft(one[1] - one[1].mean())) ** 2 for one in rows], axis=0))
-    if not strength.max() > 1e-12 * size * max(abs(float(one[1].mean())) for one in rows):
-        raise SpectraError("the force is constant: without excitation nothing can be identified")
-    excited = np.flatnonzero(strength > EXCITED * strength.max())
-    low, high = max(int(excited[0]), 1), int(excited[-1])
+    rows, rate, low, high = excited_rows(records)
+    size = rows[0][0].size
     rows = rows[: max(1, -(-most // high))]
     response, driving, cycles = (np.stack(part) for part in zip(*rows, strict=True))
     units = float(np.mean(response.std(axis=1))), float(np.mean(driving.std(axis=1)))

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gearbench.identification.lpm.covariance import CrossCovariance, diagonal_variance
+from gearbench.identification.lpm.gathered import rows_around
 from gearbench.identification.lpm.gram import batches, grams
 from gearbench.identification.lpm.local_solve import LocalFits, LpmError, solve_windows
 from gearbench.identification.lpm.missing import MissingPower
@@ -79,15 +80,18 @@ def local_polynomial(
     lines: Lines,
     window: Window,
     *,
+    regression: Regression | None = None,
     progress: Callable[[float, str], None] | None = None,
 ) -> LpmResult:
-    """Identify the branches -L..L on the output `lines` (rising, multiples of their common step).
+    """Identify the branches -L..L on the output `lines` (rising, multiples of their common step); `regression`: of
+    the spectra, where it is not that of a constant speed.
 
     Raises LpmError, with the numbers, if a window has fewer equations than unknowns, if sidebands leave the
     lines that the spectra hold, or if the inputs are numerically dependent.
     """
     require_lines(spectra, lines, window)
-    regression = prepare(spectra, transient=window.transient, reach=window.harmonics * spectra.mesh_lines)
+    if regression is None:
+        regression = prepare(spectra, transient=window.transient, reach=window.harmonics * spectra.mesh_lines)
     rows = needed_rows(lines, window.harmonics, spectra.mesh_lines)
     centres = plan_centres(rows, window, regression.last_row(window.harmonics))
     require_equations(regression, [centre for centre, _ in centres], window)
@@ -109,7 +113,7 @@ def require_lines(spectra: Spectra, lines: Lines, window: Window) -> None:
 def require_equations(regression: Regression, centres: list[int], window: Window) -> None:
     """Raise LpmError with the numbers if a window has no equation to spare over its unknowns."""
     for indices in batches(regression, window, list(range(len(centres))), written=False):
-        rows = WindowRows(regression, np.array([centres[index] for index in indices]), window)
+        rows = rows_around(regression, np.array([centres[index] for index in indices]), window)
         short = np.flatnonzero(rows.equations <= rows.unknowns)
         if short.size:
             first = int(short[0])
@@ -258,7 +262,7 @@ class _Pass:
     def _result(self) -> LpmResult:
         diagonal = self.variance.sum(axis=0)[None, :].astype(complex)
         cross = self.cross.sums if self.cross is not None else diagonal[:0]
-        middle = WindowRows(self.regression, np.array([self.centres[len(self.centres) // 2][0]]), self.window)
+        middle = rows_around(self.regression, np.array([self.centres[len(self.centres) // 2][0]]), self.window)
         transient = self.regression.experiments * (self.window.order + 1) if self.window.transient else 0
         return LpmResult(
             self.lines,

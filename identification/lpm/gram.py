@@ -15,6 +15,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from scipy.linalg import blas
 
+from gearbench.identification.lpm.gathered import rows_around
+from gearbench.identification.lpm.moving import MovingRegression
 from gearbench.identification.lpm.regression import Regression, Window
 from gearbench.identification.lpm.rows import WindowRows
 from gearbench.identification.spectra.joint import Complexes
@@ -64,11 +66,13 @@ def batches(regression: Regression, window: Window, indices: list[int], *, writt
 
 
 def _rows(regression: Regression, centres: Sequence[int], indices: list[int], window: Window) -> WindowRows:
-    return WindowRows(regression, np.array([centres[index] for index in indices], dtype=np.int64), window)
+    return rows_around(regression, np.array([centres[index] for index in indices], dtype=np.int64), window)
 
 
 def _worth_a_table(regression: Regression, centres: Sequence[int], span: list[int], window: Window) -> bool:
     """Whether centres of one residue class cost less with a table than written down."""
+    if isinstance(regression, MovingRegression):
+        return False
     size = (centres[span[-1]] - centres[span[0]]) // regression.mesh_lines + window.branches
     shared = ELEMENT * len(_pairs(window.order)) * window.width * size**2
     return len(span) * 8.0 * regression.experiments * window.width * window.unknowns**2 >= shared

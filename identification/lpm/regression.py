@@ -169,16 +169,24 @@ def prepare(spectra: Spectra, *, transient: bool, reach: int) -> Regression:
     # Line 0 holds what means differ by between records, which may be any size.
     excited = strength > EXCITATION_FLOOR * np.delete(strength, highest).max()
     force[:, ~excited] = 0.0
-    origin = -((-highest - reach) // d)
-    count = (highest + reach) // d + 1 + origin
+    force, dte, mask, origin = sorted_lines(force, dte, excited, d, reach)
+    return Regression(force, dte, mask, origin, highest, same, phase)
+
+
+def sorted_lines(
+    force: Complexes, dte: Complexes, excited: NDArray[np.bool_], mesh_lines: int, reach: int
+) -> tuple[Complexes, Complexes, NDArray[np.bool_], int]:
+    """The fields `force`, `dte`, `excited` and `origin` of a Regression, from lines -K..K (E, 2K+1) and (2K+1,)."""
+    highest = force.shape[1] // 2
+    origin = -((-highest - reach) // mesh_lines)
+    count = (highest + reach) // mesh_lines + 1 + origin
     # Class c holds the lines c + d i: columns of the lines from -origin d on, written d to a row.
-    begin = origin * d - highest
-    padded = np.zeros((2 * spectra.realisations + 1, count * d), dtype=complex)
+    begin = origin * mesh_lines - highest
+    padded = np.zeros((2 * force.shape[0] + 1, count * mesh_lines), dtype=complex)
     padded[:, begin : begin + 2 * highest + 1] = np.concatenate([force, dte, excited[None]])
-    by_class = padded.reshape(-1, count, d).transpose(2, 0, 1)
+    by_class = padded.reshape(-1, count, mesh_lines).transpose(2, 0, 1)
     arrays = [np.ascontiguousarray(part) for part in np.split(by_class[:, :-1], 2, axis=1)]
-    mask = np.ascontiguousarray(by_class[:, -1].real > 0)
-    return Regression(arrays[0], arrays[1], mask, origin, highest, same, phase)
+    return arrays[0], arrays[1], np.ascontiguousarray(by_class[:, -1].real > 0), origin
 
 
 def _two_sided(one_sided: Complexes, phase: Floats, mesh_lines: int) -> Complexes:

@@ -5,7 +5,7 @@ All arrays have the windows as their first axis, so that small windows cost nump
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -28,7 +28,7 @@ class WindowRows:
 
     def part(self, index: int) -> WindowRows:
         """Window number `index` alone."""
-        return WindowRows(self.regression, self.centres[index : index + 1], self.window)
+        return replace(self, centres=self.centres[index : index + 1])
 
     @cached_property
     def _place(self) -> tuple[Lines, Lines]:

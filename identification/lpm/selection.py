@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 
 from gearbench.identification.lpm.covariance import diagonal_variance
 from gearbench.identification.lpm.estimate import needed_rows, plan_centres
+from gearbench.identification.lpm.gathered import rows_around
 from gearbench.identification.lpm.gram import grams
 from gearbench.identification.lpm.local_solve import LpmError, solve_windows
 from gearbench.identification.lpm.regression import EXCITATION_FLOOR, Regression, Window, prepare
@@ -83,7 +84,24 @@ def choose_window(
         return Window(harmonics, order, half_width, transient)
     reach = (spectra.highest - int(lines[-1])) // spectra.mesh_lines
     ladder = [harmonics] if harmonics is not None else [value for value in LADDER if value <= reach]
-    search = _search(spectra, lines, transient, max(ladder, default=0))
+    regression = prepare(spectra, transient=transient, reach=max(ladder, default=0) * spectra.mesh_lines)
+    return choose_among(spectra, lines, regression, ladder, transient, order, half_width, ORDERS).window
+
+
+def choose_among(
+    spectra: Spectra,
+    lines: NDArray[np.int64],
+    regression: Regression,
+    ladder: Sequence[int],
+    transient: bool,
+    order: int | None,
+    half_width: int | None,
+    tried: Sequence[int],
+) -> Choice:
+    """The candidate of least predicted error with branches of the `ladder`, the `order` or those that are `tried`, and
+    the `half_width`, if given, of a `regression` that holds so many branches. Raises LpmError if there is none."""
+    harmonics = ladder[0] if len(ladder) == 1 else None
+    search = _search(spectra, lines, transient, max(ladder, default=0), regression)
 
     @cache
     def best_width(branches: int, polynomial: int) -> Choice | None:
@@ -91,7 +109,7 @@ def choose_window(
         windows = (Window(branches, polynomial, width, transient) for width in widths)
         return _climb((search.judge(window) for window in windows if search.admits(window)), patience=1, hopeless=1.0)
 
-    orders = ORDERS if order is None else (order,)
+    orders = tried if order is None else (order,)
     best: Choice | None = None
     for polynomial in orders:
         best = _climb(best_width(branches, polynomial) for branches in ladder)
@@ -102,13 +120,13 @@ def choose_window(
     # From the best rung to its neighbours in L, finer and finer, and to the other orders.
     while better := _better(best, orders, ladder, best_width):
         best = better
-    return best.window
+    return best
 
 
 def _better(
     best: Choice,
     orders: Sequence[int],
-    ladder: list[int],
+    ladder: Sequence[int],
     judge: Callable[[int, int], Choice | None],
 ) -> Choice | None:
     """The best of the neighbours in order and number of branches that improves on `best`, or None."""
@@ -159,7 +177,7 @@ class _Search:
             middle = int(self.lines[self.lines.size // 2])
             if middle + width > self.regression.highest:
                 return False
-            rows = WindowRows(self.regression, np.array([middle]), window)
+            rows = rows_around(self.regression, np.array([middle]), window)
             return bool(rows.equations[0] >= MARGIN * rows.unknowns[0] + 1)
 
         width = _least(supports, order + 1, widest)
@@ -214,7 +232,7 @@ class _Search:
 
     def trial_centres(self, window: Window) -> list[int]:
         """Rows drawn evenly from their density, as many as the window needs."""
-        middle = WindowRows(self.regression, self.lines[self.lines.size // 2][None], window)
+        middle = rows_around(self.regression, self.lines[self.lines.size // 2][None], window)
         free = int(middle.equations[0] - middle.unknowns[0])
         count = int(np.clip(FREEDOM / max(free, 1), TRIALS, TRIALS_MAX))
         sums = np.cumsum(self.density)
@@ -222,9 +240,10 @@ class _Search:
         return sorted({min(int(row), self.regression.highest - window.half_width) for row in centres})
 
 
-def _search(spectra: Spectra, lines: NDArray[np.int64], transient: bool, harmonics: int) -> _Search:
+def _search(
+    spectra: Spectra, lines: NDArray[np.int64], transient: bool, harmonics: int, regression: Regression
+) -> _Search:
     d = spectra.mesh_lines
-    regression = prepare(spectra, transient=transient, reach=harmonics * d)
     rows = np.arange(1, min(spectra.highest, int(lines[-1]) + harmonics * d) + 1)
     read, excited = np.zeros((2, rows.size))
     strength = np.abs(spectra.force).max(axis=0)

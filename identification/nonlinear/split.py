@@ -29,6 +29,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from gearbench.identification.excitation.multisine import COSET_LEAST
+from gearbench.identification.spectra.course import speed_varies
 from gearbench.identification.spectra.joint import Complexes, Floats, Spectra, SpectraError
 from gearbench.identification.spectra.records import record_spectra
 
@@ -49,10 +50,13 @@ class DistortionError(SpectraError):
 
 
 def is_coset(records: Sequence[xr.Dataset]) -> bool:
-    """Whether the records were excited on the lines +-1 modulo the mesh lines only, as `distortion` needs.
+    """Whether the records were excited on the lines +-1 modulo the mesh lines only, as `distortion` needs: never where
+    the speed varies.
 
     Raises SpectraError for records without force or of no common sampling.
     """
+    if speed_varies(records):
+        return False
     spectra, _, _ = record_spectra(records, sidebands=0)
     return not _unfit(spectra)
 

@@ -77,7 +77,8 @@ def joint_periods(samples: int, sampling_rate: float, periods: int, mesh_period:
         if periods % repeats == 0 and whole >= 1 and abs(repeats * ratio - whole) < WHOLE * max(1, whole):
             return repeats, whole
     raise SpectraError(
-        f"the record spans {periods * ratio:.6g} mesh periods ({periods} excitation period(s) of"
+        f"the record of {periods * samples / sampling_rate:.4g} s spans {periods * ratio:.6g} mesh periods"
+        f" ({periods} excitation period(s) of"
         f" {ratio:.6g} mesh periods); the identification needs a whole number of them{_advice(ratio, periods)}"
     )
 
@@ -93,6 +94,17 @@ def _advice(ratio: float, periods: int) -> str:
     if least <= periods:
         return f": give a multiple of {least} excitation periods, which hold {round(least * ratio)} mesh periods"
     return f": record {least} excitation periods, which hold {round(least * ratio)} mesh periods, or {lengths}"
+
+
+def require_mesh_periods(spectra: Spectra) -> None:
+    """Raise SpectraError where all lines of a single realisation are mesh harmonics, which the operating response has
+    too."""
+    if spectra.mesh_lines == 1 and spectra.realisations == 1:
+        raise SpectraError(
+            f"the record of {spectra.duration:.4g} s holds one mesh period, in which the response to the excitation is"
+            f" not told from the operating response; at least 2 mesh periods ({2 * spectra.duration:.4g} s) of one"
+            " excitation period, or 2 realisations, are needed"
+        )
 
 
 def period_spectra(signal: Floats, joint: int, highest: int) -> tuple[Complexes, Complexes, Floats | None]:

@@ -42,6 +42,8 @@ COURSES: tuple[tuple[Literal["wander", "ramp"], str], ...] = (
     ("wander", "20 Hz mesh wandering by 20 %"),
     ("ramp", "a mesh frequency that rises from 16 to 24 Hz"),
 )
+COURSE_RIG = ReferenceRig(mesh_frequency=20.0, edge=0.05)
+Pair = tuple[float, float]
 METHODS: tuple[tuple[Literal["lpm", "mesh-feedback"], float], ...] = (("lpm", 0.025), ("mesh-feedback", 0.01))
 # Part of a window that sdynpy's local model reads unless told otherwise, and errors that count as equal.
 DEFAULT_RATIO, MORE_ERROR = 0.1, 1.05
@@ -96,13 +98,32 @@ def at_speed(mesh_frequency: float, method: Literal["lpm", "mesh-feedback"]) -> 
     return relative(found, exact_itf(rig.system(512), frequency, np.arange(128) / 128))
 
 
-def varying_error(course: Literal["wander", "ramp"]) -> float:
-    """Mesh feedback from one second at a speed that wanders by 20 % or rises by half, 40 dB, by DOP853."""
-    rig = ReferenceRig(mesh_frequency=20.0, edge=0.05)
-    phase = wandering(20.0, 1.0) if course == "wander" else ramp(16.0, 24.0, 1.0)
-    record = varying_record(rig, phase, duration=1.0, noise=0.01)
-    frf = identify([record], IdentificationSettings("mesh-feedback", band=BAND, step=40, phases=128, modes=0))
-    return relative(itf(frf).values, truth_at(rig, frf))
+@lru_cache(maxsize=3)
+def course_record(course: Literal["wander", "ramp", "constant"]) -> xr.Dataset:
+    """One second at a speed that wanders by 20 %, rises by half, or does neither, 40 dB, by DOP853."""
+    phase = {"wander": wandering(20.0, 1.0), "ramp": ramp(16.0, 24.0, 1.0), "constant": ramp(20.0, 20.0, 1.0)}[course]
+    return varying_record(COURSE_RIG, phase, duration=1.0, noise=0.01)
+
+
+@lru_cache(maxsize=6)
+def varying(course: Literal["wander", "ramp", "constant"], method: Literal["lpm", "mesh-feedback"]) -> Pair:
+    """Error from one second of a course, and what was expected."""
+    step = 40 if method == "mesh-feedback" else 4
+    frf = identify([course_record(course)], IdentificationSettings(method, band=BAND, step=step, phases=128, modes=0))
+    some = frf.isel(frequency=slice(None, None, 40 // step))
+    return relative(itf(some).values, truth_at(COURSE_RIG, some)), float(frf.attrs["expected_error"])
+
+
+def against_constant(course: Literal["wander", "ramp"]) -> Got:
+    """Error of the local polynomial method over that at constant speed."""
+    here, there = varying(course, "lpm"), varying("constant", "lpm")
+    return Got(here[0] / there[0], f"errs by {here[0]:.1%}, expects {here[1]:.1%}; constant {there[0]:.1%}")
+
+
+def expected_at_varying_speed() -> float:
+    """Expected over actual error of the local polynomial method on both courses, or its inverse: the worst."""
+    ratios = [expected / error for error, expected in (varying(course, "lpm") for course, _ in COURSES)]
+    return max(max(ratios), 1.0 / min(ratios))
 
 
 def expected_errors() -> float:
@@ -186,9 +207,26 @@ CHECKS = [
         for mesh in (50, 200, 500)
     ),
     *(
-        Check(f"varying-{course}", f"mesh-feedback, 1 s at {words}, 40 dB", 0.01, "", partial(varying_error, course))
+        Check(
+            f"varying-{course}",
+            f"mesh-feedback, 1 s at {words}, 40 dB",
+            0.01,
+            "",
+            partial(lambda course: varying(course, "mesh-feedback")[0], course),
+        )
         for course, words in COURSES
     ),
+    *(
+        Check(
+            f"varying-lpm-{course}",
+            f"LPM, 1 s at {words}, 40 dB: error over that at constant speed",
+            3.0,
+            "times",
+            partial(against_constant, course),
+        )
+        for course, words in COURSES
+    ),
+    Check("varying-lpm-expected", "LPM there: expected against actual error", 2.0, "times", expected_at_varying_speed),
     Check("lpm-expected", "LPM: expected against actual error, worst of 20 settings", 2.0, "times", expected_errors),
     *(
         Check(

@@ -1,14 +1,18 @@
 """Mesh feedback: its response against the exact ITF, its estimates against the rig that made the record."""
 
+import re
+from typing import Literal
+
 import numpy as np
 import pytest
 import xarray as xr
 from shared.ptv import periodic_filter
 from shared.reference_rig import ReferenceRig, reference_record
 
-from gearbench.identification import IdentificationSettings, LpmError, htf, identify, itf
+from gearbench.identification import IdentificationSettings, LpmError, SpectraError, htf, identify, itf
 from gearbench.identification.feedback import branches
 from gearbench.identification.feedback.data import ClassData, class_data
+from gearbench.identification.feedback.estimate import FEWEST_INTERVALS
 from gearbench.identification.feedback.functions import Basis, Fractions, Splines, common_pairs, pairs_of
 from gearbench.identification.feedback.model import Model
 from gearbench.identification.feedback.refine import response
@@ -208,10 +212,29 @@ def test_settings_of_the_other_method_are_refused() -> None:
         IdentificationSettings(method="mesh-feedback", order=2)
 
 
-def test_short_record_is_refused() -> None:
-    short = noisy_record(0.01).isel(time=slice(0, 128)).assign_attrs(samples_per_period=128)
-    with pytest.raises(LpmError, match=r"under-determined: \d+ unknowns of the mesh-feedback model"):
-        identify([short], IdentificationSettings(method="mesh-feedback"))
+def first_periods(record: xr.Dataset, count: int) -> xr.Dataset:
+    """The first mesh periods of 128 samples, as if they repeated."""
+    return record.isel(time=slice(0, 128 * count)).assign_attrs(samples_per_period=128 * count)
+
+
+def test_short_record_is_refused(record: xr.Dataset) -> None:
+    settings = IdentificationSettings(method="mesh-feedback")
+    with pytest.raises(LpmError, match=r"0\.03125 s hold 2 mesh period.* equations .* \d+ unknowns") as error:
+        identify([first_periods(record, 2)], settings)
+    told = re.search(r"about (\d+) mesh periods", str(error.value))
+    assert told is not None
+    spectra, excited, _ = record_spectra([first_periods(record, int(told[1]))], sidebands=100)
+    data = class_data(spectra, round(excited[1] / spectra.spacing))
+    assert data.equations > 4 * (FEWEST_INTERVALS + 3)  # and of harmonics as many as there are lines for
+
+
+@pytest.mark.parametrize("method", ["lpm", "mesh-feedback"])
+def test_one_mesh_period_is_refused_before_work(
+    record: xr.Dataset, method: Literal["lpm", "mesh-feedback"]
+) -> None:
+    """All lines of it are mesh harmonics, which the operating response has too."""
+    with pytest.raises(SpectraError, match=r"record of 0\.01562 s holds one mesh period.*at least 2 mesh periods"):
+        identify([first_periods(record, 1)], IdentificationSettings(method=method))
 
 
 @pytest.mark.parametrize("negligible", [0.05, 0.005])
