@@ -96,7 +96,7 @@ def along(steady: Steady) -> Along:
     spectrum = np.fft.rfft(travel)
     rate = np.fft.irfft(2j * np.pi * np.fft.rfftfreq(samples, 1 / setup.sampling_rate) * spectrum, samples)
     table = replace(setup, substeps=substeps, table=None).table_for(0, samples)
-    at = instants(table, table.position[:entries] / model.law.phases, end=entries)
+    at = instants(model, table, table.position[:entries] / model.law.phases, entries)
     fine = resampled(travel, entries)
     force, slope = pressed(model.law, at, fine)
     level = (np.abs(force / at.gain) / model.rig.mesh.reference_force) ** (1.0 / (1.0 + model.rig.mesh.exponent))

@@ -174,7 +174,7 @@ class Setup:
             return State(after, values), outputs
         if self.table is not None and -self.block_samples <= start < 0 and stop == 0:
             # What comes before sample 0 is the end of the repetition before.
-            table = Table(*(column[2 * self.substeps * start - 1 :] for column in self.table))
+            table = self.table.part(2 * self.substeps * start - 1)
             values, outputs = self._integrate(table, drive.fine, values, 2 * self.substeps * start % drive.fine.size)
             return State(after, values), outputs
         parts = []
@@ -234,7 +234,7 @@ class Setup:
         """Static equilibrium under the mean force [N] at a sample."""
         table = self.table_for(sample, 1)
         phase = self.phase_at(sample)
-        state = self.model.equilibrium(mean_force, instants(table, phase, end=1))
+        state = self.model.equilibrium(mean_force, instants(self.model, table, phase, 1))
         return State(sample, state + under_ripple(self.model, self.mesh_frequency, phase), begins=True)
 
 

@@ -18,17 +18,18 @@ Array = NDArray[np.float64]
 
 
 class Apart(NamedTuple):
-    """What pairs whose teeth differ have of their own: excess [m] and gain at the entries of the table (entries + 1,
-    n_o, 2), and their secants (phases + 1, n_d, n_o) [N/m]."""
+    """What pairs whose teeth differ have of their own: `own` of the `Table`, and secants (phases + 1, n_d, n_o) [N/m];
+    bending: their parts (phases + 1, n_o, 2), or empty where no tooth is cracked."""
 
     own: Array
     secant: Array
+    bending: Array | tuple[()]
 
 
 class Entry(NamedTuple):
     """One entry of a `Table`."""
 
-    number: int
+    first_pair: int
     position: float
     excess: float
     excess_rate: float
@@ -51,9 +52,9 @@ class Rubbed(NamedTuple):
 
 def apart_of(table: Table, law: MeshLaw) -> Apart | tuple[()]:
     """The pairs of a table and its law; empty where all teeth are alike."""
-    if table.pair_excess.shape[1] == 0:
+    if not table.own.size:
         return ()
-    return Apart(np.stack([table.pair_excess, table.pair_gain], axis=2), law.pair_secants)
+    return Apart(table.own, law.pair_secants, law.closed[1] if table.own[:, 1:].any() else ())
 
 
 @compiled(fastmath=ROUNDING)
@@ -61,7 +62,7 @@ def entry(table: Table, i: int) -> Entry:
     """Entry i of the table."""
     changes = len(table.pull) > 0
     return Entry(
-        number=i,
+        first_pair=int(table.first_pair[i]),
         position=table.position[i],
         excess=table.excess[i],
         excess_rate=table.excess_rate[i],
@@ -90,6 +91,16 @@ def _pressed(depth: float, rate: float, position: float, gain: float, secant: Ar
 
 
 @compiled(fastmath=ROUNDING)
+def _left(bending: Any, own: Array, pair: int, row: int, o: int, weight: float) -> float:
+    """Part of its stiffness that cracks leave a pair."""
+    if len(bending) == 0:
+        return 1.0
+    one = bending[row, o, 0] + weight * (bending[row + 1, o, 0] - bending[row, o, 0])
+    two = bending[row, o, 1] + weight * (bending[row + 1, o, 1] - bending[row, o, 1])
+    return 1.0 / (1.0 + one * own[pair, 1] + two * own[pair, 2])
+
+
+@compiled(fastmath=ROUNDING)
 def _pressed_apart(travel: float, rate: float, at: Entry, apart: Apart, p: Constants) -> float:
     """Force [N] of pairs that each have an excess of their own over the deflection `travel` [m], closing at rate [m/s];
     never negative."""
@@ -98,7 +109,8 @@ def _pressed_apart(travel: float, rate: float, at: Entry, apart: Apart, p: Const
     weight = at.position - row
     elastic, tangent = 0.0, 0.0
     for o in range(apart.secant.shape[2]):
-        depth = travel + apart.own[at.number, o, 0]
+        pair = at.first_pair + o
+        depth = travel + apart.own[pair, 0]
         if depth <= 0.0 or apart.secant[row, last, o] + apart.secant[row + 1, last, o] == 0.0:
             continue
         root = p.root * sqrt(depth)
@@ -108,9 +120,9 @@ def _pressed_apart(travel: float, rate: float, at: Entry, apart: Apart, p: Const
         high = apart.secant[row, node, o] + weight * (apart.secant[row + 1, node, o] - apart.secant[row, node, o])
         rise = high - low
         stiffness = low + (root - node + 1) * rise
-        gain = apart.own[at.number, o, 1]
-        elastic += gain * depth * stiffness
-        tangent += gain * max(stiffness + 0.5 * root * rise, 0.0)
+        left = _left(apart.bending, apart.own, pair, row, o, weight)
+        elastic += left * depth * stiffness
+        tangent += left * max(stiffness + 0.5 * root * rise, 0.0)
     return max(at.gain * elastic + p.damping_factor * sqrt(at.gain * tangent) * rate, 0.0)
 
 

@@ -13,7 +13,8 @@ from gearbench.lumped.nonlinear.law import MeshLaw
 
 Array = NDArray[np.float64]
 
-BISECTIONS = 100
+STEPS = 100
+CLOSE = 1e-14  # of the tabulated deflections, at which a deflection is found
 
 
 class Instants(NamedTuple):
@@ -69,20 +70,28 @@ def pressed(law: MeshLaw, at: Instants, travel: Array) -> Pressed:
 
 
 def travel_under(law: MeshLaw, at: Instants, force: Array) -> Array:
-    """DTE (..., n) [m] at which the mesh carries the forces > 0 [N], by bisection. Raises LumpedError."""
+    """DTE (..., n) [m] at which the mesh carries the forces > 0 [N], by Newton's method between bounds. Raises
+    LumpedError."""
     force = np.broadcast_to(force, np.broadcast_shapes(np.shape(force), at.phase.shape))
     reach = at.excess + (at.pair_excess.max(axis=1) if at.differ else 0.0)
     low = np.broadcast_to(-reach, force.shape)
     high = low + law.approach[-1]
-    for _ in range(BISECTIONS):
+    for _ in range(STEPS):
         short = pressed(law, at, high).force < force
         if not short.any():
             break
         high = np.where(short, low + 2 * (high - low), high)
     else:
         raise LumpedError(f"the mesh carries {force.max():.4g} N at no deflection")
-    for _ in range(BISECTIONS):
-        middle = 0.5 * (low + high)
-        below = pressed(law, at, middle).force < force
-        low, high = np.where(below, middle, low), np.where(below, high, middle)
-    return np.asarray(high)
+    travel = high
+    for _ in range(STEPS):
+        found, stiff = pressed(law, at, travel)
+        low, high = np.where(found < force, travel, low), np.where(found < force, high, travel)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            step = travel + (force - found) / stiff
+        halved = 0.5 * (low + high)
+        after = np.where((step > low) & (step < high), step, halved)
+        if np.all(np.abs(after - travel) <= CLOSE * (high - low + law.approach[-1])):
+            return np.asarray(after)
+        travel = after
+    return np.asarray(travel)

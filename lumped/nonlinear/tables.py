@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gearbench.kernels.compiled import compiled
 from gearbench.lumped.nonlinear.model import NonLinear
-from gearbench.lumped.nonlinear.pressing import Instants
+from gearbench.lumped.nonlinear.pressing import Instants, alike
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -24,8 +24,8 @@ Integers = NDArray[np.int64]
 class Table(NamedTuple):
     """What the mesh is at each half step; arrays (entries + 1,), pace and pull empty where the speed is constant.
 
-    What pairs have of their own lies in pair_excess and pair_gain (entries + 1, n_o), without columns where all teeth
-    are alike; excess, its rate and gain are common to all pairs.
+    excess, its rate and gain are common to all pairs. Pair o of an entry has row first_pair + o of `own` besides, which
+    is empty where all teeth are alike.
     """
 
     position: Array  # in rows of the force table, which are phases
@@ -34,10 +34,14 @@ class Table(NamedTuple):
     gain: Array  # of the force
     ripple: Array  # [N]
     back: Array  # excess on the back flanks [m]
-    pair_excess: Array
-    pair_gain: Array
+    first_pair: Array  # whole numbers
+    own: Array  # (pairs, 3): excess [m], growths of the bending compliance of both teeth
     pace: Array = np.empty(0)  # speed of the nominal rotation over the one that friction is told of
     pull: Array = np.empty(0)  # acceleration of the nominal rotation along the line of action [m/s^2]
+
+    def part(self, first: int | None, end: int | None = None) -> Table:
+        """The entries from `first` to before `end`."""
+        return Table(*(column if name == "own" else column[first:end] for name, column in self._asdict().items()))
 
 
 class Series(NamedTuple):
@@ -133,36 +137,49 @@ def teeth_of(model: NonLinear) -> Teeth:
     return Teeth(excess[0], excess[1], growth[0], growth[1])
 
 
-def instants(table: Table, phase: ArrayLike, first: int = 0, end: int | None = None) -> Instants:
-    """The mesh at the table's entries from `first` to before `end`; phase [cycles] of each."""
-    columns = (table.excess, table.gain, table.pair_excess, table.pair_gain)
-    return Instants(np.atleast_1d(np.asarray(phase, dtype=float)), *(column[first:end] for column in columns))
+def instants(model: NonLinear, table: Table, phase: ArrayLike, end: int | None = None) -> Instants:
+    """The mesh at the table's entries to before `end`; phase [cycles] of each."""
+    at = np.atleast_1d(np.asarray(phase, dtype=float))
+    if not table.own.size:
+        return alike(at, table.excess[:end], table.gain[:end])
+    columns = len(model.law.offsets)
+    own = table.own[table.first_pair[:end].astype(np.int64)[:, None] + np.arange(columns)]
+    softer = (model.law.bending_of(at) * own[..., 1:]).sum(axis=-1)
+    return Instants(at, table.excess[:end], table.gain[:end], own[..., 0], 1.0 / (1.0 + softer))
 
 
 def tables(model: NonLinear, motion: Motion) -> Table:
     """The table of a model in a motion."""
     rig, law = model.rig, model.law
-    bending, teeth, mesh = law.closed[1], teeth_of(model), rig.mesh
+    mesh = rig.mesh
     correction = Correction(
         mesh.stiffness_scale,
         _series(mesh.stiffness_cos, mesh.stiffness_sin),
         mesh.error_mean,
         _series(mesh.error_cos, mesh.error_sin),
     )
-    # One entry before and one behind, for the rate of the excess.
-    entries, columns = motion.entries + 3, len(law.offsets) if teeth.differ else 0
-    common, own = np.empty((6, entries)), np.empty((2, entries, columns))
-    table = Table(*common, *own)
     varied = motion.varied
     if varied is None:
         phase = motion.first_phase + np.arange(-1.0, motion.entries + 2) * (motion.cycles / motion.entries)
     else:
         phase = varied.phase
-    _fill(table, phase, law.offsets, bending, teeth, correction, _runout(model), _waves(model))
+    # One entry before and one behind, for the rate of the excess.
+    table = Table(*np.empty((7, motion.entries + 3)), own=_own(model, phase))
+    teeth = rig.driver.teeth, rig.driven.teeth
+    _fill(table, phase, floor(phase[0]), law.phases, teeth, correction, _runout(model), _waves(model))
     rate = (table.excess[2:] - table.excess[:-2]) / motion.step
     pace, pull = (np.empty(0), np.empty(0)) if varied is None else varied[1:]
-    inner = Table(*(column[1:-1] for column in table))
-    return inner._replace(excess_rate=rate, pace=pace, pull=pull)
+    return table.part(1, -1)._replace(excess_rate=rate, pace=pace, pull=pull)
+
+
+def _own(model: NonLinear, phase: Array) -> Array:
+    """What pairs have of their own (pairs, 3), from the first one that is near contact at the first phase [cycles]."""
+    teeth, offsets = teeth_of(model), model.law.offsets
+    if not teeth.differ:
+        return np.empty((0, 3))
+    number = np.arange(floor(phase[0]) + offsets[0], floor(phase[-1]) + offsets[-1] + 1)
+    one, two = number % len(teeth.excess1), number % len(teeth.excess2)
+    return np.stack([teeth.excess1[one] + teeth.excess2[two], teeth.growth1[one], teeth.growth2[two]], axis=1)
 
 
 def _runout(model: NonLinear) -> Runout:
@@ -220,32 +237,19 @@ def _rippled(waves: Waves, phase: float) -> float:
 
 @compiled
 def _fill(
-    out: Table, phases: Array, offsets: Integers, bending: Array, teeth: Teeth, correction: Correction,
-    runout: Runout, waves: Waves,
+    out: Table, phases: Array, begin: int, rows: int, teeth: tuple[int, int], correction: Correction, runout: Runout,
+    waves: Waves,
 ) -> None:  # fmt: skip
-    """Fill the table but for `excess_rate`, pace and pull; entry n belongs to the n-th of `phases` [cycles]."""
-    rows = bending.shape[0] - 1
-    z1, z2 = len(teeth.excess1), len(teeth.excess2)
+    """Fill the table but for `excess_rate`, own, pace and pull; entry n belongs to the n-th of `phases` [cycles], whose
+    whole part begins with `begin`; rows: of the force table."""
     for n in range(len(out.position)):
         phase = phases[n]
         whole = floor(phase)
         cycle = phase - whole
-        position = min(cycle * rows, rows * (1.0 - 1e-16))
-        row = int(position)
-        weight = position - row
-        for o in range(out.pair_excess.shape[1]):
-            tooth = int(whole) + offsets[o]
-            one, two = tooth % z1, tooth % z2
-            out.pair_excess[n, o] = teeth.excess1[one] + teeth.excess2[two]
-            out.pair_gain[n, o] = 1.0
-            if teeth.growth1[one] != 0.0 or teeth.growth2[two] != 0.0:
-                b1 = bending[row, o, 0] + weight * (bending[row + 1, o, 0] - bending[row, o, 0])
-                b2 = bending[row, o, 1] + weight * (bending[row + 1, o, 1] - bending[row, o, 1])
-                out.pair_gain[n, o] = 1.0 / (1.0 + b1 * teeth.growth1[one] + b2 * teeth.growth2[two])
         turned, turned_back = 0.0, 0.0
         for i in range(2):
             if runout.cosine[i] != 0.0 or runout.sine[i] != 0.0:
-                angle = 2 * pi * phase / (z1 if i == 0 else z2)
+                angle = 2 * pi * phase / (teeth[0] if i == 0 else teeth[1])
                 along, across = cos(angle), sin(angle)
                 turned += runout.cosine[i] * along + runout.sine[i] * across
                 turned_back += runout.cosine_back[i] * along + runout.sine_back[i] * across
@@ -253,7 +257,8 @@ def _fill(
         if len(correction.error.cosine) or len(correction.stiffness.cosine):
             first, second = cos(2 * pi * cycle), sin(2 * pi * cycle)
         every = correction.mean_error + _wave(correction.error, first, second) + turned
-        out.position[n] = position
+        out.position[n] = min(cycle * rows, rows * (1.0 - 1e-16))
+        out.first_pair[n] = whole - begin
         out.excess[n] = every
         out.gain[n] = correction.scale * (1.0 + _wave(correction.stiffness, first, second))
         out.ripple[n] = _rippled(waves, phase)

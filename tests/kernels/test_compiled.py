@@ -222,8 +222,8 @@ from gearbench.lumped.nonlinear.forces import entry, mesh
 from gearbench.lumped.nonlinear.tables import Table
 
 values = dict(position=1.5, excess=2e-6, excess_rate=0.0, gain=1.2, ripple=7.0, back=3e-6)
-none = np.empty((1, 0))
-table = Table(**{name: np.array([value]) for name, value in values.items()}, pair_excess=none, pair_gain=none)
+columns = {name: np.array([value]) for name, value in values.items()}
+table = Table(**columns, first_pair=np.zeros(1), own=np.empty((0, 3)))
 secant = np.linspace(1e8, 2e8, 12).reshape(3, 4)
 constants = dict.fromkeys(Constants._fields, 0.0) | {"root": 1e3, "damping_factor": 2.0}
 print(float(mesh(8e-6, 0.1, entry(table, 0), secant, (), Constants(**constants))))

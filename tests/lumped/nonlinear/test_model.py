@@ -150,7 +150,7 @@ def test_a_rig_with_every_effect_follows_the_plain_equations(boundary: str) -> N
         return 100.0 + 20 * np.sin(2 * pi * 700 * t) + 10 * np.sin(2 * pi * 1900 * t + 1)
 
     first = tables(model, Motion(cycles=1.0, entries=2, step=1.0))
-    state = model.equilibrium(float(torque(0.0)) / RADII[0], instants(first, 0.0, end=1))
+    state = model.equilibrium(float(torque(0.0)) / RADII[0], instants(model, first, 0.0, 1))
     frequency, cycles, steps = 100.0, 3.0, 19200
     time, out = run(model, lambda t: torque(t) / RADII[0], state, mesh_frequency=frequency, cycles=cycles, steps=steps)
     assert out.mesh_force.min() > 0
