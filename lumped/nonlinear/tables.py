@@ -164,7 +164,7 @@ def tables(model: NonLinear, motion: Motion) -> Table:
     else:
         phase = varied.phase
     # One entry before and one behind, for the rate of the excess.
-    table = Table(*np.empty((7, motion.entries + 3)), own=_own(model, phase))
+    table = Table(*np.empty((7, motion.entries + 3)), _own(model, phase))
     teeth = rig.driver.teeth, rig.driven.teeth
     _fill(table, phase, floor(phase[0]), law.phases, teeth, correction, _runout(model), _waves(model))
     rate = (table.excess[2:] - table.excess[:-2]) / motion.step
