@@ -164,12 +164,13 @@ def tables(model: NonLinear, motion: Motion) -> Table:
     else:
         phase = varied.phase
     # One entry before and one behind, for the rate of the excess.
-    table = Table(*np.empty((7, motion.entries + 3)), _own(model, phase))
+    position, excess, rate, gain, ripple, back, first = np.empty((7, motion.entries + 3))
+    table = Table(position, excess, rate, gain, ripple, back, first, _own(model, phase))
     teeth = rig.driver.teeth, rig.driven.teeth
     _fill(table, phase, floor(phase[0]), law.phases, teeth, correction, _runout(model), _waves(model))
-    rate = (table.excess[2:] - table.excess[:-2]) / motion.step
+    rate[1:-1] = (excess[2:] - excess[:-2]) / motion.step
     pace, pull = (np.empty(0), np.empty(0)) if varied is None else varied[1:]
-    return table.part(1, -1)._replace(excess_rate=rate, pace=pace, pull=pull)
+    return table.part(1, -1)._replace(pace=pace, pull=pull)
 
 
 def _own(model: NonLinear, phase: Array) -> Array:
