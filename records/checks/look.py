@@ -25,6 +25,8 @@ Complexes = NDArray[np.complex128]
 GEARS = ("driver", "driven")
 # Lines of a spectrum that the checks use at most, evenly spread: more would not tell more.
 MOST_LINES = 800
+# Departure of the mesh phase from even rotation [cycles] from which the speed varies, and nothing need repeat.
+VARIES = 0.5
 # A line is excited when its force exceeds this part of the strongest line's, the mean apart.
 EXCITED = 0.1
 
@@ -62,6 +64,16 @@ class Look:
         if declared is None and phase is not None and phase[-1] > phase[0]:
             declared = (phase.size - 1) / (float(phase[-1] - phase[0]) * self.rate)
         return declared
+
+    @cached_property
+    def steady(self) -> bool:
+        """Whether the speed is constant as far as the record says, so that its spectra are those of something that
+        repeats: at both ends of a run-up the gears are elsewhere, which derivatives by lines take for a jump."""
+        phase = self.channel("mesh_phase")
+        if phase is None:
+            return True
+        even = np.linspace(float(phase[0]), float(phase[-1]), phase.size)
+        return bool(np.abs(phase - even).max() < VARIES)
 
     @cached_property
     def zero_known(self) -> bool:

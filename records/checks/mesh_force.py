@@ -96,7 +96,9 @@ class Accounts:
 
 
 def accounts_of(look: Look) -> Accounts | None:
-    """The accounts that a record allows; None where there are not two of them."""
+    """The accounts that a record allows; None where there are not two of them, or the speed varies."""
+    if not look.steady:
+        return None
     held = look.record.attrs.get("driven_boundary") == "speed"
     gears: dict[str, dict[str, Complexes]] = {}
     for gear, sign in zip(GEARS, (1.0, -1.0), strict=True):

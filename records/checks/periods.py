@@ -39,9 +39,10 @@ def periods_repeat(look: Look) -> list[Finding]:
 
 
 def _joint_samples(look: Look) -> int | None:
-    """Samples of the shortest run of excitation periods that holds whole mesh periods, if there are two such runs."""
+    """Samples of the shortest run of excitation periods that holds whole mesh periods, if there are two such runs and
+    the speed is constant."""
     period, periods = int(look.record.attrs["samples_per_period"]), int(look.record.attrs["periods"])
-    if look.mesh_period is None:
+    if look.mesh_period is None or not look.steady:
         return None
     cycles = period / (look.rate * look.mesh_period)
     for count in range(1, periods // 2 + 1):
