@@ -37,6 +37,28 @@ def polynomials_at_varying_speed(
         spectra, course, harmonics=max(ladder), order=HIGHEST_ORDER if order is None else order, half_width=widest,
         operating=True,
     )  # fmt: skip
+    while True:
+        choice, regression = _chosen(spectra, lines, free, ladder, order, half_width)
+        try:
+            result = local_polynomial(spectra, lines, choice.window, regression=regression, progress=progress)
+        except LpmError:
+            # What is chosen on a part of the lines need not suffice on all of them.
+            ladder = [one for one in ladder if one < choice.window.harmonics]
+            if harmonics is not None or not ladder:
+                raise
+            continue
+        return result, choice.window, regression.operating
+
+
+def _chosen(
+    spectra: Spectra,
+    lines: NDArray[np.int64],
+    free: MovingRegression,
+    ladder: list[int],
+    order: int | None,
+    half_width: int | None,
+) -> tuple[Choice, MovingRegression]:
+    """The choice that promises the least error, the operating response left free or not. Raises LpmError."""
     found: list[tuple[Choice, MovingRegression]] = []
     refused = ""
     for operating in (False, True):
@@ -50,9 +72,7 @@ def polynomials_at_varying_speed(
         found.append((choice, regression))
     if not found:
         raise LpmError(refused)
-    choice, regression = min(found, key=lambda one: one[0].error)
-    result = local_polynomial(spectra, lines, choice.window, regression=regression, progress=progress)
-    return result, choice.window, regression.operating
+    return min(found, key=lambda one: one[0].error)
 
 
 def _ladder(

@@ -1,5 +1,7 @@
 """The local polynomial method at a speed that varies: closed forms, and the reference system."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -10,6 +12,7 @@ from gearbench.identification import IdentificationSettings, LpmError, SpectraEr
 from gearbench.identification.excitation.multisine import random_phase_multisine
 from gearbench.identification.lpm import at_varying, moving
 from gearbench.identification.spectra.course import course_spectra, speed_varies
+from gearbench.identification.spectra.joint import Spectra
 from gearbench.records.record import make_record
 
 RATE, SIZE, MESH = 4096.0, 4096, 40.0
@@ -103,3 +106,22 @@ def test_what_cannot_be_done_is_refused(monkeypatch: pytest.MonkeyPatch) -> None
     assert speed_varies([slow], 0.01)
     with pytest.raises(SpectraError, match=r"holds 1\.57 mesh periods; at a speed that varies at least 2"):
         course_spectra([slow])
+
+
+def test_fewer_branches_are_tried_where_the_chosen_ones_do_not_fit_all_lines(monkeypatch: pytest.MonkeyPatch) -> None:
+    spectra, course = course_spectra([known()])
+    whole, asked = at_varying.local_polynomial, []
+
+    def picky(spectra: Spectra, lines: Any, window: at_varying.Window, **how: Any) -> Any:
+        asked.append(window.harmonics)
+        if window.harmonics > 1:
+            raise LpmError("under-determined")
+        return whole(spectra, lines, window, **how)
+
+    monkeypatch.setattr(at_varying, "local_polynomial", picky)
+    chosen = {"order": 1, "half_width": 24}
+    _, window, _ = at_varying.polynomials_at_varying_speed(spectra, course, LINES, harmonics=None, **chosen)
+    assert window.harmonics == asked[-1] <= 1 < asked[0]
+    assert asked == sorted(asked, reverse=True)
+    with pytest.raises(LpmError, match="under-determined"):
+        at_varying.polynomials_at_varying_speed(spectra, course, LINES, harmonics=2, **chosen)
