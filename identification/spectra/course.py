@@ -16,6 +16,7 @@ from scipy.interpolate import make_lsq_spline
 
 from gearbench.identification.spectra.joint import Floats, Spectra, SpectraError
 from gearbench.identification.spectra.transmission_error import dte, force
+from gearbench.records.even_speed import departure, mesh_phase
 
 # Departure of the mesh phase from constant speed [cycles] from which on a record counts as of varying speed, and beyond
 # which averages over excitation periods lose the branches.
@@ -45,26 +46,10 @@ class Course:
         return Course(self.force[:count], self.cycles[:count], self.shift[:count], self.lowest, self.excited)
 
 
-def mesh_phase(record: xr.Dataset) -> Floats | None:
-    """Mesh phase (E, N) [cycles]: the channel `mesh_phase`, else teeth times the driver's turns, else None."""
-    if "mesh_phase" in record:
-        return np.asarray(record["mesh_phase"].values, dtype=float)
-    if "mesh_period" not in record.attrs and "angle_driver" in record and "teeth_driver" in record.attrs:
-        return np.asarray(record["angle_driver"].values * float(record.attrs["teeth_driver"]) / (2 * np.pi))
-    return None
-
-
 def speed_varies(records: Sequence[xr.Dataset], limit: float = VARIES) -> bool:
     """Whether the mesh phase of a record departs from constant speed by more than `limit` [cycles]."""
-    for record in records:
-        phase = mesh_phase(record)
-        if phase is None:
-            continue
-        steps = np.arange(phase.shape[1])
-        for row in phase:
-            if np.abs(row - np.polyval(np.polyfit(steps, row, 1), steps)).max() > limit:
-                return True
-    return False
+    phases = (mesh_phase(record) for record in records)
+    return any(departure(row) > limit for phase in phases if phase is not None for row in phase)
 
 
 def excited_rows(records: Sequence[xr.Dataset]) -> tuple[list[tuple[Floats, Floats, Floats]], float, int, int]:

@@ -12,6 +12,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from gearbench.records.attributes import numeric_attribute
+from gearbench.records.even_speed import departure
 from gearbench.records.transmission_error import (
     AngleOnlyWarning,
     TransmissionError,
@@ -70,10 +71,7 @@ class Look:
         """Whether the speed is constant as far as the record says, so that its spectra are those of something that
         repeats: at both ends of a run-up the gears are elsewhere, which derivatives by lines take for a jump."""
         phase = self.channel("mesh_phase")
-        if phase is None:
-            return True
-        even = np.linspace(float(phase[0]), float(phase[-1]), phase.size)
-        return bool(np.abs(phase - even).max() < VARIES)
+        return phase is None or departure(phase) < VARIES
 
     @cached_property
     def zero_known(self) -> bool:

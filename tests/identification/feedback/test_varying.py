@@ -8,7 +8,8 @@ from shared.varying_rig import truth_at, varying_record, wandering
 
 from gearbench.identification import IdentificationSettings, SpectraError, estimation, identify, itf
 from gearbench.identification.feedback.varying_frf import signals_of
-from gearbench.identification.spectra.course import mesh_phase, speed_varies
+from gearbench.identification.spectra.course import speed_varies
+from gearbench.records.even_speed import mesh_phase
 
 RIG = ReferenceRig(mesh_frequency=60.0, edge=0.2)
 SETTINGS = IdentificationSettings("mesh-feedback", 16, band=(700.0, 1900.0), phases=64, modes=1, step=20)

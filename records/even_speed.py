@@ -1,0 +1,24 @@
+"""The mesh phase of a record, and how far it departs from constant speed."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+def mesh_phase(record: xr.Dataset) -> Array | None:
+    """Mesh phase (E, N) [cycles]: the channel `mesh_phase`, else teeth times the driver's turns, else None."""
+    if "mesh_phase" in record:
+        return np.asarray(record["mesh_phase"].values, dtype=float)
+    if "mesh_period" not in record.attrs and "angle_driver" in record and "teeth_driver" in record.attrs:
+        return np.asarray(record["angle_driver"].values * float(record.attrs["teeth_driver"]) / (2 * np.pi))
+    return None
+
+
+def departure(phase: Array) -> float:
+    """Largest departure [cycles] of a mesh phase (N,) from that of a constant speed, by least squares."""
+    steps = np.arange(phase.size)
+    return float(np.abs(phase - np.polyval(np.polyfit(steps, phase, 1), steps)).max())
