@@ -28,7 +28,6 @@ from gearbench.diagnosis.forces.nominal import NominalModel
 from gearbench.diagnosis.forces.unknowns import Group, Unknowns, unknowns_of
 from gearbench.diagnosis.output.structure import held, sensed, structure_groups
 from gearbench.geometry import Pair, pair
-from gearbench.lumped.nonlinear.law import MeshLaw
 from gearbench.rig import Case, Rig
 from gearbench.rig.gear import Crack
 
@@ -69,10 +68,6 @@ class Layout:
     def mesh_stiffness(self) -> float:
         """Mean stiffness [N/m] of the nominal mesh at the largest load of its table."""
         return self.model.mesh_stiffness
-
-    def law_of(self, case: Case) -> MeshLaw:
-        """The force law of the mesh of a rig of these unknowns."""
-        return replace(self.model.law, backlash=max(pair(case.rig).backlash_normal, 0.0))
 
     def case(self, p: Array, condition: str | None = None) -> Case:
         """The rig of these unknowns (size,), with the ripple of one condition, or the mean of all. Raises ValueError

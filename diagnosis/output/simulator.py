@@ -25,6 +25,7 @@ from gearbench.diagnosis.output.jacobian import (
 from gearbench.diagnosis.output.layout import Layout
 from gearbench.diagnosis.output.structure import LEAST_STEP
 from gearbench.diagnosis.output.target import Target
+from gearbench.diagnosis.replay.replays import law_of
 from gearbench.rig import Case
 
 Array = NDArray[np.float64]
@@ -126,7 +127,7 @@ class Simulator:
         def one(item: tuple[int, Measurement]) -> tuple[int, list[tuple[NDArray[np.int64], dict[str, Array]]]]:
             number, measured = item
             case = self.layout.case(p, measured.name)
-            tangent = along(steady_motion(case, measured.record, self.layout.law_of(case)))
+            tangent = along(steady_motion(case, measured.record, law_of(self.layout.model.law, case)))
             radius = self.layout.model.base_radius[1]
             found = []
             for forces, at, on in (

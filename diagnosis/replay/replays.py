@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import lru_cache
 
 import xarray as xr
 
@@ -12,6 +13,18 @@ from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.geometry import pair
 from gearbench.lumped.nonlinear.law import MeshLaw
 from gearbench.rig import Case
+
+LAWS = 8  # of different backlash whose secants are kept: most replays have the nominal one
+
+
+def law_of(law: MeshLaw, case: Case) -> MeshLaw:
+    """The law with the backlash of the case's rig."""
+    return _with_backlash(law, max(pair(case.rig).backlash_normal, 0.0))
+
+
+@lru_cache(maxsize=LAWS)
+def _with_backlash(law: MeshLaw, backlash: float) -> MeshLaw:
+    return replace(law, backlash=backlash)
 
 
 def replays(law: MeshLaw) -> Callable[[Case, xr.Dataset], xr.Dataset]:
@@ -22,7 +35,7 @@ def replays(law: MeshLaw) -> Callable[[Case, xr.Dataset], xr.Dataset]:
         # Its time loop is compiled on import, which not every user of this module wants.
         from gearbench.bench.nonlinear.replay import replay
 
-        return replay(case, record, replace(law, backlash=max(pair(case.rig).backlash_normal, 0.0)))
+        return replay(case, record, law_of(law, case))
 
     return simulate
 
