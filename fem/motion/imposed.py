@@ -42,7 +42,7 @@ def lag(machine: Machine, now: Pace, outer: Array) -> None:
     """Take off `outer`, which holds the torques of drive and load, what it takes to speed up all that turns with the
     nominal rotation: the unknowns are departures from it. Where neither speed is prescribed, the load's torque makes up
     for that."""
-    at, n1 = machine.at, len(machine.hub1)
+    at, n1 = machine.at, machine.hub1.shape[1]
     one, two = now.pull1, now.pull2
     for i, pull in ((at.driver, one), (at.drive_end, one), (at.driven, two), (at.load_end, two)):
         if i >= 0:
@@ -51,9 +51,9 @@ def lag(machine: Machine, now: Pace, outer: Array) -> None:
     if machine.loaded_at >= 0:
         outer[machine.loaded_at] += machine.course.inertia2 * now.pull2
     for k in range(n1):
-        outer[machine.hubs + k] = -machine.hub1[k, 2] * now.pull1
-    for k in range(len(machine.hub2)):
-        outer[machine.hubs + n1 + k] = machine.hub2[k, 2] * now.pull2
+        outer[machine.hubs + k] = -machine.hub1[2, k] * now.pull1
+    for k in range(machine.hub2.shape[1]):
+        outer[machine.hubs + n1 + k] = machine.hub2[2, k] * now.pull2
 
 
 class Excess(NamedTuple):

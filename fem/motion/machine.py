@@ -93,7 +93,7 @@ class Machine(NamedTuple):
     motion across it is along (axis_y, -axis_x). mass (d,): diagonal (the rest of the mass matrix is `hub_coupling`);
     hub_damping, hub_stiffness (hubs, hubs), springs, held, driven_at, loaded_at: as in `Hubs`; drive_shaft, load_shaft:
     stiffness and damping of shafts to a prescribed speed; squares (modes,): modal stiffnesses, with the damping beta
-    [s] times as large; hub1, hub2 (modes, 3): coupling mass of modes and hub; shapes1, shapes2 (2, teeth, n, modes): of
+    [s] times as large; hub1, hub2 (3, modes): coupling mass of hub and modes; shapes1, shapes2 (2, teeth, n, modes): of
     both flank sides, as in the contact law's kernels; speed1, speed2: nominal speeds [rad/s], up to time 0 where
     `course` changes them.
     """
@@ -178,9 +178,9 @@ def make_machine(
             losses=1.0 if free else 0.0,
         ),
         squares=squares,
-        # By columns: each of them is read from end to end.
-        hub1=np.asfortranarray(driver.mode_hub),
-        hub2=np.asfortranarray(driven.mode_hub),
+        # Each row is read from end to end. One layout for any number of modes: loops are compiled for each.
+        hub1=np.ascontiguousarray(driver.mode_hub.T),
+        hub2=np.ascontiguousarray(driven.mode_hub.T),
         shapes1=_shapes(law.k1),
         shapes2=_shapes(law.k2),
         speed1=2 * pi * mesh_frequency / driver.teeth,
@@ -252,27 +252,27 @@ def write_hub_coupling(machine: Machine, theta1: float, theta2: float, out: Arra
     at, hub1, hub2 = machine.at, machine.hub1, machine.hub2
     x, y = machine.axis_x, machine.axis_y
     chi1, chi2 = theta1 + machine.law.driver.zero, machine.law.driven.zero - theta2 + pi
-    n1, n2 = len(hub1), len(hub2)
+    n1, n2 = hub1.shape[1], hub2.shape[1]
     axis1, axis2 = seen_from(x, y, chi1), seen_from(x, y, chi2)
     # Slices, whose indices count from 0: others might be negative for all that the compiler knows, and are gathered.
     turn1, along1, along2 = out[at.driver], out[at.y1], out[at.y2, n1:]
     for k in range(n1):
-        turn1[k] = hub1[k, 2]
+        turn1[k] = hub1[2, k]
     for k in range(n1):
-        along1[k] = hub1[k, 0] * axis1.x + hub1[k, 1] * axis1.y
+        along1[k] = hub1[0, k] * axis1.x + hub1[1, k] * axis1.y
     for k in range(n2):
-        along2[k] = hub2[k, 0] * axis2.x + hub2[k, 1] * axis2.y
+        along2[k] = hub2[0, k] * axis2.x + hub2[1, k] * axis2.y
     if at.driven >= 0:
         turn2 = out[at.driven, n1:]
         for k in range(n2):
-            turn2[k] = -hub2[k, 2]
+            turn2[k] = -hub2[2, k]
     if at.x1 >= 0:
         # Across the supports: their direction, turned clockwise.
         across1, across2 = out[at.x1], out[at.x2, n1:]
         for k in range(n1):
-            across1[k] = hub1[k, 0] * axis1.y - hub1[k, 1] * axis1.x
+            across1[k] = hub1[0, k] * axis1.y - hub1[1, k] * axis1.x
         for k in range(n2):
-            across2[k] = hub2[k, 0] * axis2.y - hub2[k, 1] * axis2.x
+            across2[k] = hub2[0, k] * axis2.y - hub2[1, k] * axis2.x
 
 
 def hub_coupling(machine: Machine, theta1: float, theta2: float) -> Array:
@@ -352,7 +352,7 @@ def centres(machine: Machine, d: Array) -> Vector:
 @compiled(forceinline=True)
 def write_rows(machine: Machine, pairs: Meetings, n: int, places: Places, rows: Array) -> None:
     """`contact_rows` of the first n pairs into `rows`, whose other columns stay zero."""
-    hub, hubs, n1, n2 = machine.at, machine.hubs, len(machine.hub1), len(machine.hub2)
+    hub, hubs, n1, n2 = machine.at, machine.hubs, machine.hub1.shape[1], machine.hub2.shape[1]
     shapes1, shapes2 = machine.shapes1, machine.shapes2
     z1, z2 = shapes1.shape[1], shapes2.shape[1]
     for p in range(n):

@@ -159,7 +159,7 @@ def conclude(machine: Machine, scheme: Scheme, new: Stage, n: int, gain: float, 
 def torques(machine: Machine, new: Stage, n: int, torque: float, nominal: Pace, room: Room) -> Torques:
     """Torques on the outer ends of drive and load after a step that found n pairs, under the driver torque [N m]."""
     at, hubs = machine.at, machine.hubs
-    n1, n2 = len(machine.hub1), len(machine.hub2)
+    n1, n2 = machine.hub1.shape[1], machine.hub2.shape[1]
     load = load_torque(machine, torque)
     one, two, balanced, ratio = 0.0, 0.0, 0.0, machine.law.driven.rb / machine.law.driver.rb
     for p in range(n):
@@ -173,9 +173,9 @@ def torques(machine: Machine, new: Stage, n: int, torque: float, nominal: Pace, 
             two += rubbed * room.arm2[p]
             balanced += rubbed * machine.balance.losses * (room.arm2[p] - ratio * room.arm1[p])
     for k in range(n1):
-        one += machine.hub1[k, 2] * new.a[hubs + k]
+        one += machine.hub1[2, k] * new.a[hubs + k]
     for k in range(n2):
-        two += machine.hub2[k, 2] * new.a[hubs + n1 + k]
+        two += machine.hub2[2, k] * new.a[hubs + n1 + k]
     stiffness, damping = machine.drive_shaft
     if stiffness > 0.0:
         one = -stiffness * new.d[at.driver] - damping * new.v[at.driver]

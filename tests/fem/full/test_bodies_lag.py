@@ -82,5 +82,5 @@ def test_modes_balance_what_the_acceleration_takes(twins: Any, boundary: str) ->
     moving = mass @ state.a + small.damping_matrix(machine) @ state.v + small.stiffness_matrix(machine) @ state.d
     pressed = state.force @ small.contact_rows(machine, state.pairs)
     left = (moving - pressed)[machine.hubs :]
-    expected = np.concatenate([-machine.hub1[:, 2] * PULL, machine.hub2[:, 2] * PULL])
+    expected = np.concatenate([-machine.hub1[2] * PULL, machine.hub2[2] * PULL])
     assert np.abs(left - expected).max() < 1e-4 * np.abs(expected).max()

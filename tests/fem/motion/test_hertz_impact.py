@@ -76,7 +76,7 @@ class Hertz(NamedTuple):
 def unyielding(tooth: Tooth, sense: int) -> Kernel:
     """A kernel of nothing, with a mode that no flank moves: what is left is the half-plane."""
     # Laid out as those of gears, or the loops would be compiled for these arrays too.
-    table, modes = np.zeros((1, POINTS, POINTS)), np.zeros((1, 20, 2 * POINTS))[..., ::2]
+    table, modes = np.zeros((1, POINTS, POINTS)), np.zeros((1, 20, POINTS))
     coupling = np.zeros((0, 0, 2, 2, 0, 0))
     return Kernel(table, table, tooth.s_end, tooth.s_tip, 6.0, 0, 0.02, modes, modes, coupling, sense)
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+import numba
 import numpy as np
 import pytest
 
 from gearbench.fem.contact.coupling import coupling
 from gearbench.fem.contact.kernel import cross_flexibility, grid_position
 from gearbench.fem.contact.law import find_pairs, make_law
-from gearbench.fem.gear.body import condense
+from gearbench.fem.gear.body import CondensedGear, condense
 from gearbench.fem.motion.machine import contact_rows, make_machine, mass_matrix, modal_flexibility
 from gearbench.geometry.tooth.body import body
 from gearbench.rig import Load
@@ -110,16 +111,16 @@ def test_the_mass_matrix_moves_the_gears_as_wholes(unequal: Any) -> None:
         np.testing.assert_allclose(
             np.diag(m)[:4], [bodies[0].inertia, bodies[1].inertia, bodies[0].mass, bodies[1].mass]
         )
-        n1 = len(machine.hub1)
+        n1 = machine.hub1.shape[1]
         for axis, hub, modes, chi in (
             (2, machine.hub1, slice(4, 4 + n1), unequal.pair.driver_angle + theta1),
             (3, machine.hub2, slice(4 + n1, None), np.pi + unequal.pair.driven_angle - theta2),
         ):
             # World +y, seen in the gear's frame.
-            expected = hub[:, :2] @ [np.sin(chi), np.cos(chi)]
+            expected = hub[:2].T @ [np.sin(chi), np.cos(chi)]
             np.testing.assert_allclose(m[axis, modes], expected, atol=1e-12 * np.abs(hub).max())
-        np.testing.assert_allclose(m[0, 4 : 4 + n1], machine.hub1[:, 2])
-        np.testing.assert_allclose(m[1, 4 + n1 :], -machine.hub2[:, 2])
+        np.testing.assert_allclose(m[0, 4 : 4 + n1], machine.hub1[2])
+        np.testing.assert_allclose(m[1, 4 + n1 :], -machine.hub2[2])
 
 
 def test_supports_along_the_line_of_action_move_the_modes_along_it(unequal: Any) -> None:
@@ -130,13 +131,13 @@ def test_supports_along_the_line_of_action_move_the_modes_along_it(unequal: Any)
     machine, _ = machine_of(tilted)
     alpha = unequal.pair.working_pressure_angle
     m = mass_matrix(machine, 0.3, 0.2)
-    n1 = len(machine.hub1)
+    n1 = machine.hub1.shape[1]
     for axis, hub, modes, chi in (
         (2, machine.hub1, slice(4, 4 + n1), unequal.pair.driver_angle + 0.3),
         (3, machine.hub2, slice(4 + n1, None), np.pi + unequal.pair.driven_angle - 0.2),
     ):
         turn = np.array([[np.cos(chi), np.sin(chi)], [-np.sin(chi), np.cos(chi)]])
-        expected = hub[:, :2] @ turn @ [np.sin(alpha), np.cos(alpha)]
+        expected = hub[:2].T @ turn @ [np.sin(alpha), np.cos(alpha)]
         np.testing.assert_allclose(m[axis, modes], expected, atol=1e-12 * np.abs(hub).max())
 
 
@@ -168,3 +169,17 @@ def test_prescribed_speed_leaves_one_rotation(unequal: Any) -> None:
     keep = np.delete(np.arange(len(free.mass)), 1)
     np.testing.assert_array_equal(mass_matrix(driven, 0.1, 0.2), mass_matrix(free, 0.1, 0.2)[np.ix_(keep, keep)])
     assert free.speed1 * 20 == pytest.approx(free.speed2 * 30) == pytest.approx(2 * np.pi * 10)
+
+
+@pytest.mark.parametrize("kept", [0, 1, 3])
+def test_loops_need_no_compiling_for_another_number_of_modes(unequal: Any, kept: int) -> None:
+    """Loops are compiled for each layout of what they are given, a minute and more for those of the steps."""
+
+    def few(gear: CondensedGear) -> CondensedGear:
+        cut = {name: getattr(gear, name)[:kept] for name in ("omega", "mode_front", "mode_back", "mode_hub")}
+        return replace(gear, **cut)
+
+    one, two = (few(gear) for gear in unequal.gears)
+    law = make_law(unequal.pair, one, two, unequal.rig.material, unequal.law.curves[:2])
+    machine, _ = machine_of(replace(unequal, gears=(one, two), law=law))
+    assert numba.typeof(machine) == numba.typeof(machine_of(unequal)[0])

@@ -220,7 +220,7 @@ def test_action_is_reaction_at_every_step(unequal: Any, boundary: str) -> None:
         arms = sum(f * (dx * k.ny - dy * k.nx) for f, k in zip(state.force, met.contacts, strict=False) if f > 0)
         pairs.add(int(np.sum(state.force > 0)))
         # The hub of the driven gear turns with the modes that shake it: their inertia is not the contact's.
-        hub = machine.hub2[:, 2] @ state.a[r + 2 + len(machine.hub1) :]
+        hub = machine.hub2[2] @ state.a[r + 2 + machine.hub1.shape[1] :]
         driven = push[1] if r == 2 else moment - hub
         # The pairs are found where free motion would lead, the state a little behind: 1e-5 of the lever.
         assert driven - push[0] == pytest.approx(arms, rel=1e-4)
