@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.fem.contact.kernel import Kernel, grid_position, table_at
+from gearbench.fem.contact.kernel import Kernel, grid_position, place_at, table_at, table_between
 from gearbench.fem.contact.kinematics import Tooth, edge_contact
 from gearbench.kernels.compiled import compiled
 from gearbench.kernels.small import eliminate
@@ -136,13 +136,16 @@ def cell_edges(low: float, high: float, n: int) -> Array:
     return out
 
 
+@compiled(forceinline=True)
+def log_antiderivative(t: float) -> float:
+    """t ln|t|: an integral of ln|t| but for -t."""
+    return t * log(abs(t)) if t != 0.0 else 0.0
+
+
 @compiled
 def log_integral(a: float, b: float) -> float:
     """Integral of ln|t| from a to b."""
-    out = b - a
-    fa = a * log(abs(a)) if a != 0.0 else 0.0
-    fb = b * log(abs(b)) if b != 0.0 else 0.0
-    return fb - fa - out
+    return log_antiderivative(b) - log_antiderivative(a) - (b - a)
 
 
 @compiled
@@ -157,22 +160,27 @@ def flexibility_matrix(
     """
     n = len(centres)
     a = np.empty((n, n))
-    xs = np.empty(n)
-    xm = np.empty(n)
     own_s = k_slave.front[k_slave.reach]
     own_m = k_master.front[k_master.reach]
-    for i in range(n):
-        xs[i] = grid_position(k_slave, min(centres[i], k_slave.s_end))
-        xm[i] = grid_position(k_master, feet[i])
     turned = 0.0
     if s0 > k_slave.s_end:
         x0, x1 = grid_position(k_slave, s0), grid_position(k_slave, k_slave.s_end)
         turned = table_at(own_s, x0, x0) - table_at(own_s, x1, x1)
+    # Places are found once for each cell, integrals once for each edge.
+    on_slave = [place_at(grid_position(k_slave, min(centres[i], k_slave.s_end))) for i in range(n)]
+    on_master = [place_at(grid_position(k_master, feet[i])) for i in range(n)]
+    before = np.empty(n)
+    for i in range(n):
+        before[i] = log_antiderivative(edges[0] - centres[i])
     for j in range(n):
         width = edges[j + 1] - edges[j]
         for i in range(n):
-            singular = log_integral(edges[j] - centres[i], edges[j + 1] - centres[i]) / width
-            a[i, j] = table_at(own_s, xs[j], xs[i]) + turned + table_at(own_m, xm[j], xm[i]) - half_plane * singular
+            low, high = edges[j] - centres[i], edges[j + 1] - centres[i]
+            behind = log_antiderivative(high)
+            singular = (behind - before[i] - (high - low)) / width
+            before[i] = behind
+            smooth = table_between(own_s, on_slave[j], on_slave[i]) + turned
+            a[i, j] = smooth + table_between(own_m, on_master[j], on_master[i]) - half_plane * singular
     return a
 
 
