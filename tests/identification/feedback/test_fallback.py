@@ -23,7 +23,7 @@ def record(wander: float) -> xr.Dataset:
     return make_record(channels, {**attributes, "settling_residual": 0.0})
 
 
-@pytest.mark.parametrize(("wander", "most"), [(0.07, 0.05), (0.4, 0.15)])
+@pytest.mark.parametrize(("wander", "most"), [pytest.param(0.07, 0.05, marks=pytest.mark.validation), (0.4, 0.15)])
 def test_a_wander_is_left_to_the_local_polynomial_method(wander: float, most: float) -> None:
     """Half of a radian at branch 1, and 2.5: its result is taken, says so, promises little and is close at branch 0."""
     swinging = record(wander)

@@ -93,13 +93,13 @@ def test_summary_opens_with_the_answers_and_accounts_for_them(done: Path) -> Non
 
 def test_same_case_resumes_and_another_is_refused(done: Path, capsys: pytest.CaptureFixture[str]) -> None:
     before = {name: (done / name).stat().st_mtime_ns for name in DATA | PICTURES}
-    (done / "frozen.nc").unlink()
+    (done / "static.nc").unlink()
     assert run_command_line(["run", "quick_lumped", "--out", str(done), *small(), "--json"]) == 0
     captured = capsys.readouterr()
     assert json.loads(captured.out)["case"] == "quick_lumped"
-    assert "record.nc" not in captured.err and "frozen.nc: done" in captured.err
+    assert "record.nc" not in captured.err and "static.nc: done" in captured.err
     kept = {name: (done / name).stat().st_mtime_ns for name in DATA | PICTURES}
-    assert {name for name in kept if kept[name] != before[name]} == {"frozen.nc"}
+    assert {name for name in kept if kept[name] != before[name]} == {"static.nc"}
     other = small(experiment__seed="2")
     assert run_command_line(["run", "quick_lumped", "--out", str(done), *other]) == 2
     assert "another case" in capsys.readouterr().err
