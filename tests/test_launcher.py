@@ -149,7 +149,8 @@ def test_first_use_installs_and_later_use_does_not(checkout: Checkout, tmp_path:
 
 def test_test_runs_pytest_in_the_checkout(checkout: Checkout) -> None:
     _, out, _ = checkout.run("test", "-k", "a or b")
-    assert out == f"ran in {checkout.home}: -P -m pytest -m not validation -n auto --dist loadfile -k a or b\n"
+    how = "-n auto --dist loadfile --no-loadscope-reorder"
+    assert out == f"ran in {checkout.home}: -P -m pytest -m not validation {how} -k a or b\n"
 
 
 def test_exit_code_is_that_of_the_command(checkout: Checkout) -> None:
