@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 from shared.examples import failures
+from shared.members_here import members_here
 
 import gearbench
 
@@ -109,6 +110,7 @@ def test_names_are_there_from_the_start() -> None:
 @pytest.mark.parametrize("name", sorted(FUNCTIONS.keys() - {"run"}))
 def test_example_is_true(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
+    members_here(monkeypatch)
     assert failures(getattr(gearbench, name), name) == (0, True)
 
 

@@ -105,7 +105,7 @@ def near(meshing: Pair, side: int, angles: tuple[float, float], centre: Array) -
     return found
 
 
-@settings(max_examples=12, **SETTLED)
+@settings(max_examples=8, **SETTLED)
 @given(positions())
 def test_gap_is_the_least_distance(place: tuple[Pair, int, float, tuple[float, float, float]]) -> None:
     meshing, side, phase, moved = place

@@ -130,7 +130,7 @@ def _between_all(tooth: Profile, part: np.ndarray) -> np.ndarray:
     return tooth.rho_form + part * (tooth.rho_end - tooth.rho_form)
 
 
-@settings(max_examples=20, **SETTLED)
+@settings(max_examples=10, **SETTLED)
 @given(likely_gear())
 def test_the_mesh_of_every_gear_is_valid(gear: Gear) -> None:
     tooth = made(gear)
@@ -148,7 +148,7 @@ def test_the_mesh_of_every_gear_is_valid(gear: Gear) -> None:
     assert np.abs(mesh.points[mesh.mirror] - mesh.points * [1.0, -1.0]).max() < 1e-15
 
 
-@settings(max_examples=8, **SETTLED)
+@settings(max_examples=5, **SETTLED)
 @given(likely_gear(), st.integers(5, 24))
 def test_every_tooth_is_the_first_one_turned(gear: Gear, teeth: int) -> None:
     gear = gear.model_copy(update={"teeth": teeth, "hub_radius": 0.3 * gear.module})

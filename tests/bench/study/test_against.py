@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from shared.members_here import members_here
 
 import gearbench as gb
 from gearbench.bench import BenchError
@@ -63,7 +64,8 @@ def test_a_worker_elsewhere_gets_the_whole_reference() -> None:
     assert task_from(json.loads(json.dumps(task_data(task)))) == task
 
 
-def test_a_study_finds_the_stiffness_of_the_measured_rig(tmp_path: Path) -> None:
+def test_a_study_finds_the_stiffness_of_the_measured_rig(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    members_here(monkeypatch)
     law = ("simulation.mesh_stiffness=rectangular", "simulation.stiffness_single_n_per_m=2e8")
     truth = [*FAST, *law, "simulation.stiffness_double_n_per_m=3.4e8"]
     measured = gb.simulate(gb.read_case("quick_lumped", truth))

@@ -56,7 +56,7 @@ def reduced_run(twins: Any, boundary: str, torque: Array) -> Any:
     return machine, reduced.columns(samples)
 
 
-@pytest.mark.parametrize("boundary", ["speed", "torque"])
+@pytest.mark.parametrize("boundary", [pytest.param("speed", marks=pytest.mark.validation), "torque"])
 def test_run_up_moves_as_the_reduced_one_and_gains_its_momentum(
     twins: Any, build: Callable[..., Machine], boundary: str
 ) -> None:

@@ -94,7 +94,7 @@ def ledgers(machine: Machine, steps: int, radius: float, duration: float = 4e-4)
     return states, books
 
 
-@pytest.mark.parametrize("radius", [1.0, 0.6])
+@pytest.mark.parametrize("radius", [pytest.param(1.0, marks=pytest.mark.validation), 0.6])
 def test_energy_is_accounted_for_at_every_step(build: Callable[..., Machine], radius: float) -> None:
     """The identity holds to rounding only if the step has solved its equations: hubs, gears, contact and damping."""
     machine = build(300.0, beta=2e-6, damping=3e3, boundary="torque")

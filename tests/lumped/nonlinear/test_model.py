@@ -34,7 +34,7 @@ def rich_rig(boundary: str) -> Rig:
             "pitch_error": tuple(rng.normal(0, 3e-6, 30)),
             "runout": 7e-6,
             "runout_phase": -0.4,
-            "crack": Crack(tooth=3, stiffness_loss=0.5),
+            "crack": Crack(tooth=1, stiffness_loss=0.5),
         },
         support=Supports(
             driver=Support(stiffness=1e8, damping=3e3, exponent=0.35, reference_deflection=8e-6),
@@ -151,7 +151,7 @@ def test_a_rig_with_every_effect_follows_the_plain_equations(boundary: str) -> N
 
     first = tables(model, Motion(cycles=1.0, entries=2, step=1.0))
     state = model.equilibrium(float(torque(0.0)) / RADII[0], instants(model, first, 0.0, 1))
-    frequency, cycles, steps = 100.0, 3.0, 19200
+    frequency, cycles, steps = 100.0, 2.0, 12800
     time, out = run(model, lambda t: torque(t) / RADII[0], state, mesh_frequency=frequency, cycles=cycles, steps=steps)
     assert out.mesh_force.min() > 0
     motion = np.stack(out[:COORDINATES], axis=1)

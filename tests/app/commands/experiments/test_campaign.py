@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from shared.members_here import members_here
 from shared.pages import fetched
 
 import gearbench as gb
@@ -39,11 +40,7 @@ def rows(folder: Path) -> list[dict[str, str]]:
 @pytest.fixture
 def here(monkeypatch: pytest.MonkeyPatch) -> None:
     """Members in this process and no pictures, where starting one and drawing are not what is tested."""
-
-    def compute_here(tasks: Iterable[Task], workers: int) -> Iterator[Found]:
-        yield from map(compute, tasks)
-
-    monkeypatch.setattr("gearbench.bench.study.processes.compute_here", compute_here)
+    members_here(monkeypatch)
     for name in ("scatter", "tornado"):
         target = f"gearbench.figures.studies.study.draw_{name}"
         monkeypatch.setattr(target, lambda *held: held[-1].write_text("<svg></svg>"))
