@@ -4,6 +4,7 @@ model."""
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from math import cos, pi, sin, tanh
 from typing import Any
 
@@ -60,8 +61,13 @@ def rich_rig(boundary: str) -> Rig:
 def pair_stiffness(phase: float, n: int) -> float:
     """That of pair n [N/m], between the phases of the law's tables as these are read."""
     low, weight = divmod(phase * PHASES, 1.0)
-    ends = [float(stiffness(row / PHASES) * hat(row / PHASES - n)) for row in (low, low + 1)]
-    return ends[0] + weight * (ends[1] - ends[0])
+    first, second = in_row(low, n), in_row(low + 1, n)
+    return first + weight * (second - first)
+
+
+@cache
+def in_row(row: float, n: int) -> float:
+    return float(stiffness(row / PHASES) * hat(row / PHASES - n))
 
 
 def plain_equations(rig: Rig, mesh_frequency: float, torque: Callable[[float], float]) -> Callable[..., list[float]]:
