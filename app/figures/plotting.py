@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import NDArray
 
 from gearbench.files import write_whole
@@ -69,6 +70,14 @@ def _print(drawing: Figure, path: Path, metadata: dict[str, None]) -> None:
         FigureCanvasSVG(drawing).print_svg(path, metadata=metadata)
     else:
         drawing.savefig(path, metadata=metadata)
+
+
+def log_ticks(axis: Any, low: float, high: float, text: Callable[[float], str] = "{:g}".format) -> None:
+    """Ticks of a logarithmic axis whose range is low to high: at 1, 2 and 5 of each decade where these are few, all
+    written alike (matplotlib writes those between decades as powers)."""
+    axis.set_major_locator(LogLocator(10, (1.0, 2.0, 5.0) if high < 200 * low else (1.0,)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: text(value)))
+    axis.set_minor_formatter(NullFormatter())
 
 
 def closed(phase: Array, values: Array, period: float = 1.0) -> tuple[Array, Array]:

@@ -79,7 +79,7 @@ def _answer(rows: Sequence[Mapping[str, Any]], unit: str, roots: Sequence[Mappin
     if len(rows) > 1 and unit != "um":
         least = min(rows, key=lambda row: float(row["te_peak_to_peak_um"]))
         least_swing = f"{least['te_peak_to_peak_um']:.3g} um"
-        said[0] += f" Of {len(rows)} loads {least['load']:g} N m swings least: {least_swing}."
+        said[0] += f" Of {len(rows)} loads it is least under {least['load']:g} N m: {least_swing}."
     low, high = main["stiffness_least_n_per_um"], main["stiffness_most_n_per_um"]
     said.append(f"The tangent mesh stiffness runs from {low:.4g} to {high:.4g} N/um over the mesh period.")
     if roots:
@@ -164,7 +164,7 @@ def _roots(result: xr.Dataset, roots: Sequence[Mapping[str, Any]]) -> list[str]:
     """Root stress of one tooth of each gear under the largest load, beside ISO."""
     if not roots:
         reason = str(result.attrs.get("root_stress_note", ""))
-        return [text("Root stress", "h2"), text(f"None: {reason}.")] if reason else []
+        return [text("Root stress", "h2"), text(f"Not given: {reason}.")] if reason else []
     data = max(roots, key=lambda one: float(one["torque_nm"]))
     load = int(np.argmax(result["torque"].values.mean(axis=1)))
     traces = []

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.figures.plotting import BLUE, GREEN, GREY, ORANGE, figure, save
+from gearbench.figures.plotting import BLUE, GREEN, GREY, ORANGE, figure, log_ticks, save
 from gearbench.words.diagnosis import CHANNELS, STAGE_WORDS, STAGES, whole_band
 from gearbench.words.diagnosis import number as number_of
 
@@ -60,15 +60,11 @@ def draw_gap(path: Path, gaps: Sequence[Gap], record: str) -> None:
 
 def _plain_ticks(axes: Any) -> None:
     """Ticks at 1, 2, 5 in each decade, written as plain numbers; the range spans at least one decade."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-
     low, high = axes.get_xlim()
     if high < 10 * low:
         low = high / 10
     axes.set_xlim(low, high)
-    axes.xaxis.set_major_locator(LogLocator(10, (1.0, 2.0, 5.0) if high < 200 * low else (1.0,)))
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.xaxis.set_minor_formatter(NullFormatter())
+    log_ticks(axes.xaxis, low, high)
 
 
 def draw_traces(path: Path, traces: Traces) -> None:

@@ -19,11 +19,11 @@ MOST_CURVES = 12
 
 
 def plot_static(result: xr.Dataset, path: Path, zones: Sequence[Span] = (), label: str = "") -> None:
-    """Transmission error at every load over mesh phase, without load where known, and its swing over the load; `zones`
-    are shaded where there is one load."""
+    """Transmission error at every load over mesh phase, without load where known, and its peak-to-peak value over the
+    load; `zones` are shaded where there is one load."""
     te = 1e6 * result["transmission_error"].values
     loads, unit = result["load"].values, result["load"].attrs["units"]
-    if len(loads) == 1:  # no swing over the load
+    if len(loads) == 1:  # nothing over the load
         with figure(size=(8.0, 4.5)) as (drawing, axes):
             shade(axes, zones, label)
             _curves(axes, result, te, loads, unit)
@@ -41,7 +41,7 @@ def plot_static(result: xr.Dataset, path: Path, zones: Sequence[Span] = (), labe
         else:
             swing, label = np.ptp(te, axis=1), "TE, peak to peak [um]"
         right.plot(scale * loads[order], swing[order], "o-", color=BLUE, ms=4)
-        right.set(title="Swing over the load", xlabel=name, ylabel=label, ylim=(0, None))
+        right.set(title="Peak to peak over the load", xlabel=name, ylabel=label, ylim=(0, None))
         save(drawing, path)
 
 

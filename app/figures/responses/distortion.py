@@ -6,9 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import xarray as xr
-from matplotlib.ticker import FuncFormatter
 
-from gearbench.figures.plotting import BLUE, GREEN, GREY, ORANGE, figure, save
+from gearbench.figures.plotting import BLUE, GREEN, GREY, ORANGE, figure, log_ticks, save
 
 _PURPLE = "#8a3f8f"
 _STYLES = {
@@ -37,7 +36,7 @@ def draw_distortion(path: Path, split: xr.Dataset) -> None:
             rms = 1e9 * float(split.attrs["noise_rms"])
             axes.plot(frequency[known], noise[known], color=GREEN, lw=0.8, label=f"noise, {rms:.3g} nm rms", zorder=0)
         axes.set_yscale("log")
-        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        log_ticks(axes.yaxis, *axes.get_ylim())
         axes.set_xlim(0.0, frequency[-1])
         axes.set_xlabel("frequency [Hz]")
         axes.set_ylabel("DTE of a line, rms [nm]")

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 from matplotlib.colors import LogNorm
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, PercentFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import NDArray
 
-from gearbench.figures.plotting import BLUE, GREEN, GREY, ORANGE, figure, phase_axis, save
+from gearbench.figures.plotting import BLUE, GREEN, GREY, ORANGE, figure, log_ticks, phase_axis, save
 from gearbench.figures.responses.frf import coarse_map, magnitude, whole_cells
 
 Array = NDArray[np.float64]
@@ -65,8 +65,8 @@ def draw_branches(path: Path, frf: xr.Dataset) -> None:
             low, high = np.maximum(values - band, floor), np.maximum(values + band, floor)
             axes.fill_between(frf["frequency"].values, low, high, color=colour, alpha=0.2, lw=0)
         axes.set_yscale("log")
-        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         axes.set_ylim(1e-3 * size.max(), 1.5 * (size + _BAND * spread)[strongest].max())
+        log_ticks(axes.yaxis, *axes.get_ylim())
         axes.set_xlim(float(frf["frequency"].values[0]), float(frf["frequency"].values[-1]))
         axes.set_xlabel("frequency of the force [Hz]")
         axes.set_ylabel("|G_l| [nm/N]")
@@ -82,14 +82,15 @@ def draw_quality(path: Path, frf: xr.Dataset) -> None:
     power = np.mean(magnitude(frf) ** 2, axis=1)
     spread = np.sqrt(np.mean(frf["itf_var"].values, axis=1) / np.maximum(power, np.finfo(float).tiny))
     with figure(size=(9.0, 4.4)) as (drawing, axes):
-        axes.plot(frequency, left, color=ORANGE, lw=1.0, label="residual over response of the lines around")
-        axes.plot(frequency, spread, color=BLUE, lw=1.0, label="standard deviation of the ITF over the ITF")
+        axes.plot(frequency, 100 * left, color=ORANGE, lw=1.0, label="residual over response of the lines around")
+        axes.plot(frequency, 100 * spread, color=BLUE, lw=1.0, label="standard deviation of the ITF over the ITF")
         axes.set_yscale("log")
-        axes.yaxis.set_major_formatter(PercentFormatter(1.0))
+        log_ticks(axes.yaxis, *axes.get_ylim(), text="{:g} %".format)
         axes.set_xlim(frequency[0], frequency[-1])
         axes.set_xlabel("frequency [Hz]")
-        axes.set_ylabel("rms, relative")
-        axes.set_title(f"Expected error of the ITF, all in all: {float(frf.attrs.get('expected_error', np.nan)):.1%}")
+        axes.set_ylabel("relative rms")
+        error = 100 * float(frf.attrs.get("expected_error", np.nan))
+        axes.set_title(f"Expected error of the ITF, all in all: {error:.2g} %")
         axes.legend(loc="best", frameon=True, framealpha=0.9)
         save(drawing, path)
 
@@ -106,8 +107,8 @@ def draw_orders(path: Path, orders: xr.DataArray, teeth: int | None) -> None:
         on = np.array([int(np.argmin(np.abs(order - tick))) for tick in ticks[ticks <= order[-1]]])
         axes.plot(order[on], size[on], "o", color=ORANGE, ms=5, label="mesh orders 1, 2, ..")
         axes.set_yscale("log")
-        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         axes.set_ylim(0.5 * low, 2.0 * size.max())
+        log_ticks(axes.yaxis, *axes.get_ylim())
         axes.set_xlim(0.0, order[-1])
         of = "driver's shaft" if orders.attrs["reference"] == "driver" else "mesh"
         axes.set_xlabel(f"order of the {of}")
