@@ -17,7 +17,7 @@ def _delay(channel: str) -> Any:
 
 
 def _gain(channel: str) -> Any:
-    return quantity(1.0, gt=0.0, le=10.0, doc=f"factor by which channel {channel} shows too much; 1: true")
+    return quantity(1.0, gt=0.0, le=10.0, doc=f"sensitivity error of channel {channel}: shown over true value")
 
 
 def _runout(gear: str) -> Any:
@@ -27,7 +27,7 @@ def _runout(gear: str) -> Any:
 
 
 def _runout_phase(gear: str) -> Any:
-    return quantity(0.0, "deg", doc=f"rotation of the {gear} at which angle_{gear} reads most too much")
+    return quantity(0.0, "deg", doc=f"rotation of the {gear} at which angle_{gear} exceeds the true angle most")
 
 
 class Sensors(Value):

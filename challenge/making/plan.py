@@ -10,7 +10,7 @@ import numpy as np
 from gearbench.challenge.errors import ChallengeError
 from gearbench.challenge.truth.effects import EFFECTS, FOREIGN, SEVERITY
 
-# Controls, cases with an effect, foreign ones: shares of the issue's reach.
+# Controls, cases with an effect, foreign ones: as many as a scoring by which the diagnosis is judged has.
 SHARES = (60, 81, 30)
 MOST_CASES = 10_000
 
@@ -40,7 +40,7 @@ class Plan:
 
 
 def default_mix(cases: int) -> Mix:
-    """The issue's shares of `cases` cases; effects as evenly as that goes."""
+    """`cases` cases in SHARES; effects as evenly as that goes."""
     controls, foreign = (round(cases * share / sum(SHARES)) for share in (SHARES[0], SHARES[2]))
     rest = cases - controls - foreign
     each, more = divmod(rest, len(EFFECTS))

@@ -25,8 +25,11 @@ AnswersOption = Annotated[Path, typer.Option("--answers", metavar="FILE", help="
 def make(
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="folder of the cases")],
     answers: AnswersOption,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="seed of all draws; only the answers hold it")],
-    cases: Annotated[int, typer.Option("--cases", min=1, help="number of cases, in the shares of the reach")] = 171,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="seed of the random draws; written into the answers only")],
+    cases: Annotated[
+        int,
+        typer.Option("--cases", min=1, help="number of cases: without, with a known, with a foreign effect, 60:81:30"),
+    ] = 171,
     rig: Annotated[str, typer.Option("--rig", metavar="CASE", help="case of the nominal rig")] = "gap_demo",
     family: Annotated[
         str, typer.Option("--family", help="structure of the truth rigs: development, calibration or test")
