@@ -11,6 +11,7 @@ that disagree, only from those that agree once one channel is taken for what it 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,7 +60,7 @@ class Accounts:
             scale = 0.5 * (_size(first, turn) + _size(second, turn))
             return _size(first - second, turn) / scale
         gear = relation[1].removeprefix("y_")
-        basis = _orthonormal(self._columns(gear)).conj()
+        basis = self._bases[gear]
         if relation[1] in channels:  # a turned y is a force turned the other way: Re(turn* F b*) = Re(turn F* b)
             inside = (first[1] @ basis).real + (turn @ (first[0][:, None] * basis).conj()).real
         else:
@@ -89,6 +90,11 @@ class Accounts:
         for name, part in self.gears[gear].items():
             out[int(name in channels)] += part
         return out
+
+    @cached_property
+    def _bases(self) -> dict[str, Complexes]:
+        """Centre -> what its support may answer, conjugate and orthonormal: it does not depend on what is turned."""
+        return {centre: _orthonormal(self._columns(centre)).conj() for centre in self.centres}
 
     def _columns(self, centre: str) -> Complexes:
         y = SIGNS[centre] * self.centres[centre]
