@@ -20,7 +20,7 @@ PANELS = {
     "place": "Place, beyond recalibration",
     "channel": "Channel",
     "band": "Band",
-    "class": "Residue class of the line",
+    "class": "Kind of spectral line",
     "phase": "Mesh phase",
     "condition": "Condition",
 }
@@ -113,7 +113,7 @@ def _legend(drawing: Any, shares: Sequence[Share]) -> None:
         handles.append(Line2D([], [], color=GREY, linewidth=2, label="measurement noise explains"))
     if any(share.floor_nominal is not None for share in shares):
         handles.append(
-            Line2D([], [], color=ORANGE, linewidth=2, label="the nominal uncertainties explain (dotted: more)")
+            Line2D([], [], color=ORANGE, linewidth=2, label="the nominal uncertainties explain (dotted: beyond the axis)")
         )
     drawing.legend(handles=handles, loc="outside lower center", ncols=3)
 
