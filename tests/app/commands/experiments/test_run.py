@@ -18,6 +18,7 @@ from shared.pages import fetched
 
 import gearbench as gb
 from gearbench.cli import run_command_line
+from gearbench.figures import plotting
 from gearbench.rig import read_case
 
 # The case of the example in the docstring of `run`.
@@ -46,7 +47,9 @@ def small(**more: str) -> list[str]:
 @pytest.fixture(scope="module")
 def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("run") / "out_first"
-    assert run_command_line(["run", "quick_lumped", "--out", str(folder), *small()]) == 0
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(plotting._STYLE, "figure.dpi", 40)  # a tenth of the dots to draw
+        assert run_command_line(["run", "quick_lumped", "--out", str(folder), *small()]) == 0
     return folder
 
 
