@@ -41,8 +41,8 @@ def sweep_page(
         text("How far to trust it", "h2"),
         text(
             f"Every speed begins where the one before ended; it has settled when the DTE changes by less than a"
-            f" thousandth of its standard deviation from look to look. {_restless(result)} K_v of ISO 6336-1 is that of"
-            " discs that turn freely, without supports and shafts."
+            f" thousandth of its standard deviation from check to check. {_restless(result)} K_v of ISO 6336-1 is that"
+            " of discs that turn freely, without supports and shafts."
         ),
         *limits(str(result.attrs["model"])),
         text("Files beside this page", "h2"),

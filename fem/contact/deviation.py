@@ -31,7 +31,7 @@ LEAST_ROLL = 1e-4  # [m]: closer to the base circle the flank's curvature says n
 
 
 class Flanks(NamedTuple):
-    """What one gear's flanks have too much.
+    """Excess material of one gear's flanks.
 
     front, front_slope (rows, NODES): envelope [m] and its derivative by the roll length, of the working flanks; one row
     for all teeth, or one for each. back, back_slope (1, NODES): of the back flanks. start, step [m]: roll lengths.

@@ -48,7 +48,7 @@ NEAR = 0.25  # of the base pitch: how far beyond the path of contact tooth pairs
 
 class Law(NamedTuple):
     """Contact law: both teeth, both kernels, centre distance [m], 2/(pi E* b) [m/N], the load-approach curves, how
-    far, in roll length, the tip edges of driver and driven gear reach [m], what their flanks have too much, and how
+    far, in roll length, the tip edges of driver and driven gear reach [m], their flanks' excess material, and how
     much that moves a gap at most [m] (0: ideal flanks)."""
 
     driver: Tooth
@@ -93,7 +93,7 @@ def make_law(
 
 
 def _deviations(meshing: Pair, gears: tuple[Gear, Gear] | None, reach1: float, reach2: float) -> tuple[Flanks, Flanks]:
-    """What the flanks of driver and driven gear have too much. Raises GeometryError."""
+    """Excess material of the flanks of driver and driven gear. Raises GeometryError."""
     if gears is None or all(gear.model_copy(update={"crack": None}) == sound_gear(gear) for gear in gears):
         return ideal_flanks(meshing.driver.teeth), ideal_flanks(meshing.driven.teeth)
     line = meshing.line_of_action

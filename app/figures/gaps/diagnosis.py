@@ -113,7 +113,7 @@ def _legend(drawing: Any, shares: Sequence[Share]) -> None:
         handles.append(Line2D([], [], color=GREY, linewidth=2, label="measurement noise explains"))
     if any(share.floor_nominal is not None for share in shares):
         handles.append(
-            Line2D([], [], color=ORANGE, linewidth=2, label="the nominal uncertainties explain (dotted: beyond the axis)")
+            Line2D([], [], color=ORANGE, linewidth=2, label="nominal uncertainties explain (dotted: beyond the axis)")
         )
     drawing.legend(handles=handles, loc="outside lower center", ncols=3)
 
