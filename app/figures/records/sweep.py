@@ -48,7 +48,7 @@ def plot_waterfall(result: xr.Dataset, path: Path) -> None:
     level = np.log10(np.maximum(amplitude, FLOOR * top))
     step = np.ptp(rpm) / max(len(rpm) - 1, 1) or 1.0
     with figure(size=(8.5, 6.0)) as (drawing, axes):
-        # Every speed stands on its own line; a decade is as high as two speeds are apart.
+        # Every speed stands on its own line; a decade is twice as high as two speeds are apart.
         for line, speed in zip(level[::-1], rpm[::-1], strict=True):
             height = speed + 2 * step * (line - np.log10(FLOOR * top))
             axes.fill_between(order[shown], speed, height, color="white", lw=0)
@@ -56,7 +56,7 @@ def plot_waterfall(result: xr.Dataset, path: Path) -> None:
         axes.set(
             xlabel="mesh order",
             ylabel="driver speed [1/min]",
-            title=f"DTE, upwards: base line {FLOOR * top:.2g} um, a decade for two speeds' distance",
+            title=f"DTE at rising speed: each line stands on {FLOOR * top:.2g} um, a decade is two lines' spacing",
         )
         axes.grid(visible=False)
         save(drawing, path)
