@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,6 +16,16 @@ from gearbench.rig import Support
 Array = NDArray[np.float64]
 
 BISECTIONS = 100
+
+
+class Around(NamedTuple):
+    """A rig around its mesh: springs [N/m] and dampers [N s/m] (n, n) between its coordinates, inverse masses [1/kg]
+    (n,), 0 for what does not move, and what each coordinate contributes to the DTE (n,)."""
+
+    springs: Array
+    dampers: Array
+    inverse: Array
+    mesh: Array
 
 
 def centre_at_rest(support: Support, push: float, aside: float) -> tuple[float, float]:

@@ -1,5 +1,5 @@
 """Small departures from a motion of the non-linear lumped model, compiled: what a little more force in the mesh, or on
-the driver's shaft, does to every coordinate.
+one coordinate, does to every coordinate.
 
 Along a given motion the mesh is a spring k(t) and a damper c(t), so that departures q obey
 
@@ -18,8 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.kernels.compiled import ROUNDING, compiled
+from gearbench.lumped.nonlinear.coordinates import IN_MESH
 
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 
 class Tangent(NamedTuple):
@@ -36,21 +38,22 @@ class Tangent(NamedTuple):
     step: float
 
 
-def departures(tangent: Tangent, forces: Array, on: int | None, substeps: int, early: int) -> tuple[Array, Array]:
+def departures(tangent: Tangent, forces: Array, on: Integers, substeps: int, early: int) -> tuple[Array, Array]:
     """Departures (samples, n, columns) of the coordinates [m] and (samples, columns) of the mesh force [N] under forces
-    (entries, columns) [N] in the mesh, or on the coordinate `on`; `early` steps before the first sample begin at rest.
+    (entries, columns) [N], each in the mesh or on one coordinate, `on` (columns,): its number or `IN_MESH`; `early`
+    steps before the first sample begin at rest.
     """
     entries, columns = forces.shape
     size = len(tangent.inverse)
     samples = entries // (2 * substeps)
     places, pushes = np.empty((samples, size, columns)), np.empty((samples, columns))
     inverse = tangent.inverse[:, None]
-    in_mesh = 1.0 if on is None else 0.0
-    direction = -tangent.inverse * tangent.mesh if on is None else tangent.inverse * (np.arange(size) == on)
+    in_mesh = on == IN_MESH
+    direction = inverse * np.where(in_mesh, -tangent.mesh[:, None], np.arange(size)[:, None] == on)
     _run(
         -inverse * tangent.springs, -inverse * tangent.dampers, tangent.mesh, -tangent.inverse * tangent.mesh,
-        direction, in_mesh, tangent.stiffness, tangent.damping, np.ascontiguousarray(forces), tangent.step, substeps,
-        early, places, pushes,
+        direction, in_mesh.astype(float), tangent.stiffness, tangent.damping, np.ascontiguousarray(forces),
+        tangent.step, substeps, early, places, pushes,
     )  # fmt: skip
     return places, pushes
 
@@ -70,7 +73,7 @@ def _rates(
                 push[p] += mesh[i] * (k * q[i, p] + c * v[i, p])
     for i in range(size):
         for p in range(columns):
-            out[i, p] = pushed[i] * push[p] + direction[i] * force[p]
+            out[i, p] = pushed[i] * push[p] + direction[i, p] * force[p]
         for j in range(size):
             if springs[i, j] != 0.0 or dampers[i, j] != 0.0:
                 for p in range(columns):
@@ -79,7 +82,7 @@ def _rates(
 
 @compiled(fastmath=ROUNDING)
 def _run(
-    springs: Array, dampers: Array, mesh: Array, pushed: Array, direction: Array, in_mesh: float, stiffness: Array,
+    springs: Array, dampers: Array, mesh: Array, pushed: Array, direction: Array, in_mesh: Array, stiffness: Array,
     damping: Array, forces: Array, h: float, substeps: int, early: int, places: Array, pushes: Array,
 ) -> None:  # fmt: skip
     """Fill places and pushes."""
@@ -100,7 +103,7 @@ def _run(
                 for p in range(columns):
                     places[sample, c, p] = q[c, p]
             for p in range(columns):
-                pushes[sample, p] = push[p] + in_mesh * forces[i, p]
+                pushes[sample, p] = push[p] + in_mesh[p] * forces[i, p]
         for c in range(size):
             for p in range(columns):
                 q2[c, p] = q[c, p] + 0.5 * h * v[c, p]
