@@ -27,7 +27,7 @@ MOST = 3  # steps per sample that suffice: the frequency of a mode at 0.2 of the
 STABLE = 1.8  # largest rate of a mode times the step: Runge-Kutta bears 2.8
 # Of its first size, that free vibrations keep when the first sample is taken: a mean is far larger than the lines.
 TRANSIENT = 1e-9
-AT_ONCE = 48  # departures carried together: their states stay in the fastest memory
+AT_ONCE = 96  # departures carried together: their states stay in the fastest memory
 
 U1, Y1, Y2, U2, W, LOAD = (NAMES.index(name) for name in ("u1", "y1", "y2", "u2", "w", "load"))
 
@@ -67,7 +67,7 @@ class Along:
         found = [departures(self.tangent, forces[:, one], on[one], self.substeps, self.early) for one in parts]
         places = np.concatenate([one for one, _ in found], axis=2)
         u1, y1, y2, u2 = (np.ascontiguousarray(places[:, number, :].T) for number in (U1, Y1, Y2, U2))
-        dte = np.ascontiguousarray((places.transpose(0, 2, 1) @ self.tangent.mesh).T)
+        dte = np.ascontiguousarray((places.transpose(0, 2, 1) @ self.tangent.mesh.astype(np.float32)).T)
         seen = {"dte": dte, "angle_driver": u1, "angle_driven": u2, "y_driver": y1, "y_driven": y2}
         twist = u2 - places[:, LOAD, :].T if self.model.rig.load.twists else None
         mesh = np.concatenate([two for _, two in found], axis=1).T

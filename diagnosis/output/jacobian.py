@@ -127,7 +127,7 @@ def _by_tooth(tooth: NDArray[np.int64], stiffness: Array, count: int) -> Array:
     out = np.zeros((len(tooth), count))
     rows = np.arange(len(tooth))
     for column in range(tooth.shape[1]):
-        np.add.at(out, (rows, tooth[:, column]), stiffness[:, column])
+        out[rows, tooth[:, column]] += stiffness[:, column]
     return out
 
 
@@ -154,8 +154,8 @@ def around_forces(along: Along, others: Sequence[Other]) -> list[tuple[int, int,
 
 
 def others_of(layout: Layout, p: Array, sd: Array, chosen: Flags) -> list[Other]:
-    """The rigs around `p` (size,) in each of which one chosen unknown of what holds the gears is moved, by a part of its
-    `sd` (size,), as far as they have the same coordinates as that of `p` and it has what is moved."""
+    """The rigs around `p` (size,) in each of which one chosen unknown of what holds the gears is moved, by a part of
+    its `sd` (size,), as far as they have the same coordinates as that of `p` and it has what is moved."""
     # Its time loop is compiled on import, which not every user of this module wants.
     from gearbench.lumped.nonlinear.model import nonlinear_model
 

@@ -37,6 +37,10 @@ class Simulator:
     replays: int = 0
     _kept: dict[bytes, Complex] = field(default_factory=dict)
 
+    def of_record(self, number: int) -> Simulator:
+        """The same for one record alone."""
+        return Simulator(self.layout, self.target.of_record(number), self.simulate)
+
     def lines(self, p: Array) -> Complex | None:
         """Simulated lines (K,) of unknowns (size,); None where no rig has them or it does not settle."""
         key = p.tobytes()

@@ -33,7 +33,8 @@ def test_an_oscillator_answers_as_its_receptance_says(on_drive: bool) -> None:
     tangent, rate = oscillator(1 / 3)
     time = np.arange(2 * SUBSTEPS * SAMPLES) * tangent.step / 2
     forces = np.stack([np.cos(rate * time), 5.0 * np.sin(rate * time)], axis=1)
-    places, pushes = departures(tangent, forces, np.full(2, 0 if on_drive else IN_MESH), SUBSTEPS, 5 * SUBSTEPS * SAMPLES)
+    on = np.full(2, 0 if on_drive else IN_MESH)
+    places, pushes = departures(tangent, forces, on, SUBSTEPS, 5 * SUBSTEPS * SAMPLES)
     receptance = 1 / (STIFFNESS - rate**2 * MASS + 1j * rate * DAMPING)
     sign = 1.0 if on_drive else -1.0
     at = time[:: 2 * SUBSTEPS]
