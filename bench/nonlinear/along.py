@@ -12,15 +12,14 @@ from numpy.typing import NDArray
 from gearbench.bench.nonlinear.replay import Steady, resampled
 from gearbench.lumped.nonlinear.coordinates import IN_MESH, NAMES
 from gearbench.lumped.nonlinear.law import MeshLaw
-from gearbench.lumped.nonlinear.model import NonLinear
+from gearbench.lumped.nonlinear.model import LEAST_DEFLECTION, NonLinear
 from gearbench.lumped.nonlinear.pressing import Pressed, of_pairs, pressed
-from gearbench.lumped.nonlinear.rest import Around
+from gearbench.lumped.nonlinear.rest import inverse_masses, springs_and_dampers, support_directions
 from gearbench.lumped.nonlinear.step import columns
 from gearbench.lumped.nonlinear.tables import instants
 from gearbench.lumped.nonlinear.tangent import Tangent, departures
 
 Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 Integers = NDArray[np.int64]
 
 MOST = 3  # steps per sample that suffice: the frequency of a mode at 0.2 of the sampling rate is then right to 3e-4
@@ -29,6 +28,7 @@ STABLE = 1.8  # largest rate of a mode times the step: Runge-Kutta bears 2.8
 TRANSIENT = 1e-9
 AT_ONCE = 96  # departures carried together: their states stay in the fastest memory
 
+SUPPORT = ("stiffness", "exponent", "reference")  # of both supports among the constants
 U1, Y1, Y2, U2, W, LOAD = (NAMES.index(name) for name in ("u1", "y1", "y2", "u2", "w", "load"))
 
 
@@ -67,11 +67,15 @@ class Along:
         found = [departures(self.tangent, forces[:, one], on[one], self.substeps, self.early) for one in parts]
         places = np.concatenate([one for one, _ in found], axis=2)
         u1, y1, y2, u2 = (np.ascontiguousarray(places[:, number, :].T) for number in (U1, Y1, Y2, U2))
-        dte = np.ascontiguousarray((places.transpose(0, 2, 1) @ self.tangent.mesh.astype(np.float32)).T)
+        dte = u1 - u2 + self.model.factor * (y1 - y2)
         seen = {"dte": dte, "angle_driver": u1, "angle_driven": u2, "y_driver": y1, "y_driven": y2}
         twist = u2 - places[:, LOAD, :].T if self.model.rig.load.twists else None
         mesh = np.concatenate([two for _, two in found], axis=1).T
-        return {**seen, "reaction": mesh if twist is None else self._twisted(twist)}
+        reaction = mesh if twist is None else self._twisted(twist)
+        # What pushes at an end that is held is borne there.
+        held = on == LOAD
+        reaction[held] += forces[:: 2 * self.substeps, held].T
+        return {**seen, "reaction": reaction}
 
     def _twisted(self, twist: Array) -> Array:
         """Force [N] of the load's shaft twisted by so much (columns, samples) [m]."""
@@ -86,44 +90,13 @@ class Along:
         """Circular frequencies [rad/s] of the lines of one repetition."""
         return 2 * np.pi * np.fft.rfftfreq(len(self.places), 1 / self.sampling_rate)
 
-    @cached_property
-    def _lines(self) -> Complex:
-        """Lines (n, K) of all coordinates [m]."""
-        return np.fft.rfft(self.places, axis=0).T / len(self.places)
-
-    @cached_property
-    def around(self) -> Around:
-        """The rig around its mesh, with its supports as stiff as they are on average."""
-        return self.model.around(_mean_deflections(self.model, self.places))
-
-    def deflection(self, side: int) -> Array:
-        """Deflection (entries,) [m] of a support along its direction."""
-        return resampled(_deflections(self.model, self.places)[side], len(self.phase))
-
-    def shares(self, side: int) -> dict[int, float]:
-        """What the force of a support pulls at, by coordinate: its gear, and the housing by the shares that it makes of
-        its motions."""
-        structure = self.model.structure
-        out = {(Y1, Y2)[side]: 1.0}
-        if structure is not None:
-            for name, moves in (("housing", structure.housing), ("rocking", structure.rocking)):
-                out[NAMES.index(name)] = -(moves.share1, moves.share2)[side]
-        return out
-
     def turned_into(self, other: NonLinear) -> dict[int, Array]:
         """Forces (entries,) [N] by coordinate, or in the mesh, that do in first order what turning into `other` does, a
         model like this one that differs by little around its mesh."""
-        here, there = self.around, other.around(_mean_deflections(self.model, self.places))
         forces: dict[int, Array] = {}
-        for number in np.flatnonzero(here.inverse > 0.0):
-            springs, dampers = (there[part][number] - here[part][number] for part in (0, 1))
-            mass = 1.0 / there.inverse[number] - 1.0 / here.inverse[number]
-            if not (springs.any() or dampers.any() or mass):
-                continue
-            lines = springs @ self._lines + 1j * self._omega * (dampers @ self._lines)
-            lines -= self._omega**2 * mass * self._lines[number]
-            samples, entries = len(self.places), len(self.phase)
-            forces[int(number)] = resampled(np.fft.irfft(-samples * lines, samples), entries)
+        moved = _pull(other, self.places, self._omega) - _pull(self.model, self.places, self._omega)
+        for number in np.flatnonzero(moved.any(axis=1)):
+            forces[int(number)] = resampled(-moved[number], len(self.phase))
         more = other.constants().damping_factor - self.model.constants().damping_factor
         if more:
             forces[IN_MESH] = more * np.sqrt(self.tangent.stiffness) * self.rate
@@ -169,7 +142,7 @@ def along(steady: Steady) -> Along:
         rate=resampled(rate, entries) + table.excess_rate[:entries],
         law=model.law,
         level=level,
-        tangent=Tangent(*around, slope, damping, step),
+        tangent=Tangent(*around, slope, damping, step, *_bearings(model, places, entries)),
         substeps=substeps,
         early=min(ceil(log(1 / TRANSIENT) / decay / step), samples * substeps),
         places=places,
@@ -177,20 +150,48 @@ def along(steady: Steady) -> Along:
     )
 
 
-def _deflections(model: NonLinear, places: Array) -> tuple[Array, Array]:
-    """Deflections (samples,) [m] of both supports along their direction, from the places (samples, n)."""
-    y1, y2, structure = places[:, Y1], places[:, Y2], model.structure
-    if structure is None:
-        return y1, y2
-    for name, moves in (("housing", structure.housing), ("rocking", structure.rocking)):
-        moved = places[:, NAMES.index(name)]
-        y1, y2 = y1 - moves.share1 * moved, y2 - moves.share2 * moved
-    return y1, y2
+def _pull(model: NonLinear, places: Array, omega: Array) -> Array:
+    """Forces (n, samples) [N] with which springs, dampers and masses of a rig around its mesh hold its coordinates at
+    `places` (samples, n); omega (K,): circular frequencies [rad/s] of their lines."""
+    constants, structure = model.constants(), model.structure
+    springs, dampers = springs_and_dampers(constants, structure, (0.0, 0.0))
+    inverse = inverse_masses(constants, structure)
+    masses = np.divide(1.0, inverse, out=np.zeros_like(inverse), where=inverse > 0.0)
+    lines = np.fft.rfft(places, axis=0).T
+    lines = springs @ lines + 1j * omega * (dampers @ lines) - omega**2 * masses[:, None] * lines
+    out: Array = np.fft.irfft(lines, len(places), axis=1)
+    for side, along in enumerate(support_directions(structure)):
+        stiffness, exponent, reference = (getattr(constants, f"{name}{side + 1}") for name in SUPPORT)
+        deflection = places @ along
+        out += np.outer(along, stiffness * deflection * (np.abs(deflection) / reference) ** exponent)
+    still = inverse == 0.0
+    still[LOAD:][:1] = False  # it bears a reaction
+    out[still] = 0.0
+    return out
+
+
+def _bearings(model: NonLinear, places: Array, entries: int) -> tuple[Array, Array]:
+    """What coordinates contribute to the deflection of supports whose stiffness depends on it (b, n), and how much
+    stiffer than on average they are (entries, b) [N/m] at the places (samples, n)."""
+    constants = model.constants()
+    directions, stiffer = [], []
+    for side, along in enumerate(support_directions(model.structure)):
+        stiffness, exponent, reference = (getattr(constants, f"{name}{side + 1}") for name in SUPPORT)
+        if exponent:
+            deflection = resampled(places @ along, entries)
+            size = np.maximum(np.abs(np.array([*deflection, deflection.mean()])), LEAST_DEFLECTION) / reference
+            tangent = stiffness * (1 + exponent) * size**exponent
+            directions.append(along)
+            stiffer.append(tangent[:-1] - tangent[-1])
+    if not directions:
+        return np.empty((0, places.shape[1])), np.empty((entries, 0))
+    return np.stack(directions), np.stack(stiffer, axis=1)
 
 
 def _mean_deflections(model: NonLinear, places: Array) -> tuple[float, float]:
-    one, two = _deflections(model, places)
-    return float(one.mean()), float(two.mean())
+    """Those [m] of both supports along their direction, at the places (samples, n)."""
+    one, two = (float((places @ along).mean()) for along in support_directions(model.structure))
+    return one, two
 
 
 def _substeps(steady: Steady) -> int:

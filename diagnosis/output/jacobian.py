@@ -40,10 +40,10 @@ Flags = NDArray[np.bool_]
 Integers = NDArray[np.int64]
 
 # What holds the gears: by the difference between two rigs that are so far apart, in standard deviations as background.
-AROUND, APART = ("stiffness", "damping", "mass", "inertia", COMPLIANCE, *STRUCTURE), 1e-3
+AROUND, APART = ("stiffness", "damping", "mass", "inertia", *BEARINGS.values(), COMPLIANCE, *STRUCTURE), 1e-3
 # Moved and simulated, by this part of their standard deviation, where no difference between rigs says what they do.
 MOVED, STEP = (FRICTION, COMPLIANCE, *STRUCTURE), 0.05
-SMALLEST = 1e-4  # of a support's reference deflection, below which its logarithm is cut
+SMALLEST = 1e-4  # of the load at which an exponent changes nothing, below which its logarithm is cut
 
 
 class Other(NamedTuple):
@@ -63,13 +63,12 @@ class Forces(NamedTuple):
     on: Integers
 
 
-def forces_of(layout: Layout, along: Along, p: Array, condition: str, chosen: Flags, others: Sequence[Other]) -> Forces:
-    """All forces that stand for the chosen unknowns (size,) along a motion of a record, at `p` (size,); what holds the
-    gears by `others`."""
+def forces_of(layout: Layout, along: Along, condition: str, chosen: Flags, others: Sequence[Other]) -> Forces:
+    """All forces that stand for the chosen unknowns (size,) along a motion of a record; what holds the gears by
+    `others`."""
     mesh, in_mesh = mesh_forces(layout, along, chosen)
     drive, on_drive = drive_forces(layout, along, condition)
-    held = [*exponent_forces(layout, along, p), *around_forces(along, others)]
-    held = [one for one in held if chosen[one[0]]]
+    held = around_forces(along, others)
     used = chosen[on_drive]
     values = [mesh, drive[:, used], *(force[:, None] for _, _, force in held)]
     return Forces(
@@ -128,20 +127,6 @@ def _by_tooth(tooth: NDArray[np.int64], stiffness: Array, count: int) -> Array:
     rows = np.arange(len(tooth))
     for column in range(tooth.shape[1]):
         out[rows, tooth[:, column]] += stiffness[:, column]
-    return out
-
-
-def exponent_forces(layout: Layout, along: Along, p: Array) -> list[tuple[int, int, Array]]:
-    """Index of the unknown, coordinate, and force (entries,) [N] per unit of the supports' exponents."""
-    unknowns, model = layout.unknowns, layout.model
-    out = []
-    for side, key in enumerate(BEARINGS.values()):
-        y = along.deflection(side)
-        size = np.maximum(np.abs(y) / model.reference[side], SMALLEST)
-        exponent = model.exponent[side] + float(p[unknowns[key]][0])
-        stiffness = model.stiffness[side] * float(np.exp(p[unknowns["stiffness"]][side]))
-        force = -stiffness * y * size**exponent * np.log(size)
-        out += [(unknowns[key].start, on, share * force) for on, share in along.shares(side).items()]
     return out
 
 

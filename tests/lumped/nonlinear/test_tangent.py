@@ -24,6 +24,8 @@ def oscillator(on_mesh: float) -> tuple[Tangent, float]:
         stiffness=np.full(entries, STIFFNESS * on_mesh),
         damping=np.full(entries, DAMPING * on_mesh),
         step=duration / (SUBSTEPS * SAMPLES),
+        bearings=np.empty((0, 1)),
+        stiffer=np.empty((entries, 0)),
     )
     return tangent, 900.0
 
