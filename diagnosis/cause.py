@@ -119,8 +119,8 @@ def _by_simulation(
     of: Searched, found: Simulated, held_out: Measurement | None, known: Calibration, common: dict[str, Any]
 ) -> Finding:
     """The finding that simulation justifies."""
-    found = seconded(sized(found), of.result)
-    judged = judgement(of.problem, found, held_out)
+    entered = found.selection.entered
+    judged = judgement(of.problem, seconded(sized(found), of.result), held_out)
     found = judged.found
     missing = _missing(of, found)
     signs = {f"over {place}": float(over) for place, over in zip(PLACES, missing.over, strict=True)}
@@ -129,7 +129,7 @@ def _by_simulation(
     decided = decide_simulated(judged, of.result, missing, of.unsteady, changing, known=known)
     signs |= {"lines": float(found.simulator.target.counts.sum()), "unknown": decided.sign, "left": judged.left,
               "remains": judged.remains, "changing": changing}  # fmt: skip
-    chances = chances_of(judged, decided, known, signs["lines"])
+    chances = chances_of(judged, decided, known, signs["lines"], (*entered, *judged.dropped))
     kept = [one.hypothesis for one in decided.named]
     return Finding(
         verdict=decided.verdict,

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from gearbench.diagnosis.odds import Calibration, effect_signs
 from gearbench.diagnosis.output.judged import Judged
+from gearbench.diagnosis.output.selection import Weighed
 from gearbench.diagnosis.output.verdict_of import Decided
 
 
@@ -16,10 +18,14 @@ class Chances(NamedTuple):
     best: tuple[float, ...]
 
 
-def chances_of(judged: Judged, decided: Decided, known: Calibration, lines: float) -> Chances:
-    """The chances of what was named, and of the best candidate, named or not, that the judged record did not speak
-    against. Evidence is that over the background alone, as the candidates have it."""
-    dropped = {one.hypothesis.effect.name for one in judged.dropped if one.hypothesis.effect is not None}
+def chances_of(
+    judged: Judged, decided: Decided, known: Calibration, lines: float, entered: Sequence[Weighed]
+) -> Chances:
+    """The chances of what was named, and of the best candidate, named or not, that nothing spoke against: of what had
+    `entered` and is not named, its size or the judged record did. Evidence is that over the background alone, as the
+    candidates have it."""
+    told = {one.hypothesis.effect.name for one in decided.named if one.hypothesis.effect is not None}
+    dropped = {one.hypothesis.effect.name for one in entered if one.hypothesis.effect is not None} - told
     alone: dict[str, float] = {}
     for one in judged.found.selection.weighed:
         assert one.hypothesis.effect is not None

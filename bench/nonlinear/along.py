@@ -3,47 +3,45 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from math import ceil, log
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.bench.nonlinear.replay import Steady, resampled
-from gearbench.lumped.nonlinear.coordinates import COORDINATES
+from gearbench.lumped.nonlinear.coordinates import IN_MESH, NAMES
 from gearbench.lumped.nonlinear.law import MeshLaw
+from gearbench.lumped.nonlinear.model import LEAST_DEFLECTION, NonLinear
 from gearbench.lumped.nonlinear.pressing import Pressed, of_pairs, pressed
-from gearbench.lumped.nonlinear.rest import inverse_masses, mesh_direction, springs_and_dampers
+from gearbench.lumped.nonlinear.rest import inverse_masses, springs_and_dampers, support_directions
 from gearbench.lumped.nonlinear.step import columns
 from gearbench.lumped.nonlinear.tables import instants
 from gearbench.lumped.nonlinear.tangent import Tangent, departures
 
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
-MOST = 5  # steps per sample that suffice: the frequency of a mode at 0.3 of the sampling rate is then right to 2e-4
+MOST = 3  # steps per sample that suffice: the frequency of a mode at 0.2 of the sampling rate is then right to 3e-4
 STABLE = 1.8  # largest rate of a mode times the step: Runge-Kutta bears 2.8
 # Of its first size, that free vibrations keep when the first sample is taken: a mean is far larger than the lines.
 TRANSIENT = 1e-9
-AT_ONCE = 48  # departures carried together: their states stay in the fastest memory
+AT_ONCE = 96  # departures carried together: their states stay in the fastest memory
+
+SUPPORT = ("stiffness", "exponent", "reference")  # of both supports among the constants
+U1, Y1, Y2, U2, W, LOAD = (NAMES.index(name) for name in ("u1", "y1", "y2", "u2", "w", "load"))
 
 
-class Moving(NamedTuple):
-    """A coordinate's motion on the half-step grid (entries,): place [m], rate [m/s], acceleration [m/s^2]."""
-
-    place: Array
-    rate: Array
-    acceleration: Array
-
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Along:
-    """A steady motion on the half-step grid (entries,) of one repetition: mesh phase [cycles], elastic force of the
-    mesh [N], what each pair has of it on the working flanks, force and tangent (entries, n_o), rate of the deflection
-    [m/s], the law of its force, the force that the teeth would have without an exponent over the one where that changes
-    nothing, and of the coordinates u1, y1, y2, u2 their motion.
-    `drive` is the coordinate that the driver's torque acts on; `early` steps let free vibrations die out.
+    """A steady motion of `model` on the half-step grid (entries,) of one repetition: mesh phase [cycles], elastic force
+    of the mesh [N], what each pair has of it on the working flanks, force and tangent (entries, n_o), rate of the
+    deflection [m/s], the law of its force, and the force that the teeth would have without an exponent over the one
+    where that changes nothing. `places` (samples, n) of all coordinates [m], sampled at `sampling_rate`. `early` steps
+    let free vibrations die out.
     """
 
+    model: NonLinear
     phase: Array
     elastic: Array
     pairs: Pressed
@@ -53,22 +51,56 @@ class Along:
     tangent: Tangent
     substeps: int
     early: int
-    factor: float
-    drive: int
-    coordinates: tuple[Moving, ...]
+    places: Array
+    sampling_rate: float
 
-    def answers(self, forces: Array, on: int | None = None) -> dict[str, Array]:
-        """Changes (columns, samples) of the channels under forces (entries, columns) [N] added in the mesh, or on a
-        coordinate: dte [m], rb times angles [m], y [m], and the mesh force [N]."""
-        found: list[tuple[Array, Array]] = []
-        for start in range(0, forces.shape[1], AT_ONCE):
-            chunk = forces[:, start : start + AT_ONCE]
-            found.append(departures(self.tangent, chunk, on, self.substeps, self.early))
+    @property
+    def drive(self) -> int:
+        """The coordinate that the driver's torque acts on."""
+        return W if self.model.elastic_shaft else U1
+
+    def answers(self, forces: Array, on: Integers) -> dict[str, Array]:
+        """Changes (columns, samples) of the channels under forces (entries, columns) [N], each added in the mesh or on
+        a coordinate, `on` (columns,): dte [m], rb times angles [m], y [m], and the load's force at its base circle [N],
+        `reaction`."""
+        parts = np.array_split(np.arange(len(on)), max(ceil(len(on) / AT_ONCE), 1))
+        found = [departures(self.tangent, forces[:, one], on[one], self.substeps, self.early) for one in parts]
         places = np.concatenate([one for one, _ in found], axis=2)
-        mesh = np.concatenate([two for _, two in found], axis=1)
-        u1, y1, y2, u2 = (np.ascontiguousarray(places[:, number, :].T) for number in range(4))
-        dte = u1 - u2 + self.factor * (y1 - y2)
-        return {"dte": dte, "angle_driver": u1, "angle_driven": u2, "y_driver": y1, "y_driven": y2, "mesh": mesh.T}
+        u1, y1, y2, u2 = (np.ascontiguousarray(places[:, number, :].T) for number in (U1, Y1, Y2, U2))
+        dte = u1 - u2 + self.model.factor * (y1 - y2)
+        seen = {"dte": dte, "angle_driver": u1, "angle_driven": u2, "y_driver": y1, "y_driven": y2}
+        twist = u2 - places[:, LOAD, :].T if self.model.rig.load.twists else None
+        mesh = np.concatenate([two for _, two in found], axis=1).T
+        reaction = mesh if twist is None else self._twisted(twist)
+        # What pushes at an end that is held is borne there.
+        held = on == LOAD
+        reaction[held] += forces[:: 2 * self.substeps, held].T
+        return {**seen, "reaction": reaction}
+
+    def _twisted(self, twist: Array) -> Array:
+        """Force [N] of the load's shaft twisted by so much (columns, samples) [m]."""
+        shaft = self.model.structure
+        assert shaft is not None  # who twists has one
+        lines = np.fft.rfft(twist, axis=1)
+        stiffness = shaft.load_stiffness + 1j * self._omega * shaft.load_damping
+        return np.fft.irfft(stiffness * lines, twist.shape[1], axis=1)
+
+    @cached_property
+    def _omega(self) -> Array:
+        """Circular frequencies [rad/s] of the lines of one repetition."""
+        return 2 * np.pi * np.fft.rfftfreq(len(self.places), 1 / self.sampling_rate)
+
+    def turned_into(self, other: NonLinear) -> dict[int, Array]:
+        """Forces (entries,) [N] by coordinate, or in the mesh, that do in first order what turning into `other` does, a
+        model like this one that differs by little around its mesh."""
+        forces: dict[int, Array] = {}
+        moved = _pull(other, self.places, self._omega) - _pull(self.model, self.places, self._omega)
+        for number in np.flatnonzero(moved.any(axis=1)):
+            forces[int(number)] = resampled(-moved[number], len(self.phase))
+        more = other.constants().damping_factor - self.model.constants().damping_factor
+        if more:
+            forces[IN_MESH] = more * np.sqrt(self.tangent.stiffness) * self.rate
+        return forces
 
     def rate_of(self, excess: Array) -> Array:
         """Time derivative (entries, columns) of periodic signals on the grid."""
@@ -83,61 +115,83 @@ class Along:
 def along(steady: Steady) -> Along:
     """The tangent of a steady motion."""
     setup, model = steady.setup, steady.setup.model
-    samples, outputs = len(steady.outputs), steady.outputs
-    c, s = model.constants(), model.structure
-    mesh = mesh_direction(c, s)
+    samples, out = len(steady.outputs), columns(steady.outputs)
+    places = np.stack([getattr(out, name) for name in NAMES[: model.size]], axis=1)
+    around = model.around(_mean_deflections(model, places))
+    travel = places @ around.mesh
+    spectrum = np.fft.rfft(travel)
+    rate = np.fft.irfft(2j * np.pi * np.fft.rfftfreq(samples, 1 / setup.sampling_rate) * spectrum, samples)
     substeps = _substeps(steady)
     entries = 2 * substeps * samples
     step = 1.0 / (setup.sampling_rate * substeps)
-    out = columns(outputs)
-    travel = np.asarray(mesh[0] * out.u1 + mesh[1] * out.y1 + mesh[2] * out.y2 + mesh[3] * out.u2)
-    if s is not None:
-        travel = travel + s.slide * (out.x1 - out.x2)
-    spectrum = np.fft.rfft(travel)
-    rate = np.fft.irfft(2j * np.pi * np.fft.rfftfreq(samples, 1 / setup.sampling_rate) * spectrum, samples)
     table = replace(setup, substeps=substeps, table=None).table_for(0, samples)
     at = instants(model, table, table.position[:entries] / model.law.phases, entries)
     fine = resampled(travel, entries)
     force, slope = pressed(model.law, at, fine)
     level = (np.abs(force / at.gain) / model.rig.mesh.reference_force) ** (1.0 / (1.0 + model.rig.mesh.exponent))
     slope = np.maximum(slope, 0.0)
-    damping = c.damping_factor * np.sqrt(slope)
-    tangents = tuple(
-        stiffness * (1 + exponent) * (max(abs(float(y.mean())), 1e-9) / reference) ** exponent
-        for stiffness, exponent, reference, y in (
-            (c.stiffness1, c.exponent1, c.reference1, out.y1),
-            (c.stiffness2, c.exponent2, c.reference2, out.y2),
-        )
-    )
-    springs, dampers = springs_and_dampers(c, s, (tangents[0], tangents[1]))
-    drive = 0 if c.rigid else COORDINATES - 1
-    omega = 2j * np.pi * np.fft.rfftfreq(samples, 1 / setup.sampling_rate)
+    damping = model.constants().damping_factor * np.sqrt(slope)
     decay = max(model.slowest_decay(float(steady.drive.fine.mean())), 1e-9)
-    early = min(ceil(log(1 / TRANSIENT) / decay / step), samples * substeps)
     first = setup.phase_at(0)
     cycles: Array = first + np.arange(entries, dtype=np.float64) * (setup.cycles_per_sample / (2 * substeps))
-    tangent = Tangent(springs, dampers, inverse_masses(c, s), mesh, slope, damping, step)
-
-    def moving(signal: Array) -> Moving:
-        lines = np.fft.rfft(signal)
-        rates = (np.fft.irfft(omega**order * lines, samples) for order in (1, 2))
-        return Moving(resampled(signal, entries), *(resampled(one, entries) for one in rates))
-
-    coordinates = tuple(moving(signal) for signal in (out.u1, out.y1, out.y2, out.u2))
     return Along(
+        model=model,
         phase=cycles,
         elastic=force,
         pairs=of_pairs(model.law, at, fine),
         rate=resampled(rate, entries) + table.excess_rate[:entries],
         law=model.law,
         level=level,
-        tangent=tangent,
+        tangent=Tangent(*around, slope, damping, step, *_bearings(model, places, entries)),
         substeps=substeps,
-        early=early,
-        factor=model.factor,
-        drive=drive,
-        coordinates=coordinates,
+        early=min(ceil(log(1 / TRANSIENT) / decay / step), samples * substeps),
+        places=places,
+        sampling_rate=setup.sampling_rate,
     )
+
+
+def _pull(model: NonLinear, places: Array, omega: Array) -> Array:
+    """Forces (n, samples) [N] with which springs, dampers and masses of a rig around its mesh hold its coordinates at
+    `places` (samples, n); omega (K,): circular frequencies [rad/s] of their lines."""
+    constants, structure = model.constants(), model.structure
+    springs, dampers = springs_and_dampers(constants, structure, (0.0, 0.0))
+    inverse = inverse_masses(constants, structure)
+    masses = np.divide(1.0, inverse, out=np.zeros_like(inverse), where=inverse > 0.0)
+    lines = np.fft.rfft(places, axis=0).T
+    lines = springs @ lines + 1j * omega * (dampers @ lines) - omega**2 * masses[:, None] * lines
+    out: Array = np.fft.irfft(lines, len(places), axis=1)
+    for side, along in enumerate(support_directions(structure)):
+        stiffness, exponent, reference = (getattr(constants, f"{name}{side + 1}") for name in SUPPORT)
+        deflection = places @ along
+        out += np.outer(along, stiffness * deflection * (np.abs(deflection) / reference) ** exponent)
+    still = inverse == 0.0
+    still[LOAD:][:1] = False  # it bears a reaction
+    out[still] = 0.0
+    return out
+
+
+def _bearings(model: NonLinear, places: Array, entries: int) -> tuple[Array, Array]:
+    """What coordinates contribute to the deflection of supports whose stiffness depends on it (b, n), and how much
+    stiffer than on average they are (entries, b) [N/m] at the places (samples, n)."""
+    constants = model.constants()
+    directions, stiffer = [], []
+    for side, along in enumerate(support_directions(model.structure)):
+        stiffness, exponent, reference = (getattr(constants, f"{name}{side + 1}") for name in SUPPORT)
+        if exponent:
+            deflection = resampled(places @ along, entries)
+            size = np.maximum(np.abs(np.array([*deflection, deflection.mean()])), LEAST_DEFLECTION) / reference
+            tangent = stiffness * (1 + exponent) * size**exponent
+            directions.append(along)
+            stiffer.append(tangent[:-1] - tangent[-1])
+    if not directions:
+        return np.empty((0, places.shape[1])), np.empty((entries, 0))
+    return np.stack(directions), np.stack(stiffer, axis=1)
+
+
+def _mean_deflections(model: NonLinear, places: Array) -> tuple[float, float]:
+    """Those [m] of both supports along their direction, at the places (samples, n)."""
+    one, two = (float((places @ along).mean()) for along in support_directions(model.structure))
+    return one, two
 
 
 def _substeps(steady: Steady) -> int:

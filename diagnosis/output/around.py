@@ -41,7 +41,7 @@ HOUSED = (HOUSING, MODE, SHAPE)
 # Channels, and the coordinate that each is; the reaction is the force itself.
 COORDINATE = {"angle_driver": 0, "y_driver": 1, "y_driven": 2}
 REACTION = "torque_driven"
-LINES = 200  # of each record, excited and operating, that are enough
+LINES, FEWEST = 200, 80  # of all records and of each, excited and operating, that are enough
 # Parts of the local level below which no model is right: wide first, so that distant resonances pull.
 LEVELS = (0.1, 0.01)
 SMOOTHED = 12  # parts of the band over which the level is taken
@@ -88,7 +88,8 @@ def around(layout: Layout, conditions: Sequence[Condition], held: Array) -> Arra
     load = layout.nominal.rig.load
     # Held at its end the driven gear hands the force of the mesh on.
     reaction = (REACTION,) if load.boundary == "speed" and not load.twists else ()
-    lines = [found for found in (_lines_of(one, (*COORDINATE, *reaction)) for one in conditions) if found is not None]
+    wanted, most = (*COORDINATE, *reaction), max(LINES // len(conditions), FEWEST)
+    lines = [found for found in (_lines_of(one, wanted, most) for one in conditions) if found is not None]
     if not lines:
         return None
     try:
@@ -247,15 +248,16 @@ def _answers(layout: Layout, system: _System, lines: _Lines) -> Complex:
     return answer
 
 
-def _lines_of(condition: Condition, wanted: tuple[str, ...]) -> _Lines | None:
+def _lines_of(condition: Condition, wanted: tuple[str, ...], most: int) -> _Lines | None:
+    """At most so many lines of a condition; None where it has too few, or not the channels."""
     kinds = kinds_of(condition)
     strong = (KINDS.index("operating"), KINDS.index("excited"))
     bins = np.flatnonzero(np.isin(kinds, strong) & (np.arange(condition.bins) > 0))
     names = tuple(name for name in wanted if name in condition.spectra)
     if len(names) < 3 or not any(name.startswith("y_") for name in names) or len(bins) < SMOOTHED:
         return None
-    if len(bins) > LINES:
-        bins = bins[np.linspace(0, len(bins) - 1, LINES).astype(int)]
+    if len(bins) > most:
+        bins = bins[np.linspace(0, len(bins) - 1, most).astype(int)]
     channels = np.stack([condition.spectra[name][bins] for name in names], axis=1)
     width = max(len(bins) // SMOOTHED, 3)
     padded = np.pad(np.abs(channels) ** 2, ((width // 2, width - 1 - width // 2), (0, 0)), mode="edge")

@@ -54,8 +54,9 @@ def seen_by(around: Around | None, unknowns: Unknowns, held: Array) -> Array | N
 
 def levelled(simulator: Simulator, seen: Array, p: Array, sd: Array) -> Array:
     """The rig around the mesh as it was `seen` (size,), with supports across and a mesh whose stiffnesses go together:
-    along narrow valleys, between which no fit walks."""
+    along narrow valleys, between which no fit walks. One record tells them as all do."""
     unknowns = simulator.layout.unknowns
+    simulator = simulator.of_record(simulator.target.most_excited)
     trials = levels(simulator, seen, p)
     costs = np.array([linear_cost(simulator, trial, sd) for trial in trials])
     # The best of each stiffness across.

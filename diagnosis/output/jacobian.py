@@ -1,14 +1,14 @@
 """Derivatives of all simulated lines by all unknowns, at one rig.
 
-What a tooth, the mesh's series, run-out and ripple do is a small force at an unchanged motion, carried through the
-rig's tangent (`bench.nonlinear.along`), many at once. Delays, gains and encoders act on the channels alone. The rest
-(supports, masses, friction, coupling) is moved a little and simulated.
+What teeth, the mesh's series, run-out and ripple do, and what holds the gears, is a small force at an unchanged
+motion, carried through the rig's tangent (`bench.nonlinear.along`), many at once. Delays, gains and encoders act on the
+channels alone. The rest (friction, structure that the rig does not have yet) is moved a little and simulated.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,21 +26,56 @@ from gearbench.diagnosis.forces.basis import waves
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.intake.signals import measured_channels
 from gearbench.diagnosis.output.layout import Layout
-from gearbench.diagnosis.output.structure import ENCODER, GAIN, STRUCTURE_MOVED
+from gearbench.diagnosis.output.structure import ENCODER, GAIN, LEAST_STEP, STRUCTURE
 from gearbench.diagnosis.output.target import Target
+from gearbench.lumped.nonlinear.coordinates import IN_MESH
 
 if TYPE_CHECKING:
     from gearbench.bench.nonlinear.along import Along
+    from gearbench.lumped.nonlinear.model import NonLinear
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Flags = NDArray[np.bool_]
 Integers = NDArray[np.int64]
 
-# Moved and simulated, by this part of their standard deviation as background.
-MOVED = (FRICTION, COMPLIANCE, *STRUCTURE_MOVED)
-SMALLEST = 1e-4  # of a support's reference deflection, below which its logarithm is cut
-STEP = 0.05
+# What holds the gears: by the difference between two rigs that are so far apart, in standard deviations as background.
+AROUND, APART = ("stiffness", "damping", "mass", "inertia", *BEARINGS.values(), COMPLIANCE, *STRUCTURE), 1e-3
+# Moved and simulated, by this part of their standard deviation, where no difference between rigs says what they do.
+MOVED, STEP = (FRICTION, COMPLIANCE, *STRUCTURE), 0.05
+SMALLEST = 1e-4  # of the load at which an exponent changes nothing, below which its logarithm is cut
+
+
+class Other(NamedTuple):
+    """A rig in which one unknown, by its `index`, is larger by `step`."""
+
+    index: int
+    step: float
+    model: NonLinear
+
+
+class Forces(NamedTuple):
+    """Forces (entries, columns) [N] per unit of unknowns, these unknowns' indices (columns,), and what each force acts
+    on (columns,): a coordinate or the mesh."""
+
+    values: Array
+    at: Integers
+    on: Integers
+
+
+def forces_of(layout: Layout, along: Along, condition: str, chosen: Flags, others: Sequence[Other]) -> Forces:
+    """All forces that stand for the chosen unknowns (size,) along a motion of a record; what holds the gears by
+    `others`."""
+    mesh, in_mesh = mesh_forces(layout, along, chosen)
+    drive, on_drive = drive_forces(layout, along, condition)
+    held = around_forces(along, others)
+    used = chosen[on_drive]
+    values = [mesh, drive[:, used], *(force[:, None] for _, _, force in held)]
+    return Forces(
+        np.concatenate(values, axis=1),
+        np.array([*in_mesh, *on_drive[used], *(index for index, _, _ in held)], dtype=np.int64),
+        np.array([*[IN_MESH] * len(in_mesh), *[along.drive] * int(used.sum()), *(on for _, on, _ in held)]),
+    )
 
 
 def mesh_forces(layout: Layout, along: Along, chosen: Flags) -> tuple[Array, Integers]:
@@ -91,31 +126,40 @@ def _by_tooth(tooth: NDArray[np.int64], stiffness: Array, count: int) -> Array:
     out = np.zeros((len(tooth), count))
     rows = np.arange(len(tooth))
     for column in range(tooth.shape[1]):
-        np.add.at(out, (rows, tooth[:, column]), stiffness[:, column])
+        out[rows, tooth[:, column]] += stiffness[:, column]
     return out
 
 
-def inertial_forces(layout: Layout, along: Along, p: Array) -> list[tuple[Array, Integers, int]]:
-    """Forces (entries, columns) [N] per unit of the unknowns of supports, masses and inertias, these unknowns'
-    indices, and the coordinate that they act on."""
-    unknowns, model = layout.unknowns, layout.model
+def around_forces(along: Along, others: Sequence[Other]) -> list[tuple[int, int, Array]]:
+    """Index of the unknown, coordinate or mesh, and force (entries,) [N] per unit of what holds the gears."""
     out = []
-    for side, (key, number) in enumerate(zip(BEARINGS.values(), (1, 2), strict=True)):
-        y, held = along.coordinates[number], model.reference[side]
-        size = np.maximum(np.abs(y.place) / held, SMALLEST)
-        exponent = model.exponent[side] + float(p[unknowns[key]][0])
-        stiffness = model.stiffness[side] * float(np.exp(p[unknowns["stiffness"]][side]))
-        spring = stiffness * y.place * size**exponent
-        damping = model.damping[side] * float(np.exp(p[unknowns["damping"]][side]))
-        columns = [-spring, -damping * y.rate, -model.mass[side] * y.acceleration, -spring * np.log(size)]
-        at = [*(unknowns[name].start + side for name in ("stiffness", "damping", "mass")), unknowns[key].start]
-        out.append((np.stack(columns, axis=1), np.array(at), number))
-    turning, start = along.coordinates[0].acceleration, unknowns["inertia"].start
-    masses = np.array((model.inertia[0], model.rotor)) / model.base_radius[0] ** 2
-    # The rotor's column is that of a rotor which turns with the gear: else it is moved and simulated.
-    rows = (0, 2) if along.drive == 0 else (0,)
-    columns = [-masses[0 if row == 0 else 1] * turning for row in rows]
-    out.append((np.stack(columns, axis=1), start + np.array(rows), 0))
+    for one in others:
+        out += [(one.index, on, force / one.step) for on, force in along.turned_into(one.model).items()]
+    return out
+
+
+def others_of(layout: Layout, p: Array, sd: Array, chosen: Flags) -> list[Other]:
+    """The rigs around `p` (size,) in each of which one chosen unknown of what holds the gears is moved, by a part of
+    its `sd` (size,), as far as they have the same coordinates as that of `p` and it has what is moved."""
+    # Its time loop is compiled on import, which not every user of this module wants.
+    from gearbench.lumped.nonlinear.model import nonlinear_model
+
+    def model(values: Array) -> NonLinear:
+        return nonlinear_model(layout.case(values).rig, layout.meshing, layout.model.law)
+
+    unknowns, here = layout.unknowns, model(p)
+    low, high = unknowns.bounds()
+    out = []
+    for key in AROUND:
+        for index in range(*unknowns[key].indices(unknowns.size)) if key in unknowns.slices else ():
+            absent = 0.0 <= p[index] < LEAST_STEP.get(key, 0.0) or (key == COMPLIANCE and not here.elastic_shaft)
+            if absent or not chosen[index] or sd[index] <= 0.0:
+                continue
+            step = APART * sd[index]
+            moved = p.copy()
+            moved[index] += step if p[index] + step <= high[index] else -step
+            if low[index] <= moved[index] and (other := model(moved)).like(here):
+                out.append(Other(index, float(moved[index] - p[index]), other))
     return out
 
 

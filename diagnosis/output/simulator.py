@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -13,15 +13,7 @@ from gearbench.bench.plan.workers import side_by_side
 from gearbench.diagnosis.effects.sensor_delay import KEYS as DELAYS
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.intake.signals import simulated_channels
-from gearbench.diagnosis.output.jacobian import (
-    MOVED,
-    STEP,
-    drive_forces,
-    inertial_forces,
-    mesh_forces,
-    moving,
-    sensor_columns,
-)
+from gearbench.diagnosis.output.jacobian import MOVED, STEP, Other, forces_of, moving, others_of, sensor_columns
 from gearbench.diagnosis.output.layout import Layout
 from gearbench.diagnosis.output.structure import LEAST_STEP
 from gearbench.diagnosis.output.target import Target
@@ -31,6 +23,7 @@ from gearbench.rig import Case
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Flags = NDArray[np.bool_]
+Integers = NDArray[np.int64]
 Simulate = Callable[[Case, xr.Dataset], xr.Dataset]
 
 
@@ -43,6 +36,10 @@ class Simulator:
     simulate: Simulate
     replays: int = 0
     _kept: dict[bytes, Complex] = field(default_factory=dict)
+
+    def of_record(self, number: int) -> Simulator:
+        """The same for one record alone."""
+        return Simulator(self.layout, self.target.of_record(number), self.simulate)
 
     def lines(self, p: Array) -> Complex | None:
         """Simulated lines (K,) of unknowns (size,); None where no rig has them or it does not settle."""
@@ -91,17 +88,25 @@ class Simulator:
             return None
         out = np.zeros((self.layout.size, here.size), dtype=complex)
         try:
-            self._by_forces(out, p, chosen)
+            others = others_of(self.layout, p, sd, chosen)
+            self._by_forces(out, p, chosen, others)
         except ValueError:
             return None
-        unknowns = self.layout.unknowns
+        known = [one.index for one in others]
+        self._by_moves(out, p, sd, chosen & ~np.isin(np.arange(p.size), known))
+        return out
+
+    def _by_moves(self, out: Complex, p: Array, sd: Array, chosen: Flags) -> None:
+        """Fill in what is moved and simulated."""
+        unknowns, here = self.layout.unknowns, self.lines(p)
+        assert here is not None
         low, high = unknowns.bounds()
         unmoved = self.layout.case(p)
-        for key in (*MOVED, "inertia"):
+        for key in MOVED:
             if key not in unknowns.slices:
                 continue
             for index in range(*unknowns[key].indices(unknowns.size)):
-                if not chosen[index] or sd[index] <= 0.0 or out[index].any():
+                if not chosen[index] or sd[index] <= 0.0:
                     continue
                 least = LEAST_STEP.get(key, 0.0)
                 step = least if 0.0 <= p[index] < least else STEP * sd[index]
@@ -116,45 +121,35 @@ class Simulator:
                     if answer is not None:
                         out[index] = (answer - here) / signed
                         break
-        return out
 
-    def _by_forces(self, out: Complex, p: Array, chosen: Flags) -> None:
-        """Fill in what forces in the mesh and on the shaft, and sensors, do."""
+    def _by_forces(self, out: Complex, p: Array, chosen: Flags, others: Sequence[Other]) -> None:
+        """Fill in what forces in the mesh and on the coordinates, and sensors, do."""
         # Its time loop is compiled on import, which not every user of this module wants.
         from gearbench.bench.nonlinear.along import along
         from gearbench.bench.nonlinear.replay import steady_motion
 
-        def one(item: tuple[int, Measurement]) -> tuple[int, list[tuple[NDArray[np.int64], dict[str, Array]]]]:
+        def one(item: tuple[int, Measurement]) -> tuple[Integers, dict[str, Array], dict[int, dict[str, Array]]]:
             number, measured = item
             case = self.layout.case(p, measured.name)
             tangent = along(steady_motion(case, measured.record, law_of(self.layout.model.law, case)))
-            radius = self.layout.model.base_radius[1]
-            found = []
-            for forces, at, on in (
-                (*mesh_forces(self.layout, tangent, chosen), None),
-                (*drive_forces(self.layout, tangent, measured.name), tangent.drive),
-                *inertial_forces(self.layout, tangent, p),
-            ):
-                if len(at):
-                    answers = tangent.answers(forces, on)
-                    answers["torque_driven"] = radius * answers.pop("mesh")
-                    found.append((at, answers))
-            here = self.channels(p, measured)
-            for index, parts in sensor_columns(self.layout, self.target, number, here).items():
+            forces = forces_of(self.layout, tangent, measured.name, chosen, others)
+            answers = tangent.answers(forces.values, forces.on)
+            answers["torque_driven"] = self.layout.model.base_radius[1] * answers.pop("reaction")
+            sensed = sensor_columns(self.layout, self.target, number, self.channels(p, measured))
+            return forces.at, answers, sensed
+
+        for number, (at, answers, sensed) in enumerate(side_by_side(one, list(enumerate(self.target.measurements)))):
+            self._put(out, number, at, answers)
+            for index, parts in sensed.items():
                 if chosen[index]:
-                    found.append((np.array([index]), {name: values[None] for name, values in parts.items()}))
-            return number, found
+                    self._put(out, number, np.array([index]), {name: values[None] for name, values in parts.items()})
 
-        for number, found in side_by_side(one, list(enumerate(self.target.measurements))):
-            for at, answers in found:
-                self._put(out, number, at, answers)
-
-    def _put(self, out: Complex, number: int, at: NDArray[np.int64], answers: dict[str, Array]) -> None:
+    def _put(self, out: Complex, number: int, at: Integers, answers: dict[str, Array]) -> None:
+        """Add the lines of what a record answers; unknowns may have several answers."""
         start = 0
         for record, channel, bins in self.target.plan:
             stop = start + len(bins)
             if record == number:
                 spectrum = np.fft.rfft(answers[channel], axis=-1)[:, bins] / answers[channel].shape[-1]
-                out[at, start:stop] += spectrum
+                np.add.at(out, (at, slice(start, stop)), spectrum)
             start = stop
-

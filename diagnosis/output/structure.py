@@ -47,10 +47,10 @@ FELT, STIFFEST = 0.01, 0.03
 SHAFT_FELT, SHAFT_STIFFEST = 0.03, 0.06
 # Moved from nothing by the least that a rig feels: a smaller step would show no derivative, and a fit that begins
 # without it would never find it.
-LEAST_STEP: Mapping[str, float] = {ACROSS: STIFFEST, SHAFT: SHAFT_STIFFEST}
+LEAST_STEP: Mapping[str, float] = {ACROSS: STIFFEST, SHAFT: SHAFT_STIFFEST, HOUSING: 0.05 * HOUSING_SD}
 NONE = 1e-4  # compliance of a housing below which there is none
-# Moved and simulated: no small force at an unchanged motion stands for them.
-STRUCTURE_MOVED = (ACROSS, CROSS, HOUSING, MODE, SHAPE, SHAFT)
+# What holds the gears beside the nominal rig's supports.
+STRUCTURE = (ACROSS, CROSS, HOUSING, MODE, SHAPE, SHAFT)
 # What is told of the structure that was found.
 NAMES = (
     (ACROSS, "support compliance across over along", "1"),

@@ -73,6 +73,24 @@ class Target:
         spectra = [_spectrum(channels[number][channel])[..., bins] for number, channel, bins in self.plan]
         return np.concatenate(spectra, axis=-1)
 
+    def of_record(self, number: int) -> Target:
+        """What is measured in one record alone."""
+        ends = np.cumsum([len(bins) for _, _, bins in self.plan])
+        kept = [one for one, (record, _, _) in enumerate(self.plan) if record == number]
+        inside = np.concatenate([np.arange(ends[one] - len(self.plan[one][2]), ends[one]) for one in kept])
+        blocks, of_line = np.unique(self.of_line[inside], return_inverse=True)
+        return Target(
+            (self.measurements[number],),
+            tuple((0, channel, bins) for _, channel, bins in (self.plan[one] for one in kept)),
+            self.lines[inside],
+            of_line,
+            tuple(self.blocks[block] for block in blocks),
+            self.floors[blocks],
+            self.noise[blocks],
+            self.counts[blocks],
+            self.sizes[blocks],
+        )
+
     def energies(self, residual: Complex) -> Array:
         """C (blocks,) of a residual (K,)."""
         found = np.bincount(self.of_line, np.abs(residual) ** 2, len(self.floors))
@@ -85,6 +103,15 @@ class Target:
     def cost(self, residual: Complex) -> float:
         """Nats that a residual costs."""
         return float(np.sum(self.counts * self.nats(self.energies(residual))))
+
+    @property
+    def most_excited(self) -> int:
+        """Number of the record with the most excited lines."""
+        names = list(dict.fromkeys(block.record for block in self.blocks))
+        lines = np.zeros(len(names))
+        for block, size in zip(self.blocks, self.sizes, strict=True):
+            lines[names.index(block.record)] += size if block.kind == "excited" else 0.0
+        return int(np.argmax(lines))
 
     def excited_cost(self, residual: Complex) -> float:
         """Nats that a residual costs on the excited lines, or on all where nothing is excited."""

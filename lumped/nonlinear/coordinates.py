@@ -35,6 +35,7 @@ class Further(NamedTuple):
 COORDINATES = len(Coordinates._fields)
 FURTHER = len(Further._fields)
 NAMES = (*Coordinates._fields, *Further._fields)
+IN_MESH = -1  # instead of the number of a coordinate that a force acts on
 
 
 def parted(values: Array) -> tuple[Coordinates, Further | tuple[()]]:

@@ -59,6 +59,7 @@ from gearbench.lumped.nonlinear.coordinates import Coordinates, Further
 from gearbench.lumped.nonlinear.law import MeshLaw
 from gearbench.lumped.nonlinear.pressing import Instants, travel_under
 from gearbench.lumped.nonlinear.rest import (
+    Around,
     centre_at_rest,
     housing_at_rest,
     inverse_masses,
@@ -81,6 +82,8 @@ RESOLVED = 0.125
 # Of a mode beyond half the sampling rate, what a step resolves like one below: its frequency is then right to 1 % and
 # its damping ratio to 0.01, far from where Runge-Kutta becomes unstable.
 UNSEEN = 0.5
+# Of a support whose stiffness depends on it [m]: at rest without load it would be 0 or infinite.
+LEAST_DEFLECTION = 1e-9
 
 LIMITS = (
     "forces of unbalance, also of eccentric gears, are left out",
@@ -141,6 +144,13 @@ class NonLinear:
     def elastic_shaft(self) -> bool:
         """Whether the rotor is a coordinate of its own."""
         return self.masses[2] > 0
+
+    def like(self, other: NonLinear) -> bool:
+        """Whether both models have the same coordinates, the same of which move."""
+        if self.size != other.size or self.elastic_shaft != other.elastic_shaft:
+            return False
+        here, there = (inverse_masses(one.constants(), one.structure) > 0.0 for one in (self, other))
+        return bool((here == there).all())
 
     @property
     def ends(self) -> tuple[float, float]:
@@ -250,22 +260,28 @@ class NonLinear:
         place = Coordinates(u2 + apart, y1, y2, u2, u2 + apart + twist), Further(u2 - out, *housed, x1, x2)
         return np.array([*place[0], *place[1], *np.zeros(self.size)])
 
+    def around(self, deflections: tuple[float, float]) -> Around:
+        """The rig around its mesh, with its supports as stiff as they are about these deflections [m]."""
+        c, s = self.constants(), self.structure
+        one, two = (
+            stiffness * (1 + exponent) * (max(abs(y), LEAST_DEFLECTION) / reference) ** exponent
+            for y, stiffness, exponent, reference in (
+                (deflections[0], c.stiffness1, c.exponent1, c.reference1),
+                (deflections[1], c.stiffness2, c.exponent2, c.reference2),
+            )
+        )
+        return Around(*springs_and_dampers(c, s, (one, two)), inverse_masses(c, s), mesh_direction(c, s))
+
     def linearised(self, stiffness: float, force: float) -> Array:
         """State matrix (2 size, 2 size) at a mesh stiffness [N/m], supports at rest under `force`.
 
         Without friction: away from the pitch point small vibrations do not turn the steady direction of sliding.
         """
-        c, s = self.constants(), self.structure
-        mesh = mesh_direction(c, s)
         (y1, _), (y2, _) = self.centres(force)
-        tangents = (
-            c.stiffness1 * (1 + c.exponent1) * (abs(y1) / c.reference1) ** c.exponent1,
-            c.stiffness2 * (1 + c.exponent2) * (abs(y2) / c.reference2) ** c.exponent2,
-        )
-        springs, dampers = springs_and_dampers(c, s, tangents)
+        springs, dampers, inverse, mesh = self.around((y1, y2))
         springs += stiffness * np.outer(mesh, mesh)
-        dampers += c.damping_factor * np.sqrt(stiffness) * np.outer(mesh, mesh)
-        inverse, size = inverse_masses(c, s), self.size
+        dampers += self.constants().damping_factor * np.sqrt(stiffness) * np.outer(mesh, mesh)
+        size = self.size
         matrix = np.zeros((2 * size, 2 * size))
         matrix[:size, size:] = np.eye(size)
         matrix[size:, :size] = -inverse[:, None] * springs

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,6 +16,16 @@ from gearbench.rig import Support
 Array = NDArray[np.float64]
 
 BISECTIONS = 100
+
+
+class Around(NamedTuple):
+    """A rig around its mesh: springs [N/m] and dampers [N s/m] (n, n) between its coordinates, inverse masses [1/kg]
+    (n,), 0 for what does not move, and what each coordinate contributes to the DTE (n,)."""
+
+    springs: Array
+    dampers: Array
+    inverse: Array
+    mesh: Array
 
 
 def centre_at_rest(support: Support, push: float, aside: float) -> tuple[float, float]:
@@ -94,11 +106,21 @@ def mesh_direction(c: Constants, s: Structure | None) -> Array:
     return np.array(plain if s is None else [*plain, 0.0, 0.0, 0.0, s.slide, -s.slide])
 
 
+def support_directions(s: Structure | None) -> tuple[Array, Array]:
+    """What each coordinate contributes to the deflections of both supports along their direction; (5,) or (10,)."""
+    if s is None:
+        _, y1, y2, _, _ = np.eye(COORDINATES)
+        return y1, y2
+    _, y1, y2, _, _, _, housing, rocking, _, _ = np.eye(COORDINATES + FURTHER)
+    first = y1 - s.housing.share1 * housing - s.rocking.share1 * rocking
+    return first, y2 - s.housing.share2 * housing - s.rocking.share2 * rocking
+
+
 def springs_and_dampers(c: Constants, s: Structure | None, tangents: tuple[float, float]) -> tuple[Array, Array]:
     """Stiffness [N/m] and damping [N s/m] of all but the mesh, (n, n); tangents: of both supports along [N/m]."""
     size = COORDINATES if s is None else COORDINATES + FURTHER
     one = np.eye(size)
-    u1, y1, y2, u2, w = one[:COORDINATES]
+    u1, _, _, u2, w = one[:COORDINATES]
     shaft = u1 - w
     springs, dampers = c.shaft_stiffness * np.outer(shaft, shaft), c.shaft_damping * np.outer(shaft, shaft)
     if s is None:
@@ -107,8 +129,7 @@ def springs_and_dampers(c: Constants, s: Structure | None, tangents: tuple[float
             dampers[row, row] += d
         return springs, dampers
     load, housing, rocking, x1, x2 = one[COORDINATES:]
-    first = y1 - s.housing.share1 * housing - s.rocking.share1 * rocking
-    second = y2 - s.housing.share2 * housing - s.rocking.share2 * rocking
+    first, second = support_directions(s)
     pairs = (
         (u2 - load, s.load_stiffness, s.load_damping),
         (housing, s.housing.stiffness, s.housing.damping),

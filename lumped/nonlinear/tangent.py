@@ -1,13 +1,15 @@
 """Small departures from a motion of the non-linear lumped model, compiled: what a little more force in the mesh, or on
-the driver's shaft, does to every coordinate.
+one coordinate, does to every coordinate.
 
 Along a given motion the mesh is a spring k(t) and a damper c(t), so that departures q obey
 
-    M q'' + C q' + K q = -m (k(t) m.q + c(t) m.q' + f(t)) + d g(t)
+    M q'' + C q' + K q = -m (k(t) m.q + c(t) m.q' + f(t)) - sum b_i s_i(t) b_i.q + d g(t)
 
-with m what each coordinate contributes to the deflection, f(t) the force that a change of the rig adds in the mesh at
+with m what each coordinate contributes to the deflection, b_i likewise that of a support whose stiffness departs by
+s_i(t) from the mean one, f(t) the force that a change of the rig adds in the mesh at
 unchanged motion, and g(t) that on one coordinate d: a support, the driver, its shaft. Friction is left out:
-it turns a few per cent of a departure. Many departures are carried at once by the classical Runge-Kutta method.
+it turns a few per cent of a departure. Many departures are carried at once by the classical Runge-Kutta method, in
+single precision, which leaves 1e-6 of the largest departure.
 """
 
 from __future__ import annotations
@@ -18,14 +20,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.kernels.compiled import ROUNDING, compiled
+from gearbench.lumped.nonlinear.coordinates import IN_MESH
 
 Array = NDArray[np.float64]
+Single = NDArray[np.float32]
+Integers = NDArray[np.int64]
+
+# A plain 0.5 would be of double precision, and what it is multiplied with.
+HALF, SIXTH, TWO = np.float32(0.5), np.float32(1 / 6), np.float32(2.0)
 
 
 class Tangent(NamedTuple):
     """A rig along a motion: springs K, dampers C (n, n), inverse masses (n,), what coordinates contribute to the
     deflection (n,), and of the mesh on the half-step grid of one repetition stiffness k and damping c (entries,);
-    `step` [s] is two entries."""
+    `step` [s] is two entries. Of supports whose stiffness varies what coordinates contribute to their deflection (b, n)
+    and by how much it departs from that in K (entries, b)."""
 
     springs: Array
     dampers: Array
@@ -34,31 +43,39 @@ class Tangent(NamedTuple):
     stiffness: Array
     damping: Array
     step: float
+    bearings: Array
+    stiffer: Array
 
 
-def departures(tangent: Tangent, forces: Array, on: int | None, substeps: int, early: int) -> tuple[Array, Array]:
+def departures(
+    tangent: Tangent, forces: Array, on: Integers, substeps: int, early: int
+) -> tuple[Single, Single]:
     """Departures (samples, n, columns) of the coordinates [m] and (samples, columns) of the mesh force [N] under forces
-    (entries, columns) [N] in the mesh, or on the coordinate `on`; `early` steps before the first sample begin at rest.
+    (entries, columns) [N], each in the mesh or on one coordinate, `on` (columns,): its number or `IN_MESH`; `early`
+    steps before the first sample begin at rest.
     """
     entries, columns = forces.shape
     size = len(tangent.inverse)
     samples = entries // (2 * substeps)
-    places, pushes = np.empty((samples, size, columns)), np.empty((samples, columns))
+    places, pushes = np.empty((samples, size, columns), np.float32), np.empty((samples, columns), np.float32)
     inverse = tangent.inverse[:, None]
-    in_mesh = 1.0 if on is None else 0.0
-    direction = -tangent.inverse * tangent.mesh if on is None else tangent.inverse * (np.arange(size) == on)
-    _run(
+    in_mesh = on == IN_MESH
+    direction = inverse * np.where(in_mesh, -tangent.mesh[:, None], np.arange(size)[:, None] == on)
+    values = (
         -inverse * tangent.springs, -inverse * tangent.dampers, tangent.mesh, -tangent.inverse * tangent.mesh,
-        direction, in_mesh, tangent.stiffness, tangent.damping, np.ascontiguousarray(forces), tangent.step, substeps,
-        early, places, pushes,
+        direction, in_mesh, tangent.stiffness, tangent.damping, forces, tangent.bearings,
+        -inverse.T * tangent.bearings, tangent.stiffer,
     )  # fmt: skip
+    single = (np.ascontiguousarray(one, np.float32) for one in values)
+    _run(*single, np.float32(tangent.step), substeps, early, places, pushes)
     return places, pushes
 
 
 @compiled(fastmath=ROUNDING)
 def _rates(
-    q: Array, v: Array, springs: Array, dampers: Array, mesh: Array, pushed: Array, direction: Array, k: float,
-    c: float, force: Array, out: Array, push: Array,
+    q: Single, v: Single, springs: Single, dampers: Single, mesh: Single, pushed: Single, direction: Single,
+    k: np.float32, c: np.float32, force: Single, bearings: Single, held: Single, stiffer: Single, out: Single,
+    push: Single,
 ) -> None:  # fmt: skip
     """Accelerations `out` (n, columns) and the mesh's elastic and damping force `push` (columns,)."""
     size, columns = q.shape
@@ -70,56 +87,64 @@ def _rates(
                 push[p] += mesh[i] * (k * q[i, p] + c * v[i, p])
     for i in range(size):
         for p in range(columns):
-            out[i, p] = pushed[i] * push[p] + direction[i] * force[p]
+            out[i, p] = pushed[i] * push[p] + direction[i, p] * force[p]
         for j in range(size):
             if springs[i, j] != 0.0 or dampers[i, j] != 0.0:
                 for p in range(columns):
                     out[i, p] += springs[i, j] * q[j, p] + dampers[i, j] * v[j, p]
+    for b in range(len(bearings)):
+        for i in range(size):
+            for j in range(size):
+                if held[b, i] != 0.0 and bearings[b, j] != 0.0:
+                    for p in range(columns):
+                        out[i, p] += held[b, i] * stiffer[b] * bearings[b, j] * q[j, p]
 
 
 @compiled(fastmath=ROUNDING)
 def _run(
-    springs: Array, dampers: Array, mesh: Array, pushed: Array, direction: Array, in_mesh: float, stiffness: Array,
-    damping: Array, forces: Array, h: float, substeps: int, early: int, places: Array, pushes: Array,
+    springs: Single, dampers: Single, mesh: Single, pushed: Single, direction: Single, in_mesh: Single,
+    stiffness: Single, damping: Single, forces: Single, bearings: Single, held: Single, stiffer: Single,
+    h: np.float32, substeps: int, early: int, places: Single, pushes: Single,
 ) -> None:  # fmt: skip
     """Fill places and pushes."""
     entries, columns = forces.shape
     size = len(mesh)
-    q, v = np.zeros((size, columns)), np.zeros((size, columns))
+    q, v = np.zeros((size, columns), np.float32), np.zeros((size, columns), np.float32)
     q2, v2, v3, v4 = np.empty_like(q), np.empty_like(q), np.empty_like(q), np.empty_like(q)
     a1, a2, a3, a4 = np.empty_like(q), np.empty_like(q), np.empty_like(q), np.empty_like(q)
-    push = np.empty(columns)
+    push = np.empty(columns, np.float32)
     steps = entries // 2
     for number in range(-early, steps):
         i = (2 * number) % entries
         middle, after = i + 1, (i + 2) % entries
-        _rates(q, v, springs, dampers, mesh, pushed, direction, stiffness[i], damping[i], forces[i], a1, push)
+        _rates(q, v, springs, dampers, mesh, pushed, direction, stiffness[i], damping[i], forces[i],
+               bearings, held, stiffer[i], a1, push)  # fmt: skip
         if number >= 0 and number % substeps == 0:
             sample = number // substeps
             for c in range(size):
                 for p in range(columns):
                     places[sample, c, p] = q[c, p]
             for p in range(columns):
-                pushes[sample, p] = push[p] + in_mesh * forces[i, p]
+                pushes[sample, p] = push[p] + in_mesh[p] * forces[i, p]
         for c in range(size):
             for p in range(columns):
-                q2[c, p] = q[c, p] + 0.5 * h * v[c, p]
-                v2[c, p] = v[c, p] + 0.5 * h * a1[c, p]
+                q2[c, p] = q[c, p] + HALF * h * v[c, p]
+                v2[c, p] = v[c, p] + HALF * h * a1[c, p]
         _rates(q2, v2, springs, dampers, mesh, pushed, direction, stiffness[middle], damping[middle], forces[middle],
-               a2, push)  # fmt: skip
+               bearings, held, stiffer[middle], a2, push)  # fmt: skip
         for c in range(size):
             for p in range(columns):
-                q2[c, p] = q[c, p] + 0.5 * h * v2[c, p]
-                v3[c, p] = v[c, p] + 0.5 * h * a2[c, p]
+                q2[c, p] = q[c, p] + HALF * h * v2[c, p]
+                v3[c, p] = v[c, p] + HALF * h * a2[c, p]
         _rates(q2, v3, springs, dampers, mesh, pushed, direction, stiffness[middle], damping[middle], forces[middle],
-               a3, push)  # fmt: skip
+               bearings, held, stiffer[middle], a3, push)  # fmt: skip
         for c in range(size):
             for p in range(columns):
                 q2[c, p] = q[c, p] + h * v3[c, p]
                 v4[c, p] = v[c, p] + h * a3[c, p]
         _rates(q2, v4, springs, dampers, mesh, pushed, direction, stiffness[after], damping[after], forces[after],
-               a4, push)  # fmt: skip
+               bearings, held, stiffer[after], a4, push)  # fmt: skip
         for c in range(size):
             for p in range(columns):
-                q[c, p] += h / 6.0 * (v[c, p] + 2.0 * (v2[c, p] + v3[c, p]) + v4[c, p])
-                v[c, p] += h / 6.0 * (a1[c, p] + 2.0 * (a2[c, p] + a3[c, p]) + a4[c, p])
+                q[c, p] += SIXTH * h * (v[c, p] + TWO * (v2[c, p] + v3[c, p]) + v4[c, p])
+                v[c, p] += SIXTH * h * (a1[c, p] + TWO * (a2[c, p] + a3[c, p]) + a4[c, p])

@@ -1,4 +1,4 @@
-"""How likely an effect is, where the judged record has spoken against one."""
+"""How likely an effect is, where its size or the judged record has spoken against it."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ def weighed(name: str, evidence: float) -> Any:
     return SimpleNamespace(hypothesis=hypothesis, log_bayes_factor=evidence)
 
 
-def test_an_effect_that_closes_nothing_of_the_judged_record_makes_none_likely() -> None:
+def test_an_effect_that_entered_and_is_not_named_makes_none_likely() -> None:
     backlash, friction = weighed("backlash", 824.0), weighed("friction", 1.0)
     selection = SimpleNamespace(weighed=(backlash, friction))
     decided: Any = SimpleNamespace(named=())
 
-    def best(*dropped: Any) -> tuple[float, ...]:
-        judged: Any = SimpleNamespace(found=SimpleNamespace(selection=selection), dropped=dropped, closings={})
-        return chances_of(judged, decided, POPULATION, LINES).best
+    def best(*entered: Any) -> tuple[float, ...]:
+        judged: Any = SimpleNamespace(found=SimpleNamespace(selection=selection), closings={})
+        return chances_of(judged, decided, POPULATION, LINES, entered).best
 
     assert best() == effect_signs(824.0, LINES, False, 0.0)
     assert best(backlash) == effect_signs(1.0, LINES, False, 0.0)

@@ -61,6 +61,11 @@ class FakeSimulator:
     layout: SimpleNamespace = field(default_factory=lambda: SimpleNamespace(unknowns=unknowns()))
     jacobians: int = 0
 
+    def of_record(self, number: int) -> FakeSimulator:
+        """It has one record."""
+        assert number == 0
+        return self
+
     def lines(self, p: np.ndarray) -> np.ndarray | None:
         return None if np.abs(p).max() > self.largest else self.of(p)
 

@@ -11,6 +11,7 @@ from gearbench.bench.nonlinear.along import along
 from gearbench.bench.nonlinear.law_table import mesh_law
 from gearbench.bench.nonlinear.replay import steady_motion
 from gearbench.cases import case_files
+from gearbench.lumped.nonlinear.coordinates import IN_MESH
 from gearbench.lumped.nonlinear.step import columns
 from gearbench.rig import read_case
 
@@ -37,7 +38,7 @@ def test_an_error_of_one_tooth_does_what_two_simulations_differ_by() -> None:
     tangent = along(steady_motion(case, record, law))
     numbers, _ = law.pairs(tangent.phase)
     force = SMALL * (tangent.pairs.tangent * (numbers % 20 == 3)).sum(axis=1, keepdims=True)
-    found = tangent.answers(force)
+    found = tangent.answers(force, np.array([IN_MESH]))
     more, less = uneven(SMALL), uneven(-SMALL)
     wanted = {channel: 0.5 * (more[channel] - less[channel]) for channel in more}
     for channel, change in wanted.items():
@@ -55,7 +56,7 @@ def test_torque_on_the_shaft_does_what_ripple_does() -> None:
     plain, other = steady_motion(case, record, law), steady_motion(rippled, record, law)
     tangent = along(plain)
     force = 0.2 * np.cos(6 * 2 * np.pi * tangent.phase / 20)[:, None] / plain.setup.meshing.driver.base_radius
-    found = tangent.answers(force, tangent.drive)["dte"][0]
+    found = tangent.answers(force, np.array([tangent.drive]))["dte"][0]
     change = other.setup.dte(other.outputs) - plain.setup.dte(plain.outputs)
     assert np.linalg.norm(found - change) < 0.05 * np.linalg.norm(change)
 
@@ -69,6 +70,6 @@ def test_a_rig_with_stiff_supports_across_keeps_its_tangent_stable() -> None:
     moved = case.model_copy(update={"rig": case.rig.model_copy(update={"mesh": softer})})
     plain, other = steady_motion(case, record, law), steady_motion(moved, record, law)
     tangent = along(plain)
-    found = tangent.answers(tangent.of_excess(np.full((len(tangent.phase), 1), SMALL)))["dte"][0]
+    found = tangent.answers(tangent.of_excess(np.full((len(tangent.phase), 1), SMALL)), np.array([IN_MESH]))["dte"][0]
     change = other.setup.dte(other.outputs) - plain.setup.dte(plain.outputs)
     assert found == pytest.approx(change, abs=0.05 * SMALL)

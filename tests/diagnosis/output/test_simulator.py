@@ -55,7 +55,7 @@ CLOSE = 0.12  # of the change in any channel: modes beyond the band, and steps o
         ("mesh-ratio", 0, 0.05),
         ("shape", 2, 0.05),
         ("eccentricity-driven", 1, 0.5),
-        ("pitch-driven", 7, 0.5),
+        ("pitch-driven", 7, 0.1),
         ("bearing-driver", 0, 0.1),
         ("delay-y_driver", 0, 0.5),
         ("ripple", 3, 0.5),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from gearbench.lumped.nonlinear.coordinates import IN_MESH
 from gearbench.lumped.nonlinear.tangent import Tangent, departures
 
 MASS, STIFFNESS, DAMPING = 2.0, 3e6, 400.0  # of the oscillator; the mesh has a third of the stiffness
@@ -23,6 +24,8 @@ def oscillator(on_mesh: float) -> tuple[Tangent, float]:
         stiffness=np.full(entries, STIFFNESS * on_mesh),
         damping=np.full(entries, DAMPING * on_mesh),
         step=duration / (SUBSTEPS * SAMPLES),
+        bearings=np.empty((0, 1)),
+        stiffer=np.empty((entries, 0)),
     )
     return tangent, 900.0
 
@@ -32,7 +35,8 @@ def test_an_oscillator_answers_as_its_receptance_says(on_drive: bool) -> None:
     tangent, rate = oscillator(1 / 3)
     time = np.arange(2 * SUBSTEPS * SAMPLES) * tangent.step / 2
     forces = np.stack([np.cos(rate * time), 5.0 * np.sin(rate * time)], axis=1)
-    places, pushes = departures(tangent, forces, 0 if on_drive else None, SUBSTEPS, 5 * SUBSTEPS * SAMPLES)
+    on = np.full(2, 0 if on_drive else IN_MESH)
+    places, pushes = departures(tangent, forces, on, SUBSTEPS, 5 * SUBSTEPS * SAMPLES)
     receptance = 1 / (STIFFNESS - rate**2 * MASS + 1j * rate * DAMPING)
     sign = 1.0 if on_drive else -1.0
     at = time[:: 2 * SUBSTEPS]
