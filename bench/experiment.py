@@ -18,7 +18,7 @@ from gearbench.bench.models import model_for
 from gearbench.bench.plan.damping import damping_advice
 from gearbench.bench.plan.memory import Work, check_disk, check_memory, check_work
 from gearbench.bench.plan.schedule import ProgressReport, schedule
-from gearbench.bench.plan.settling import check_settling, kept_samples
+from gearbench.bench.plan.settling import check_decay, check_settling, kept_samples
 from gearbench.bench.plan.workers import READY, processors
 from gearbench.bench.realisations import Ready, Realisation, raw_channels, realise, stretches
 from gearbench.bench.record.channels import Stretch
@@ -142,8 +142,11 @@ def _ready(case: Case, model: str | None, progress: ProgressReport | None, worke
     check_delays(case.rig, plan.wraps, plan.repeat_time, case.experiment.changes_speed)
     with READY:
         prepared = solver.prepare(case, plan, lambda note: report(0.0, note))
-    if plan.repeats or prepared.decay is None:
-        check_settling(plan, case.experiment, prepared.slowest, damping_advice(case))
+    if not plan.repeats and prepared.decay is not None:
+        check_decay(plan, case.experiment, prepared.decay, damping_advice(case))
+    else:
+        linear = prepared.keep == "mean"
+        check_settling(plan, case.experiment, prepared.slowest, damping_advice(case), linear)
     report(0.0, f"integrating with {prepared.substeps} steps a sample")
     return Ready(case, plan, prepared, report)
 

@@ -227,6 +227,9 @@ class Setup:
     def apart(self, outputs: Array) -> NDArray[np.bool_]:
         return np.asarray(columns(outputs).mesh_force == 0)
 
+    def strayed(self, outputs: Array) -> None:
+        """Springs know no flanks to leave."""
+
     def divided(self, outputs: Array) -> None:
         """All steps are alike."""
 
