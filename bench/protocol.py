@@ -29,8 +29,8 @@ Note = Callable[[str], None]
 
 
 class Drive(NamedTuple):
-    """One excitation period of the torque: `torque` (samples_per_period,) [N m] as recorded, `fine` on the model's own
-    grid and in its own unit."""
+    """One excitation period of the torque, or one sample of a constant one: `torque` (samples,) [N m] as recorded, and
+    `fine` on the model's own grid and in its own unit; both repeat."""
 
     torque: Array
     fine: Array

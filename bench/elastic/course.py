@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 def drive_of(torque: Torque, samples_per_period: int, substeps: int) -> Drive:
     """One period of the driver torque, of which entry k of `fine` is that at the end of step k."""
-    period = torque.sample(samples_per_period * substeps)
+    period = torque.sample(torque.samples_of(samples_per_period) * substeps)
     return Drive(period[::substeps].copy(), np.roll(period, -1))
 
 

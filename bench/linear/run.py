@@ -68,7 +68,7 @@ class LinearRig:
         return {}
 
     def drive(self, torque: Torque) -> Drive:
-        fine = torque.sample(2 * self.substeps * self.samples_per_period)
+        fine = torque.sample(2 * self.substeps * torque.samples_of(self.samples_per_period))
         return Drive(fine[:: 2 * self.substeps].copy(), self.force_per_torque * fine)
 
     def start(self, sample: int) -> Array:
