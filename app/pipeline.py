@@ -99,6 +99,7 @@ def run(
     >>> f"{numbers['te_peak_to_peak_um']:.2f} um"
     '5.53 um'
     """
+    from gearbench.bench.experiment import check_record_held
     from gearbench.bench.readiness import check_case
     from gearbench.bench.refusals.stated import check_stated
     from gearbench.records.provenance import source_digest
@@ -118,6 +119,7 @@ def run(
                 "experiment.speed_end_rpm or speed_table changes the speed: run identifies a response at a constant"
                 " mesh frequency; `simulate` makes the record"
             )
+        check_record_held(one)
     with claimed(Path(out), "run", fingerprint(dump_case(case), source_digest()), force) as output:
         jobs = [
             Job(one, output, progress or Silent(), f"-{name}" if name else "", workers)
@@ -133,34 +135,33 @@ def run(
 
 def _simulate_together(jobs: list[Job], workers: int | None) -> None:
     """Records of several conditions side by side, those that an earlier run has not left."""
-    from gearbench.bench.conditions import simulate_all
-    from gearbench.records import write_record
+    from gearbench.bench.conditions import simulate_all_to
 
     missing = [job for job in jobs if not job.output.has(job.name("record.nc"))]
     if len(missing) < 2:
         return
 
-    def take(number: int, record: xr.Dataset) -> None:
-        job = missing[number]
-        job.output.write(job.name("record.nc"), lambda path: write_record(record, path))
+    def take(number: int, _: dict[str, Any]) -> None:
+        missing[number].output.note(missing[number].name("record.nc"), paths[number])
 
-    progress = missing[0].progress
+    progress, paths = missing[0].progress, [job.output.path(job.name("record.nc")) for job in missing]
     progress.step(f"records of {len(missing)} conditions")
     with ExitStack() as folders:
-        kept = [folders.enter_context(checkpoints_of(job.output.path(job.name("record.nc")))) for job in missing]
-        simulate_all([job.case for job in missing], take, progress=progress, checkpoints=kept, workers=workers)
+        kept = [folders.enter_context(checkpoints_of(path)) for path in paths]
+        cases = [job.case for job in missing]
+        simulate_all_to(cases, paths, take, progress=progress, checkpoints=kept, workers=workers)
 
 
 def run_experiment(job: Job) -> tuple[dict[str, Any], RunPart | None]:
     """All products of one experiment; the numbers of its summary, and its part of a report that is still to be made."""
-    from gearbench.bench import simulate
+    from gearbench.bench import simulate_to
     from gearbench.bench.models import model_for
     from gearbench.bench.results.responses import identify_case, linearised_modes, reference_results
     from gearbench.bench.statics import static
     from gearbench.figures.of_run import FIGURES, RunResults
     from gearbench.geometry import pair
     from gearbench.identification import distortion, is_coset, read_frf, write_frf
-    from gearbench.records import read_dataset, read_record, write_dataset, write_record
+    from gearbench.records import read_dataset, read_record, write_dataset
     from gearbench.rig import dump_case
 
     case, progress = job.case, job.progress
@@ -170,13 +171,13 @@ def run_experiment(job: Job) -> tuple[dict[str, Any], RunPart | None]:
     statics = job.dataset(
         "static.nc", read_dataset, lambda: static(case, positions=POSITIONS, progress=progress), write_dataset
     )
-    with checkpoints_of(job.output.path(job.name("record.nc"))) as checkpoints:
-        record = job.dataset(
-            "record.nc",
-            read_record,
-            lambda: simulate(case, progress=progress, checkpoints=checkpoints, workers=job.workers),
-            write_record,
-        )
+    if not job.output.has(job.name("record.nc")):
+        progress.step(job.name("record.nc"))
+        with checkpoints_of(job.output.path(job.name("record.nc"))) as kept:
+            # Piece by piece into its file: memory then holds the record, not what it is made of besides.
+            simulating = partial(simulate_to, case, progress=progress, checkpoints=kept, workers=job.workers)
+            job.output.write(job.name("record.nc"), simulating)
+    record = read_record(job.output.path(job.name("record.nc")))
     modes: dict[str, xr.Dataset] = {}
     results = {"identified": job.dataset("frf.nc", read_frf, lambda: identify_case(case, record, progress), write_frf)}
     if not model_for(case)[1].elastic:

@@ -16,13 +16,14 @@ from gearbench.bench.errors import BenchError
 from gearbench.bench.finish import begin_of, channel_attributes, record_attributes, shown
 from gearbench.bench.models import model_for
 from gearbench.bench.plan.damping import damping_advice
-from gearbench.bench.plan.memory import Work, check_disk, check_memory, check_work
+from gearbench.bench.plan.memory import Work, check_disk, check_held, check_memory, check_work
 from gearbench.bench.plan.schedule import ProgressReport, schedule
-from gearbench.bench.plan.settling import check_settling, kept_samples
+from gearbench.bench.plan.settling import check_decay, check_settling, kept_samples
 from gearbench.bench.plan.workers import READY, processors
 from gearbench.bench.realisations import Ready, Realisation, raw_channels, realise, stretches
 from gearbench.bench.record.channels import Stretch
 from gearbench.bench.record.sensors import CHANNELS, Noise, check_delays, needs_whole
+from gearbench.bench.refusals.effects import is_nonlinear
 from gearbench.bench.refusals.gears import check_gears
 from gearbench.bench.refusals.stated import check_stated
 from gearbench.bench.tape import End, Shelf
@@ -129,6 +130,14 @@ def simulate_to(
     return _size(target, head, tallies)
 
 
+def check_record_held(case: Case) -> None:
+    """Raise BenchError where the record of a case is larger than the memory that is free."""
+    case, solver = model_for(case)
+    plan = schedule(case.experiment, case.rig)
+    mean = not solver.elastic and not is_nonlinear(case)  # the record is a mean of blocks
+    check_held(kept_samples(plan, "mean") if mean else plan.record_samples, case.experiment.realisations)
+
+
 def _ready(case: Case, model: str | None, progress: ProgressReport | None, workers: int | None) -> Ready:
     """The experiment made ready, whatever cannot be asked for refused."""
     report = progress or (lambda fraction, note: None)
@@ -142,8 +151,11 @@ def _ready(case: Case, model: str | None, progress: ProgressReport | None, worke
     check_delays(case.rig, plan.wraps, plan.repeat_time, case.experiment.changes_speed)
     with READY:
         prepared = solver.prepare(case, plan, lambda note: report(0.0, note))
-    if plan.repeats or prepared.decay is None:
-        check_settling(plan, case.experiment, prepared.slowest, damping_advice(case))
+    if not plan.repeats and prepared.decay is not None:
+        check_decay(plan, case.experiment, prepared.decay, damping_advice(case))
+    else:
+        linear = prepared.keep == "mean"
+        check_settling(plan, case.experiment, prepared.slowest, damping_advice(case), linear)
     report(0.0, f"integrating with {prepared.substeps} steps a sample")
     return Ready(case, plan, prepared, report)
 
@@ -157,7 +169,8 @@ def _check_memory(ready: Ready, workers: int | None, streamed: bool = False) -> 
         compared = plan.block_samples if plan.repeats else plan.samples_per_period
         block = compared if plan.repeats or ready.prepared.decay is None else 0
         whole = needs_whole(ready.case.rig)
-        work = Work(kept, block, plan.samples_per_period, ready.prepared.substeps, ready.samples if whole else 0)
+        period = plan.samples_per_period if ready.case.experiment.multisine else 1
+        work = Work(kept, block, period, ready.prepared.substeps, ready.samples if whole else 0)
         check_work(work, at_once)
     else:
         check_memory(ready.samples, kept, ready.prepared.substeps, total, at_once)

@@ -8,10 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gearbench.bench.plan.damping import undamped
 from gearbench.bench.plan.schedule import Schedule
 from gearbench.bench.protocol import Prepared
 from gearbench.bench.realisations import Ready, Realisation
 from gearbench.bench.record.attributes import (
+    beyond_model,
     divided_steps,
     experiment_attributes,
     joined,
@@ -85,11 +87,14 @@ def record_attributes(ready: Ready, meshing: Pair, runs: Sequence[Realisation]) 
     case, plan, prepared, samples = ready.case, ready.plan, ready.prepared, ready.samples
     lost = None if runs[0].lost is None else sum(run.lost or 0 for run in runs)
     divided = None if runs[0].divided is None else sum(run.divided or 0 for run in runs)
+    strayed = None if runs[0].strayed is None else sum(run.strayed or 0 for run in runs)
+    begins = [(run.first + run.strayed_first) / plan.sampling_rate for run in runs if run.strayed_first is not None]
     told = (
+        beyond_model(strayed or 0, len(runs) * samples, min(begins, default=0.0)),
         lost_contact(lost or 0, len(runs) * samples),
         divided_steps(divided or 0, len(runs) * samples * prepared.substeps),
         unlike_periods(plan),
-        unsettled(max(run.residual for run in runs), case.experiment.settling_tolerance),
+        unsettled(max(run.residual for run in runs), case.experiment.settling_tolerance, undamped(case)),
     )
     periods = samples // plan.samples_per_period
     return {
@@ -101,6 +106,7 @@ def record_attributes(ready: Ready, meshing: Pair, runs: Sequence[Realisation]) 
         "repeats_after_mesh_cycles": plan.repeat_cycles,
         "hunting_period": None if plan.rotation else plan.repeat_cycles * plan.mesh_period,
         "contact_lost_samples": lost,
+        "beyond_model_samples": strayed,
         "divided_steps": divided,
         "warnings": joined(*told, *prepared.warnings),
         "model": case.simulation.model,

@@ -29,8 +29,8 @@ Note = Callable[[str], None]
 
 
 class Drive(NamedTuple):
-    """One excitation period of the torque: `torque` (samples_per_period,) [N m] as recorded, `fine` on the model's own
-    grid and in its own unit."""
+    """One excitation period of the torque, or one sample of a constant one: `torque` (samples,) [N m] as recorded, and
+    `fine` on the model's own grid and in its own unit; both repeat."""
 
     torque: Array
     fine: Array
@@ -103,6 +103,10 @@ class Prepared(Protocol[State]):
 
     def apart(self, outputs: Array) -> NDArray[np.bool_] | None:
         """Samples (samples,) in which no teeth touch; None for a model that does not let go."""
+
+    def strayed(self, outputs: Array) -> NDArray[np.bool_] | None:
+        """Samples (samples,) in which teeth overlap beyond the modelled flanks or press harder than modelled: what the
+        model says there and afterwards is not the rig's; None for a model without such limits."""
 
     def divided(self, outputs: Array) -> int | None:
         """Steps that had to be divided to be solved; None for a model that never does that."""

@@ -28,10 +28,13 @@ Array = NDArray[np.float64]
 @dataclass(frozen=True)
 class Realisation:
     """What one realisation leaves beside its channels: `lost` samples without contact, None where the model has no such
-    thing, likewise steps that were `divided`; the rest as in `Steady`."""
+    thing, likewise steps that were `divided` and samples beyond what is modelled (`strayed`, the first of them
+    `strayed_first`, None where there is none); the rest as in `Steady`."""
 
     lost: int | None
     divided: int | None
+    strayed: int | None
+    strayed_first: int | None
     residual: float
     settling_periods: int
     first: int
@@ -69,9 +72,6 @@ def realise(
     decay = None if plan.repeats else prepared.decay
     slowest = None if case.experiment.settling_periods_max else prepared.slowest
     wait = waiting(plan, case.experiment, slowest, damping_advice(case))
-    if prepared.keep == "mean":
-        # A linear rig answers what repeats by what repeats: what still changes in the end grows for ever.
-        wait = wait._replace(ends=False)
     expected = samples_to_run(plan, prepared.keep)
 
     def run(number: int) -> Realisation:
@@ -183,7 +183,19 @@ def _realisation(ready: Ready, steady: Steady) -> Realisation:
     def divided(within: int, count: int) -> int | None:
         return prepared.divided(outputs[within : within + count])
 
+    first_strayed: list[int] = []
+
+    def strayed(within: int, count: int) -> int | None:
+        beyond = prepared.strayed(outputs[within : within + count])
+        if beyond is None:
+            return None
+        if beyond.any() and not first_strayed:
+            first_strayed.append(within + int(beyond.argmax()))
+        return int(beyond.sum())
+
     return Realisation(
+        strayed=_summed(strayed, ready.samples, len(outputs)),
+        strayed_first=first_strayed[0] if first_strayed else None,
         divided=_summed(divided, len(outputs), len(outputs)),
         lost=_summed(lost, ready.samples, len(outputs)),
         residual=steady.residual,

@@ -58,13 +58,14 @@ class Sweepable(Protocol):
 
 class Look(NamedTuple):
     """What is kept of a speed: rms of the DTE about its mean [m], its mean [m], largest mesh force over the static one,
-    part of the time without contact, change from look to look, whether free vibrations had to be left to die out for
-    longer than `WAIT`, amplitudes (orders,) [m]."""
+    part of the time without contact and beyond what is modelled, change from look to look, whether free vibrations had
+    to be left to die out for longer than `WAIT`, amplitudes (orders,) [m]."""
 
     dte_rms: float
     dte_mean: float
     dynamic_factor: float
     contact_loss: float
+    beyond_model: float
     residual: float
     hurried: bool
     spectrum: Array
@@ -80,11 +81,11 @@ def sweep(
 ) -> xr.Dataset:
     """Steady answer to the mean torque at driver speeds [rad/s], upwards and downwards.
 
-    Variables over (direction, speed): dte_rms, dte_mean [m], dynamic_factor, contact_loss, residual, settled; and
-    dte_amplitude (direction, speed, order) [m], order in mesh orders. iso_dynamic_factor (speed): K_v by ISO 6336-1
-    Method B. Both directions run side by side unless `workers` (absent: as many as there are processors) is 1; the
-    result is the same to the last bit. `progress` is called from any of their threads. Raises BenchError for a model
-    that cannot be swept.
+    Variables over (direction, speed): dte_rms, dte_mean [m], dynamic_factor, contact_loss, beyond_model, residual,
+    settled; and dte_amplitude (direction, speed, order) [m], order in mesh orders. iso_dynamic_factor (speed): K_v by
+    ISO 6336-1 Method B. Both directions run side by side unless `workers` (absent: as many as there are processors) is
+    1; the result is the same to the last bit. `progress` is called from any of their threads. Raises BenchError for a
+    model that cannot be swept.
     """
     report = progress or (lambda fraction, note: None)
     case, solver = model_for(_still(case), model)
@@ -181,13 +182,14 @@ def waiting(settling: float, rate: float) -> int:
 
 
 def _measured(prepared: Prepared[Any], mesh: Sweepable, outputs: Array, residual: float, case: Case) -> Look:
-    dte, apart = prepared.dte(outputs), prepared.apart(outputs)
+    dte, apart, beyond = prepared.dte(outputs), prepared.apart(outputs), prepared.strayed(outputs)
     static = case.experiment.torque_mean / pair(case.rig).driver.base_radius
     return Look(
         dte_rms=float(dte.std()),
         dte_mean=float(dte.mean()),
         dynamic_factor=float(mesh.mesh_force(outputs).max()) / static,
         contact_loss=0.0 if apart is None else float(apart.mean()),
+        beyond_model=0.0 if beyond is None else float(beyond.mean()),
         residual=residual,
         hurried=False,
         spectrum=2 * np.abs(np.fft.rfft(dte - dte.mean()))[: SAMPLES * CYCLES // 4] / dte.size,
@@ -222,7 +224,7 @@ def _errors(rig: Rig) -> dict[str, float]:
 
 def _dataset(case: Case, solver: Model, speeds: Array, looks: dict[str, list[Look]]) -> xr.Dataset:
     iso, resonance = iso_factors(case, speeds)
-    units = {"dte_rms": "m", "dte_mean": "m", "dynamic_factor": "1", "contact_loss": "1", "residual": "1"}
+    units = dict.fromkeys(Look._fields[:6], "1") | {"dte_rms": "m", "dte_mean": "m"}
     both = {
         name: (
             ("direction", "speed"),
@@ -252,8 +254,25 @@ def _dataset(case: Case, solver: Model, speeds: Array, looks: dict[str, list[Loo
             "torque_mean": case.experiment.torque_mean,
             "teeth_driver": case.rig.driver.teeth,
             "iso_resonance_speed": resonance,
-            "warnings": _hurried([look for each in looks.values() for look in each]),
+            "warnings": _warnings([look for each in looks.values() for look in each]),
         },
+    )
+
+
+def _warnings(looks: list[Look]) -> str:
+    """What limits the looks, a line each; empty where nothing does."""
+    return "\n".join(filter(None, (_beyond(looks), _hurried(looks))))
+
+
+def _beyond(looks: list[Look]) -> str:
+    """A sentence where the motion went beyond what is modelled; empty where it did not."""
+    count = sum(look.beyond_model > 0.0 for look in looks)
+    if not count:
+        return ""
+    return (
+        f"at {count} of {len(looks)} speeds teeth overlap beyond the modelled flanks or press harder than modelled"
+        " (beyond_model: for which part of the time): what the model says there is beyond its validity; lower"
+        " experiment.torque_mean_nm, or damp the rig"
     )
 
 

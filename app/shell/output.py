@@ -38,9 +38,13 @@ class Output:
         def write_and_note(temporary: Path) -> None:
             write(temporary)
             # Noted before the file has its name: a run that is killed in between makes the product again.
-            self.set_mark(self.mark() | {"files": self.files() | {name: digest_of(temporary)}})
+            self.note(name, temporary)
 
         return write_whole(self.path(name), write_and_note)
+
+    def note(self, name: str, file: Path) -> None:
+        """Take a complete `file`, which is the product `name` or is to become it, for a product."""
+        self.set_mark(self.mark() | {"files": self.files() | {name: digest_of(file)}})
 
     def write_text(self, name: str, text: str) -> Path:
         """Write a text product."""

@@ -8,16 +8,13 @@ from numpy.typing import NDArray
 from gearbench.bench.errors import BenchError
 from gearbench.bench.plan.excitation import Torque
 from gearbench.bench.protocol import Drive
-from gearbench.fem.limits import EDGE_SEPARATION
-from gearbench.geometry import Pair
-from gearbench.rig.lengths import length_words
 
 Array = NDArray[np.float64]
 
 
 def drive_of(torque: Torque, samples_per_period: int, substeps: int) -> Drive:
     """One period of the driver torque, of which entry k of `fine` is that at the end of step k."""
-    period = torque.sample(samples_per_period * substeps)
+    period = torque.sample(torque.samples_of(samples_per_period) * substeps)
     return Drive(period[::substeps].copy(), np.roll(period, -1))
 
 
@@ -26,14 +23,9 @@ def torque_of(drive: Drive, first: int, steps: int) -> Array:
     return np.take(drive.fine, np.arange(first, first + steps), mode="wrap")
 
 
-def check_course(t: float, off: bool, lost: str, outputs: Array) -> None:
-    """Raises BenchError where an integration has ended early at `t` [s]: off the modelled flanks, without contact
-    forces (`lost` is then the sentence for it, else empty), or without end."""
-    if off:
-        raise BenchError(
-            f"at t = {t:.6g} s the teeth overlap where contact leaves the modelled flanks: lower"
-            " experiment.torque_mean_nm or the multisine"
-        )
+def check_course(t: float, lost: str, outputs: Array) -> None:
+    """Raises BenchError where an integration has ended early at `t` [s]: without contact forces (`lost` is then the
+    sentence for it, else empty), or without end."""
     if lost:
         raise BenchError(lost)
     if not np.isfinite(outputs).all():
@@ -43,18 +35,3 @@ def check_course(t: float, off: bool, lost: str, outputs: Array) -> None:
 def begun_with(here: Array, outputs: Array) -> Array:
     """Outputs (samples, n) at the starts of steps, from `here` (n,) and those at their ends."""
     return np.vstack([here[None], outputs[:-1]])
-
-
-def reach_of(meshing: Pair) -> float:
-    """DTE [m] up to which tip edges are followed."""
-    return EDGE_SEPARATION * meshing.driver.module
-
-
-def check_reach(dte: Array, meshing: Pair) -> None:
-    """Raises BenchError where the flanks overlap further than tip edges are followed; dte [m]."""
-    most = reach_of(meshing)
-    if dte.max() > most:
-        raise BenchError(
-            f"the DTE reaches {length_words(float(dte.max()))}, beyond the {length_words(most)} to which contact off"
-            " the line of action is modelled for this module: lower experiment.torque_mean_nm or the multisine"
-        )

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.bench.elastic.course import begun_with, check_course, check_reach, drive_of, reach_of, torque_of
+from gearbench.bench.elastic.course import begun_with, check_course, drive_of, torque_of
 from gearbench.bench.elastic.rest import check_rest
 from gearbench.bench.elastic.rig import ElasticRig, choose_substeps, elastic_rig, machine_for, slowest_decay
 from gearbench.bench.elastic.together import under_excitation, under_ripple
@@ -26,6 +26,7 @@ from gearbench.bench.record.channels import (
     support_factor,
     turned_by,
 )
+from gearbench.fem.contact.static import ContactError
 from gearbench.fem.motion.machine import Machine
 from gearbench.fem.motion.scheme import Scheme, make_scheme
 from gearbench.fem.motion.start import State as Step
@@ -42,6 +43,8 @@ LIMITS = (
     "a varying factor on the mesh force neither gives nor takes work through the rotation",
     "Coriolis and centrifugal forces of the elastic displacement relative to the hubs are left out",
 )
+
+HALVINGS = 6  # of the mean torque, to find a rest to begin from
 
 
 class State(NamedTuple):
@@ -104,7 +107,7 @@ class Elastic:
         return drive_of(torque, self.samples_per_period, self.substeps)
 
     def start(self, sample: int) -> State:
-        step = initial_state(self.machine, self.mean_torque, sample / self.sampling_rate)
+        step = rest_of(self.machine, self.mean_torque, sample / self.sampling_rate)
         return State(sample, under_ripple(self.machine, step), np.zeros(CHANNELS), begins=True)
 
     def resume(self, state: State) -> State:
@@ -136,7 +139,7 @@ class Elastic:
                 f"contact was not found at t = {step.t:.6g} s, in steps of {self.scheme.step / PARTS:.2g} s either:"
                 " the motion diverges, or forces are far beyond what the flanks can carry"
             )
-        check_course(step.t, run.off, lost, outputs)
+        check_course(step.t, lost, outputs)
         return State(state.sample + samples, step, outputs[-1]), begun_with(state.here, outputs)
 
     def dte(self, outputs: Array) -> Array:
@@ -147,11 +150,9 @@ class Elastic:
         return dte_of(turned, out.y_driver, out.y_driven, support_factor(rig, meshing), *across)
 
     def channels(self, outputs: Array, torque: Array) -> Channels:
-        """Raises BenchError where the flanks overlapped further than tip edges are followed."""
         dte, out, rig = self.dte(outputs), columns(outputs), self.elastic.rig
         across, held = rig.support.move_across, rig.drive.boundary == "speed"
         applied = out.torque_driver if held else torque
-        check_reach(dte, self.elastic.pair)
         return Channels(
             torque_driven=out.torque_driven,
             angle_driver=out.angle_driver,
@@ -172,6 +173,20 @@ class Elastic:
     def apart(self, outputs: Array) -> NDArray[np.bool_]:
         return np.asarray(columns(outputs).loaded == 0)
 
+    def strayed(self, outputs: Array) -> NDArray[np.bool_]:
+        return np.asarray(columns(outputs).strayed > 0)
+
+
+def rest_of(machine: Machine, torque: float, t: float) -> Step:
+    """Where a motion begins: at rest under the mean torque [N m], or, at a position where the flanks do not bear that,
+    under the largest of its halves that they do bear. Raises ContactError where there is none."""
+    for halved in range(HALVINGS):
+        try:
+            return initial_state(machine, torque / 2**halved, t)
+        except ContactError:
+            continue
+    return initial_state(machine, torque / 2**HALVINGS, t)
+
 
 def prepare(case: Case, plan: Schedule, note: Note) -> Elastic:
     """Gears condensed, contact tabulated, step chosen. Raises GeometryError, ContactError or BenchError."""
@@ -191,5 +206,5 @@ def prepare(case: Case, plan: Schedule, note: Note) -> Elastic:
         changes=plan.rotation is not None,
     )
     note("looking at rest")
-    check_rest(machine, prepared.dte, case.experiment.torque_mean, plan, reach_of(elastic.pair))
+    check_rest(machine, prepared.dte, case.experiment.torque_mean, plan)
     return prepared

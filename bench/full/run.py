@@ -9,7 +9,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.bench.elastic.course import begun_with, check_course, check_reach, drive_of, torque_of
+from gearbench.bench.elastic.course import begun_with, check_course, drive_of, torque_of
 from gearbench.bench.elastic.rig import ElasticRig, choose_substeps, elastic_rig, machine_for, slowest_decay
 from gearbench.bench.plan.excitation import Torque
 from gearbench.bench.plan.rotation import Rotation
@@ -85,7 +85,7 @@ class Full:
         torque = torque_of(drive, first, steps)
         run = advance(self.integrator, state.step, torque, self.substeps)
         lost = f"the full model found no contact forces at t = {run.state.t:.6g} s" if run.lost else ""
-        check_course(run.state.t, run.off, lost, run.samples)
+        check_course(run.state.t, lost, run.samples)
         return State(state.sample + samples, run.state, run.samples[-1]), begun_with(state.here, run.samples)
 
     def dte(self, outputs: Array) -> Array:
@@ -94,9 +94,7 @@ class Full:
         return dte_of(turned, out.y_driver, out.y_driven, support_factor(self.elastic.rig, self.elastic.pair))
 
     def channels(self, outputs: Array, torque: Array) -> Channels:
-        """Raises BenchError where the flanks overlapped further than tip edges are followed."""
         dte, out = self.dte(outputs), columns(outputs)
-        check_reach(dte, self.elastic.pair)
         return Channels(
             torque_driven=out.torque_driven,
             angle_driver=out.angle_driver,
@@ -110,6 +108,9 @@ class Full:
 
     def apart(self, outputs: Array) -> NDArray[np.bool_]:
         return np.asarray(columns(outputs).loaded == 0)
+
+    def strayed(self, outputs: Array) -> NDArray[np.bool_]:
+        return np.asarray(columns(outputs).strayed > 0)
 
     def divided(self, outputs: Array) -> None:
         """All steps are alike."""

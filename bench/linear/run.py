@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from math import gcd
+from dataclasses import dataclass, replace
+from math import ceil, gcd, log
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gearbench.bench.errors import BenchError
 from gearbench.bench.plan.excitation import Torque
 from gearbench.bench.plan.schedule import Schedule
 from gearbench.bench.plan.settling import Keep
@@ -18,11 +19,14 @@ from gearbench.bench.record.attributes import bodies_of
 from gearbench.bench.record.channels import dte_of
 from gearbench.geometry import Pair, pair
 from gearbench.lumped import Lumped, lumped_model
+from gearbench.lumped.linear.model import STATES
 from gearbench.lumped.linear.runge_kutta import Tables, integrate, tabulate
 from gearbench.lumped.stiffness.potential_energy import outside_foundation_fit
 from gearbench.rig import Case
 
 Array = NDArray[np.float64]
+
+GROWTH = 1e-6  # from one mesh period to the next, that rounding may make
 
 
 @dataclass(frozen=True)
@@ -43,6 +47,7 @@ class LinearRig:
     free: bool  # the driven gear's speed is not imposed
     samples_per_period: int
     warnings: tuple[str, ...]
+    slowest: float  # rate [1/s] at which free vibrations die out at the mesh frequency
 
     keep: ClassVar[Keep] = "mean"
     piece: ClassVar[int] = 0
@@ -55,11 +60,6 @@ class LinearRig:
         return 1.0 / self.meshing.driver.base_radius
 
     @property
-    def slowest(self) -> float:
-        """Slowest rate [1/s] at which free vibrations die out, the mesh held."""
-        return self.model.slowest_decay()
-
-    @property
     def settings(self) -> dict[str, Any]:
         return {"model": "lumped", "substeps": self.substeps}
 
@@ -68,7 +68,7 @@ class LinearRig:
         return {}
 
     def drive(self, torque: Torque) -> Drive:
-        fine = torque.sample(2 * self.substeps * self.samples_per_period)
+        fine = torque.sample(2 * self.substeps * torque.samples_of(self.samples_per_period))
         return Drive(fine[:: 2 * self.substeps].copy(), self.force_per_torque * fine)
 
     def start(self, sample: int) -> Array:
@@ -102,6 +102,9 @@ class LinearRig:
     def apart(self, outputs: Array) -> None:
         """A heavily loaded mesh: the model has no backlash."""
 
+    def strayed(self, outputs: Array) -> None:
+        """Springs know no flanks to leave."""
+
     def divided(self, outputs: Array) -> None:
         """All steps are alike."""
 
@@ -114,8 +117,27 @@ def tables_for(model: Lumped, plan: Schedule, substeps: int) -> Tables:
     return tabulate(model, cycles=plan.mesh_cycles // common, steps=steps // common, step=step)
 
 
+def slowest_decay(model: Lumped, mesh_period: float, step: float) -> float:
+    """Slowest rate [1/s] at which free vibrations die out, the mesh held or turning with that period [s], in steps of
+    `step` [s] or less. Raises BenchError where they grow: nothing in a linear model limits them."""
+    steps = ceil(mesh_period / step)
+    cycle = tabulate(model, cycles=1, steps=steps, step=mesh_period / steps)
+    cycle = replace(cycle, mesh=cycle.mesh._replace(force=np.zeros(2 * steps)))
+    ends = [integrate(cycle, np.zeros(2), state, samples=1, substeps=steps)[0] for state in np.eye(STATES)]
+    # Floquet's multipliers: by how much vibrations grow in a mesh period.
+    factor = float(np.abs(np.linalg.eigvals(np.array(ends).T)).max())
+    if factor > 1.0 + GROWTH:
+        raise BenchError(
+            f"no steady state: at {1 / mesh_period:g} Hz mesh frequency (experiment.mesh_frequency_hz or"
+            f" speed_driver_rpm) the varying mesh stiffness makes vibrations grow {factor:.4g} times from one mesh"
+            " period to the next, and this linear model never parts the teeth, which would end that: change the speed,"
+            ' raise rig.damping.mesh_ratio, or set simulation.mesh_stiffness = "finite-element"'
+        )
+    return min(model.slowest_decay(), -log(max(factor, np.finfo(float).tiny)) / mesh_period)
+
+
 def prepare(case: Case, plan: Schedule) -> LinearRig:
-    """Model, step and tables of an experiment. Raises LumpedError or GeometryError."""
+    """Model, step and tables of an experiment. Raises LumpedError, GeometryError or BenchError."""
     rig, meshing = case.rig, pair(case.rig)
     model = lumped_model(rig, meshing, case.simulation)
     substeps = runge_kutta_substeps(model.fastest_rate(), case.experiment, case.simulation, plan)
@@ -130,5 +152,6 @@ def prepare(case: Case, plan: Schedule) -> LinearRig:
         inertias=(one.inertia, two.inertia),
         free=rig.load.boundary == "torque",
         samples_per_period=plan.samples_per_period,
+        slowest=slowest_decay(model, plan.mesh_period, 1.0 / (plan.sampling_rate * substeps)),
         warnings=tuple(outside_foundation_fit(rig, meshing)) if tabled else (),
     )

@@ -147,8 +147,9 @@ class Setup:
         return Varied(turning.cycles(time), turning.frequency(time[1:-1]) / self.mesh_frequency, along)
 
     def drive(self, torque: Torque) -> Drive:
-        fine = torque.sample(2 * self.substeps * self.samples_per_period)
-        return Drive(torque.sample(self.samples_per_period), fine / self.meshing.driver.base_radius)
+        period = torque.samples_of(self.samples_per_period)
+        fine = torque.sample(2 * self.substeps * period)
+        return Drive(torque.sample(period), fine / self.meshing.driver.base_radius)
 
     def start(self, sample: int) -> State:
         return self.at_rest(self.mean_force, sample)
@@ -226,6 +227,9 @@ class Setup:
 
     def apart(self, outputs: Array) -> NDArray[np.bool_]:
         return np.asarray(columns(outputs).mesh_force == 0)
+
+    def strayed(self, outputs: Array) -> None:
+        """Springs know no flanks to leave."""
 
     def divided(self, outputs: Array) -> None:
         """All steps are alike."""

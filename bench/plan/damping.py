@@ -45,6 +45,9 @@ def _of_gears(case: Case) -> Damper:
 
 def damping_advice(case: Case) -> str:
     """The damping to raise, by its keys and their values: those that are 0 where there are any, else all."""
-    found = dampers(case)
-    none = [damper for damper in found if damper.value == 0.0]
-    return ", ".join(str(damper) for damper in none or found)
+    return undamped(case) or ", ".join(map(str, dampers(case)))
+
+
+def undamped(case: Case) -> str:
+    """The keys of the dampers that are 0; empty where there are none."""
+    return ", ".join(str(damper) for damper in dampers(case) if damper.value == 0.0)

@@ -26,6 +26,10 @@ class Torque:
     mean: float
     signal: MultisineSignal | None = None
 
+    def samples_of(self, period: int) -> int:
+        """Samples after which it repeats, of an excitation period of so many: a constant repeats after each."""
+        return 1 if self.signal is None else period
+
     def sample(self, points: int) -> Array:
         """Exact values (points,) [N m] at equidistant instants of one excitation period, from its start."""
         if self.signal is None:

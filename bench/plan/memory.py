@@ -45,6 +45,18 @@ def check_memory(samples: int, kept: int, substeps: int, realisations: int, at_o
     )
 
 
+def check_held(samples: int, realisations: int) -> None:
+    """Raise BenchError where a record takes more memory than there is, which is read from its file as a whole."""
+    needed, free = memory_needed(samples, 0, 0, realisations, 1), memory_free()
+    if free is None or needed <= free:
+        return
+    raise BenchError(
+        f"the record takes about {needed / 1e9:.3g} GB, and is identified as a whole: {free / 1e9:.3g} GB of memory are"
+        " free; lower experiment.samples_per_period, experiment.periods or experiment.realisations, or let `simulate`"
+        " write it piece by piece"
+    )
+
+
 class Work(NamedTuple):
     """What one realisation takes on its way into a file: `kept` samples are simulated, of which blocks of `block` are
     compared (0: none are), under a torque that repeats after `period` samples, in `substeps` steps each; `whole`: the
@@ -76,8 +88,9 @@ def check_work(work: Work, at_once: int) -> None:
     keys += " or experiment.periods" if work.whole or work.block > work.period else ""
     sensors = ", leave out rig.sensors.filter_hz and delays, which need the whole record at once" if work.whole else ""
     raise BenchError(
-        f"a realisation of {work.kept} samples in {work.substeps} steps each, {work.period} of them in an excitation"
-        f" period, takes about {needed / at_once / 1e9:.3g} GB of memory while it runs"
+        f"a realisation of {work.kept} samples in {work.substeps} steps each"
+        + (f", {work.period} of them in an excitation period," if work.period > 1 else "")
+        + f" takes about {needed / at_once / 1e9:.3g} GB of memory while it runs"
         + (f", {at_once} at a time {needed / 1e9:.3g} GB," if at_once > 1 else "")
         + f" and {free / 1e9:.3g} GB are free: lower {keys}{sensors}"
         + (f", or run fewer than {at_once} at a time (--workers)" if at_once > 1 else "")

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from itertools import chain, islice, repeat
-from math import ceil, exp, log
+from math import ceil, exp, inf, log
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -54,8 +54,9 @@ class Steady:
 
 
 class Wait(NamedTuple):
-    """How many excitation periods a motion may take to settle, and whether free vibrations have died out by then: what
-    still changes is then the answer itself. Of a rig whose vibrations take longer: `damping`, which keys damp them."""
+    """How many excitation periods a motion may take to settle, and whether what still changes by then is the answer
+    itself: free vibrations have died out, or nothing damps them. Else it is an error, with the keys that `damping`
+    names."""
 
     most: int
     ends: bool
@@ -82,26 +83,51 @@ def waiting(plan: Schedule, experiment: Experiment, slowest: float | None, dampi
     `damping`: the keys that damp them, for an error to name."""
     if experiment.settling_periods_max:
         return Wait(experiment.settling_periods_max, False, damping)
-    if slowest is None or not slowest > 0.0:
+    if slowest is None:
         return Wait(FEW, False, damping)
+    if not slowest > 0.0:
+        return Wait(FEW, True)
     period = plan.samples_per_period / plan.sampling_rate
     needed = log(1 / experiment.settling_tolerance) / slowest / period
     if needed > MOST:
-        return Wait(FEW, False, damping)
+        return Wait(FEW, True)
     return Wait(min(max(FEW, ceil(PATIENCE * needed)), MOST), True)
 
 
-def check_settling(plan: Schedule, experiment: Experiment, slowest: float | None, damping: str = "") -> None:
+def check_settling(
+    plan: Schedule, experiment: Experiment, slowest: float | None, damping: str = "", linear: bool = False
+) -> None:
     """Raise BenchError for a rig whose free vibrations die out, at that slowest rate [1/s], but later than is waited
-    for, unless the case says how long; of one that is not damped at all only the motion itself tells."""
-    if experiment.settling_periods_max or slowest is None or not slowest > 0.0:
+    for, unless the case says how long; of one that is not damped at all, where it is linear: else its record tells."""
+    if experiment.settling_periods_max or slowest is None:
         return
-    needed = log(1 / experiment.settling_tolerance) / slowest * plan.sampling_rate / plan.samples_per_period
+    period = plan.samples_per_period / plan.sampling_rate
+    needed = log(1 / experiment.settling_tolerance) / slowest / period if slowest > 0.0 else inf
+    if linear and needed >= ENDLESS:
+        raise BenchError(f"no steady state: free vibrations do not die out: damp the rig (raise one of {damping})")
     if MOST < needed < ENDLESS:
         raise BenchError(
             f"no steady state: free vibrations take about {needed:.3g} excitation periods to die out to"
             f" experiment.settling_tolerance = {experiment.settling_tolerance:g} of their size, and at most {MOST} are"
             f" waited for: damp the rig (raise one of {damping}), or set experiment.settling_periods_max"
+        )
+
+
+def check_decay(plan: Schedule, experiment: Experiment, decay: float, damping: str = "") -> None:
+    """Raise BenchError for a record that does not repeat, and so waits until free vibrations have died out at their
+    slowest rate [1/s], where that takes too long or for ever."""
+    most = experiment.settling_periods_max or MOST
+    wait = Wait(most, False, damping)
+    if not decay > 0:
+        raise _no_steady_state("free vibrations do not die out: they grow or keep their size", experiment, wait)
+    period = plan.samples_per_period / plan.sampling_rate
+    periods = ceil(log(1 / experiment.settling_tolerance) / decay / period)
+    if periods > most:
+        raise _no_steady_state(
+            f"free vibrations take {periods} excitation periods to die out: after {most} they still have"
+            f" {exp(-decay * most * period):.3g} of their size",
+            experiment,
+            wait,
         )
 
 
@@ -126,7 +152,7 @@ def steady_state(
     if not plan.repeats:
         if decay is None:
             return _from_two_starts(course, plan, experiment, dte, wait, gather)
-        return _after_decay(course, plan, experiment, decay, wait, gather, piece)
+        return _after_decay(course, plan, experiment, decay, gather, piece)
     if keep == "every":
         return _every_block(course, plan, experiment, dte, wait, gather)
     blocks = course(0, repeat(plan.block_samples))
@@ -214,25 +240,13 @@ def _after_decay(
     plan: Schedule,
     experiment: Experiment,
     decay: float,
-    wait: Wait,
     gather: Gather,
     piece: int,
 ) -> Steady:
     """A record shorter than what repeats: it begins when free vibrations have died out by their slowest rate."""
-    period = plan.samples_per_period / plan.sampling_rate
+    check_decay(plan, experiment, decay)
     wanted = log(1 / experiment.settling_tolerance) * plan.sampling_rate / plan.samples_per_period
-    most = experiment.settling_periods_max or MOST
-    wait = wait._replace(most=most)
-    if not decay > 0:
-        raise _no_steady_state("free vibrations do not die out: they grow or keep their size", experiment, wait)
     periods = ceil(wanted / decay)
-    if periods > most:
-        raise _no_steady_state(
-            f"free vibrations take {periods} excitation periods to die out: after {most} they still have"
-            f" {exp(-decay * most * period):.3g} of their size",
-            experiment,
-            wait,
-        )
     settling = periods * plan.samples_per_period
     if plan.rotation:  # an excitation period may be the whole record: the part of it that is needed is enough
         settling = max(ceil(wanted / decay * plan.samples_per_period), 1)

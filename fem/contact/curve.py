@@ -20,6 +20,7 @@ Array = NDArray[np.float64]
 LOADS = 15
 BLEND = 0.1  # of the path of contact, on either side of its middle: where the slave changes
 SMALLEST = 1e-30  # force [N] that counts as none
+LAST0, LAST1, LAST2, LAST3 = -1 / 3, 3 / 2, -3.0, 11 / 6  # `lagrange_slopes` at the last of four nodes
 
 
 class Curve(NamedTuple):
@@ -195,6 +196,12 @@ def interval_of(nodes: Array, xi: float) -> Interval:
 
 
 @compiled(forceinline=True)
+def largest_force(curve: Curve) -> float:
+    """Force of a pair [N] up to which its curve is tabulated; beyond, approach per force goes on linearly in ln F."""
+    return exp(curve.log_low + (curve.value.shape[0] - 1) * curve.log_step)
+
+
+@compiled(forceinline=True)
 def load_node(curve: Curve, force: float) -> int:
     """First of the four loads between which the approach under a force [N] is read."""
     y = (log(max(force, SMALLEST)) - curve.log_low) / curve.log_step
@@ -220,12 +227,17 @@ def curve_cut(curve: Curve, xi: float, node: int) -> Cut:
 
 @compiled(forceinline=True)
 def along_cut(curve: Curve, cut: Cut, force: float):
-    """Approach [m] and slope [m/N] under a force [N] for which `cut` holds; below all loads linear in ln F."""
+    """Approach [m] and slope [m/N] under a force [N] for which `cut` holds; beyond all loads linear in ln F."""
     f = max(force, SMALLEST)
     y = (log(f) - curve.log_low) / curve.log_step
     if y < 0.0:
         rise = cut.c1 - cut.c0
         c = cut.c0 + y * rise
+        return c * f, c + rise / curve.log_step
+    past = y - (curve.value.shape[0] - 1)
+    if past > 0.0:
+        rise = LAST0 * cut.c0 + LAST1 * cut.c1 + LAST2 * cut.c2 + LAST3 * cut.c3
+        c = cut.c3 + past * rise
         return c * f, c + rise / curve.log_step
     w0, w1, w2, w3 = lagrange(y - cut.node)
     d0, d1, d2, d3 = lagrange_slopes(y - cut.node)

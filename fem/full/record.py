@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gearbench.fem.contact.curve import largest_force
 from gearbench.fem.contact.law import off_flanks
 from gearbench.fem.full.machine import angles
 from gearbench.fem.full.transient import Integrator, State, take_step
@@ -27,14 +28,15 @@ class Samples(NamedTuple):
     middle: Array  # of the pair nearest the pitch point
     entering: Array  # of the pair that comes to it next
     back: Array  # of all back flanks
+    strayed: Array  # 1 where teeth overlap beyond the modelled flanks, or press harder than modelled
 
 
 CHANNELS = len(Samples._fields)
 
 
 class Run(NamedTuple):
-    """The state at the end, samples (n, CHANNELS), and what stopped the run early: contact that was not found, or that
-    left the modelled flanks."""
+    """The state at the end, samples (n, CHANNELS); whether contact was not found, which ends a run, and whether it left
+    the modelled flanks at a sample."""
 
     state: State
     samples: Array
@@ -53,12 +55,12 @@ def advance(integrator: Integrator, state: State, torque: Array, substeps: int =
     machine = integrator.machine
     r = machine.rotations
     samples = np.zeros((len(torque) // substeps, CHANNELS))
-    out = columns(samples)
+    out, most = columns(samples), largest_force(machine.law.curves.driver)
     for i, value in enumerate(torque):
         step = take_step(integrator, state, float(value))
         state = step.state
         if not step.converged:
-            return Run(state, samples, True, False)
+            return Run(state, samples, True, bool(out.strayed.any()))
         if (i + 1) % substeps:
             continue
         k, hub, at = i // substeps, state.d.hub, angles(machine, state.d.hub, state.t)
@@ -72,6 +74,6 @@ def advance(integrator: Integrator, state: State, torque: Array, substeps: int =
             getattr(out, name)[k] = state.force[working & chosen].sum()
         out.back[k] = state.force[~working].sum()
         dx, dy = machine.axis * (hub[r + 1] - hub[r])
-        if off_flanks(machine.law, at.driver, at.driven, machine.law.centre + dx, dy):
-            return Run(state, samples, False, True)
-    return Run(state, samples, False, False)
+        off = off_flanks(machine.law, at.driver, at.driven, machine.law.centre + dx, dy)
+        out.strayed[k] = off or state.force.max(initial=0.0) > most
+    return Run(state, samples, False, bool(out.strayed.any()))

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gearbench.fem.contact.curve import largest_force
 from gearbench.fem.contact.law import off_flanks
 from gearbench.fem.motion.machine import Machine, angles, centres, pace
 from gearbench.fem.motion.scheme import Scheme
@@ -37,6 +38,7 @@ class Samples(NamedTuple):
     middle: Array  # of the pair nearest the pitch point
     entering: Array  # of the pair that comes to it next
     back: Array  # of all back flanks
+    strayed: Array  # 1 where teeth overlap beyond the modelled flanks, or press harder than modelled
 
 
 CHANNELS = len(Samples._fields)
@@ -45,7 +47,7 @@ PARTS = 256  # into which a step is divided where contact is not found
 
 class Run(NamedTuple):
     """Where an integration has come to, and how: time and last step [s], driver torque [N m], tooth pairs near contact;
-    the step at which contact was not found (-1: none) or, if off, left the modelled flanks."""
+    the step at which contact was not found (-1: none); off: whether it left the modelled flanks at a sample."""
 
     t: float
     lately: float
@@ -137,7 +139,7 @@ def take_over(new: Stage, old: Stage, n: int) -> None:
 
 @compiled(**INLINED)
 def sample(machine: Machine, now: Stage, run: Run, room: Room, k: int, out: Samples) -> bool:
-    """Fill row k of `out`; whether contact is on the modelled flanks."""
+    """Fill row k of `out`; whether contact is off the modelled flanks, or its forces beyond the modelled loads."""
     at = machine.at
     theta1, theta2 = angles(machine, now.d, run.t)
     out.angle_driver[k], out.angle_driven[k] = theta1, theta2
@@ -147,8 +149,10 @@ def sample(machine: Machine, now: Stage, run: Run, room: Room, k: int, out: Samp
     held = torques(machine, now, run.pairs, run.torque, pace(machine, run.t), room)
     out.torque_driver[k], out.torque_driven[k] = held.driver, held.driven
     nearest = floor(theta2 / machine.law.driven.pitch + 0.5)
+    most, hardest = largest_force(machine.law.curves.driver), 0.0
     for p in range(run.pairs):
         force = now.force[p]
+        hardest = max(hardest, force)
         out.loaded[k] += force > 0.0
         if now.pairs[p].side == 1:
             out.back[k] += force
@@ -159,7 +163,9 @@ def sample(machine: Machine, now: Stage, run: Run, room: Room, k: int, out: Samp
         else:
             out.middle[k] += force
     apart = centres(machine, now.d)
-    return not off_flanks(machine.law, theta1, theta2, apart.x, apart.y)
+    off = hardest > most or off_flanks(machine.law, theta1, theta2, apart.x, apart.y)
+    out.strayed[k] = off
+    return off
 
 
 @compiled(**INLINED)
@@ -175,7 +181,7 @@ def integrate(
 ) -> Run:  # fmt: skip
     """Fill `out` as `advance` says; `now` is the stage at the beginning and becomes that at the end."""
     machine, now, new, room, out = borrowed(machine), borrowed(now), borrowed(new), borrowed(room), borrowed(out)
-    t, lately, before, pairs, divided = begin.t, begin.lately, begin.torque, begin.pairs, 0
+    t, lately, before, pairs, divided, off = begin.t, begin.lately, begin.torque, begin.pairs, 0, False
     for i in range(len(torque)):
         tried = Tried(False, 0)
         # Parts of the step: what is done of it, and what is tried next.
@@ -195,11 +201,10 @@ def integrate(
                 divided += whole
                 whole = False
             else:
-                return Run(t, lately, before, pairs, i, False)
+                return Run(t, lately, before, pairs, i, off)
         before = torque[i]
         if (i + 1) % substeps == 0:
-            run, k = Run(t, lately, before, pairs, i, True), (i + 1) // substeps - 1
+            run, k = Run(t, lately, before, pairs, -1, off), (i + 1) // substeps - 1
             out.divided[k], divided = divided, 0
-            if not sample(machine, now, run, room, k, out):
-                return run
-    return Run(t, lately, before, pairs, -1, False)
+            off = sample(machine, now, run, room, k, out) or off
+    return Run(t, lately, before, pairs, -1, off)

@@ -96,10 +96,12 @@ def _sampling(experiment: Table, driver: Any) -> list[str]:
         top = _number(multisine["band_hz"][1])
     if multisine is not None and not top:
         return []
-    cycles = max(1, round(PERIOD * float(mesh))) if top else 1
-    period = cycles / mesh
+    cycles, given = max(1, round(PERIOD * float(mesh))) if top else 1, _number(samples)
+    if top and rate is None and given:  # rather a shorter period than one that is sampled too coarsely
+        cycles = max(1, min(cycles, int(float(given) / _fewest(top, mesh, 1))))
+    period, chosen = cycles / mesh, rate is None
     if rate is None:
-        count = _number(samples) or Decimal(2 ** max(4, ceil(log2(_fewest(top, mesh, cycles)))))
+        count = given or Decimal(2 ** max(4, ceil(log2(_fewest(top, mesh, cycles)))))
         rate = experiment["sampling_rate_hz"] = count / period
         said = [f"experiment.sampling_rate_hz = {float(rate):.10g}"]
     else:
@@ -113,8 +115,9 @@ def _sampling(experiment: Table, driver: Any) -> list[str]:
     held = f"{cycles} mesh period{'s' if cycles > 1 else ''} a period"
     if not top:
         return [f"{' and '.join(said)}: {held}, without excitation"]
-    reason = f"for a band up to {float(top):g} Hz and what the mesh makes of it"
-    return [f"{' and '.join(said)}: {held}, {reason}", *_realisations(experiment)]
+    reason = f", for a band up to {float(top):g} Hz and what the mesh makes of it"
+    enough = chosen and float(rate) >= _fewest(top, mesh, 1) * float(mesh)
+    return [f"{' and '.join(said)}: {held}{reason if enough else ''}", *_realisations(experiment)]
 
 
 def _fewest(top: Decimal | None, mesh: Decimal, cycles: int) -> float:

@@ -79,6 +79,9 @@ class PreparedSpring:
     def apart(self, outputs: Array) -> NDArray[np.bool_]:
         return outputs[:, 0] < 0
 
+    def strayed(self, outputs: Array) -> None:
+        """A spring knows no flanks."""
+
     def divided(self, outputs: Array) -> None:
         """All steps are alike."""
 

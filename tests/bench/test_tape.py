@@ -88,7 +88,7 @@ def test_what_was_done_is_not_done_again(tmp_path: Path, monkeypatch: pytest.Mon
     def advance(*_: object) -> None:
         raise AssertionError("integrated again")
 
-    monkeypatch.setattr("gearbench.bench.linear.run.integrate", advance)
+    monkeypatch.setattr("gearbench.bench.linear.run.LinearRig.advance", advance)
     gb.simulate(LINEAR, checkpoints=folder)
 
 

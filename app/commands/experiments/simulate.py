@@ -72,6 +72,8 @@ def simulate(
             f"{summary['file']}: {summary['realisations']} x {summary['duration_s']:g} s at"
             f" {summary['sampling_rate_hz']:g} Hz, DTE {summary['dte_peak_to_peak_um']:.4g} um peak to peak"
         )
+        for warning in summary["warnings"].splitlines():
+            typer.echo(f"warning: {warning}")
 
 
 def write_records(

@@ -13,7 +13,7 @@ from gearbench.figures.plotting import BLUE, GREY, ORANGE, figure, save
 if TYPE_CHECKING:
     import xarray as xr
 
-SHOWN = 4.0  # mesh orders in the waterfall
+SHOWN = 4.5  # mesh orders in the waterfall: whole peaks, nothing is left of the next one
 FLOOR = 1e-3  # of the largest amplitude
 # What is drawn over speed: variable, factor to the unit of the axis, label of the axis.
 ROWS = (

@@ -28,9 +28,19 @@ def test_without_damping_the_keys_are_named() -> None:
     case = quick("rig.support.damping_n_s_per_m=0")
     expected = "rig.support.driver.damping_n_s_per_m = 0, rig.support.driven.damping_n_s_per_m = 0"
     assert damping_advice(case) == expected
-    words = rf"set experiment\.settling_periods_max above {FEW} or damp the rig \(raise one of {expected}\)"
+    notes: list[str] = []
+    words = rf"free vibrations do not die out: damp the rig \(raise one of {expected}\)"
     with pytest.raises(BenchError, match=words):
-        simulate(case)
+        simulate(case, progress=lambda _, note: notes.append(note))
+    assert not [note for note in notes if note.startswith("integrating")]
+
+
+def test_the_record_of_a_rig_that_is_not_linear_tells_what_is_not_damped() -> None:
+    """Its teeth may part, so that nothing grows for ever."""
+    hardening = ("rig.mesh.exponent=0.01", "rig.mesh.reference_force_n=3e3")
+    record = simulate(quick("rig.support.damping_n_s_per_m=0", *hardening))
+    assert record.attrs["settling_residual"] > 1e-3 and np.isfinite(record["dte"].values).all()
+    assert "not damped (rig.support.driver.damping_n_s_per_m = 0, rig.support." in record.attrs["warnings"]
 
 
 def test_all_of_a_rigs_dampers_are_known() -> None:

@@ -52,9 +52,10 @@ def test_the_wait_covers_what_vibrations_need() -> None:
     period = SAMPLES / RATE
     assert wait.ends and exp(-SLOW * wait.most * period) < experiment.settling_tolerance
     assert waiting(plan, experiment, 1e6) == Wait(FEW, True)
-    # What takes for ever, or is not known, is not waited for; what a case says holds.
-    for rate in (None, 0.0, -1.0, log(1000) / period / (2 * MOST)):
-        assert waiting(plan, experiment, rate) == Wait(FEW, False)
+    # What takes for ever is not waited for, but kept; what is not known is an error; what a case says holds.
+    for rate in (0.0, -1.0, log(1000) / period / (2 * MOST)):
+        assert waiting(plan, experiment, rate) == Wait(FEW, True)
+    assert waiting(plan, experiment, None) == Wait(FEW, False)
     assert waiting(plan, make_experiment(7), SLOW) == Wait(7, False)
 
 
@@ -67,6 +68,9 @@ def test_what_takes_too_long_to_die_out_is_refused_before_it_runs() -> None:
     for slowest in (2 * rate, 0.0, -1.0, 1e-9 * rate, None):
         check_settling(plan, make_experiment(), slowest)
     check_settling(plan, make_experiment(4), rate / 2)
+    for slowest in (0.0, -1.0, 1e-9 * rate):
+        with pytest.raises(BenchError, match=r"do not die out: damp the rig \(raise one of a, b\)"):
+            check_settling(plan, make_experiment(), slowest, "a, b", linear=True)
 
 
 @pytest.mark.parametrize(("keep", "repeat"), [("every", 1), ("mean", 1), ("one", 1), ("every", 9)])

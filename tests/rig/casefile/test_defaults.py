@@ -146,3 +146,15 @@ def test_a_rigid_support_has_nothing_else(tmp_path: Path, key: str) -> None:
     text = GEARS.partition("[rig.support]")[0]
     with pytest.raises(CaseError, match="without it is rigid, and has no"):
         gb.read_case(written(tmp_path, text), [f"rig.support.{key}"])
+
+
+def test_few_samples_shorten_the_period_rather_than_coarsen_it(tmp_path: Path) -> None:
+    """At 315 Hz mesh the response reaches 24 branches above the band of 2 kHz: 8192 samples do for 0.4 s of that."""
+    text = written(tmp_path, GEARS + EXPERIMENT.format(mesh=315))
+    case = gb.read_case(text, ["experiment.samples_per_period=8192"])
+    assert case.experiment.sampling_rate >= 2 * (2000 + 24 * 315)
+    assert schedule(case.experiment, case.rig).samples_per_period == 8192
+    assert any("for a band up to 2000 Hz" in line for line in case.assumed)
+    # Too few for any, or a rate that was given: nothing is claimed of the band.
+    for setting in ("experiment.samples_per_period=32", "experiment.sampling_rate_hz=8190"):
+        assert not any("for a band" in line for line in gb.read_case(text, [setting]).assumed)
