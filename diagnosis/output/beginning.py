@@ -20,6 +20,7 @@ from gearbench.diagnosis.output.simulator import Simulator
 from gearbench.diagnosis.output.structure import ACROSS, CROSS, MOTIONS, housings
 
 Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 # From unknowns (size,) that are held: the same with the rig around the mesh as the records show it.
 Around = Callable[[Array], Array | None]
 
@@ -55,16 +56,23 @@ def seen_by(around: Around | None, unknowns: Unknowns, held: Array) -> Array | N
 def levelled(simulator: Simulator, seen: Array, p: Array, sd: Array) -> Array:
     """The rig around the mesh as it was `seen` (size,), with supports across and a mesh whose stiffnesses go together:
     along narrow valleys, between which no fit walks. One record tells them as all do."""
-    unknowns = simulator.layout.unknowns
     simulator = simulator.of_record(simulator.target.most_excited)
-    trials = levels(simulator, seen, p)
+    known = _known(simulator, seen)
+    # A support that stiffens resonates along where a gear across it would.
+    trusted = [known, np.zeros_like(known)] if known.any() else [known]
+    return min((_levelled(simulator, seen, p, sd, one) for one in trusted), key=lambda one: one[0])[1]
+
+
+def _levelled(simulator: Simulator, seen: Array, p: Array, sd: Array, known: Flags) -> tuple[float, Array]:
+    """Linear cost and unknowns (size,), gears of which (2,) it is `known` how they yield across staying as seen."""
+    trials = levels(simulator, seen, p, known)
     costs = np.array([linear_cost(simulator, trial, sd) for trial in trials])
     # The best of each stiffness across.
     rows = costs.reshape(-1, len(STIFFER))
     numbers = [len(STIFFER) * row + int(np.argmin(rows[row])) for row in np.argsort(rows.min(axis=1))[:VALLEYS]]
-    soft = unknowns[ACROSS].start + np.flatnonzero(~_known(simulator, seen))
+    soft = simulator.layout.unknowns[ACROSS].start + np.flatnonzero(~known)
     found = [_followed(simulator, trials[number], soft, sd) for number in numbers]
-    return min(found, key=lambda one: one[0])[1]
+    return min(found, key=lambda one: one[0])
 
 
 def _followed(simulator: Simulator, p: Array, soft: NDArray[np.int64], sd: Array) -> tuple[float, Array]:
@@ -86,12 +94,11 @@ def _followed(simulator: Simulator, p: Array, soft: NDArray[np.int64], sd: Array
     return float(found.fun), moved(found.x)
 
 
-def levels(simulator: Simulator, seen: Array, p: Array) -> list[Array]:
+def levels(simulator: Simulator, seen: Array, p: Array, known: Flags) -> list[Array]:
     """The rig around the mesh as it was `seen` (size,), with supports across and meshes of several stiffnesses around
-    that of `p` (size,); where a gear's resonance across its support was seen, that support stays."""
+    that of `p` (size,); supports of which it is `known` (2,) how they yield across stay."""
     unknowns, out = simulator.layout.unknowns, []
     spread = unknowns.prior()[unknowns["scale"]]
-    known = _known(simulator, seen)
     for soft, stiffer in product(SOFT if not known.all() else SOFT[:1], STIFFER):
         trial = seen.copy()
         trial[unknowns[ACROSS]] = np.where(known, seen[unknowns[ACROSS]], soft)
@@ -100,7 +107,7 @@ def levels(simulator: Simulator, seen: Array, p: Array) -> list[Array]:
     return out
 
 
-def _known(simulator: Simulator, seen: Array) -> NDArray[np.bool_]:
+def _known(simulator: Simulator, seen: Array) -> Flags:
     """Which gears (2,) were seen to resonate across their supports."""
     return np.asarray(np.abs(seen[simulator.layout.unknowns[CROSS]]) > COUPLED)
 
