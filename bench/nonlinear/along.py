@@ -83,12 +83,13 @@ class Along:
         assert shaft is not None  # who twists has one
         lines = np.fft.rfft(twist, axis=1)
         stiffness = shaft.load_stiffness + 1j * self._omega * shaft.load_damping
-        return np.fft.irfft(stiffness * lines, twist.shape[1], axis=1)
+        out: Array = np.fft.irfft(stiffness * lines, twist.shape[1], axis=1)
+        return out
 
     @cached_property
     def _omega(self) -> Array:
         """Circular frequencies [rad/s] of the lines of one repetition."""
-        return 2 * np.pi * np.fft.rfftfreq(len(self.places), 1 / self.sampling_rate)
+        return np.asarray(2 * np.pi * np.fft.rfftfreq(len(self.places), 1 / self.sampling_rate))
 
     def turned_into(self, other: NonLinear) -> dict[int, Array]:
         """Forces (entries,) [N] by coordinate, or in the mesh, that do in first order what turning into `other` does, a

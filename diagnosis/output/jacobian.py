@@ -47,9 +47,9 @@ SMALLEST = 1e-4  # of the load at which an exponent changes nothing, below which
 
 
 class Other(NamedTuple):
-    """A rig in which one unknown, by its `index`, is larger by `step`."""
+    """A rig in which one unknown, by its number, is larger by `step`."""
 
-    index: int
+    number: int
     step: float
     model: NonLinear
 
@@ -134,7 +134,7 @@ def around_forces(along: Along, others: Sequence[Other]) -> list[tuple[int, int,
     """Index of the unknown, coordinate or mesh, and force (entries,) [N] per unit of what holds the gears."""
     out = []
     for one in others:
-        out += [(one.index, on, force / one.step) for on, force in along.turned_into(one.model).items()]
+        out += [(one.number, on, force / one.step) for on, force in along.turned_into(one.model).items()]
     return out
 
 

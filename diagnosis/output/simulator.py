@@ -92,7 +92,7 @@ class Simulator:
             self._by_forces(out, p, chosen, others)
         except ValueError:
             return None
-        known = [one.index for one in others]
+        known = [one.number for one in others]
         self._by_moves(out, p, sd, chosen & ~np.isin(np.arange(p.size), known))
         return out
 
@@ -151,5 +151,5 @@ class Simulator:
             stop = start + len(bins)
             if record == number:
                 spectrum = np.fft.rfft(answers[channel], axis=-1)[:, bins] / answers[channel].shape[-1]
-                np.add.at(out, (at, slice(start, stop)), spectrum)
+                np.add.at(out[:, start:stop], at, spectrum)
             start = stop
