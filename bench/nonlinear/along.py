@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil, log
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,7 @@ from gearbench.lumped.nonlinear.tables import instants
 from gearbench.lumped.nonlinear.tangent import Tangent, departures
 
 Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 Integers = NDArray[np.int64]
 
 MOST = 3  # steps per sample that suffice: the frequency of a mode at 0.2 of the sampling rate is then right to 3e-4
@@ -28,7 +30,6 @@ STABLE = 1.8  # largest rate of a mode times the step: Runge-Kutta bears 2.8
 TRANSIENT = 1e-9
 AT_ONCE = 96  # departures carried together: their states stay in the fastest memory
 
-SUPPORT = ("stiffness", "exponent", "reference")  # of both supports among the constants
 U1, Y1, Y2, U2, W, LOAD = (NAMES.index(name) for name in ("u1", "y1", "y2", "u2", "w", "load"))
 
 
@@ -91,13 +92,28 @@ class Along:
         """Circular frequencies [rad/s] of the lines of one repetition."""
         return np.asarray(2 * np.pi * np.fft.rfftfreq(len(self.places), 1 / self.sampling_rate))
 
+    @cached_property
+    def _lines(self) -> Complex:
+        """Half-spectra (n, K) of all coordinates [m]."""
+        return np.fft.rfft(self.places, axis=0).T
+
     def turned_into(self, other: NonLinear) -> dict[int, Array]:
         """Forces (entries,) [N] by coordinate, or in the mesh, that do in first order what turning into `other` does, a
         model like this one that differs by little around its mesh."""
-        forces: dict[int, Array] = {}
-        moved = _pull(other, self.places, self._omega) - _pull(self.model, self.places, self._omega)
-        for number in np.flatnonzero(moved.any(axis=1)):
-            forces[int(number)] = resampled(-moved[number], len(self.phase))
+        moved: dict[int, Array] = {}
+        here, there = _linear(self.model), _linear(other)
+        springs, dampers, masses = (two - one for one, two in zip(here, there, strict=True))
+        for number in np.flatnonzero(springs.any(axis=1) | dampers.any(axis=1) | (masses != 0.0)):
+            lines = springs[number] @ self._lines + 1j * self._omega * (dampers[number] @ self._lines)
+            lines -= self._omega**2 * masses[number] * self._lines[number]
+            moved[int(number)] = np.fft.irfft(lines, len(self.places))
+        for one, two in zip(_springs(self.model), _springs(other), strict=True):
+            if one != two:
+                pulls = [(-1.0, one, one.force(self.places)), (1.0, two, two.force(self.places))]
+                for number in np.flatnonzero([any(parts) for parts in zip(one.along, two.along, strict=True)]):
+                    more = sum(sign * support.along[number] * force for sign, support, force in pulls)
+                    moved[int(number)] = moved.get(int(number), 0.0) + more
+        forces = {number: resampled(-force, len(self.phase)) for number, force in moved.items()}
         more = other.constants().damping_factor - self.model.constants().damping_factor
         if more:
             forces[IN_MESH] = more * np.sqrt(self.tangent.stiffness) * self.rate
@@ -151,47 +167,64 @@ def along(steady: Steady) -> Along:
     )
 
 
-def _pull(model: NonLinear, places: Array, omega: Array) -> Array:
-    """Forces (n, samples) [N] with which springs, dampers and masses of a rig around its mesh hold its coordinates at
-    `places` (samples, n); omega (K,): circular frequencies [rad/s] of their lines."""
+class _Spring(NamedTuple):
+    """A support: what coordinates contribute to its deflection (n,), stiffness [N/m], exponent and reference [m]."""
+
+    along: tuple[float, ...]
+    stiffness: float
+    exponent: float
+    reference: float
+
+    def deflection(self, places: Array) -> Array:
+        """Its deflection [m] at places (..., n)."""
+        return np.asarray(places @ np.array(self.along))
+
+    def force(self, places: Array) -> Array:
+        """Its force [N] at places (..., n)."""
+        deflection = self.deflection(places)
+        return self.stiffness * deflection * (np.abs(deflection) / self.reference) ** self.exponent
+
+    def tangent(self, deflection: Array) -> Array:
+        """Its stiffness [N/m] about deflections [m]."""
+        size = np.maximum(np.abs(deflection), LEAST_DEFLECTION) / self.reference
+        return self.stiffness * (1 + self.exponent) * size**self.exponent
+
+
+def _springs(model: NonLinear) -> tuple[_Spring, _Spring]:
+    c = model.constants()
+    one, two = (tuple(float(part) for part in along) for along in support_directions(model.structure))
+    return _Spring(one, c.stiffness1, c.exponent1, c.reference1), _Spring(two, c.stiffness2, c.exponent2, c.reference2)
+
+
+def _linear(model: NonLinear) -> tuple[Array, Array, Array]:
+    """Springs [N/m] and dampers [N s/m] (n, n) of a rig but for its mesh and its supports' springs, and masses [kg]
+    (n,); none on a coordinate that does not move, unless it is the load's, which bears a reaction."""
     constants, structure = model.constants(), model.structure
     springs, dampers = springs_and_dampers(constants, structure, (0.0, 0.0))
     inverse = inverse_masses(constants, structure)
-    masses = np.divide(1.0, inverse, out=np.zeros_like(inverse), where=inverse > 0.0)
-    lines = np.fft.rfft(places, axis=0).T
-    lines = springs @ lines + 1j * omega * (dampers @ lines) - omega**2 * masses[:, None] * lines
-    out: Array = np.fft.irfft(lines, len(places), axis=1)
-    for side, along in enumerate(support_directions(structure)):
-        stiffness, exponent, reference = (getattr(constants, f"{name}{side + 1}") for name in SUPPORT)
-        deflection = places @ along
-        out += np.outer(along, stiffness * deflection * (np.abs(deflection) / reference) ** exponent)
     still = inverse == 0.0
-    still[LOAD:][:1] = False  # it bears a reaction
-    out[still] = 0.0
-    return out
+    masses = np.divide(1.0, inverse, out=np.zeros_like(inverse), where=~still)
+    still[LOAD:][:1] = False
+    springs[still], dampers[still] = 0.0, 0.0
+    return springs, dampers, masses
 
 
 def _bearings(model: NonLinear, places: Array, entries: int) -> tuple[Array, Array]:
     """What coordinates contribute to the deflection of supports whose stiffness depends on it (b, n), and how much
-    stiffer than on average they are (entries, b) [N/m] at the places (samples, n)."""
-    constants = model.constants()
-    directions, stiffer = [], []
-    for side, along in enumerate(support_directions(model.structure)):
-        stiffness, exponent, reference = (getattr(constants, f"{name}{side + 1}") for name in SUPPORT)
-        if exponent:
-            deflection = resampled(places @ along, entries)
-            size = np.maximum(np.abs(np.array([*deflection, deflection.mean()])), LEAST_DEFLECTION) / reference
-            tangent = stiffness * (1 + exponent) * size**exponent
-            directions.append(along)
-            stiffer.append(tangent[:-1] - tangent[-1])
-    if not directions:
+    stiffer than about their mean they are (entries, b) [N/m] at the places (samples, n)."""
+    varying = [one for one in _springs(model) if one.exponent]
+    if not varying:
         return np.empty((0, places.shape[1])), np.empty((entries, 0))
-    return np.stack(directions), np.stack(stiffer, axis=1)
+    stiffer = []
+    for one in varying:
+        deflection = one.deflection(places)
+        stiffer.append(one.tangent(resampled(deflection, entries)) - one.tangent(deflection.mean()))
+    return np.array([one.along for one in varying]), np.stack(stiffer, axis=1)
 
 
 def _mean_deflections(model: NonLinear, places: Array) -> tuple[float, float]:
     """Those [m] of both supports along their direction, at the places (samples, n)."""
-    one, two = (float((places @ along).mean()) for along in support_directions(model.structure))
+    one, two = (float(spring.deflection(places).mean()) for spring in _springs(model))
     return one, two
 
 
