@@ -1,7 +1,8 @@
 """Output-error fit: all unknowns moved together to where the simulation comes closest, under one set of priors.
 
-Gauss-Newton on `quadratic`, whose steps are simulated: a step that does not lower the cost is halved, then the Jacobian
-is renewed where the unknowns are by now; it is done when no step promises half a nat.
+Gauss-Newton on `quadratic`, whose steps are simulated: a step that does not lower the cost is halved, then tried
+without what the rig does not feel yet, then the Jacobian is renewed where the unknowns are by now; it is done when no
+step promises half a nat.
 """
 
 from __future__ import annotations
@@ -11,8 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.output.quadratic import Quadratic, quadratic_of
 from gearbench.diagnosis.output.simulator import Simulator
+from gearbench.diagnosis.output.structure import LEAST_STEP
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -86,6 +89,32 @@ def prior_cost(p: Array, sd: Array) -> float:
     return 0.5 * float(((p[held] / sd[held]) ** 2).sum())
 
 
+def _stepped(
+    simulator: Simulator, p: Array, sd: Array, active: NDArray[np.int64], step: Array, cost: float
+) -> tuple[Array, float]:
+    """`p` (size,) after as much of the step of its active unknowns as lowers the cost, and that cost; itself where
+    nothing does."""
+    for halving in range(HALVINGS + 1):
+        trial = p.copy()
+        trial[active] += 0.5**halving * step
+        value = cost_of(simulator, trial, sd)
+        if value < cost:
+            return trial, value
+    return p, cost
+
+
+def _standing(unknowns: Unknowns, p: Array) -> tuple[Array, Array]:
+    """Bounds (size,) between which what a rig does not feel yet stands still: its derivative is that of a jump, and a
+    step shorter than that promises what it does not keep."""
+    low, high = unknowns.bounds()
+    for key, least in LEAST_STEP.items():
+        if key in unknowns.slices:
+            at = np.arange(*unknowns[key].indices(unknowns.size))
+            at = at[(p[at] >= 0.0) & (p[at] < least)]
+            low[at] = high[at] = p[at]
+    return low, high
+
+
 def fit(
     simulator: Simulator, p: Array, sd: Array, sensitivity: Sensitivity, *, renewals: int, chosen: Flags
 ) -> Optimum | None:
@@ -103,16 +132,13 @@ def fit(
         lines = simulator.lines(p)
         assert lines is not None
         near = sensitivity.quadratic.moved(target.lines - lines, sensitivity.jacobian)
-        step, promised, _ = near.best(p, sd, bounds)
-        gain = 0.0
-        if cost - promised > GAIN:
-            for halving in range(HALVINGS + 1):
-                trial = p.copy()
-                trial[near.active] += 0.5**halving * step
-                value = cost_of(simulator, trial, sd)
-                if value < cost:
-                    gain, p, cost = cost - value, trial, value
-                    break
+        before = cost
+        for limits in (bounds, _standing(simulator.layout.unknowns, p)):
+            step, promised, _ = near.best(p, sd, limits)
+            p, cost = _stepped(simulator, p, sd, near.active, step, cost) if cost - promised > GAIN else (p, cost)
+            if cost < before:
+                break
+        gain = before - cost
         wanted = max(GAIN, POOR * (cost + gain - promised))
         if gain < wanted:
             if fresh or renewals == 0:
@@ -126,7 +152,7 @@ def fit(
     lines = simulator.lines(p)
     assert lines is not None
     near = sensitivity.quadratic.moved(target.lines - lines, sensitivity.jacobian)
-    _, promised, _ = near.best(p, sd, bounds)
+    _, promised, _ = near.best(p, sd, _standing(simulator.layout.unknowns, p))
     here = near.information(np.zeros(len(near.active)))
     return Optimum(
         p=p,

@@ -73,3 +73,27 @@ def test_what_the_records_do_not_show_is_known_as_before() -> None:
     best = fit(simulator, np.zeros(8), SD, first, renewals=1, chosen=ALL)
     assert best is not None and best.p[4] == 0.0
     assert best.std[4] == SD[4] and 0.0 < best.std[0] < SD[0]
+
+
+class Jumping(FakeSimulator):
+    """Feels friction from 0.2 on; the derivative is that of the jump there."""
+
+    def jacobian(self, p: np.ndarray, sd: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+        return np.where(chosen[:, None], ALIKE, 0.0)
+
+
+ALIKE = MATRIX.copy()
+ALIKE[3] = MATRIX[0] + 2.0 * MATRIX[1]  # what the first unknown does, once the second takes back the rest
+
+
+def test_what_is_not_felt_yet_does_not_stand_in_the_way(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A jump and the second unknown promise cheaply what the first one can do alone: with bounds that do not hold it
+    the fit stays where it begins."""
+    monkeypatch.setattr("gearbench.diagnosis.output.fit.LEAST_STEP", {"friction": 0.2})
+    simulator = Jumping(lambda p: np.where(np.arange(8) == 3, p * (p >= 0.2), p) @ ALIKE, target(0.12 * MATRIX[0]))
+    sd = np.array([0.02, *SD[1:]])
+    first = sensitivity_of(simulator, np.zeros(8), sd, ALL)
+    assert first is not None
+    best = fit(simulator, np.zeros(8), sd, first, renewals=2, chosen=ALL)
+    assert best is not None and best.left < 0.5
+    assert best.p[0] == pytest.approx(0.12, abs=2e-3)
