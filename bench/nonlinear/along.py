@@ -109,10 +109,10 @@ class Along:
             moved[int(number)] = np.fft.irfft(lines, len(self.places))
         for one, two in zip(_springs(self.model), _springs(other), strict=True):
             if one != two:
-                pulls = [(-1.0, one, one.force(self.places)), (1.0, two, two.force(self.places))]
+                before, after = one.force(self.places), two.force(self.places)
                 for number in np.flatnonzero([any(parts) for parts in zip(one.along, two.along, strict=True)]):
-                    more = sum(sign * support.along[number] * force for sign, support, force in pulls)
-                    moved[int(number)] = moved.get(int(number), 0.0) + more
+                    change = two.along[number] * after - one.along[number] * before
+                    moved[int(number)] = moved.get(int(number), np.zeros(len(change))) + change
         forces = {number: resampled(-force, len(self.phase)) for number, force in moved.items()}
         more = other.constants().damping_factor - self.model.constants().damping_factor
         if more:
