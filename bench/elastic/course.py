@@ -20,7 +20,8 @@ def drive_of(torque: Torque, samples_per_period: int, substeps: int) -> Drive:
 
 def torque_of(drive: Drive, first: int, steps: int) -> Array:
     """Driver torque [N m] (steps,) at the ends of the steps from `first` on."""
-    return np.take(drive.fine, np.arange(first, first + steps), mode="wrap")
+    # Not by `take` with mode "wrap", which comes down to an index by one period after the other.
+    return np.asarray(drive.fine[np.arange(first, first + steps) % drive.fine.size])
 
 
 def check_course(t: float, lost: str, outputs: Array) -> None:
