@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil, log
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +12,9 @@ from numpy.typing import NDArray
 from gearbench.bench.nonlinear.replay import Steady, resampled
 from gearbench.lumped.nonlinear.coordinates import IN_MESH, NAMES
 from gearbench.lumped.nonlinear.law import MeshLaw
-from gearbench.lumped.nonlinear.model import LEAST_DEFLECTION, NonLinear
+from gearbench.lumped.nonlinear.model import NonLinear
 from gearbench.lumped.nonlinear.pressing import Pressed, of_pairs, pressed
-from gearbench.lumped.nonlinear.rest import inverse_masses, springs_and_dampers, support_directions
+from gearbench.lumped.nonlinear.rest import inverse_masses, springs_and_dampers
 from gearbench.lumped.nonlinear.step import columns
 from gearbench.lumped.nonlinear.tables import instants
 from gearbench.lumped.nonlinear.tangent import Tangent, departures
@@ -37,8 +36,8 @@ U1, Y1, Y2, U2, W, LOAD = (NAMES.index(name) for name in ("u1", "y1", "y2", "u2"
 class Along:
     """A steady motion of `model` on the half-step grid (entries,) of one repetition: mesh phase [cycles], elastic force
     of the mesh [N], what each pair has of it on the working flanks, force and tangent (entries, n_o), rate of the
-    deflection [m/s], the law of its force, and the force that the teeth would have without an exponent over the one
-    where that changes nothing. `places` (samples, n) of all coordinates [m], sampled at `sampling_rate`. `early` steps
+    deflection [m/s], and the force that the teeth would have without an exponent over the one where that changes
+    nothing. `places` (samples, n) of all coordinates [m], sampled at `sampling_rate`. `early` steps
     let free vibrations die out.
     """
 
@@ -47,13 +46,17 @@ class Along:
     elastic: Array
     pairs: Pressed
     rate: Array
-    law: MeshLaw
     level: Array
     tangent: Tangent
     substeps: int
     early: int
     places: Array
     sampling_rate: float
+
+    @property
+    def law(self) -> MeshLaw:
+        """That of the force in the mesh."""
+        return self.model.law
 
     @property
     def drive(self) -> int:
@@ -107,7 +110,7 @@ class Along:
             lines = springs[number] @ self._lines + 1j * self._omega * (dampers[number] @ self._lines)
             lines -= self._omega**2 * masses[number] * self._lines[number]
             moved[int(number)] = np.fft.irfft(lines, len(self.places))
-        for one, two in zip(_springs(self.model), _springs(other), strict=True):
+        for one, two in zip(self.model.support_springs, other.support_springs, strict=True):
             if one != two:
                 before, after = one.force(self.places), two.force(self.places)
                 for number in np.flatnonzero([any(parts) for parts in zip(one.along, two.along, strict=True)]):
@@ -157,7 +160,6 @@ def along(steady: Steady) -> Along:
         elastic=force,
         pairs=of_pairs(model.law, at, fine),
         rate=resampled(rate, entries) + table.excess_rate[:entries],
-        law=model.law,
         level=level,
         tangent=Tangent(*around, slope, damping, step, *_bearings(model, places, entries)),
         substeps=substeps,
@@ -165,35 +167,6 @@ def along(steady: Steady) -> Along:
         places=places,
         sampling_rate=setup.sampling_rate,
     )
-
-
-class _Spring(NamedTuple):
-    """A support: what coordinates contribute to its deflection (n,), stiffness [N/m], exponent and reference [m]."""
-
-    along: tuple[float, ...]
-    stiffness: float
-    exponent: float
-    reference: float
-
-    def deflection(self, places: Array) -> Array:
-        """Its deflection [m] at places (..., n)."""
-        return np.asarray(places @ np.array(self.along))
-
-    def force(self, places: Array) -> Array:
-        """Its force [N] at places (..., n)."""
-        deflection = self.deflection(places)
-        return self.stiffness * deflection * (np.abs(deflection) / self.reference) ** self.exponent
-
-    def tangent(self, deflection: Array) -> Array:
-        """Its stiffness [N/m] about deflections [m]."""
-        size = np.maximum(np.abs(deflection), LEAST_DEFLECTION) / self.reference
-        return self.stiffness * (1 + self.exponent) * size**self.exponent
-
-
-def _springs(model: NonLinear) -> tuple[_Spring, _Spring]:
-    c = model.constants()
-    one, two = (tuple(float(part) for part in along) for along in support_directions(model.structure))
-    return _Spring(one, c.stiffness1, c.exponent1, c.reference1), _Spring(two, c.stiffness2, c.exponent2, c.reference2)
 
 
 def _linear(model: NonLinear) -> tuple[Array, Array, Array]:
@@ -212,7 +185,7 @@ def _linear(model: NonLinear) -> tuple[Array, Array, Array]:
 def _bearings(model: NonLinear, places: Array, entries: int) -> tuple[Array, Array]:
     """What coordinates contribute to the deflection of supports whose stiffness depends on it (b, n), and how much
     stiffer than about their mean they are (entries, b) [N/m] at the places (samples, n)."""
-    varying = [one for one in _springs(model) if one.exponent]
+    varying = [one for one in model.support_springs if one.exponent]
     if not varying:
         return np.empty((0, places.shape[1])), np.empty((entries, 0))
     stiffer = []
@@ -224,7 +197,7 @@ def _bearings(model: NonLinear, places: Array, entries: int) -> tuple[Array, Arr
 
 def _mean_deflections(model: NonLinear, places: Array) -> tuple[float, float]:
     """Those [m] of both supports along their direction, at the places (samples, n)."""
-    one, two = (float(spring.deflection(places).mean()) for spring in _springs(model))
+    one, two = (float(spring.deflection(places).mean()) for spring in model.support_springs)
     return one, two
 
 

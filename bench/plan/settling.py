@@ -87,11 +87,15 @@ def waiting(plan: Schedule, experiment: Experiment, slowest: float | None, dampi
         return Wait(FEW, False, damping)
     if not slowest > 0.0:
         return Wait(FEW, True)
-    period = plan.samples_per_period / plan.sampling_rate
-    needed = log(1 / experiment.settling_tolerance) / slowest / period
+    needed = _periods_of_decay(plan, experiment, slowest)
     if needed > MOST:
         return Wait(FEW, True)
     return Wait(min(max(FEW, ceil(PATIENCE * needed)), MOST), True)
+
+
+def _periods_of_decay(plan: Schedule, experiment: Experiment, rate: float) -> float:
+    """Excitation periods until free vibrations that die out at a rate [1/s] are as small as the tolerance."""
+    return log(1 / experiment.settling_tolerance) / rate / (plan.samples_per_period / plan.sampling_rate)
 
 
 def check_settling(
@@ -101,8 +105,7 @@ def check_settling(
     for, unless the case says how long; of one that is not damped at all, where it is linear: else its record tells."""
     if experiment.settling_periods_max or slowest is None:
         return
-    period = plan.samples_per_period / plan.sampling_rate
-    needed = log(1 / experiment.settling_tolerance) / slowest / period if slowest > 0.0 else inf
+    needed = _periods_of_decay(plan, experiment, slowest) if slowest > 0.0 else inf
     if linear and needed >= ENDLESS:
         raise BenchError(f"no steady state: free vibrations do not die out: damp the rig (raise one of {damping})")
     if MOST < needed < ENDLESS:
@@ -121,7 +124,7 @@ def check_decay(plan: Schedule, experiment: Experiment, decay: float, damping: s
     if not decay > 0:
         raise _no_steady_state("free vibrations do not die out: they grow or keep their size", experiment, wait)
     period = plan.samples_per_period / plan.sampling_rate
-    periods = ceil(log(1 / experiment.settling_tolerance) / decay / period)
+    periods = ceil(_periods_of_decay(plan, experiment, decay))
     if periods > most:
         raise _no_steady_state(
             f"free vibrations take {periods} excitation periods to die out: after {most} they still have"

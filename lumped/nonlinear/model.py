@@ -60,11 +60,13 @@ from gearbench.lumped.nonlinear.law import MeshLaw
 from gearbench.lumped.nonlinear.pressing import Instants, travel_under
 from gearbench.lumped.nonlinear.rest import (
     Around,
+    SupportSpring,
     centre_at_rest,
     housing_at_rest,
     inverse_masses,
     mesh_direction,
     springs_and_dampers,
+    support_springs,
 )
 from gearbench.lumped.nonlinear.structure import (
     Structure,
@@ -82,8 +84,6 @@ RESOLVED = 0.125
 # Of a mode beyond half the sampling rate, what a step resolves like one below: its frequency is then right to 1 % and
 # its damping ratio to 0.01, far from where Runge-Kutta becomes unstable.
 UNSEEN = 0.5
-# Of a support whose stiffness depends on it [m]: at rest without load it would be 0 or infinite.
-LEAST_DEFLECTION = 1e-9
 
 LIMITS = (
     "forces of unbalance, also of eccentric gears, are left out",
@@ -260,16 +260,15 @@ class NonLinear:
         place = Coordinates(u2 + apart, y1, y2, u2, u2 + apart + twist), Further(u2 - out, *housed, x1, x2)
         return np.array([*place[0], *place[1], *np.zeros(self.size)])
 
+    @cached_property
+    def support_springs(self) -> tuple[SupportSpring, SupportSpring]:
+        """The supports of driver and driven gear along their direction."""
+        return support_springs(self.constants(), self.structure)
+
     def around(self, deflections: tuple[float, float]) -> Around:
         """The rig around its mesh, with its supports as stiff as they are about these deflections [m]."""
         c, s = self.constants(), self.structure
-        one, two = (
-            stiffness * (1 + exponent) * (max(abs(y), LEAST_DEFLECTION) / reference) ** exponent
-            for y, stiffness, exponent, reference in (
-                (deflections[0], c.stiffness1, c.exponent1, c.reference1),
-                (deflections[1], c.stiffness2, c.exponent2, c.reference2),
-            )
-        )
+        one, two = (float(spring.tangent(y)) for spring, y in zip(self.support_springs, deflections, strict=True))
         return Around(*springs_and_dampers(c, s, (one, two)), inverse_masses(c, s), mesh_direction(c, s))
 
     def linearised(self, stiffness: float, force: float) -> Array:

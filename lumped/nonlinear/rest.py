@@ -16,6 +16,8 @@ from gearbench.rig import Support
 Array = NDArray[np.float64]
 
 BISECTIONS = 100
+# Of a support whose stiffness depends on it [m]: at rest without load it would be 0 or infinite.
+LEAST_DEFLECTION = 1e-9
 
 
 class Around(NamedTuple):
@@ -114,6 +116,38 @@ def support_directions(s: Structure | None) -> tuple[Array, Array]:
     _, y1, y2, _, _, _, housing, rocking, _, _ = np.eye(COORDINATES + FURTHER)
     first = y1 - s.housing.share1 * housing - s.rocking.share1 * rocking
     return first, y2 - s.housing.share2 * housing - s.rocking.share2 * rocking
+
+
+class SupportSpring(NamedTuple):
+    """A support: what coordinates contribute to its deflection (n,), stiffness [N/m], exponent and reference [m]."""
+
+    along: tuple[float, ...]
+    stiffness: float
+    exponent: float
+    reference: float
+
+    def deflection(self, places: Array) -> Array:
+        """Its deflection [m] at places (..., n)."""
+        return np.asarray(places @ np.array(self.along))
+
+    def force(self, places: Array) -> Array:
+        """Its force [N] at places (..., n)."""
+        deflection = self.deflection(places)
+        return self.stiffness * deflection * (np.abs(deflection) / self.reference) ** self.exponent
+
+    def tangent(self, deflection: Array | float) -> Array:
+        """Its stiffness [N/m] about deflections [m]."""
+        size = np.maximum(np.abs(deflection), LEAST_DEFLECTION) / self.reference
+        return np.asarray(self.stiffness * (1 + self.exponent) * size**self.exponent)
+
+
+def support_springs(c: Constants, s: Structure | None) -> tuple[SupportSpring, SupportSpring]:
+    """The supports of driver and driven gear along their direction."""
+    one, two = (tuple(float(part) for part in along) for along in support_directions(s))
+    return (
+        SupportSpring(one, c.stiffness1, c.exponent1, c.reference1),
+        SupportSpring(two, c.stiffness2, c.exponent2, c.reference2),
+    )
 
 
 def springs_and_dampers(c: Constants, s: Structure | None, tangents: tuple[float, float]) -> tuple[Array, Array]:

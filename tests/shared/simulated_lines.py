@@ -1,0 +1,49 @@
+"""A simulator of the demonstration's first condition, and how far derivatives are from two simulations."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gearbench.bench import simulate
+from gearbench.cases import case_files
+from gearbench.diagnosis.evidence.problem import problem_of
+from gearbench.diagnosis.intake.measurements import measurement
+from gearbench.diagnosis.output.layout import layout_of
+from gearbench.diagnosis.output.simulator import Simulator
+from gearbench.diagnosis.output.target import target_of
+from gearbench.diagnosis.replay.replays import replays
+from gearbench.rig import read_case
+
+
+def demonstration() -> Simulator:
+    """Replays of one record of `gap_demo`, whose tooth 3 may be cracked."""
+    nominal = read_case(case_files()["gap_demo"])
+    record = simulate(nominal.under(nominal.conditions[0]))
+    measured = measurement(record, "base", nominal)
+    problem = problem_of([measured], nominal)
+    layout = layout_of(nominal, problem.model, problem.conditions, (3,))
+    return Simulator(layout, target_of([measured], problem.conditions), replays(problem.model.law))
+
+
+def jacobian_at(simulator: Simulator, p: np.ndarray) -> np.ndarray:
+    """Derivatives by all unknowns at `p` (size,)."""
+    found = simulator.jacobian(p, simulator.layout.unknowns.prior(), np.ones(p.size, dtype=bool))
+    assert found is not None
+    return found
+
+
+def off(
+    simulator: Simulator, column: np.ndarray, p: np.ndarray, at: int, step: float
+) -> dict[str, tuple[float, float]]:
+    """By channel, how far the derivative `column` by the unknown `at` is from that between two simulations about `p`
+    (size,), and the size of the latter."""
+    before, after = p.copy(), p.copy()
+    before[at], after[at] = p[at] - step, p[at] + step
+    lines = [simulator.lines(one) for one in (before, after)]
+    assert lines[0] is not None and lines[1] is not None
+    change, start, found = (lines[1] - lines[0]) / (2 * step), 0, {}
+    for _, channel, bins in simulator.target.plan:
+        own = slice(start, start + len(bins))
+        start += len(bins)
+        found[channel] = (float(np.linalg.norm(column[own] - change[own])), float(np.linalg.norm(change[own])))
+    return found
