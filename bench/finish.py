@@ -12,18 +12,9 @@ from gearbench.bench.plan.damping import undamped
 from gearbench.bench.plan.schedule import Schedule
 from gearbench.bench.protocol import Prepared
 from gearbench.bench.realisations import Ready, Realisation
-from gearbench.bench.record.attributes import (
-    beyond_model,
-    divided_steps,
-    experiment_attributes,
-    joined,
-    lost_contact,
-    rig_attributes,
-    shown_mean,
-    unlike_periods,
-    unsettled,
-)
+from gearbench.bench.record.attributes import experiment_attributes, rig_attributes, shown_mean
 from gearbench.bench.record.channels import WHOLE, Stretch, mesh_phases, sensed, with_rotation
+from gearbench.bench.record.remarks import beyond_model, divided_steps, joined, lost_contact, unlike_periods, unsettled
 from gearbench.bench.record.sensors import repeated, sensor_attributes
 from gearbench.geometry import Pair
 from gearbench.records import provenance

@@ -15,15 +15,9 @@ from gearbench.bench.nonlinear.run import HEADROOM, Setup, make_setup
 from gearbench.bench.plan.schedule import Schedule, schedule
 from gearbench.bench.plan.settling import change
 from gearbench.bench.protocol import Drive
-from gearbench.bench.record.attributes import (
-    experiment_attributes,
-    joined,
-    lost_contact,
-    rig_attributes,
-    shown_mean,
-    turning_inertias,
-)
+from gearbench.bench.record.attributes import experiment_attributes, rig_attributes, shown_mean, turning_inertias
 from gearbench.bench.record.channels import mesh_phases, sensed, with_rotation
+from gearbench.bench.record.remarks import joined, lost_contact
 from gearbench.bench.record.sensors import check_delays, filter_delay, imposed, repeated
 from gearbench.geometry import pair
 from gearbench.lumped.nonlinear.law import MeshLaw

@@ -20,43 +20,52 @@ if TYPE_CHECKING:
 
 MOST_SENTENCES = 5
 
+VaryOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--vary",
+        metavar="KEY=VALUES",
+        help="what varies: KEY=V1,V2,.. | LOW:HIGH:COUNT | LOW:HIGH | normal(MEAN,SD); KEY1+KEY2 move together",
+    ),
+]
+OfOption = Annotated[
+    list[str] | None, typer.Option("--of", metavar="RESULT", help="what is wanted: te-peak-to-peak, first-mode, ..")
+]
+SampleOption = Annotated[
+    Literal["grid", "lhs", "sobol"] | None,
+    typer.Option("--sample", help="every combination, a Latin hypercube, or a Sobol design; absent: grid"),
+]
+SizeOption = Annotated[
+    int | None, typer.Option("--size", help="members of lhs; base points of sobol: keys + 2 times as many members")
+]
+TorqueOption = Annotated[
+    float | None, typer.Option("--torque-nm", help="load of static and ISO results; absent: the case's mean")
+]
+AgainstOption = Annotated[
+    Path | None, typer.Option("--against", metavar="RECORD", help="measured record, for the result gap")
+]
+WorkersOption = Annotated[
+    int | None, typer.Option("--workers", min=1, help="processes (Slurm: jobs); absent: one a processor")
+]
+ClusterOption = Annotated[
+    str | None, typer.Option("--cluster", metavar="ADDRESS", help="dask scheduler, tcp://HOST:PORT, or slurm")
+]
+
 
 def campaign(
     case: CaseArgument,
-    vary: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--vary",
-            metavar="KEY=VALUES",
-            help="what varies: KEY=V1,V2,.. | LOW:HIGH:COUNT | LOW:HIGH | normal(MEAN,SD); KEY1+KEY2 move together",
-        ),
-    ] = None,
-    of: Annotated[
-        list[str] | None, typer.Option("--of", metavar="RESULT", help="what is wanted: te-peak-to-peak, first-mode, ..")
-    ] = None,
+    vary: VaryOption = None,
+    of: OfOption = None,
     out: Annotated[Path | None, typer.Option("--out", help="output folder; absent: study_NAME")] = None,
-    sample: Annotated[
-        Literal["grid", "lhs", "sobol"] | None,
-        typer.Option("--sample", help="every combination, a Latin hypercube, or a Sobol design; absent: grid"),
-    ] = None,
-    size: Annotated[
-        int | None, typer.Option("--size", help="members of lhs; base points of sobol: keys + 2 times as many members")
-    ] = None,
+    sample: SampleOption = None,
+    size: SizeOption = None,
     seed: Annotated[int | None, typer.Option("--seed", help="seed of lhs and sobol")] = None,
-    torque_nm: Annotated[
-        float | None, typer.Option("--torque-nm", help="load of static and ISO results; absent: the case's mean")
-    ] = None,
+    torque_nm: TorqueOption = None,
     positions: Annotated[int | None, typer.Option("--positions", help="mesh phases of a mesh cycle")] = None,
     cycles: Annotated[int | None, typer.Option("--cycles", help="mesh cycles, where teeth differ")] = None,
-    against: Annotated[
-        Path | None, typer.Option("--against", metavar="RECORD", help="measured record, for the result gap")
-    ] = None,
-    workers: Annotated[
-        int | None, typer.Option("--workers", min=1, help="processes (Slurm: jobs); absent: one a processor")
-    ] = None,
-    cluster: Annotated[
-        str | None, typer.Option("--cluster", metavar="ADDRESS", help="dask scheduler, tcp://HOST:PORT, or slurm")
-    ] = None,
+    against: AgainstOption = None,
+    workers: WorkersOption = None,
+    cluster: ClusterOption = None,
     force: Annotated[
         bool, typer.Option("--force", help="replace what another study or other sources left in the folder")
     ] = False,
@@ -88,7 +97,6 @@ def campaign(
         typer.echo("\n".join(_lines(table, effects, summary, folder)))
     if summary["failed"] == summary["members"]:
         from gearbench.shell.failure import InputError
-        from gearbench.words.study import failures
 
         raise InputError(f"no member has a result: {failures(table)[0][0]}")
 

@@ -25,36 +25,43 @@ from gearbench.words.root_stress import root_lines, root_tables
 if TYPE_CHECKING:
     from gearbench.rig import Case
 
+TorqueOption = Annotated[
+    list[float] | None, typer.Option("--torque-nm", help="driver torques [N m]; absent: the case's mean")
+]
+DteOption = Annotated[
+    list[float] | None, typer.Option("--dte-um", help="transmission errors in um, instead of torques")
+]
+FigureOption = Annotated[
+    Path | None, typer.Option("--figure", help="picture of the result as well (.png, .svg, .pdf)")
+]
+StiffnessFigureOption = Annotated[
+    Path | None, typer.Option("--stiffness-figure", help="picture of the mesh stiffness by every method as well")
+]
+RootFigureOption = Annotated[
+    Path | None, typer.Option("--root-figure", help="picture of the root stress over the mesh cycle as well")
+]
+FieldsOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--fields",
+        metavar="PHASE",
+        help="mesh phases at which stress and displacement under the largest load are written beside --out as .vtu"
+        " and .png",
+    ),
+]
+
 
 def static(
     case: CaseArgument,
     out: Annotated[Path, typer.Option("--out", help="result to write (NetCDF-4)")],
-    torque_nm: Annotated[
-        list[float] | None, typer.Option("--torque-nm", help="driver torques [N m]; absent: the case's mean")
-    ] = None,
-    dte_um: Annotated[
-        list[float] | None, typer.Option("--dte-um", help="transmission errors in um, instead of torques")
-    ] = None,
+    torque_nm: TorqueOption = None,
+    dte_um: DteOption = None,
     positions: Annotated[int, typer.Option("--positions", help="mesh phases over one cycle")] = 64,
     cycles: Annotated[int, typer.Option("--cycles", help="mesh cycles, where teeth differ from one another")] = 1,
-    figure: Annotated[
-        Path | None, typer.Option("--figure", help="picture of the result as well (.png, .svg, .pdf)")
-    ] = None,
-    stiffness_figure: Annotated[
-        Path | None, typer.Option("--stiffness-figure", help="picture of the mesh stiffness by every method as well")
-    ] = None,
-    fields: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--fields",
-            metavar="PHASE",
-            help="mesh phases at which stress and displacement under the largest load are written beside --out as .vtu"
-            " and .png",
-        ),
-    ] = None,
-    root_figure: Annotated[
-        Path | None, typer.Option("--root-figure", help="picture of the root stress over the mesh cycle as well")
-    ] = None,
+    figure: FigureOption = None,
+    stiffness_figure: StiffnessFigureOption = None,
+    fields: FieldsOption = None,
+    root_figure: RootFigureOption = None,
     report: ReportOption = True,
     model: ModelOption = None,
     settings: SetOption = None,
@@ -85,8 +92,7 @@ def static(
 
             plot_static(result, figure)
         written = _stress_files(loaded, result, files, root_figure, progress)
-    from gearbench.commands.gears.static_methods import draw_largest, methods_data, methods_lines, stiffness_tables
-    from gearbench.words.te_source import te_source
+    from gearbench.commands.gears.static_methods import draw_largest, methods_data, stiffness_tables
 
     tables = stiffness_tables(loaded, result)
     if stiffness_figure is not None:
@@ -100,13 +106,20 @@ def static(
     if as_json:
         print_json(summary)
         return
-    lines = [*_lines(summary), *methods_lines(loaded, tables)]
-    if roots:
-        lines += root_lines(max(roots, key=lambda one: float(one["torque_nm"])))
-    lines += [f"warning: {warning}" for warning in summary["warnings"]]
-    lines.append(f"note: {te_source(str(summary['model']), loaded.simulation.mesh_stiffness)}")
-    for line in [*lines, str(out), *map(str, written)]:
+    for line in [*_told(loaded, summary, tables, roots), str(out), *map(str, written)]:
         typer.echo(line)
+
+
+def _told(case: Case, summary: dict[str, Any], tables: list[Any], roots: list[dict[str, Any]]) -> list[str]:
+    """What the command says of its result."""
+    from gearbench.commands.gears.static_methods import methods_lines
+    from gearbench.words.te_source import te_source
+
+    told = [*_lines(summary), *methods_lines(case, tables)]
+    if roots:
+        told += root_lines(max(roots, key=lambda one: float(one["torque_nm"])))
+    told += [f"warning: {warning}" for warning in summary["warnings"]]
+    return [*told, f"note: {te_source(str(summary['model']), case.simulation.mesh_stiffness)}"]
 
 
 def _write_page(

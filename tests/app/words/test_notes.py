@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from gearbench.bench.record.attributes import joined
+from gearbench.bench.record.remarks import joined
 from gearbench.words.limits import left_out
 from gearbench.words.summary import warnings_of
 

@@ -11,7 +11,7 @@ import pytest
 from gearbench.bench import BenchError
 from gearbench.bench.plan.schedule import Schedule
 from gearbench.bench.plan.settling import FEW, MOST, Keep, Wait, change, check_settling, steady_state, waiting
-from gearbench.bench.record.attributes import unsettled
+from gearbench.bench.record.remarks import unsettled
 from gearbench.rig import Experiment
 
 SAMPLES, RATE = 20, 200.0
