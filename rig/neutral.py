@@ -54,9 +54,9 @@ def effects_in(rig: Rig) -> tuple[str, ...]:
 
     An effect is what an ideal rig lacks: tooth errors and cracks, non-linear supports and those across, a housing,
     what stands behind a coupling, boundaries other than torque on the driver and speed or balancing torque on the load,
-    ripple, friction, corrections of the mesh, errors of the sensors. A field with its neutral value is none, and
-    neither is an error of zero, a shape without an amount, a crack without loss or length, a ripple of amplitude 0, or
-    a rigid shaft to a load whose speed is prescribed.
+    ripple, friction, damping that grows with the load, corrections of the mesh, errors of the sensors. A field with its
+    neutral value is none, and neither is an error of zero, a shape without an amount, a crack without loss or length, a
+    ripple of amplitude 0, or a rigid shaft to a load whose speed is prescribed.
     Backlash (thinning, centre distance) belongs to the geometry and is not listed.
     """
     found: list[str] = []
@@ -72,6 +72,8 @@ def effects_in(rig: Rig) -> tuple[str, ...]:
         found.append("rig.housing")
     found += [f"rig.drive.{key}" for key in _drive_effects(rig.drive)]
     found += [f"rig.load.{key}" for key in _load_effects(rig.load)]
+    if rig.damping.mesh_exponent:
+        found.append("rig.damping.mesh_exponent")
     for table in ("friction", "mesh", "sensors"):
         found += [f"rig.{table}.{key}" for key in _departures(getattr(rig, table))]
     return tuple(found)

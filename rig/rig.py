@@ -35,6 +35,12 @@ class Damping(Value):
     )
     material_frequency: float = quantity(1250.0, "hz", gt=0.0, doc="frequency at which `material_ratio` holds")
     mesh_ratio: float = quantity(0.05, ge=0.0, lt=0.5, doc="lumped model: zeta in c(t) = 2 zeta sqrt(k(t) m_e)")
+    mesh_exponent: float = quantity(
+        0.0, ge=0.0, le=2.0, doc="lumped model: n of c(t) (F / mesh_reference_force)^n, F the elastic force; 0: c(t)"
+    )
+    mesh_reference_force: float = quantity(
+        1000.0, "n", gt=0.0, le=1e9, doc="normal force at which the exponent leaves the damping of the mesh as it is"
+    )
 
     @property
     def beta(self) -> float:

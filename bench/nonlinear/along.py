@@ -117,9 +117,9 @@ class Along:
                     change = two.along[number] * after - one.along[number] * before
                     moved[int(number)] = moved.get(int(number), np.zeros(len(change))) + change
         forces = {number: resampled(-force, len(self.phase)) for number, force in moved.items()}
-        more = other.constants().damping_factor - self.model.constants().damping_factor
-        if more:
-            forces[IN_MESH] = more * np.sqrt(self.tangent.stiffness) * self.rate
+        before, after = self.model.constants().damping_factor, other.constants().damping_factor
+        if before != after:
+            forces[IN_MESH] = (after / before - 1.0) * self.tangent.damping * self.rate
         return forces
 
     def rate_of(self, excess: Array) -> Array:
@@ -150,7 +150,10 @@ def along(steady: Steady) -> Along:
     force, slope = pressed(model.law, at, fine)
     level = (np.abs(force / at.gain) / model.rig.mesh.reference_force) ** (1.0 / (1.0 + model.rig.mesh.exponent))
     slope = np.maximum(slope, 0.0)
-    damping = model.constants().damping_factor * np.sqrt(slope)
+    damping = model.viscosity(slope, np.abs(force))
+    closing = resampled(rate, entries) + table.excess_rate[:entries]
+    # Damping that grows with the force is the stiffer for being pressed while the flanks close.
+    stiffer = 1.0 + model.rig.damping.mesh_exponent * damping * closing / np.maximum(np.abs(force), 1e-9 * force.max())
     decay = max(model.slowest_decay(float(steady.drive.fine.mean())), 1e-9)
     first = setup.phase_at(0)
     cycles: Array = first + np.arange(entries, dtype=np.float64) * (setup.cycles_per_sample / (2 * substeps))
@@ -159,9 +162,9 @@ def along(steady: Steady) -> Along:
         phase=cycles,
         elastic=force,
         pairs=of_pairs(model.law, at, fine),
-        rate=resampled(rate, entries) + table.excess_rate[:entries],
+        rate=closing,
         level=level,
-        tangent=Tangent(*around, slope, damping, step, *_bearings(model, places, entries)),
+        tangent=Tangent(*around, slope * stiffer, damping, step, *_bearings(model, places, entries)),
         substeps=substeps,
         early=min(ceil(log(1 / TRANSIENT) / decay / step), samples * substeps),
         places=places,

@@ -28,6 +28,7 @@ LUMPED = tuple(
         *("drive.boundary", "drive.coupling", "drive.ripple"),
         *("load.boundary", "load.coupling"),
         "friction.coefficient",
+        "damping.mesh_exponent",
         "mesh.",
         "sensors.",
     )

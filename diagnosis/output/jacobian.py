@@ -28,6 +28,7 @@ from gearbench.diagnosis.intake.signals import measured_channels
 from gearbench.diagnosis.output.layout import Layout
 from gearbench.diagnosis.output.structure import ENCODER, GAIN, LEAST_STEP, STRUCTURE
 from gearbench.diagnosis.output.target import Target
+from gearbench.diagnosis.output.viscous import LOADED, damping_reference
 from gearbench.lumped.nonlinear.coordinates import IN_MESH
 
 if TYPE_CHECKING:
@@ -94,10 +95,15 @@ def mesh_forces(layout: Layout, along: Along, chosen: Flags) -> tuple[Array, Int
     numbers, bending = law.pairs(phase)[0], law.bending_of(phase)
     wave = waves(phase).T
     damped = (along.tangent.damping * along.rate)[:, None]
-    put("scale", along.elastic[:, None] + 0.5 * damped)
+    loaded = along.model.rig.damping
+    put("scale", along.elastic[:, None] + (0.5 + loaded.mesh_exponent) * damped)
+    if LOADED in unknowns.slices:
+        about = damping_reference(loaded, layout.model)
+        level = np.maximum(np.abs(along.elastic) / about, SMALLEST)
+        put(LOADED, damped * np.log(level)[:, None])
     put("mesh-ratio", damped)
     put("curvature", (along.elastic * np.log(np.maximum(along.level, SMALLEST)))[:, None])
-    put("shape", (along.elastic[:, None] + 0.5 * damped) * wave)
+    put("shape", (along.elastic[:, None] + (0.5 + loaded.mesh_exponent) * damped) * wave)
     put("offset", along.of_excess(np.ones((len(phase), 1))))
     put("profile", along.of_excess(wave))
     for side, key in enumerate(RUNOUTS.values()):

@@ -27,6 +27,7 @@ from gearbench.diagnosis.forces.condition import Condition
 from gearbench.diagnosis.forces.nominal import NominalModel
 from gearbench.diagnosis.forces.unknowns import Group, Unknowns, unknowns_of
 from gearbench.diagnosis.output.structure import held, sensed, structure_groups
+from gearbench.diagnosis.output.viscous import viscous, viscous_groups
 from gearbench.geometry import Pair, pair
 from gearbench.rig import Case, Rig
 from gearbench.rig.gear import Crack
@@ -80,6 +81,7 @@ class Layout:
                 rig = effect.add(rig, _all_of(effect.name), fitted)[0]
         rig = _cracked(rig, self, p)
         rig = held(_supports(rig, self, p), self.model, self.unknowns, p, self.mesh_stiffness)
+        rig = viscous(rig, self.model, self.unknowns, p)
         rig = sensed(rig, self.model, self.unknowns, p, DELAYS)
         rig = _drive(rig, self, fitted, condition)
         return with_rig(case, rig)
@@ -98,6 +100,7 @@ def layout_of(
     for effect in LIBRARY:
         groups += effect.unknowns(model, conditions)
     groups += structure_groups(nominal.rig, model)
+    groups += viscous_groups(nominal, model)
     # Bases belong to force residuals: here unknowns are moved one by one.
     plain = [replace(one, basis=None) for one in groups]
     means = {condition.name: condition.torque_mean for condition in conditions}

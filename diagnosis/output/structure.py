@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from gearbench.diagnosis.effects.effect import SIDES, changed
 from gearbench.diagnosis.forces.nominal import NominalModel
 from gearbench.diagnosis.forces.unknowns import Group, Unknowns, group
+from gearbench.diagnosis.output.viscous import LOADED, LOADED_NAME
 from gearbench.diagnosis.verdict import NINE_OF_TEN, Found
 from gearbench.rig import Across, Housing, OutputShaft, Rig, Rocking
 
@@ -58,6 +59,7 @@ NAMES = (
     (HOUSING, "housing compliance over the supports'", "1"),
     (SHAFT, "output shaft compliance over the mesh's", "1"),
     (GAIN, "gain of the reaction torque (logarithm)", "1"),
+    (LOADED, LOADED_NAME, "1"),
 )
 # Where a fit begins with them: below some per cent a rig does not show them.
 ACROSS_BEGIN, HOUSING_BEGIN, SHAFT_BEGINS = 0.15, 0.04, (0.1, 0.7)

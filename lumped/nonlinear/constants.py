@@ -31,6 +31,8 @@ class Constants(NamedTuple):
     reference1: float  # [m]
     reference2: float
     damping_factor: float  # 2 zeta sqrt(m_e) [kg^1/2]
+    damping_exponent: float  # of the elastic force
+    damping_pliancy: float  # over its reference [1/N]
     backlash: float  # [m]
     root: float  # grid steps per root of deflection [m^-1/2]
     mirror: float  # phase at which back flanks pass the pitch point, in rows of the force table

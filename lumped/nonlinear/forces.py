@@ -75,6 +75,15 @@ def entry(table: Table, i: int) -> Entry:
 
 
 @compiled(fastmath=ROUNDING)
+def _viscosity(elastic: float, tangent: float, p: Constants) -> float:
+    """Damping coefficient of the mesh [N s/m] at an elastic force [N] and its tangent [N/m]."""
+    plain = p.damping_factor * sqrt(tangent)
+    if p.damping_exponent == 0.0:
+        return plain
+    return plain * (elastic * p.damping_pliancy) ** p.damping_exponent
+
+
+@compiled(fastmath=ROUNDING)
 def _pressed(depth: float, rate: float, position: float, gain: float, secant: Array, p: Constants) -> float:
     """Force [N] of flanks pressed by depth > 0 [m] and closing at rate [m/s]; never negative."""
     last = secant.shape[1] - 1
@@ -87,7 +96,8 @@ def _pressed(depth: float, rate: float, position: float, gain: float, secant: Ar
     rise = high - low
     stiffness = low + (root - node) * rise
     tangent = max(stiffness + 0.5 * root * rise, 0.0)
-    return max(gain * depth * stiffness + p.damping_factor * sqrt(gain * tangent) * rate, 0.0)
+    elastic = gain * depth * stiffness
+    return max(elastic + _viscosity(elastic, gain * tangent, p) * rate, 0.0)
 
 
 @compiled(fastmath=ROUNDING)
@@ -123,7 +133,8 @@ def _pressed_apart(travel: float, rate: float, at: Entry, apart: Apart, p: Const
         left = _left(apart.bending, apart.own, pair, row, o, weight)
         elastic += left * depth * stiffness
         tangent += left * max(stiffness + 0.5 * root * rise, 0.0)
-    return max(at.gain * elastic + p.damping_factor * sqrt(at.gain * tangent) * rate, 0.0)
+    elastic *= at.gain
+    return max(elastic + _viscosity(elastic, at.gain * tangent, p) * rate, 0.0)
 
 
 @compiled(fastmath=ROUNDING)

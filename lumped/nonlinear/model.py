@@ -201,10 +201,18 @@ class NonLinear:
             reference1=one.reference_deflection,
             reference2=two.reference_deflection,
             damping_factor=2 * self.rig.damping.mesh_ratio * float(np.sqrt(self.mesh_mass)),
+            damping_exponent=self.rig.damping.mesh_exponent,
+            damping_pliancy=1.0 / self.rig.damping.mesh_reference_force,
             backlash=self.teeth.backlash,
             root=(len(self.teeth.approach) - 1) / float(np.sqrt(self.teeth.approach[-1])),
             mirror=self.teeth.mirror * self.teeth.phases,
         )
+
+    def viscosity(self, stiffness: Array | float, force: Array | float) -> Array:
+        """Damping coefficient of the mesh [N s/m] at tangents [N/m] and elastic forces [N]."""
+        damping = self.rig.damping
+        loaded = (np.maximum(force, 0.0) / damping.mesh_reference_force) ** damping.mesh_exponent
+        return np.asarray(self.constants().damping_factor * np.sqrt(stiffness) * loaded)
 
     def rubbing(self, mesh_frequency: float) -> Rubbing | None:
         """What the integrator needs for friction at a mesh frequency [Hz]; None without friction."""
@@ -279,7 +287,7 @@ class NonLinear:
         (y1, _), (y2, _) = self.centres(force)
         springs, dampers, inverse, mesh = self.around((y1, y2))
         springs += stiffness * np.outer(mesh, mesh)
-        dampers += self.constants().damping_factor * np.sqrt(stiffness) * np.outer(mesh, mesh)
+        dampers += self.viscosity(stiffness, force) * np.outer(mesh, mesh)
         size = self.size
         matrix = np.zeros((2 * size, 2 * size))
         matrix[:size, size:] = np.eye(size)

@@ -11,6 +11,7 @@ from shared.simulated_lines import demonstration, jacobian_at, off
 from gearbench.diagnosis.effects.bearing_nonlinearity import KEYS as BEARINGS
 from gearbench.diagnosis.output.simulator import Simulator
 from gearbench.diagnosis.output.structure import ACROSS, CROSS, HOUSING, MODE, SHAFT, SHAPE, with_motion
+from gearbench.diagnosis.output.viscous import LOADED
 
 CLOSE = 0.04  # of the change in any channel
 
@@ -30,7 +31,7 @@ def bench() -> Bench:
     for motion, frequency in enumerate((0.3, -0.2)):
         p = with_motion(unknowns, p, motion, frequency, 0.05)
     p[unknowns[ACROSS]], p[unknowns[CROSS]], p[unknowns[SHAFT]] = (0.2, 0.15), (0.1, -0.1), 0.5
-    p[unknowns[BEARINGS["driver"]]] = 0.2
+    p[unknowns[BEARINGS["driver"]]], p[unknowns[LOADED]] = 0.2, 0.6
     return Bench(simulator, p, jacobian_at(simulator, p))
 
 
@@ -42,6 +43,8 @@ def bench() -> Bench:
         ("mass", 0, 0.05),
         ("inertia", 1, 0.05),
         ("scale", 0, 0.02),
+        ("mesh-ratio", 0, 0.05),
+        (LOADED, 0, 0.05),
         (BEARINGS["driver"], 0, 0.02),
         (ACROSS, 0, 0.02),
         (CROSS, 1, 0.02),

@@ -21,7 +21,19 @@ from gearbench.lumped.linear.runge_kutta import tabulate
 from gearbench.lumped.nonlinear.coordinates import COORDINATES
 from gearbench.lumped.nonlinear.step import columns, integrate
 from gearbench.lumped.nonlinear.tables import Motion, instants, tables
-from gearbench.rig import Coupling, Crack, Drive, Friction, Load, MeshCorrection, Rig, Ripple, Support, Supports
+from gearbench.rig import (
+    Coupling,
+    Crack,
+    Damping,
+    Drive,
+    Friction,
+    Load,
+    MeshCorrection,
+    Rig,
+    Ripple,
+    Support,
+    Supports,
+)
 
 Array = NDArray[np.float64]
 
@@ -47,6 +59,7 @@ def rich_rig(boundary: str) -> Rig:
         ),
         load=Load(boundary=boundary),
         friction=Friction(coefficient=0.06, transition_speed=20e-3),
+        damping=Damping(mesh_ratio=ZETA, mesh_exponent=0.7, mesh_reference_force=2e3),
         mesh=MeshCorrection(
             stiffness_scale=1.1,
             stiffness_cos=(0.05, 0.02),
@@ -119,7 +132,8 @@ def plain_equations(rig: Rig, mesh_frequency: float, torque: Callable[[float], f
             levers[2] += share * slides * roll2
         force = 0.0
         if elastic > 0:
-            force = max(elastic + 2 * ZETA * (tangent * m_e) ** 0.5 * closing, 0.0)
+            damper = 2 * ZETA * (tangent * m_e) ** 0.5 * (elastic / 2e3) ** 0.7
+            force = max(elastic + damper * closing, 0.0)
         rub = friction.coefficient * force
         drive = torque(t) + sum(
             a * cos(o * speed1 * t + p) for o, a, p in zip(ripple.orders, ripple.amplitude, ripple.phase, strict=True)
