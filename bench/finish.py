@@ -58,7 +58,8 @@ def shown(
         channels |= teeth  # no sensor sees them
     channels = {name: repeated(values, samples) for name, values in channels.items()}
     channels = channels if absolute else with_rotation(channels, plan, at=at)
-    channels["mesh_phase"] = np.broadcast_to(mesh_phases(plan, samples, first, at), channels["dte"].shape)
+    told = mesh_phases(plan, samples, first, at) + case.rig.sensors.mesh_phase_zero
+    channels["mesh_phase"] = np.broadcast_to(told, channels["dte"].shape)
     return channels
 
 

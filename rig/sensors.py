@@ -31,8 +31,8 @@ def _runout_phase(gear: str) -> Any:
 
 
 class Sensors(Value):
-    """Errors of the channels, in the order in which they arise: encoder run-out, delay, anti-alias filter, gain, white
-    noise (rms per sample), quantisation."""
+    """Errors of the channels, in the order in which they arise: zero and run-out of the encoders, delay, anti-alias
+    filter, gain, white noise (rms per sample), quantisation."""
 
     delay_angle_driver: float = _delay("angle_driver")
     delay_angle_driven: float = _delay("angle_driven")
@@ -43,6 +43,9 @@ class Sensors(Value):
     noise_angle: float = quantity(0.0, "urad", ge=0.0, le=1.0, doc="noise of both angles, rms per sample")
     noise_displacement: float = quantity(0.0, "um", ge=0.0, le=1e-2, doc="noise of the displacements, rms per sample")
     noise_torque: float = quantity(0.0, "nm", ge=0.0, le=1e6, doc="noise of both torques, rms per sample")
+    mesh_phase_zero: float = quantity(
+        0.0, ge=-0.5, le=0.5, doc="mesh phase in cycles that both angles show where that of the gears is 0"
+    )
     encoder_runout_driver: float = _runout("driver")
     encoder_runout_driver_phase: float = _runout_phase("driver")
     encoder_runout_driven: float = _runout("driven")

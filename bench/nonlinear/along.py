@@ -36,9 +36,9 @@ U1, Y1, Y2, U2, W, LOAD = (NAMES.index(name) for name in ("u1", "y1", "y2", "u2"
 class Along:
     """A steady motion of `model` on the half-step grid (entries,) of one repetition: mesh phase [cycles], elastic force
     of the mesh [N], what each pair has of it on the working flanks, force and tangent (entries, n_o), rate of the
-    deflection [m/s], and the force that the teeth would have without an exponent over the one where that changes
-    nothing. `places` (samples, n) of all coordinates [m], sampled at `sampling_rate`. `early` steps
-    let free vibrations die out.
+    deflection [m/s], what the force grows by with the phase alone [N/cycle], and the force that the teeth would have
+    without an exponent over the one where that changes nothing. `places` (samples, n) of all coordinates [m], sampled
+    at `sampling_rate`. `early` steps let free vibrations die out.
     """
 
     model: NonLinear
@@ -46,6 +46,7 @@ class Along:
     elastic: Array
     pairs: Pressed
     rate: Array
+    turning: Array
     level: Array
     tangent: Tangent
     substeps: int
@@ -117,9 +118,9 @@ class Along:
                     change = two.along[number] * after - one.along[number] * before
                     moved[int(number)] = moved.get(int(number), np.zeros(len(change))) + change
         forces = {number: resampled(-force, len(self.phase)) for number, force in moved.items()}
-        before, after = self.model.constants().damping_factor, other.constants().damping_factor
-        if before != after:
-            forces[IN_MESH] = (after / before - 1.0) * self.tangent.damping * self.rate
+        dampers = [one.constants().damping_factor for one in (self.model, other)]
+        if dampers[0] != dampers[1]:
+            forces[IN_MESH] = (dampers[1] / dampers[0] - 1.0) * self.tangent.damping * self.rate
         return forces
 
     def rate_of(self, excess: Array) -> Array:
@@ -145,9 +146,14 @@ def along(steady: Steady) -> Along:
     entries = 2 * substeps * samples
     step = 1.0 / (setup.sampling_rate * substeps)
     table = replace(setup, substeps=substeps, table=None).table_for(0, samples)
-    at = instants(model, table, table.position[:entries] / model.law.phases, entries)
+    turned = table.position[:entries] / model.law.phases + resampled(model.turned_on(places), entries)
+    turned = np.clip(turned, 0.0, 1.0 - 1e-12)  # the teeth are those of the entry's cycle
+    at = instants(model, table, turned, entries)
     fine = resampled(travel, entries)
     force, slope = pressed(model.law, at, fine)
+    row = 1.0 / model.law.phases
+    after, before = (pressed(model.law, at._replace(phase=turned + part), fine).force for part in (row, -row))
+    turning = (after - before) / (2 * row)
     level = (np.abs(force / at.gain) / model.rig.mesh.reference_force) ** (1.0 / (1.0 + model.rig.mesh.exponent))
     slope = np.maximum(slope, 0.0)
     damping = model.viscosity(slope, np.abs(force))
@@ -163,8 +169,17 @@ def along(steady: Steady) -> Along:
         elastic=force,
         pairs=of_pairs(model.law, at, fine),
         rate=closing,
+        turning=turning,
         level=level,
-        tangent=Tangent(*around, slope * stiffer, damping, step, *_bearings(model, places, entries)),
+        tangent=Tangent(
+            *around,
+            slope * stiffer,
+            damping,
+            step,
+            *_bearings(model, places, entries),
+            model.turned_on(np.eye(model.size)),
+            turning,
+        ),
         substeps=substeps,
         early=min(ceil(log(1 / TRANSIENT) / decay / step), samples * substeps),
         places=places,

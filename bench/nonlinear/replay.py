@@ -91,7 +91,7 @@ def replay(case: Case, record: xr.Dataset, law: MeshLaw | None = None, realisati
     quiet = case.rig.model_copy(update={"sensors": _quiet(case.rig.sensors)})
     shown = sensed(rows, quiet, meshing, plan, samples=len(outputs), seed=0, first=phase)
     seen = with_rotation(shown, plan, phase)
-    seen["mesh_phase"] = mesh_phases(plan, len(outputs), phase)[None]
+    seen["mesh_phase"] = mesh_phases(plan, len(outputs), phase)[None] + case.rig.sensors.mesh_phase_zero
     unsettled = None if residual <= TOLERANCE else f"the DTE still changes by {residual:.3g} from period to period"
     lost = int(setup.apart(outputs).sum())
     inertias = turning_inertias(case.rig, meshing)
@@ -142,6 +142,7 @@ def _rotation(case: Case, record: xr.Dataset, realisation: int) -> tuple[float, 
         raise BenchError(
             'the record has no channel mesh_phase, and mesh_phase_origin is not "geometry": its mesh phase is unknown'
         )
+    first -= case.rig.sensors.mesh_phase_zero
     total = record.sizes["time"]
     cycles = round(speed * total)
     if cycles < 1 or abs(speed * total - cycles) > 0.01:

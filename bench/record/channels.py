@@ -105,6 +105,9 @@ def sensed(
     speeds = {"angle_driver": plan.speed_driver, "angle_driven": plan.speed_driven} if plan.rotation is None else {}
     signals = {name: Signal(swing, speeds.get(name, 0.0)) for name, swing in swings.items()}
     for gear, teeth in (("driver", rig.driver.teeth), ("driven", rig.driven.teeth)):
+        if rig.sensors.mesh_phase_zero:
+            swing, ramp = signals[f"angle_{gear}"].swing, signals[f"angle_{gear}"].ramp
+            signals[f"angle_{gear}"] = Signal(swing + 2 * pi / teeth * rig.sensors.mesh_phase_zero, ramp)
         if getattr(rig.sensors, f"encoder_runout_{gear}"):
             swing, ramp = signals[f"angle_{gear}"].swing, signals[f"angle_{gear}"].ramp
             rotation = 2 * pi / teeth * mesh_phases(plan, swing.shape[-1], first, stretch.within)

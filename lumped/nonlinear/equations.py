@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from gearbench.kernels.compiled import ROUNDING, compiled
 from gearbench.lumped.nonlinear.constants import Constants, Rubbing
 from gearbench.lumped.nonlinear.coordinates import Coordinates, Further
-from gearbench.lumped.nonlinear.forces import Apart, Entry, Rubbed, friction, mesh, spring
+from gearbench.lumped.nonlinear.forces import Apart, Entry, Rubbed, friction, mesh, spring, turned_on
 from gearbench.lumped.nonlinear.structure import Structure
 
 Array = NDArray[np.float64]
@@ -171,7 +171,9 @@ def _accelerated(found: Answer, pull: float, of: Equations) -> Answer:
 def answer(q: Coordinates, v: Coordinates, e: Any, r: Any, at: Entry, force: float, of: Equations) -> Answer:
     """Accelerations and forces at the coordinates q and e and their rates v and r, under T1/rb1 = force [N]."""
     p, s = of.constants, of.structure
-    travel = _seen(q.u1 - q.u2 + p.factor * (q.y1 - q.y2), e, s)
+    closed = p.factor * (q.y1 - q.y2)
+    travel = _seen(q.u1 - q.u2 + closed, e, s)
+    at = turned_on(at, -p.leaning * closed, of.secant.shape[0] - 1, of.apart)
     f = mesh(travel, _seen(v.u1 - v.u2 + p.factor * (v.y1 - v.y2), r, s), at, of.secant, of.apart, p)
     felt = Felt(
         mesh=f,

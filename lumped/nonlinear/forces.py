@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import copysign, sqrt, tanh
+from math import copysign, floor, sqrt, tanh
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -72,6 +72,17 @@ def entry(table: Table, i: int) -> Entry:
         pace=table.pace[i] if changes else 1.0,
         pull=table.pull[i] if changes else 0.0,
     )
+
+
+@compiled(fastmath=ROUNDING)
+def turned_on(at: Entry, rows: float, count: int, apart: Any) -> Entry:
+    """The entry with the mesh turned on by so many rows of a table of `count`."""
+    position, last = at.position + rows, count * (1.0 - 1e-16)
+    if len(apart) == 0:
+        position -= count * floor(position / count)
+    # An entry's teeth are those of its cycle: they wait at its ends for the next.
+    position = min(max(position, 0.0), last)
+    return Entry(at.first_pair, position, at.excess, at.excess_rate, at.gain, at.ripple, at.back, at.pace, at.pull)
 
 
 @compiled(fastmath=ROUNDING)

@@ -125,6 +125,22 @@ class NonLinear:
         return sin(self.working_pressure_angle) if self.rig.support.direction == "tangential" else 0.0
 
     @property
+    def leaning(self) -> float:
+        """How far [cycles] the mesh turns back where a motion of the centres along their supports closes it by 1 m.
+
+        Centres that move across the line between them turn that line by gamma = (y1 - y2) / a: seen from it, the driver
+        has turned on by gamma and the driven gear back, rb2 gamma on the line of action. What moves a centre along the
+        line of action leaves that line where it is.
+        """
+        if self.rig.support.direction != "tangential":
+            return 0.0
+        return self.base_radii[1] / sum(self.base_radii) / self.teeth.base_pitch
+
+    def turned_on(self, places: Array) -> Array:
+        """How far [cycles] the centres' motion turns the mesh on beyond its rotation, at the places (..., n) [m]."""
+        return np.asarray(-self.leaning * self.factor * (places[..., 1] - places[..., 2]))
+
+    @property
     def structure(self) -> Structure | None:
         """What the integrator needs beyond `constants`; None for a rig without more structure."""
         return structure_of(self.rig, self.masses[3:], self.outer, self.base_radii[1], self.slide)
@@ -206,6 +222,7 @@ class NonLinear:
             backlash=self.teeth.backlash,
             root=(len(self.teeth.approach) - 1) / float(np.sqrt(self.teeth.approach[-1])),
             mirror=self.teeth.mirror * self.teeth.phases,
+            leaning=self.leaning * self.teeth.phases,
         )
 
     def viscosity(self, stiffness: Array | float, force: Array | float) -> Array:

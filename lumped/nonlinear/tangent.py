@@ -3,9 +3,10 @@ one coordinate, does to every coordinate.
 
 Along a given motion the mesh is a spring k(t) and a damper c(t), so that departures q obey
 
-    M q'' + C q' + K q = -m (k(t) m.q + c(t) m.q' + f(t)) - sum b_i s_i(t) b_i.q + d g(t)
+    M q'' + C q' + K q = -m (k(t) m.q + c(t) m.q' + w(t) n.q + f(t)) - sum b_i s_i(t) b_i.q + d g(t)
 
-with m what each coordinate contributes to the deflection, b_i likewise that of a support whose stiffness departs by
+with m what each coordinate contributes to the deflection, n to the phase of the mesh, which the force grows with by
+w(t), b_i likewise that of a support whose stiffness departs by
 s_i(t) from the mean one, f(t) the force that a change of the rig adds in the mesh at
 unchanged motion, and g(t) that on one coordinate d: a support, the driver, its shaft. Friction is left out:
 it turns a few per cent of a departure. Many departures are carried at once by the classical Runge-Kutta method, in
@@ -34,7 +35,8 @@ class Tangent(NamedTuple):
     """A rig along a motion: springs K, dampers C (n, n), inverse masses (n,), what coordinates contribute to the
     deflection (n,), and of the mesh on the half-step grid of one repetition stiffness k and damping c (entries,);
     `step` [s] is two entries. Of supports whose stiffness varies what coordinates contribute to their deflection (b, n)
-    and by how much it departs from that in K (entries, b)."""
+    and by how much it departs from that in K (entries, b). By how much coordinates turn the mesh on (n,) [cycles/m],
+    and what its force grows by with that (entries,) [N/cycle]."""
 
     springs: Array
     dampers: Array
@@ -45,6 +47,8 @@ class Tangent(NamedTuple):
     step: float
     bearings: Array
     stiffer: Array
+    turned_on: Array
+    turning: Array
 
 
 def departures(
@@ -64,7 +68,7 @@ def departures(
     values = (
         -inverse * tangent.springs, -inverse * tangent.dampers, tangent.mesh, -tangent.inverse * tangent.mesh,
         direction, in_mesh, tangent.stiffness, tangent.damping, forces, tangent.bearings,
-        -inverse.T * tangent.bearings, tangent.stiffer,
+        -inverse.T * tangent.bearings, tangent.stiffer, tangent.turned_on, tangent.turning,
     )  # fmt: skip
     single = (np.ascontiguousarray(one, np.float32) for one in values)
     _run(*single, np.float32(tangent.step), substeps, early, places, pushes)
@@ -74,8 +78,8 @@ def departures(
 @compiled(fastmath=ROUNDING)
 def _rates(
     q: Single, v: Single, springs: Single, dampers: Single, mesh: Single, pushed: Single, direction: Single,
-    k: np.float32, c: np.float32, force: Single, bearings: Single, held: Single, stiffer: Single, out: Single,
-    push: Single,
+    k: np.float32, c: np.float32, force: Single, bearings: Single, held: Single, stiffer: Single, turned: Single,
+    w: np.float32, out: Single, push: Single,
 ) -> None:  # fmt: skip
     """Accelerations `out` (n, columns) and the mesh's elastic and damping force `push` (columns,)."""
     size, columns = q.shape
@@ -83,8 +87,9 @@ def _rates(
         push[p] = 0.0
     for i in range(size):
         if mesh[i] != 0.0:
+            spring, damper = mesh[i] * k + turned[i] * w, mesh[i] * c
             for p in range(columns):
-                push[p] += mesh[i] * (k * q[i, p] + c * v[i, p])
+                push[p] += spring * q[i, p] + damper * v[i, p]
     for i in range(size):
         for p in range(columns):
             out[i, p] = pushed[i] * push[p] + direction[i, p] * force[p]
@@ -104,7 +109,7 @@ def _rates(
 def _run(
     springs: Single, dampers: Single, mesh: Single, pushed: Single, direction: Single, in_mesh: Single,
     stiffness: Single, damping: Single, forces: Single, bearings: Single, held: Single, stiffer: Single,
-    h: np.float32, substeps: int, early: int, places: Single, pushes: Single,
+    turned: Single, turning: Single, h: np.float32, substeps: int, early: int, places: Single, pushes: Single,
 ) -> None:  # fmt: skip
     """Fill places and pushes."""
     entries, columns = forces.shape
@@ -118,7 +123,7 @@ def _run(
         i = (2 * number) % entries
         middle, after = i + 1, (i + 2) % entries
         _rates(q, v, springs, dampers, mesh, pushed, direction, stiffness[i], damping[i], forces[i],
-               bearings, held, stiffer[i], a1, push)  # fmt: skip
+               bearings, held, stiffer[i], turned, turning[i], a1, push)  # fmt: skip
         if number >= 0 and number % substeps == 0:
             sample = number // substeps
             for c in range(size):
@@ -131,19 +136,19 @@ def _run(
                 q2[c, p] = q[c, p] + HALF * h * v[c, p]
                 v2[c, p] = v[c, p] + HALF * h * a1[c, p]
         _rates(q2, v2, springs, dampers, mesh, pushed, direction, stiffness[middle], damping[middle], forces[middle],
-               bearings, held, stiffer[middle], a2, push)  # fmt: skip
+               bearings, held, stiffer[middle], turned, turning[middle], a2, push)  # fmt: skip
         for c in range(size):
             for p in range(columns):
                 q2[c, p] = q[c, p] + HALF * h * v2[c, p]
                 v3[c, p] = v[c, p] + HALF * h * a2[c, p]
         _rates(q2, v3, springs, dampers, mesh, pushed, direction, stiffness[middle], damping[middle], forces[middle],
-               bearings, held, stiffer[middle], a3, push)  # fmt: skip
+               bearings, held, stiffer[middle], turned, turning[middle], a3, push)  # fmt: skip
         for c in range(size):
             for p in range(columns):
                 q2[c, p] = q[c, p] + h * v3[c, p]
                 v4[c, p] = v[c, p] + h * a3[c, p]
         _rates(q2, v4, springs, dampers, mesh, pushed, direction, stiffness[after], damping[after], forces[after],
-               bearings, held, stiffer[after], a4, push)  # fmt: skip
+               bearings, held, stiffer[after], turned, turning[after], a4, push)  # fmt: skip
         for c in range(size):
             for p in range(columns):
                 q[c, p] += SIXTH * h * (v[c, p] + TWO * (v2[c, p] + v3[c, p]) + v4[c, p])

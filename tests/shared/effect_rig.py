@@ -34,6 +34,10 @@ def make_rig(driver: dict[str, Any] | None = None, driven: dict[str, Any] | None
     return Rig(driver=one, driven=two, **values)
 
 
+def along_line_of_action(rig: Rig) -> Rig:
+    return rig.model_copy(update={"support": rig.support.model_copy(update={"direction": "line-of-action"})})
+
+
 def make_model(rig: Rig, law: MeshLaw | None = None) -> NonLinear:
     """The model with inertias of its own, written down here: shafts, boundaries and direction as the rig says."""
     rotor, turning1, beyond1 = _shaft(rig.drive.coupling, GEARS[0])

@@ -80,7 +80,9 @@ def plain_rates(rig: Rig, frequency: float, torque: Callable[[float], float], me
         closing = r1 * v[1] - r2 * v[2] + float((speed1 - speed2) @ NORMAL)
         if delta <= 0:
             return np.zeros(2), 0.0, 0.0, 0.0, 0.0
-        phase = frequency * t
+        # Seen from the line of centres, which their motion turns, the driven gear turns back.
+        tilt = (d[5] - d[7]) * cos(ALPHA) / sum(RADII) if tangential else 0.0
+        phase = frequency * t - r2 * tilt / BASE_PITCH
         k = float(stiffness(phase)) * rig.mesh.stiffness_scale
         tangent = k * (1 + 1.5 * BEND * (delta / TOP) ** 0.5)
         press = max(k * delta * (1 + BEND * (delta / TOP) ** 0.5) + 2 * ZETA * (tangent * m_e) ** 0.5 * closing, 0.0)

@@ -1,7 +1,7 @@
 """The reduced model against the non-linear lumped one on the same finite-element tables, slowly turning.
 
 Both have every effect from their own equations. At handovers they differ by what lumped pairs cannot do (they share one
-spring, and know no tilt of the normal at tip edges): 0.7 % of the swing of the dte without any effect.
+spring, and know no tilt of the normal at tip edges): 0.15 % of the swing of the dte without any effect.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ ROCKING = "{mass_kg=20.0, stiffness_n_per_m=8e8, damping_n_s_per_m=3e5, driver_s
 
 # Settings, bound of the difference of means, and of the rms of the swings over their range.
 EFFECTS: dict[str, tuple[list[str], float, float]] = {
-    "friction": (["rig.friction.coefficient=0.08"], 5e-4, 1e-2),
-    "exponent": (["rig.support.driver.exponent=0.5"], 5e-4, 1e-2),
-    "ripple": ([f"rig.drive.coupling={SHAFT}", RIPPLE], 5e-4, 1e-2),
-    "series": (["rig.mesh.stiffness_cos=[0.1]", "rig.mesh.stiffness_sin=[0.05]"], 5e-4, 1e-2),
-    "error": (["rig.mesh.error_cos_um=[1.0]", "rig.mesh.error_sin_um=[0.5]", "rig.mesh.error_mean_um=2.0"], 5e-4, 1e-2),
+    "friction": (["rig.friction.coefficient=0.08"], 5e-4, 5e-3),
+    "exponent": (["rig.support.driver.exponent=0.5"], 5e-4, 3e-3),
+    "ripple": ([f"rig.drive.coupling={SHAFT}", RIPPLE], 5e-4, 3e-3),
+    "series": (["rig.mesh.stiffness_cos=[0.1]", "rig.mesh.stiffness_sin=[0.05]"], 5e-4, 3e-3),
+    "error": (["rig.mesh.error_cos_um=[1.0]", "rig.mesh.error_sin_um=[0.5]", "rig.mesh.error_mean_um=2.0"], 5e-4, 3e-3),
     "shaft": ([f"rig.load.coupling={SHAFT}"], 5e-4, 0.1),  # handovers ring in it
-    "housing": (["rig.housing={mass_kg=20.0, stiffness_n_per_m=1e8, damping_n_s_per_m=1e5}"], 5e-4, 2e-2),
-    "rocking": ([f"rig.housing={ROCKING}"], 5e-4, 2e-2),
+    "housing": (["rig.housing={mass_kg=20.0, stiffness_n_per_m=1e8, damping_n_s_per_m=1e5}"], 5e-4, 3e-3),
+    "rocking": ([f"rig.housing={ROCKING}"], 5e-4, 3e-3),
     # Teeth that bear 800 N in the mean: the force at which nothing changes lies far below.
-    "hardening": (["rig.mesh.exponent=0.2", "rig.mesh.reference_force_n=300"], 5e-4, 2e-2),
-    "across": ([f"rig.support.driver.across={SIDE}"], 2e-3, 2e-2),
+    "hardening": (["rig.mesh.exponent=0.2", "rig.mesh.reference_force_n=300"], 5e-4, 3e-3),
+    "across": ([f"rig.support.driver.across={SIDE}"], 2e-3, 1e-2),
     "held": (["rig.load.boundary=torque", "rig.drive.boundary=speed"], 5e-4, 2e-2),
 }
 
@@ -57,6 +57,14 @@ def test_both_models_have_the_same_effect(folder: Path, effect: str) -> None:
     one, two = (record["dte"].values[0] for record in (found, lumped))
     assert np.std(one - two) < swing * np.ptp(two)
     assert found.attrs["divided_steps"] == 0 and "friction acts on the hubs" in found.attrs["limits"]
+
+
+@pytest.mark.parametrize("stiffness", ["2e7", "1e7"])
+def test_soft_supports_turn_the_mesh_on(folder: Path, stiffness: str) -> None:
+    """Centres that move turn the line between them, and the contact with it: else 14 and 27 % of the dte are missing."""
+    case = twin_case(folder, *supports(stiffness, "2e4"))
+    one, two = (simulate(case, model)["dte"].values[0] for model in ("reduced", "lumped"))
+    assert np.std(one - two) < 5e-3 * np.std(one)
 
 
 def test_free_gears_keep_their_mean_speed(folder: Path) -> None:

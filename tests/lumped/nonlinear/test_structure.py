@@ -96,7 +96,7 @@ def motions(out: Outputs) -> Array:
     return np.stack([*turns, out.housing, out.y1, out.x1, out.y2, out.x2, out.rocking], axis=1)
 
 
-def excited(rig: Rig, constant: bool = False, steps: int = 6400, cycles: int = 2) -> tuple[Array, Outputs, Array]:
+def excited(rig: Rig, constant: bool = False, steps: int = 9600, cycles: int = 2) -> tuple[Array, Outputs, Array]:
     """Time, outputs of some mesh cycles and the state at rest from which they begin."""
     model = make_model(rig)
     state = model.equilibrium(FORCE, alike(0.0, gain=rig.mesh.stiffness_scale))

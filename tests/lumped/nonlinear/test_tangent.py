@@ -26,6 +26,8 @@ def oscillator(on_mesh: float) -> tuple[Tangent, float]:
         step=duration / (SUBSTEPS * SAMPLES),
         bearings=np.empty((0, 1)),
         stiffer=np.empty((entries, 0)),
+        turned_on=np.zeros(1),
+        turning=np.zeros(entries),
     )
     return tangent, 900.0
 
