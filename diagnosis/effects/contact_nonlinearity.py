@@ -13,7 +13,7 @@ from gearbench.rig import Rig
 KEY = "curvature"
 # Exponent of the mesh force over its own: teeth stiffen a little as their contacts widen, and far more where flanks
 # bear on a part of their width: a point contact has one half.
-SD, WIDE, LEAST, LARGEST = 0.05, 0.25, -0.4, 0.8
+SD, WIDE, LEAST, LARGEST = 0.08, 0.25, -0.4, 0.8
 
 
 def unknowns(model: NominalModel, conditions: Sequence[Condition]) -> tuple[Group, ...]:

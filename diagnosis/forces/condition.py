@@ -18,6 +18,8 @@ Complex = NDArray[np.complex128]
 TINY = 1e-40  # variance that no channel falls below: divisions stay finite
 CHANNELS = ("angle_driver", "angle_driven", "y_driver", "y_driven", "torque_driver", "torque_driven")
 
+NEAR = 0.5  # of the nominal deflection of the supports, within which a measured mean is one
+
 
 @dataclass(frozen=True)
 class Condition:
@@ -26,13 +28,13 @@ class Condition:
 
     `spectra` maps a channel to its full half-spectrum (N/2 + 1,) = rfft/N of the period mean, angles as departures
     u = rb (theta - nominal rotation) [m]; `noise` to the variance of one of its bins; `omega` (N/2 + 1,) [rad/s];
-    `phase` (N,) mesh phase [cycles]; `tooth` (2, N, n_o) tooth numbers of the pairs in contact, `load_share` (N, n_o)
-    their shares of the load, `bending` (N, n_o, 2) the teeth's parts of their flexibility; `lever_arms` (3, N) of
-    friction over base radius, for driver rotation, y and driven rotation; `waves` (2 orders, N) of the mesh phase,
-    `lobes` (2, 2, N) cosine and sine of both rotations; `pitch_speed` rb speed [m/s]; `force_level` [N] and
-    `stiffness_level` [N/m] of the mesh at the mean torque; `force_full` (N/2 + 1,) spectrum of the mesh force that a
-    nominal equation gives, zero beyond the used bins; `hats_full` basis of smooth functions of frequency
-    (knots, N/2 + 1).
+    `phase` (N,) mesh phase [cycles] with the centres' motion; `tooth` (2, N, n_o) tooth numbers of the pairs that
+    touch, `load_share` (N, n_o) their shares of the load, `bending` (N, n_o, 2) the teeth's parts of their flexibility;
+    `lever_arms` (3, N) of friction over base radius, for driver rotation, y and driven rotation; `waves` (2 orders, N)
+    of the rotation's mesh phase, `lobes` (2, 2, N) cosine and sine of both rotations; `pitch_speed` rb speed [m/s];
+    `force_level` [N] and `stiffness_level` [N/m] of the mesh at the mean torque; `force_full` (N/2 + 1,) spectrum of
+    the mesh force that a nominal equation gives, zero beyond the used bins; `hats_full` basis of smooth functions of
+    frequency (knots, N/2 + 1).
     """
 
     name: str
@@ -61,12 +63,13 @@ class Condition:
 
 def prepare(measured: Measurement, model: NominalModel, band: float) -> Condition:
     """The condition of a measurement; `band` [Hz] is where the used bins end."""
-    phase, rate = measured.phase, measured.sampling_rate
-    samples = phase.size
+    rate, samples = measured.sampling_rate, measured.phase.size
     spectra, noise = _spectra(measured, model)
+    phase = measured.phase + _turned_on(model, spectra, samples)
     omega = np.asarray(2 * np.pi * np.fft.rfftfreq(samples, 1 / rate), dtype=np.float64)
     bins = min(int(np.searchsorted(omega, 2 * np.pi * band, side="right")), samples // 2)
     numbers, share = model.law.pairs(phase)
+    per_cycle = [2 * np.pi / z for z in model.teeth]
     rb1 = model.base_radius[0]
     mean = float(spectra["torque_driver"][0].real)
     force = _force(model, spectra, omega)
@@ -85,8 +88,8 @@ def prepare(measured: Measurement, model: NominalModel, band: float) -> Conditio
         load_share=share,
         bending=model.law.bending_of(phase),
         lever_arms=_lever_arms(model, measured.mesh_frequency, phase, spectra, omega),
-        waves=waves(phase),
-        lobes=np.stack([(np.cos(turn), np.sin(turn)) for turn in (2 * np.pi * phase / z for z in model.teeth)]),
+        waves=waves(measured.phase),
+        lobes=np.stack([(np.cos(turn), np.sin(turn)) for turn in (turns * measured.phase for turns in per_cycle)]),
         pitch_speed=2 * np.pi * measured.mesh_frequency / model.teeth[0] * rb1,
         teeth=model.teeth,
         torque_mean=mean,
@@ -95,6 +98,34 @@ def prepare(measured: Measurement, model: NominalModel, band: float) -> Conditio
         force_full=force,
         hats_full=hats(omega / (2 * np.pi), band),
     )
+
+
+def _turned_on(model: NominalModel, spectra: Mapping[str, Complex], samples: int) -> Array:
+    """How far (samples,) [cycles] the driven gear's vibration and the centres' motion turn the mesh on, as in the
+    lumped model: the motion as measured, about where the supports rest."""
+
+    def swing(channel: str) -> Array:
+        if channel not in spectra:
+            return np.zeros(samples)
+        lines = spectra[channel].copy()
+        lines[0] = 0.0
+        return np.asarray(np.fft.irfft(lines, samples) * samples)
+
+    rb1, rb2 = model.base_radius
+    closed = swing("y_driver") - swing("y_driven") + _rest(model, spectra)
+    leaning = rb2 / (rb1 + rb2) * model.support_factor if model.cross_factor > 0.0 else 0.0
+    return np.asarray((swing("angle_driven") - leaning * closed) / model.law.base_pitch)
+
+
+def _rest(model: NominalModel, spectra: Mapping[str, Complex]) -> float:
+    """Mean difference [m] of both centres' displacements: the nominal supports' under the mean torque, or the measured
+    one where that is near it, as that of sensors is which have their zero without load."""
+    force = float(spectra["torque_driver"][0].real) / model.base_radius[0] * model.support_factor
+    rest = -force * (1.0 / model.stiffness[0] + 1.0 / model.stiffness[1])
+    if "y_driver" not in spectra or "y_driven" not in spectra:
+        return rest
+    seen = float((spectra["y_driver"][0] - spectra["y_driven"][0]).real)
+    return seen if abs(seen - rest) < NEAR * abs(rest) else rest
 
 
 def _spectra(measured: Measurement, model: NominalModel) -> tuple[dict[str, Complex], dict[str, float]]:

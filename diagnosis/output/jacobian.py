@@ -25,11 +25,13 @@ from gearbench.diagnosis.effects.torque_ripple import ORDERS
 from gearbench.diagnosis.forces.basis import waves
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.intake.signals import measured_channels
+from gearbench.diagnosis.output.contrast import CONTRAST, modulated
 from gearbench.diagnosis.output.layout import Layout
-from gearbench.diagnosis.output.structure import ENCODER, GAIN, LEAST_STEP, STRUCTURE
+from gearbench.diagnosis.output.structure import ENCODER, GAIN, LEAST_STEP, PHASE, STRUCTURE
 from gearbench.diagnosis.output.target import Target
 from gearbench.diagnosis.output.viscous import LOADED, damping_reference
 from gearbench.lumped.nonlinear.coordinates import IN_MESH
+from gearbench.rig import MeshCorrection
 
 if TYPE_CHECKING:
     from gearbench.bench.nonlinear.along import Along
@@ -96,14 +98,18 @@ def mesh_forces(layout: Layout, along: Along, chosen: Flags) -> tuple[Array, Int
     wave = waves(phase).T
     damped = (along.tangent.damping * along.rate)[:, None]
     loaded = along.model.rig.damping
-    put("scale", along.elastic[:, None] + (0.5 + loaded.mesh_exponent) * damped)
+    stiffer = along.elastic[:, None] + (0.5 + loaded.mesh_exponent) * damped
+    put("scale", stiffer)
     if LOADED in unknowns.slices:
         about = damping_reference(loaded, layout.model)
         level = np.maximum(np.abs(along.elastic) / about, SMALLEST)
         put(LOADED, damped * np.log(level)[:, None])
     put("mesh-ratio", damped)
     put("curvature", (along.elastic * np.log(np.maximum(along.level, SMALLEST)))[:, None])
-    put("shape", (along.elastic[:, None] + (0.5 + loaded.mesh_exponent) * damped) * wave)
+    (series, slope), (_, error_slope) = _series_of(along.model.rig.mesh, phase)
+    put(CONTRAST, stiffer * (modulated(layout.modulation, phase) / series)[:, None])
+    put("shape", stiffer * (wave / series[:, None]))
+    put(PHASE, -(along.turning[:, None] + stiffer * (slope / series)[:, None] + along.of_excess(error_slope[:, None])))
     put("offset", along.of_excess(np.ones((len(phase), 1))))
     put("profile", along.of_excess(wave))
     for side, key in enumerate(RUNOUTS.values()):
@@ -125,6 +131,20 @@ def mesh_forces(layout: Layout, along: Along, chosen: Flags) -> tuple[Array, Int
         parts.append(np.stack(soft, axis=1)[:, keep])
         at.extend(indices[keep])
     return np.concatenate(parts, axis=1), np.array(at)
+
+
+def _series_of(mesh: MeshCorrection, phase: Array) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+    """Factor on the stiffness and excess [m] of the mesh at phases (n,) [cycles], each with its growth a cycle."""
+    found = []
+    for mean, parts in (
+        (1.0, (mesh.stiffness_cos, mesh.stiffness_sin)),
+        (0.0, (mesh.error_cos, mesh.error_sin)),
+    ):
+        orders = 2 * np.pi * np.arange(1, len(parts[0]) + 1)[:, None]
+        cosine, sine = np.cos(orders * phase), np.sin(orders * phase)
+        a, b = (np.array(part)[:, None] for part in parts)
+        found.append((mean + (a * cosine + b * sine).sum(axis=0), (orders * (b * cosine - a * sine)).sum(axis=0)))
+    return found[0], found[1]
 
 
 def _by_tooth(tooth: NDArray[np.int64], stiffness: Array, count: int) -> Array:

@@ -26,6 +26,7 @@ from gearbench.diagnosis.effects.torque_ripple import KEY as RIPPLE
 from gearbench.diagnosis.forces.condition import Condition
 from gearbench.diagnosis.forces.nominal import NominalModel
 from gearbench.diagnosis.forces.unknowns import Group, Unknowns, unknowns_of
+from gearbench.diagnosis.output.contrast import contrast_groups, contrasted, modulation_of
 from gearbench.diagnosis.output.structure import held, sensed, structure_groups
 from gearbench.diagnosis.output.viscous import viscous, viscous_groups
 from gearbench.geometry import Pair, pair
@@ -70,6 +71,11 @@ class Layout:
         """Mean stiffness [N/m] of the nominal mesh at the largest load of its table."""
         return self.model.mesh_stiffness
 
+    @cached_property
+    def modulation(self) -> Array:
+        """Amplitudes (2, orders) of the nominal mesh's stiffness over its phase."""
+        return modulation_of(self.model)
+
     def case(self, p: Array, condition: str | None = None) -> Case:
         """The rig of these unknowns (size,), with the ripple of one condition, or the mean of all. Raises ValueError
         for values that no rig may have."""
@@ -81,6 +87,7 @@ class Layout:
                 rig = effect.add(rig, _all_of(effect.name), fitted)[0]
         rig = _cracked(rig, self, p)
         rig = held(_supports(rig, self, p), self.model, self.unknowns, p, self.mesh_stiffness)
+        rig = contrasted(rig, self.modulation, self.unknowns, p)
         rig = viscous(rig, self.model, self.unknowns, p)
         rig = sensed(rig, self.model, self.unknowns, p, DELAYS)
         rig = _drive(rig, self, fitted, condition)
@@ -100,7 +107,7 @@ def layout_of(
     for effect in LIBRARY:
         groups += effect.unknowns(model, conditions)
     groups += structure_groups(nominal.rig, model)
-    groups += viscous_groups(nominal, model)
+    groups += [*contrast_groups(), *viscous_groups(nominal, model)]
     # Bases belong to force residuals: here unknowns are moved one by one.
     plain = [replace(one, basis=None) for one in groups]
     means = {condition.name: condition.torque_mean for condition in conditions}

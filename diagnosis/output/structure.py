@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from gearbench.diagnosis.effects.effect import SIDES, changed
 from gearbench.diagnosis.forces.nominal import NominalModel
 from gearbench.diagnosis.forces.unknowns import Group, Unknowns, group
+from gearbench.diagnosis.output.contrast import CONTRAST, CONTRAST_NAME
 from gearbench.diagnosis.output.viscous import LOADED, LOADED_NAME
 from gearbench.diagnosis.verdict import NINE_OF_TEN, Found
 from gearbench.rig import Across, Housing, OutputShaft, Rig, Rocking
@@ -43,6 +44,9 @@ GAIN, GAIN_SD = "gain", 0.01
 # Encoder run-out along the base circle over the deflection of the mesh: what grating and centring of a good encoder
 # leave.
 ENCODER, ENCODER_SD = "encoder", 0.03
+# Mesh phase [cycles] that the encoders show at that of the gears: zeros are set by a tooth that touches, not better
+# than this.
+PHASE, PHASE_SD, PHASE_LARGEST = "phase", 0.01, 0.05
 # Softer than the former part a rig has it, and then at least the latter: steps stay long.
 FELT, STIFFEST = 0.01, 0.03
 SHAFT_FELT, SHAFT_STIFFEST = 0.03, 0.06
@@ -59,7 +63,9 @@ NAMES = (
     (HOUSING, "housing compliance over the supports'", "1"),
     (SHAFT, "output shaft compliance over the mesh's", "1"),
     (GAIN, "gain of the reaction torque (logarithm)", "1"),
+    (PHASE, "zero of the mesh phase in cycles", "1"),
     (LOADED, LOADED_NAME, "1"),
+    (CONTRAST, CONTRAST_NAME, "1"),
 )
 # Where a fit begins with them: below some per cent a rig does not show them.
 ACROSS_BEGIN, HOUSING_BEGIN, SHAFT_BEGINS = 0.15, 0.04, (0.1, 0.7)
@@ -71,6 +77,7 @@ def structure_groups(rig: Rig, model: NominalModel) -> list[Group]:
         group(ACROSS, "1", SIDES, ACROSS_SD, slot="structure", low=0.0, high=ACROSS_LARGEST),
         group(CROSS, "1", SIDES, CROSS_SD, slot="structure", first=4, low=-CROSS_LARGEST, high=CROSS_LARGEST),
         group(GAIN, "1", ("torque_driven",), GAIN_SD, slot="structure", first=2),
+        group(PHASE, "1", ("mesh",), PHASE_SD, slot="structure", first=19, low=-PHASE_LARGEST, high=PHASE_LARGEST),
         group(ENCODER, "m", [f"{s}.{part}" for s in SIDES for part in ("cos", "sin")],
               ENCODER_SD * model.deflection, slot="structure", first=6),
     ]  # fmt: skip
@@ -191,6 +198,7 @@ def sensed(rig: Rig, model: NominalModel, unknowns: Unknowns, p: Array, delays: 
         field = f"delay_{channel}"
         update[field] = getattr(sensors, field) + float(p[unknowns[key]][0])
     update["gain_torque_driven"] = sensors.gain_torque_driven * exp(float(p[unknowns[GAIN]][0]))
+    update["mesh_phase_zero"] = sensors.mesh_phase_zero + float(p[unknowns[PHASE]][0])
     parts = p[unknowns[ENCODER]]
     for number, side in enumerate(SIDES):
         field, radius = f"encoder_runout_{side}", model.base_radius[number]

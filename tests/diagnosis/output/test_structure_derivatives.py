@@ -9,6 +9,7 @@ import pytest
 from shared.simulated_lines import demonstration, jacobian_at, off
 
 from gearbench.diagnosis.effects.bearing_nonlinearity import KEYS as BEARINGS
+from gearbench.diagnosis.output.contrast import CONTRAST
 from gearbench.diagnosis.output.simulator import Simulator
 from gearbench.diagnosis.output.structure import ACROSS, CROSS, HOUSING, MODE, SHAFT, SHAPE, with_motion
 from gearbench.diagnosis.output.viscous import LOADED
@@ -45,6 +46,7 @@ def bench() -> Bench:
         ("scale", 0, 0.02),
         ("mesh-ratio", 0, 0.05),
         (LOADED, 0, 0.05),
+        (CONTRAST, 0, 0.02),
         (BEARINGS["driver"], 0, 0.02),
         (ACROSS, 0, 0.02),
         (CROSS, 1, 0.02),
