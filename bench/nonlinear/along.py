@@ -118,9 +118,9 @@ class Along:
                     change = two.along[number] * after - one.along[number] * before
                     moved[int(number)] = moved.get(int(number), np.zeros(len(change))) + change
         forces = {number: resampled(-force, len(self.phase)) for number, force in moved.items()}
-        dampers = [one.constants().damping_factor for one in (self.model, other)]
-        if dampers[0] != dampers[1]:
-            forces[IN_MESH] = (dampers[1] / dampers[0] - 1.0) * self.tangent.damping * self.rate
+        factor, changed = (one.constants().damping_factor for one in (self.model, other))
+        if factor != changed:
+            forces[IN_MESH] = (changed / factor - 1.0) * self.tangent.damping * self.rate
         return forces
 
     def rate_of(self, excess: Array) -> Array:

@@ -61,7 +61,7 @@ def test_both_models_have_the_same_effect(folder: Path, effect: str) -> None:
 
 @pytest.mark.parametrize("stiffness", ["2e7", "1e7"])
 def test_soft_supports_turn_the_mesh_on(folder: Path, stiffness: str) -> None:
-    """Centres that move turn the line between them, and the contact with it: else 14 and 27 % of the dte are missing."""
+    """Centres that move turn the line between them, and the contact with it: else 14 and 27 % of the dte are off."""
     case = twin_case(folder, *supports(stiffness, "2e4"))
     one, two = (simulate(case, model)["dte"].values[0] for model in ("reduced", "lumped"))
     assert np.std(one - two) < 5e-3 * np.std(one)
