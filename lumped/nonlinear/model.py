@@ -89,7 +89,7 @@ LIMITS = (
     "forces of unbalance, also of eccentric gears, are left out",
     "a pair deflects as between sound neighbours: what the neighbours of an uneven tooth carry does not bend it",
     "back flanks are free of friction, pitch errors and cracks",
-    "mesh phase is that of the steady rotation",
+    "mesh phase is that of the steady rotation, turned on by the centres along their supports alone",
 )
 ONE_DIRECTION = "the centres move along the support direction only: friction acts on rotations and tangential supports"
 
