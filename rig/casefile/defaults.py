@@ -58,6 +58,7 @@ def complete(document: Table, path: Path) -> Completed:
         return Completed(tuple(assumed), False)
     experiment = document.get("experiment")
     if isinstance(experiment, dict) and isinstance(rig, dict):
+        assumed += _rigid(rig.get("support", {}))
         assumed += _sampling(experiment, rig.get("driver"))
     return Completed(tuple(assumed), True)
 
@@ -80,6 +81,18 @@ def _hub(gear: Any, where: str) -> str | None:
         return None
     gear["hub_radius_mm"] = hub = round(HUB_PART * root, 4)
     return f"{where}.hub_radius_mm = {float(hub):g}: the gear is rigid inside {100 * HUB_PART:.0f} % of its root circle"
+
+
+def _rigid(supports: Any) -> list[str]:
+    """What is said of supports without a stiffness, which hold a gear's centre where it is."""
+    if not isinstance(supports, dict):
+        return []
+    own = {side: supports.get(side) for side in ("driver", "driven")}
+    if "stiffness_n_per_m" in supports:
+        return []
+    held = [side for side, one in own.items() if not (isinstance(one, dict) and "stiffness_n_per_m" in one)]
+    where = {2: "rig.support", 1: f"rig.support.{''.join(held)}"}
+    return [f"{where[len(held)]}: rigid, as no stiffness_n_per_m is given"] if held else []
 
 
 def _sampling(experiment: Table, driver: Any) -> list[str]:

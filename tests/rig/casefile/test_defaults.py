@@ -53,6 +53,21 @@ def test_gears_alone_make_a_case(tmp_path: Path) -> None:
     ]
 
 
+@pytest.mark.parametrize(
+    ("support", "said"),
+    [
+        ("", ["rig.support: rigid, as no stiffness_n_per_m is given"]),
+        ("[rig.support]\nstiffness_n_per_m = 1e8\n", []),
+        ("[rig.support.driver]\nstiffness_n_per_m = 1e8\n",
+         ["rig.support.driven: rigid, as no stiffness_n_per_m is given"]),
+    ],
+)  # fmt: skip
+def test_supports_that_are_not_given_are_said_to_be_rigid(tmp_path: Path, support: str, said: list[str]) -> None:
+    gears = GEARS.partition("[rig.support]")[0]
+    case = gb.read_case(written(tmp_path, f"{gears}{support}{EXPERIMENT.format(mesh=50)}"))
+    assert [line for line in case.assumed if line.startswith("rig.support")] == said
+
+
 def test_what_is_said_is_not_assumed(tmp_path: Path) -> None:
     text = GEARS.replace("bore_radius_mm = 12", "hub_radius_mm = 15").replace("profile_shift", "hub_radius_mm = 20\n#")
     case = gb.read_case(written(tmp_path, text))
