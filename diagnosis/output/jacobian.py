@@ -46,6 +46,7 @@ Integers = NDArray[np.int64]
 AROUND, APART = ("stiffness", "damping", "mass", "inertia", *BEARINGS.values(), COMPLIANCE, *STRUCTURE), 1e-3
 # Moved and simulated, by this part of their standard deviation, where no difference between rigs says what they do.
 MOVED, STEP = (FRICTION, COMPLIANCE, *STRUCTURE), 0.05
+STILL = 1e-6  # of the transmission error's range
 SMALLEST = 1e-4  # of the load at which an exponent changes nothing, below which its logarithm is cut
 
 
@@ -227,8 +228,13 @@ def sensor_columns(
     return {index: {name: parts.get(name, zero) for name in channels} for index, parts in found.items()}
 
 
+def stands(channels: Mapping[str, Array], channel: str) -> bool:
+    """Whether a simulated channel (N,) shows no motion but that of its last digits."""
+    return bool(np.ptp(channels[channel]) <= STILL * np.ptp(channels["dte"]))
+
+
 def moving(measured: Measurement, channels: Mapping[str, Array], channel: str) -> Array:
     """The simulated channel (N,), or the measured one where the rig holds what it shows."""
-    if np.ptp(channels[channel]) > 0.0:
+    if not stands(channels, channel):
         return channels[channel]
     return measured_channels(measured)[channel].mean(axis=0)

@@ -13,7 +13,7 @@ from gearbench.bench.plan.workers import side_by_side
 from gearbench.diagnosis.effects.sensor_delay import KEYS as DELAYS
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.intake.signals import simulated_channels
-from gearbench.diagnosis.output.jacobian import MOVED, STEP, Other, forces_of, moving, others_of, sensor_columns
+from gearbench.diagnosis.output.jacobian import MOVED, STEP, Other, forces_of, moving, others_of, sensor_columns, stands
 from gearbench.diagnosis.output.layout import Layout
 from gearbench.diagnosis.output.structure import LEAST_STEP
 from gearbench.diagnosis.output.target import Target
@@ -74,7 +74,7 @@ class Simulator:
         """The channels with what a delay of the driven angle does to the measured one, where the rig holds its speed
         and the simulated one stands still."""
         late = float(p[self.layout.unknowns[DELAYS["angle_driven"]]][0])
-        if not late or np.ptp(channels["angle_driven"]) > 0.0:
+        if not late or not stands(channels, "angle_driven"):
             return channels
         seen = moving(measured, channels, "angle_driven")
         omega = 2 * np.pi * np.fft.rfftfreq(seen.size, 1 / measured.sampling_rate)

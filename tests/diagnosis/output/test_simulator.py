@@ -145,3 +145,17 @@ def test_a_mesh_that_changes_more_over_its_phase_is_moved_along_it(key: str, ent
         # Edges of contact zones jump between steps of the grid, which excites what lies beyond the band.
         edges = 0.25 if channel == "torque_driven" else 0.08
         assert 0.0 < error < (edges if key == PHASE else close) * size, channel
+
+
+def test_a_zero_of_the_phase_does_not_hide_that_the_driven_gear_is_held(bench: Bench) -> None:
+    """What a late sensor does to a motion that the simulated gear does not make is that of the measured one."""
+    unknowns, measured = bench.layout.unknowns, bench.simulator.target.measurements[0]
+
+    def dte(zero: float, late: float) -> np.ndarray:
+        p = np.zeros(unknowns.size)
+        p[unknowns[PHASE]], p[unknowns["delay-angle_driven"]] = zero, late
+        return bench.simulator.channels(p, measured)["dte"]
+
+    plain, turned = (dte(zero, 2e-5) - dte(zero, 0.0) for zero in (0.0, 0.004))
+    assert np.std(plain) > 0.0
+    assert turned == pytest.approx(plain, abs=1e-6 * np.ptp(plain))
