@@ -27,7 +27,7 @@ from gearbench.diagnosis.intake.signals import UNITS, measured_channels
 from gearbench.diagnosis.odds import Calibration, effect_signs
 from gearbench.diagnosis.output.judged import Closing, Judged, itself, judged_on, rms_closed
 from gearbench.diagnosis.output.missing import Missing, missing_forces, nothing_missing
-from gearbench.diagnosis.output.selection import only, with_entered
+from gearbench.diagnosis.output.selection import WORTH, only, with_entered
 from gearbench.diagnosis.output.simulated import Simulated, simulated
 from gearbench.diagnosis.output.structure import structure_found
 from gearbench.diagnosis.output.verdict_of import Decided, decide_simulated, relative_size, size_needed
@@ -120,7 +120,7 @@ def _by_simulation(
 ) -> Finding:
     """The finding that simulation justifies."""
     entered = found.selection.entered
-    judged = judgement(of.problem, seconded(sized(found), of.result), held_out)
+    judged = judgement(of.problem, sized(seconded(found, of.result)), held_out)
     found = judged.found
     missing = _missing(of, found)
     signs = {f"over {place}": float(over) for place, over in zip(PLACES, missing.over, strict=True)}
@@ -188,7 +188,7 @@ def seconded(found: Simulated, forces: Search) -> Simulated:
     if found.selection.entered or best is None:
         return found
     for one in found.selection.weighed:
-        if one.hypothesis.name == best.hypothesis.name and one.optimum is not None and one.log_bayes_factor > 0.0:
+        if one.hypothesis.name == best.hypothesis.name and one.optimum is not None and one.log_bayes_factor > WORTH:
             selection = with_entered(found.simulator, found.selection, one)
             return replace(found, selection=selection, std=selection.best.std)
     return found

@@ -17,7 +17,7 @@ from gearbench.rig import Rig
 Array = NDArray[np.float64]
 
 # Over the nominal change: none at -1; discs with webs and rims against solid ones differ by some tenths.
-CONTRAST, CONTRAST_SD, CONTRAST_LEAST, CONTRAST_LARGEST = "contrast", 0.3, -0.9, 1.5
+CONTRAST, CONTRAST_SD, CONTRAST_LEAST, CONTRAST_LARGEST = "contrast", 0.12, -0.5, 0.6
 CONTRAST_NAME = "change of the mesh stiffness over its phase, beyond the nominal one over it"
 ORDERS = 16  # of the mesh: a pair comes and goes within a sixteenth of its cycle
 

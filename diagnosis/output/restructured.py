@@ -33,13 +33,14 @@ def restructured(simulator: Simulator, found: Optimum, around: Around | None, re
     """The optimum begun again with a structure that its fit could not walk to, where that comes closer; `around` finds
     a part of it (None: nothing does)."""
     if not is_close(simulator, found):
-        found = _better(found, _from_around(simulator, found, around, report))
+        found = better(found, _from_around(simulator, found, around, report))
     if not is_close(simulator, found):
-        found = _better(found, _otherwise(simulator, found, report))
+        found = better(found, _otherwise(simulator, found, report))
     return found
 
 
-def _better(found: Optimum, other: Optimum | None) -> Optimum:
+def better(found: Optimum, other: Optimum | None) -> Optimum:
+    """The one of more evidence."""
     return other if other is not None and other.evidence > found.evidence else found
 
 
