@@ -36,9 +36,9 @@ U1, Y1, Y2, U2, W, LOAD = (NAMES.index(name) for name in ("u1", "y1", "y2", "u2"
 class Along:
     """A steady motion of `model` on the half-step grid (entries,) of one repetition: mesh phase [cycles], elastic force
     of the mesh [N], what each pair has of it on the working flanks, force and tangent (entries, n_o), rate of the
-    deflection [m/s], what the force grows by with the phase alone [N/cycle], and the force that the teeth would have
-    without an exponent over the one where that changes nothing. `places` (samples, n) of all coordinates [m], sampled
-    at `sampling_rate`. `early` steps let free vibrations die out.
+    deflection [m/s], and the force that the teeth would have without an exponent over the one where that changes
+    nothing. `places` (samples, n) of all coordinates [m], sampled at `sampling_rate`. `early` steps let free vibrations
+    die out.
     """
 
     model: NonLinear
@@ -46,7 +46,6 @@ class Along:
     elastic: Array
     pairs: Pressed
     rate: Array
-    turning: Array
     level: Array
     tangent: Tangent
     substeps: int
@@ -169,7 +168,6 @@ def along(steady: Steady) -> Along:
         elastic=force,
         pairs=of_pairs(model.law, at, fine),
         rate=closing,
-        turning=turning,
         level=level,
         tangent=Tangent(
             *around,
