@@ -110,7 +110,8 @@ def mesh_forces(layout: Layout, along: Along, chosen: Flags) -> tuple[Array, Int
     (series, slope), (_, error_slope) = _series_of(along.model.rig.mesh, phase)
     put(CONTRAST, stiffer * (modulated(layout.modulation, phase) / series)[:, None])
     put("shape", stiffer * (wave / series[:, None]))
-    put(PHASE, -(along.tangent.turning[:, None] + stiffer * (slope / series)[:, None] + along.of_excess(error_slope[:, None])))
+    turned = along.tangent.turning[:, None] + stiffer * (slope / series)[:, None]
+    put(PHASE, -(turned + along.of_excess(error_slope[:, None])))
     put("offset", along.of_excess(np.ones((len(phase), 1))))
     put("profile", along.of_excess(wave))
     for side, key in enumerate(RUNOUTS.values()):
