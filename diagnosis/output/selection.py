@@ -34,8 +34,8 @@ BY_FORCES = 2  # of them at least, by the force residuals' ranking
 MOST = 3  # effects
 LOOKED_AT = 8  # hypotheses whose quadratic is followed to its minimum
 WORTH = 2.0  # nats promised from which a hypothesis is simulated
-# Renewals of the Jacobian: of the background, of each hypothesis, and of what entered in the end, whose structure has
-# been found beside a gap that the effects now close.
+# Renewals of the Jacobian: of the background, of each promising hypothesis, and of what entered in the end, whose
+# structure has been found beside a gap that the effects now close.
 RENEWALS_BASE, RENEWALS, RENEWALS_LAST = 4, 1, 2
 
 
@@ -166,7 +166,9 @@ def weigh(
         if one.name not in names:
             return Weighed(one, min(value, 0.0), None)
         report(f"simulating: {one.name}")
-        optimum = _refit(simulator, base, one, step, starts.get(one.name))
+        # What any further step from there promises says nothing for this one.
+        renewals = RENEWALS if value - base.left > LIMIT else 0
+        optimum = _refit(simulator, base, one, step, starts.get(one.name), renewals)
         if optimum is None:
             return Weighed(one, min(value, 0.0), None)
         factor = optimum.evidence - base.evidence - float(np.log(one.choices))
@@ -198,7 +200,7 @@ def first_look(base: Optimum, hypotheses: Sequence[Hypothesis], unknowns: Unknow
 
 
 def _refit(
-    simulator: Simulator, base: Optimum, one: Hypothesis, step: Array, start: Start | None
+    simulator: Simulator, base: Optimum, one: Hypothesis, step: Array, start: Start | None, renewals: int
 ) -> Optimum | None:
     unknowns, active = simulator.layout.unknowns, base.sensitivity.quadratic.active
     sd = widened_prior(unknowns, base.sd, one)
@@ -216,7 +218,7 @@ def _refit(
     begin = trials[int(np.argmin(costs))]
     chosen = np.ones(unknowns.size, dtype=bool)
     near: Sensitivity = base.sensitivity
-    return fit(simulator, begin, sd, near, renewals=RENEWALS, chosen=chosen)
+    return fit(simulator, begin, sd, near, renewals=renewals, chosen=chosen)
 
 
 def widened_prior(unknowns: Unknowns, sd: Array, hypothesis: Hypothesis) -> Array:
