@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.diagnosis.effects.effect import SIDES, Fitted, with_rig
-from gearbench.diagnosis.forces.basis import SHAPE_ORDERS
 from gearbench.diagnosis.forces.nominal import NominalModel
 from gearbench.rig import Case, Rig
 
@@ -39,15 +38,17 @@ def recalibrated(nominal: Case, fitted: Fitted) -> Case:
     return with_rig(nominal, rig.model_copy(update=update))
 
 
+def added(old: tuple[float, ...], new: Array) -> tuple[float, ...]:
+    """Amplitudes at the orders 1, 2, .. with others (n,) added, as a field of a rig holds them."""
+    total = np.zeros(max(len(old), len(new)))
+    total[: len(old)] += old
+    total[: len(new)] += new
+    return tuple(float(value) for value in total)
+
+
 def _mesh(rig: Rig, model: NominalModel, fitted: Fitted) -> dict[str, object]:
     """Fields of the mesh correction: nominal plus what the fit adds."""
     shape, profile = fitted.of("shape"), fitted.of("profile")
-
-    def added(old: tuple[float, ...], new: Array) -> tuple[float, ...]:
-        total = np.zeros(max(len(old), SHAPE_ORDERS))
-        total[: len(old)] += old
-        total[:SHAPE_ORDERS] += new
-        return tuple(float(value) for value in total)
 
     return {
         "stiffness_scale": float(model.scale * np.exp(fitted.of("scale")[0])),

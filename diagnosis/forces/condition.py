@@ -69,7 +69,7 @@ def prepare(measured: Measurement, model: NominalModel, band: float) -> Conditio
     omega = np.asarray(2 * np.pi * np.fft.rfftfreq(samples, 1 / rate), dtype=np.float64)
     bins = min(int(np.searchsorted(omega, 2 * np.pi * band, side="right")), samples // 2)
     numbers, share = model.law.pairs(phase)
-    per_cycle = [2 * np.pi / z for z in model.teeth]
+    turns = [2 * np.pi * measured.phase / z for z in model.teeth]
     rb1 = model.base_radius[0]
     mean = float(spectra["torque_driver"][0].real)
     force = _force(model, spectra, omega)
@@ -89,7 +89,7 @@ def prepare(measured: Measurement, model: NominalModel, band: float) -> Conditio
         bending=model.law.bending_of(phase),
         lever_arms=_lever_arms(model, measured.mesh_frequency, phase, spectra, omega),
         waves=waves(measured.phase),
-        lobes=np.stack([(np.cos(turn), np.sin(turn)) for turn in (turns * measured.phase for turns in per_cycle)]),
+        lobes=np.stack([(np.cos(turn), np.sin(turn)) for turn in turns]),
         pitch_speed=2 * np.pi * measured.mesh_frequency / model.teeth[0] * rb1,
         teeth=model.teeth,
         torque_mean=mean,

@@ -7,9 +7,10 @@ second pair stiffens the mesh; the less, the more the stiffness of a mesh change
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from gearbench.diagnosis.effects.effect import changed
+from gearbench.diagnosis.effects.recalibrated import added
 from gearbench.diagnosis.forces.nominal import NominalModel
 from gearbench.diagnosis.forces.unknowns import Group, Unknowns, group
 from gearbench.rig import Rig
@@ -39,10 +40,12 @@ def modulation_of(model: NominalModel) -> Array:
     return np.stack([lines.real, -lines.imag])
 
 
-def modulated(modulation: Array, phase: Array) -> Array:
-    """That change over the mean stiffness at mesh phases (n,) [cycles], (n,)."""
-    angle = 2 * np.pi * np.arange(1, modulation.shape[1] + 1)[:, None] * phase
-    return np.asarray(modulation[0] @ np.cos(angle) + modulation[1] @ np.sin(angle))
+def series_at(cosine: ArrayLike, sine: ArrayLike, phase: Array) -> tuple[Array, Array]:
+    """A series in the mesh phase, of amplitudes (orders,), at phases (n,) [cycles], and its growth a cycle (n,)."""
+    a, b = np.asarray(cosine, dtype=float), np.asarray(sine, dtype=float)
+    orders = 2 * np.pi * np.arange(1, len(a) + 1)
+    c, s = np.cos(orders[:, None] * phase), np.sin(orders[:, None] * phase)
+    return np.asarray(a @ c + b @ s), np.asarray((orders * b) @ c - (orders * a) @ s)
 
 
 def contrasted(rig: Rig, modulation: Array, unknowns: Unknowns, p: Array) -> Rig:
@@ -50,11 +53,6 @@ def contrasted(rig: Rig, modulation: Array, unknowns: Unknowns, p: Array) -> Rig
     more = float(p[unknowns[CONTRAST]][0])
     if not more:
         return rig
-    series = {}
-    for name, part in zip(("stiffness_cos", "stiffness_sin"), modulation, strict=True):
-        before = getattr(rig.mesh, name)
-        total = np.zeros(max(len(before), len(part)))
-        total[: len(before)] += before
-        total[: len(part)] += more * part
-        series[name] = tuple(float(value) for value in total)
-    return changed(rig, "mesh", **series)
+    cosine, sine = (added(old, more * part) for old, part in
+                    zip((rig.mesh.stiffness_cos, rig.mesh.stiffness_sin), modulation, strict=True))  # fmt: skip
+    return changed(rig, "mesh", stiffness_cos=cosine, stiffness_sin=sine)

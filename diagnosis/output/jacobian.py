@@ -25,13 +25,12 @@ from gearbench.diagnosis.effects.torque_ripple import ORDERS
 from gearbench.diagnosis.forces.basis import waves
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.intake.signals import measured_channels
-from gearbench.diagnosis.output.contrast import CONTRAST, modulated
+from gearbench.diagnosis.output.contrast import CONTRAST, series_at
 from gearbench.diagnosis.output.layout import Layout
 from gearbench.diagnosis.output.structure import ENCODER, GAIN, LEAST_STEP, PHASE, STRUCTURE
 from gearbench.diagnosis.output.target import Target
 from gearbench.diagnosis.output.viscous import LOADED, damping_reference
 from gearbench.lumped.nonlinear.coordinates import IN_MESH
-from gearbench.rig import MeshCorrection
 
 if TYPE_CHECKING:
     from gearbench.bench.nonlinear.along import Along
@@ -107,8 +106,10 @@ def mesh_forces(layout: Layout, along: Along, chosen: Flags) -> tuple[Array, Int
         put(LOADED, damped * np.log(level)[:, None])
     put("mesh-ratio", damped)
     put("curvature", (along.elastic * np.log(np.maximum(along.level, SMALLEST)))[:, None])
-    (series, slope), (_, error_slope) = _series_of(along.model.rig.mesh, phase)
-    put(CONTRAST, stiffer * (modulated(layout.modulation, phase) / series)[:, None])
+    mesh = along.model.rig.mesh
+    departure, slope = series_at(mesh.stiffness_cos, mesh.stiffness_sin, phase)
+    series, (_, error_slope) = 1.0 + departure, series_at(mesh.error_cos, mesh.error_sin, phase)
+    put(CONTRAST, stiffer * (series_at(layout.modulation[0], layout.modulation[1], phase)[0] / series)[:, None])
     put("shape", stiffer * (wave / series[:, None]))
     turned = along.tangent.turning[:, None] + stiffer * (slope / series)[:, None]
     put(PHASE, -(turned + along.of_excess(error_slope[:, None])))
@@ -133,20 +134,6 @@ def mesh_forces(layout: Layout, along: Along, chosen: Flags) -> tuple[Array, Int
         parts.append(np.stack(soft, axis=1)[:, keep])
         at.extend(indices[keep])
     return np.concatenate(parts, axis=1), np.array(at)
-
-
-def _series_of(mesh: MeshCorrection, phase: Array) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
-    """Factor on the stiffness and excess [m] of the mesh at phases (n,) [cycles], each with its growth a cycle."""
-    found = []
-    for mean, parts in (
-        (1.0, (mesh.stiffness_cos, mesh.stiffness_sin)),
-        (0.0, (mesh.error_cos, mesh.error_sin)),
-    ):
-        orders = 2 * np.pi * np.arange(1, len(parts[0]) + 1)[:, None]
-        cosine, sine = np.cos(orders * phase), np.sin(orders * phase)
-        a, b = (np.array(part)[:, None] for part in parts)
-        found.append((mean + (a * cosine + b * sine).sum(axis=0), (orders * (b * cosine - a * sine)).sum(axis=0)))
-    return found[0], found[1]
 
 
 def _by_tooth(tooth: NDArray[np.int64], stiffness: Array, count: int) -> Array:
