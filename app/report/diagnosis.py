@@ -23,8 +23,8 @@ from gearbench.words.diagnosis import (
     percent,
     places_in_words,
     sentences,
+    value_in_words,
     whole_band,
-    with_std,
 )
 
 if TYPE_CHECKING:
@@ -94,7 +94,7 @@ def _parameters(verdict: Verdict) -> list[str]:
             effects_in_words([effect.name]),
             percent(effect.probability),
             parameter_in_words(effect.name, name),
-            *_value(parameter),
+            *value_in_words(parameter),
         )
         for effect in verdict.effects
         for name, parameter in effect.parameters.items()
@@ -106,12 +106,6 @@ def _parameters(verdict: Verdict) -> list[str]:
         table(("effect", "probability", "parameter", "value ± std", "unit"), rows, numbers=(1, 3)),
         *(text(meaning(effect.name)) for effect in verdict.effects if meaning(effect.name)),
     ]
-
-
-def _value(parameter: object) -> tuple[str, str]:
-    value, std, unit = (getattr(parameter, name) for name in ("value", "std", "unit"))
-    scale, shown = SHOWN_UNITS.get(unit, (1.0, unit))
-    return with_std(scale * value, scale * std), shown
 
 
 def _how_far(report: Report) -> list[str]:

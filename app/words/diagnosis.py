@@ -10,7 +10,7 @@ from gearbench.diagnosis.effects.library import LIBRARY
 from gearbench.diagnosis.words import CHANNELS, PLACES, SHOWN_UNITS, band_in_words, length, number, percent
 
 if TYPE_CHECKING:
-    from gearbench.diagnosis.verdict import Gap, Range, Verdict
+    from gearbench.diagnosis.verdict import Gap, Parameter, Range, Verdict
 
 __all__ = [
     "CHANNELS",
@@ -27,10 +27,12 @@ __all__ = [
     "meaning",
     "number",
     "parameter_in_words",
+    "parameters_in_words",
     "percent",
     "places_in_words",
     "sentences",
     "shrinkage",
+    "value_in_words",
     "whole_band",
     "with_std",
 ]
@@ -73,6 +75,27 @@ def parameter_in_words(effect: str, name: str) -> str:
     words = EFFECTS[effect].parameters.get(last, last) if effect in EFFECTS else last
     words = words.replace("_", " ")
     return f"{words} ({CHANNELS.get(about, about).replace('_', ' ')})" if about else words
+
+
+def parameters_in_words(verdict: Verdict) -> tuple[str, ...]:
+    """`Friction between the flanks: coefficient of friction 0.0592 ± 0.0008.`: a sentence for each effect that is
+    named, of all that it states."""
+    out = []
+    for effect in verdict.effects:
+        parts = []
+        for name, parameter in effect.parameters.items():
+            value, unit = value_in_words(parameter)
+            parts.append(f"{parameter_in_words(effect.name, name)} {value}{'' if unit in ('', '1') else f' {unit}'}")
+        if parts:
+            noun = effects_in_words([effect.name])
+            out.append(f"{noun[:1].upper()}{noun[1:]}: {', '.join(parts)}.")
+    return tuple(out)
+
+
+def value_in_words(parameter: Parameter) -> tuple[str, str]:
+    """A parameter's value with its standard deviation, and the unit that is shown."""
+    scale, shown = SHOWN_UNITS.get(parameter.unit, (1.0, parameter.unit))
+    return with_std(scale * parameter.value, scale * parameter.std), shown
 
 
 def meaning(effect: str) -> str:

@@ -41,6 +41,10 @@ _SUPPORT = {"stiffness": Usual(1e4, 1e13, 1e6, "N/um")}
 _EXPERIMENT = {"sampling_rate": Usual(100.0, 1e8, 1e3, "kHz")}
 _RIG = {"centre_distance": Usual(2.0, 20000.0, *_LENGTH)}
 
+# Significant digits of a number that somebody typed: one with more was computed, in the unit of its key, such as a
+# run-out of nanometres that a diagnosis leaves in its rig.
+_TYPED = 5
+
 # Face width over module: of nearly all gears 5 to 15, of racks and hobs and toys not beyond these.
 _WIDTH = (1.0, 60.0)
 # Nominal root bending stress and Hertz pressure [Pa] that no material of gears bears.
@@ -50,8 +54,8 @@ _FORM = 4.0
 
 
 def smells(case: Case) -> tuple[str, ...]:
-    """A sentence for each value that is unusual as it stands and usual in another unit (zeros and absent ones pass),
-    and for face widths and loads that do not go with the rest."""
+    """A sentence for each value that is unusual as it stands and usual in another unit (zeros, absent and computed ones
+    pass), and for face widths and loads that do not go with the rest."""
     rig = case.rig
     tables: list[tuple[str, Value, dict[str, Usual]]] = [
         ("rig", rig, _RIG),
@@ -71,7 +75,8 @@ def smells(case: Case) -> tuple[str, ...]:
             unit = unit_of(type(value), name)
             number = float(format_number(held, unit))
             read = number * usual.factor
-            if not usual.low <= number <= usual.high and usual.low <= read <= usual.high:
+            typed = len(f"{number:.12e}".partition("e")[0].replace(".", "").strip("-0")) <= _TYPED
+            if typed and not usual.low <= number <= usual.high and usual.low <= read <= usual.high:
                 found.append(
                     f"{where}.{key_of(type(value), name)} = {number:g} is unusual: was {number:g} {usual.other} meant,"
                     f" which is {read:g} {SYMBOLS[unit]}? It is taken as {number:g} {SYMBOLS[unit]}"

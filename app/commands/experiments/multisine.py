@@ -64,7 +64,7 @@ def sentences(found: Design) -> list[str]:
         f" {found.bandwidth:.3g} Hz of bandwidth: {found.branches} branches a side, {found.needed:.3g} s of distinct"
         " excitation",
         f"at {found.snr_db:g} dB, {found.identified[0]:g}-{found.identified[1]:g} Hz: {found.method} ({window})"
-        f" will expect to err by {found.expected:.1%} and errs by {found.actual:.1%}",
+        f" would err by {found.actual:.1%}, and expect of itself {found.expected:.1%}",
     ]
 
 

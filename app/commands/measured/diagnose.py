@@ -68,7 +68,7 @@ def diagnose(
     from gearbench.commands.measured.challenge import diagnose_case
     from gearbench.diagnosis.diagnosis import take_in
     from gearbench.rig_limits import limits_of
-    from gearbench.words.diagnosis import confidence, headline, sentences
+    from gearbench.words.diagnosis import confidence, headline, parameters_in_words, sentences
 
     with Progress(f"diagnose {nominal.name}") as progress:
         progress.step("reading")
@@ -85,7 +85,7 @@ def diagnose(
         return
     typer.echo(headline(diagnosis.verdict))
     typer.echo(confidence(diagnosis.verdict))
-    for sentence in sentences(diagnosis.verdict):
+    for sentence in (*parameters_in_words(diagnosis.verdict), *sentences(diagnosis.verdict)):
         typer.echo(f"  {sentence}")
     typer.echo(f"{out}: report.html, verdict.json, updated.toml")
 

@@ -7,7 +7,7 @@ import pytest
 
 from gearbench.diagnosis.effects.library import LIBRARY
 from gearbench.diagnosis.intake.signals import CHANNELS
-from gearbench.diagnosis.verdict import Effect, Gap, Probabilities, Range, Verdict
+from gearbench.diagnosis.verdict import Effect, Gap, Parameter, Probabilities, Range, Verdict
 from gearbench.figures.gaps.diagnosis_gap import octave_bands
 from gearbench.rig.contract import PLACES
 from gearbench.words.diagnosis import CHANNELS as CHANNEL_WORDS
@@ -20,6 +20,7 @@ from gearbench.words.diagnosis import (
     length,
     number,
     parameter_in_words,
+    parameters_in_words,
     percent,
     whole_band,
     with_std,
@@ -99,6 +100,20 @@ def gap(channel: str, band: tuple[float, float], nominal: float, with_effect: fl
 
 
 FLOOR = Range(value=5e-8, low=4e-8, high=6e-8)
+
+
+def test_what_is_named_is_told_with_its_numbers() -> None:
+    delay = {"angle_driver.delay": Parameter(value=25.0, low=20.0, high=30.0, unit="us")}
+    rubs = {"coefficient": Parameter(value=0.0581, low=0.0561, high=0.0601, unit="1")}
+    found = Verdict(
+        verdict="effects", probability=Probabilities(effect=0.9, none=0.0, unknown=0.1), place="mesh",
+        effects=(Effect(name="friction", probability=0.8, parameters=rubs),
+                 Effect(name="sensor-delay", probability=0.7, parameters=delay)),
+    )  # fmt: skip
+    assert parameters_in_words(found) == (
+        "Friction between the flanks: coefficient of friction 0.0581 ± 0.0012.",
+        "A delay of one sensor: delay (angle of the driver) 25.0 ± 3.0 us.",
+    )
 
 
 def test_the_sentences_of_a_verdict() -> None:

@@ -51,6 +51,11 @@ def test_a_value_that_smells_is_questioned_and_taken(setting: str, words: str) -
     assert re.search(words, found[0])
 
 
+def test_a_number_that_was_computed_is_not_questioned() -> None:
+    for typed, doubts in (("0.012", 1), ("0.01199", 1), ("0.00519917", 0)):
+        assert len(smells(gb.read_case("quick_lumped", [f"rig.driver.runout_um={typed}"]))) == doubts
+
+
 def test_shipped_cases_and_plastics_smell_of_nothing() -> None:
     from gearbench.cases import case_files
 
