@@ -9,7 +9,9 @@ from math import ceil, log
 import numpy as np
 from numpy.typing import NDArray
 
+from gearbench.bench.nonlinear.followed import Followed
 from gearbench.bench.nonlinear.replay import Steady, resampled
+from gearbench.bench.nonlinear.run import Setup
 from gearbench.lumped.nonlinear.coordinates import IN_MESH, NAMES
 from gearbench.lumped.nonlinear.law import MeshLaw
 from gearbench.lumped.nonlinear.model import NonLinear
@@ -37,7 +39,8 @@ class Along:
     """A steady motion of `model` on the half-step grid (entries,) of one repetition: mesh phase [cycles], elastic force
     of the mesh [N], what each pair has of it on the working flanks, force and tangent (entries, n_o), rate of the
     deflection [m/s], and the force that the teeth would have without an exponent over the one where that changes
-    nothing. `places` (samples, n) of all coordinates [m], sampled at `sampling_rate`. `early` steps let free vibrations
+    nothing. `places` (samples, n) of all coordinates [m], sampled at `sampling_rate`, and `turned` (samples,) what all
+    that turns moves by besides, as the nominal rotation departs from a steady one. `early` steps let free vibrations
     die out.
     """
 
@@ -51,6 +54,7 @@ class Along:
     substeps: int
     early: int
     places: Array
+    turned: Array
     sampling_rate: float
 
     @property
@@ -77,7 +81,7 @@ class Along:
         mesh = np.concatenate([two for _, two in found], axis=1).T
         reaction = mesh if twist is None else self._twisted(twist)
         # What pushes at an end that is held is borne there.
-        held = on == LOAD
+        held = (on == LOAD) | ((on == U2) & (self.tangent.inverse[U2] == 0.0))
         reaction[held] += forces[:: 2 * self.substeps, held].T
         return {**seen, "reaction": reaction}
 
@@ -100,6 +104,12 @@ class Along:
         """Half-spectra (n, K) of all coordinates [m]."""
         return np.fft.rfft(self.places, axis=0).T
 
+    @cached_property
+    def _turning(self) -> dict[int, Complex | float]:
+        """Half-spectra (K,) by coordinate of what it moves by with the nominal rotation [m]."""
+        lines = np.fft.rfft(self.turned)
+        return {number: lines if number in (U1, U2, W, LOAD) else 0.0 for number in range(self.model.size)}
+
     def turned_into(self, other: NonLinear) -> dict[int, Array]:
         """Forces (entries,) [N] by coordinate, or in the mesh, that do in first order what turning into `other` does, a
         model like this one that differs by little around its mesh."""
@@ -108,7 +118,7 @@ class Along:
         springs, dampers, masses = (two - one for one, two in zip(here, there, strict=True))
         for number in np.flatnonzero(springs.any(axis=1) | dampers.any(axis=1) | (masses != 0.0)):
             lines = springs[number] @ self._lines + 1j * self._omega * (dampers[number] @ self._lines)
-            lines -= self._omega**2 * masses[number] * self._lines[number]
+            lines -= self._omega**2 * masses[number] * (self._lines[number] + self._turning[int(number)])
             moved[int(number)] = np.fft.irfft(lines, len(self.places))
         for one, two in zip(self.model.support_springs, other.support_springs, strict=True):
             if one != two:
@@ -144,7 +154,8 @@ def along(steady: Steady) -> Along:
     substeps = _substeps(steady)
     entries = 2 * substeps * samples
     step = 1.0 / (setup.sampling_rate * substeps)
-    table = replace(setup, substeps=substeps, table=None).table_for(0, samples)
+    stepped = replace(setup, substeps=substeps, table=None)
+    table = stepped.table_for(0, samples)
     turned = table.position[:entries] / model.law.phases + resampled(model.turned_on(places), entries)
     turned = np.clip(turned, 0.0, 1.0 - 1e-12)  # the teeth are those of the entry's cycle
     at = instants(model, table, turned, entries)
@@ -160,11 +171,9 @@ def along(steady: Steady) -> Along:
     # Damping that grows with the force is the stiffer for being pressed while the flanks close.
     stiffer = 1.0 + model.rig.damping.mesh_exponent * damping * closing / np.maximum(np.abs(force), 1e-9 * force.max())
     decay = max(model.slowest_decay(float(steady.drive.fine.mean())), 1e-9)
-    first = setup.phase_at(0)
-    cycles: Array = first + np.arange(entries, dtype=np.float64) * (setup.cycles_per_sample / (2 * substeps))
     return Along(
         model=model,
-        phase=cycles,
+        phase=stepped.phases(0, entries),
         elastic=force,
         pairs=of_pairs(model.law, at, fine),
         rate=closing,
@@ -181,18 +190,30 @@ def along(steady: Steady) -> Along:
         substeps=substeps,
         early=min(ceil(log(1 / TRANSIENT) / decay / step), samples * substeps),
         places=places,
+        turned=_turned(setup, samples),
         sampling_rate=setup.sampling_rate,
     )
 
 
+def _turned(setup: Setup, samples: int) -> Array:
+    """What all that turns moves by (samples,) [m] as the nominal rotation departs from a steady one."""
+    if not isinstance(setup.rotation, Followed):
+        return np.zeros(samples)
+    departures = np.resize(setup.rotation.departures, samples)
+    return np.asarray(departures * setup.model.law.base_pitch)
+
+
 def _linear(model: NonLinear) -> tuple[Array, Array, Array]:
     """Springs [N/m] and dampers [N s/m] (n, n) of a rig but for its mesh and its supports' springs, and masses [kg]
-    (n,); none on a coordinate that does not move, unless it is the load's, which bears a reaction."""
+    (n,); none on a coordinate that does not move, unless it is the load's or a driven gear's, which bears a
+    reaction."""
     constants, structure = model.constants(), model.structure
     springs, dampers = springs_and_dampers(constants, structure, (0.0, 0.0))
     inverse = inverse_masses(constants, structure)
     still = inverse == 0.0
     masses = np.divide(1.0, inverse, out=np.zeros_like(inverse), where=~still)
+    if still[U2]:
+        masses[U2] = model.masses[1]
     still[LOAD:][:1] = False
     springs[still], dampers[still] = 0.0, 0.0
     return springs, dampers, masses

@@ -1,4 +1,5 @@
-"""A record's own torque on the non-linear lumped model of a rig: what that rig would have answered."""
+"""A record's own torque and driven rotation on the non-linear lumped model of a rig: what that rig would have
+answered."""
 
 from __future__ import annotations
 
@@ -10,6 +11,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from gearbench.bench.errors import BenchError
+from gearbench.bench.nonlinear.followed import Followed, followed, follows
 from gearbench.bench.nonlinear.law_table import mesh_law
 from gearbench.bench.nonlinear.run import HEADROOM, Setup, make_setup
 from gearbench.bench.plan.schedule import Schedule, schedule
@@ -66,17 +68,23 @@ def steady_motion(case: Case, record: xr.Dataset, law: MeshLaw | None = None, re
     law = law or mesh_law(case.rig, case.simulation, HEADROOM * float(np.abs(torque).max()))
     plan = schedule(experiment, case.rig)
     check_delays(case.rig, plan.wraps, plan.repeat_time)
-    setup = make_setup(case, plan, law, phase)
+    turning = None
+    if follows(case.rig, record) and plan.repeat_periods == 1:
+        turning = followed(case.rig, record, realisation, plan.cycles_per_sample, phase)
+    setup = make_setup(case, plan, law, phase, turning)
     drive = Drive(torque, resampled(torque, 2 * setup.substeps * samples) / meshing.driver.base_radius)
     outputs, residual = _settled(setup, drive)
     return Steady(setup, drive, outputs, residual, plan, torque, frequency, phase)
 
 
 def replay(case: Case, record: xr.Dataset, law: MeshLaw | None = None, realisation: int = 0) -> xr.Dataset:
-    """One steady period of the case's rig under the record's torque, speed, sampling and starting mesh phase.
+    """One steady period of the case's rig under the record's torque, rotation of the driven gear, sampling and starting
+    mesh phase.
 
     The torque is the mean over the record's periods of one realisation, as a trigonometric sum; gain, delay and filter
-    of the rig's torque sensor are taken back for the torque on the rig. What the rig's sensors do is applied, but for
+    of the rig's torque sensor are taken back for the torque on the rig. Where the rig prescribes the driven gear's
+    speed, it turns as recorded, whatever holds the load (`bench.nonlinear.followed`). What the rig's sensors do is
+    applied, but for
     noise and quantisation. Where teeth differ and the excitation period does not hold all pairings, the result is as
     long as they take; where the mesh stiffness drifts, as long as the record.
     Attribute `settling_residual` is the change of the DTE over the last two periods; a motion that does not settle is
@@ -87,6 +95,10 @@ def replay(case: Case, record: xr.Dataset, law: MeshLaw | None = None, realisati
     meshing, samples = setup.meshing, plan.samples_per_period
     applied = repeated(steady.torque, len(outputs))
     swings = {**setup.channels(outputs, applied)._asdict(), "torque_driver": applied}
+    if isinstance(setup.rotation, Followed):
+        turned = 2 * np.pi * repeated(setup.rotation.departures, len(outputs))
+        swings["angle_driver"] = swings["angle_driver"] + turned / case.rig.driver.teeth
+        swings["angle_driven"] = swings["angle_driven"] + turned / case.rig.driven.teeth
     rows = {name: values[None] for name, values in swings.items() if values is not None}
     quiet = case.rig.model_copy(update={"sensors": _quiet(case.rig.sensors)})
     shown = sensed(rows, quiet, meshing, plan, samples=len(outputs), seed=0, first=phase)

@@ -13,6 +13,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gearbench.bench.nonlinear.followed import Followed
 from gearbench.bench.nonlinear.law_table import mesh_law
 from gearbench.bench.nonlinear.together import under_excitation, under_ripple
 from gearbench.bench.plan.excitation import Torque
@@ -63,7 +64,7 @@ class Setup:
     table: Table | None = None
     first_phase: float = 0.0
     record_samples: int = 1  # over which the mesh stiffness drifts
-    rotation: Rotation | None = None  # where the speed changes
+    rotation: Rotation | Followed | None = None  # where the speed changes
 
     keep: ClassVar[Keep] = "one"
     absolute: ClassVar[bool] = False
@@ -136,6 +137,13 @@ class Setup:
             return table
         passed = (start + np.arange(entries + 1) / (2 * self.substeps)) / max(self.record_samples - 1, 1)
         return table._replace(gain=table.gain * (1.0 + drift * np.clip(passed, 0.0, 1.0)))
+
+    def phases(self, start: int, entries: int) -> Array:
+        """Mesh phase (entries,) [cycles] at half steps from sample `start` on."""
+        if self.rotation is None:
+            return np.asarray(self.phase_at(start) + np.arange(entries) * (self.cycles_per_sample / (2 * self.substeps)))
+        time = start / self.sampling_rate + np.arange(float(entries)) * (self.step / 2)
+        return self.rotation.cycles(np.asarray(time, dtype=np.float64))
 
     def _varied(self, start: int, entries: int) -> Varied | None:
         """The rotation from sample `start` on, where its speed changes."""
@@ -251,8 +259,11 @@ def largest_load(experiment: Experiment) -> float:
     return HEADROOM * (experiment.torque_mean + peak)
 
 
-def make_setup(case: Case, plan: Schedule, law: MeshLaw | None = None, first_phase: float = 0.0) -> Setup:
-    """Model, step and tables of an experiment that begins at `first_phase` [cycles], with the mesh law given or solved.
+def make_setup(
+    case: Case, plan: Schedule, law: MeshLaw | None = None, first_phase: float = 0.0, followed: Followed | None = None
+) -> Setup:
+    """Model, step and tables of an experiment that begins at `first_phase` [cycles], with the mesh law given or solved,
+    and the rotation of a record in place of a constant speed's.
 
     Raises LumpedError, BenchError, GeometryError or ContactError.
     """
@@ -274,7 +285,7 @@ def make_setup(case: Case, plan: Schedule, law: MeshLaw | None = None, first_pha
         warnings=tuple(outside_foundation_fit(rig, meshing)) if tabled else (),
         first_phase=first_phase,
         record_samples=plan.record_samples,
-        rotation=plan.rotation,
+        rotation=plan.rotation or followed,
     )
     if not plan.repeats or 2 * setup.substeps * setup.block_samples > MOST_ENTRIES:
         return setup

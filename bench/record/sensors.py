@@ -89,14 +89,20 @@ def _poles(corner: float) -> NDArray[np.complex128]:
 def imposed(recorded: Array, sensors: Sensors, sampling_rate: float) -> Array:
     """The driver torque (..., n) on the rig, which repeats, from what its sensor recorded: gain, delay and filter taken
     back. Where the filter leaves less than LEFT of a line, the line stays as it is."""
-    gain, corner = sensors.gain_torque_driver, sensors.filter
+    gain = sensors.gain_torque_driver
     torque = recorded / gain if gain != 1.0 else recorded
-    torque = delayed(Signal(torque), -sensors.delay_torque_driver, sampling_rate).swing
-    if corner is None:
-        return torque
-    response = filter_response(np.fft.rfftfreq(torque.shape[-1], 1 / sampling_rate), corner)
+    return taken_back(torque, sensors, sensors.delay_torque_driver, sampling_rate)
+
+
+def taken_back(recorded: Array, sensors: Sensors, delay: float, sampling_rate: float) -> Array:
+    """What a sensor with this delay [s] saw (..., n), which repeats, from what it recorded: delay and filter taken
+    back. Where the filter leaves less than LEFT of a line, the line stays as it is."""
+    seen = delayed(Signal(recorded), -delay, sampling_rate).swing
+    if sensors.filter is None:
+        return seen
+    response = filter_response(np.fft.rfftfreq(seen.shape[-1], 1 / sampling_rate), sensors.filter)
     response[np.abs(response) < LEFT] = 1.0
-    return answered(torque, np.reciprocal(response))
+    return answered(seen, np.reciprocal(response))
 
 
 def encoder_error(sensors: Sensors, gear: str, rotation: Array) -> Array:

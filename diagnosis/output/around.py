@@ -26,6 +26,7 @@ from gearbench.diagnosis.effects.effect import SIDES
 from gearbench.diagnosis.effects.sensor_delay import KEYS as DELAYS
 from gearbench.diagnosis.forces.condition import Condition
 from gearbench.diagnosis.forces.covariance import KINDS, kinds_of
+from gearbench.diagnosis.forces.nominal import NominalModel
 from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.output.layout import Layout
 from gearbench.diagnosis.output.structure import ACROSS, CROSS, GAIN, HOUSING, MODE, MOTIONS, SHAPE, with_motion
@@ -86,10 +87,11 @@ def around(layout: Layout, conditions: Sequence[Condition], held: Array) -> Arra
     """Unknowns (size,): `held` with those of supports, masses and housing that the records show; None where records
     have no displacement of the gears or no line, or no rig answers."""
     load = layout.nominal.rig.load
-    # Held at its end the driven gear hands the force of the mesh on.
+    # Held behind itself the driven gear hands on what its inertia leaves of the mesh's force.
     reaction = (REACTION,) if load.boundary == "speed" and not load.twists else ()
     wanted, most = (*COORDINATE, *reaction), max(LINES // len(conditions), FEWEST)
-    lines = [found for found in (_lines_of(one, wanted, most) for one in conditions) if found is not None]
+    found = (_lines_of(layout.model, one, wanted, most) for one in conditions)
+    lines = [one for one in found if one is not None]
     if not lines:
         return None
     try:
@@ -248,7 +250,7 @@ def _answers(layout: Layout, system: _System, lines: _Lines) -> Complex:
     return answer
 
 
-def _lines_of(condition: Condition, wanted: tuple[str, ...], most: int) -> _Lines | None:
+def _lines_of(model: NominalModel, condition: Condition, wanted: tuple[str, ...], most: int) -> _Lines | None:
     """At most so many lines of a condition; None where it has too few, or not the channels."""
     kinds = kinds_of(condition)
     strong = (KINDS.index("operating"), KINDS.index("excited"))
@@ -258,7 +260,12 @@ def _lines_of(condition: Condition, wanted: tuple[str, ...], most: int) -> _Line
         return None
     if len(bins) > most:
         bins = bins[np.linspace(0, len(bins) - 1, most).astype(int)]
-    channels = np.stack([condition.spectra[name][bins] for name in names], axis=1)
+    spectra = {name: condition.spectra[name][bins] for name in names}
+    if REACTION in spectra:  # what the driven gear's own inertia takes of the force
+        radius, inertia = model.base_radius[1], model.inertia[1]
+        turning = inertia * condition.omega[bins] ** 2 * condition.spectra["angle_driven"][bins] / radius
+        spectra[REACTION] = spectra[REACTION] - turning
+    channels = np.stack([spectra[name] for name in names], axis=1)
     width = max(len(bins) // SMOOTHED, 3)
     padded = np.pad(np.abs(channels) ** 2, ((width // 2, width - 1 - width // 2), (0, 0)), mode="edge")
     level = np.lib.stride_tricks.sliding_window_view(padded, width, axis=0).mean(axis=-1)

@@ -23,8 +23,6 @@ from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
 from gearbench.diagnosis.effects.torque_ripple import KEY as RIPPLE
 from gearbench.diagnosis.effects.torque_ripple import ORDERS
 from gearbench.diagnosis.forces.basis import waves
-from gearbench.diagnosis.intake.measurements import Measurement
-from gearbench.diagnosis.intake.signals import measured_channels
 from gearbench.diagnosis.output.contrast import CONTRAST, series_at
 from gearbench.diagnosis.output.layout import Layout
 from gearbench.diagnosis.output.structure import ENCODER, GAIN, LEAST_STEP, PHASE, STRUCTURE
@@ -43,9 +41,10 @@ Integers = NDArray[np.int64]
 
 # What holds the gears: by the difference between two rigs that are so far apart, in standard deviations as background.
 AROUND, APART = ("stiffness", "damping", "mass", "inertia", *BEARINGS.values(), COMPLIANCE, *STRUCTURE), 1e-3
-# Moved and simulated, by this part of their standard deviation, where no difference between rigs says what they do.
-MOVED, STEP = (FRICTION, COMPLIANCE, *STRUCTURE), 0.05
-STILL = 1e-6  # of the transmission error's range
+# Moved and simulated, by this part of their standard deviation, where no difference between rigs says what they do: so
+# is the delay of the driven angle, since the simulated gear turns as that was recorded.
+FOLLOWED = DELAYS["angle_driven"]
+MOVED, STEP = (FRICTION, COMPLIANCE, *STRUCTURE, FOLLOWED), 0.05
 SMALLEST = 1e-4  # of the load at which an exponent changes nothing, below which its logarithm is cut
 
 
@@ -193,18 +192,21 @@ def drive_forces(layout: Layout, along: Along, condition: str) -> tuple[Array, I
 def sensor_columns(
     layout: Layout, target: Target, number: int, channels: Mapping[str, Array]
 ) -> dict[int, dict[str, Array]]:
-    """Changes of the channels (N,) of a record per unit of the unknowns of its sensors, by their index."""
+    """Changes of the channels (N,) of a record per unit of the unknowns of its sensors, by their index.
+
+    That the gear turns otherwise where the driven angle's run-out is another shakes the rig a thousand times less.
+    """
     unknowns, one = layout.unknowns, target.measurements[number]
     samples = one.phase.size
     omega = 2 * np.pi * np.fft.rfftfreq(samples, 1 / one.sampling_rate)
     g = layout.model.support_factor
-    into = {"angle_driver": 1.0, "angle_driven": -1.0, "y_driver": g, "y_driven": -g}
+    into = {"angle_driver": 1.0, "y_driver": g, "y_driven": -g}
     zero = np.zeros(samples)
     found: dict[int, dict[str, Array]] = {}
     for channel, key in DELAYS.items():
-        if channel not in channels:
+        if channel not in channels or key == FOLLOWED:
             continue
-        late = np.fft.irfft(-1j * omega * np.fft.rfft(moving(one, channels, channel)), samples)
+        late = np.fft.irfft(-1j * omega * np.fft.rfft(channels[channel]), samples)
         found[unknowns[key].start] = {channel: late, "dte": into[channel] * late}
     if "torque_driven" in channels:
         found[unknowns[GAIN].start] = {"torque_driven": channels["torque_driven"]}
@@ -214,15 +216,3 @@ def sensor_columns(
             column = (1.0, -1.0)[side] * wave(turn)
             found[unknowns[ENCODER].start + 2 * side + part] = {f"angle_{gear}": wave(turn), "dte": column}
     return {index: {name: parts.get(name, zero) for name in channels} for index, parts in found.items()}
-
-
-def stands(channels: Mapping[str, Array], channel: str) -> bool:
-    """Whether a simulated channel (N,) shows no motion but that of its last digits."""
-    return bool(np.ptp(channels[channel]) <= STILL * np.ptp(channels["dte"]))
-
-
-def moving(measured: Measurement, channels: Mapping[str, Array], channel: str) -> Array:
-    """The simulated channel (N,), or the measured one where the rig holds what it shows."""
-    if not stands(channels, channel):
-        return channels[channel]
-    return measured_channels(measured)[channel].mean(axis=0)

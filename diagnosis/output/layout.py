@@ -86,7 +86,7 @@ class Layout:
             if effect.name in ("friction", "eccentricity", "pitch-error", "backlash", "contact-nonlinearity"):
                 rig = effect.add(rig, _all_of(effect.name), fitted)[0]
         rig = _cracked(rig, self, p)
-        rig = held(_supports(rig, self, p), self.model, self.unknowns, p, self.mesh_stiffness)
+        rig = held(_supports(rig, self, p), self.model, self.unknowns, p)
         rig = contrasted(rig, self.modulation, self.unknowns, p)
         rig = viscous(rig, self.model, self.unknowns, p)
         rig = sensed(rig, self.model, self.unknowns, p, DELAYS)

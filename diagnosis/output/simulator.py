@@ -10,10 +10,9 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from gearbench.bench.plan.workers import side_by_side
-from gearbench.diagnosis.effects.sensor_delay import KEYS as DELAYS
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.intake.signals import simulated_channels
-from gearbench.diagnosis.output.jacobian import MOVED, STEP, Other, forces_of, moving, others_of, sensor_columns, stands
+from gearbench.diagnosis.output.jacobian import MOVED, STEP, Other, forces_of, others_of, sensor_columns
 from gearbench.diagnosis.output.layout import Layout
 from gearbench.diagnosis.output.structure import LEAST_STEP
 from gearbench.diagnosis.output.target import Target
@@ -68,18 +67,7 @@ class Simulator:
     def channels(self, p: Array, measured: Measurement) -> dict[str, Array]:
         """Simulated channels of one record."""
         replayed = self.simulate(self.layout.case(p, measured.name), measured.record)
-        return self._with_held(p, measured, simulated_channels(measured, replayed))
-
-    def _with_held(self, p: Array, measured: Measurement, channels: dict[str, Array]) -> dict[str, Array]:
-        """The channels with what a delay of the driven angle does to the measured one, where the rig holds its speed
-        and the simulated one stands still."""
-        late = float(p[self.layout.unknowns[DELAYS["angle_driven"]]][0])
-        if not late or not stands(channels, "angle_driven"):
-            return channels
-        seen = moving(measured, channels, "angle_driven")
-        omega = 2 * np.pi * np.fft.rfftfreq(seen.size, 1 / measured.sampling_rate)
-        early = np.fft.irfft(np.exp(1j * omega * late) * np.fft.rfft(seen), seen.size)
-        return {**channels, "dte": channels["dte"] + early - seen}
+        return simulated_channels(measured, replayed)
 
     def jacobian(self, p: Array, sd: Array, chosen: Flags) -> Complex | None:
         """Derivatives (size, K) of the lines by the chosen unknowns, zero for the others; None where `p` is no rig."""

@@ -1,5 +1,6 @@
 """Structure of real rigs that a nominal case leaves out, as unknowns around "nearly none": supports that yield across
-their direction and couple both, a housing behind them, an elastic shaft behind the driven gear, sensor gain, encoders.
+their direction and couple both, a housing behind them, sensor gain, encoders. What holds the load is none of them: the
+driven gear turns as it was measured.
 
 Every unknown is a ratio to numbers of the nominal rig (compliance over compliance, logarithm of a frequency over that
 of the supports), so that priors hold for rigs of any size.
@@ -20,7 +21,7 @@ from gearbench.diagnosis.forces.unknowns import Group, Unknowns, group
 from gearbench.diagnosis.output.contrast import CONTRAST, CONTRAST_NAME
 from gearbench.diagnosis.output.viscous import LOADED, LOADED_NAME
 from gearbench.diagnosis.verdict import NINE_OF_TEN, Found
-from gearbench.rig import Across, Housing, OutputShaft, Rig, Rocking
+from gearbench.rig import Across, Housing, Rig, Rocking
 
 Array = NDArray[np.float64]
 
@@ -37,8 +38,6 @@ MODE, MODE_SD, MODE_LARGEST, HOUSING_RATIO = "housing-mode", 0.7, 2.0, 0.05
 MOTIONS = ("along", "rocking")
 SHAPE, SHAPE_SD, SHAPE_LARGEST = "housing-shape", 0.4, pi / 4
 EQUAL = (pi / 4, -pi / 4)
-# Shaft behind the driven gear: compliance over that of the mesh, both at the base circle.
-SHAFT, SHAFT_SD, SHAFT_LARGEST, SHAFT_RATIO = "shaft", 0.3, 10.0, 0.03
 # Gain of the reaction's sensor: torque sensors are good to a few tenths of a per cent, their mounting to one.
 GAIN, GAIN_SD = "gain", 0.01
 # Encoder run-out along the base circle over the deflection of the mesh: what grating and centring of a good encoder
@@ -49,26 +48,24 @@ ENCODER, ENCODER_SD = "encoder", 0.03
 PHASE, PHASE_SD, PHASE_LARGEST = "phase", 0.01, 0.05
 # Softer than the former part a rig has it, and then at least the latter: steps stay long.
 FELT, STIFFEST = 0.01, 0.03
-SHAFT_FELT, SHAFT_STIFFEST = 0.03, 0.06
 # Moved from nothing by the least that a rig feels: a smaller step would show no derivative, and a fit that begins
 # without it would never find it.
-LEAST_STEP: Mapping[str, float] = {ACROSS: STIFFEST, SHAFT: SHAFT_STIFFEST, HOUSING: 0.05 * HOUSING_SD}
+LEAST_STEP: Mapping[str, float] = {ACROSS: STIFFEST, HOUSING: 0.05 * HOUSING_SD}
 NONE = 1e-4  # compliance of a housing below which there is none
 # What holds the gears beside the nominal rig's supports.
-STRUCTURE = (ACROSS, CROSS, HOUSING, MODE, SHAPE, SHAFT)
+STRUCTURE = (ACROSS, CROSS, HOUSING, MODE, SHAPE)
 # What is told of the structure that was found.
 NAMES = (
     (ACROSS, "support compliance across over along", "1"),
     (CROSS, "support cross-coupling over root of both stiffnesses", "1"),
     (HOUSING, "housing compliance over the supports'", "1"),
-    (SHAFT, "output shaft compliance over the mesh's", "1"),
     (GAIN, "gain of the reaction torque (logarithm)", "1"),
     (PHASE, "zero of the mesh phase in cycles", "1"),
     (LOADED, LOADED_NAME, "1"),
     (CONTRAST, CONTRAST_NAME, "1"),
 )
 # Where a fit begins with them: below some per cent a rig does not show them.
-ACROSS_BEGIN, HOUSING_BEGIN, SHAFT_BEGINS = 0.15, 0.04, (0.1, 0.7)
+ACROSS_BEGIN, HOUSING_BEGIN = 0.15, 0.04
 
 
 def structure_groups(rig: Rig, model: NominalModel) -> list[Group]:
@@ -77,7 +74,7 @@ def structure_groups(rig: Rig, model: NominalModel) -> list[Group]:
         group(ACROSS, "1", SIDES, ACROSS_SD, slot="structure", low=0.0, high=ACROSS_LARGEST),
         group(CROSS, "1", SIDES, CROSS_SD, slot="structure", first=4, low=-CROSS_LARGEST, high=CROSS_LARGEST),
         group(GAIN, "1", ("torque_driven",), GAIN_SD, slot="structure", first=2),
-        group(PHASE, "1", ("mesh",), PHASE_SD, slot="structure", first=19, low=-PHASE_LARGEST, high=PHASE_LARGEST),
+        group(PHASE, "1", ("mesh",), PHASE_SD, slot="structure", first=18, low=-PHASE_LARGEST, high=PHASE_LARGEST),
         group(ENCODER, "m", [f"{s}.{part}" for s in SIDES for part in ("cos", "sin")],
               ENCODER_SD * model.deflection, slot="structure", first=6),
     ]  # fmt: skip
@@ -89,34 +86,23 @@ def structure_groups(rig: Rig, model: NominalModel) -> list[Group]:
                             high=MODE_LARGEST))  # fmt: skip
         groups.append(group(SHAPE, "rad", MOTIONS, SHAPE_SD, slot="structure", first=16, low=-SHAPE_LARGEST,
                             high=SHAPE_LARGEST))  # fmt: skip
-    if rig.load.boundary == "speed" and not rig.load.twists:
-        groups.append(group(SHAFT, "1", ("compliance",), SHAFT_SD, slot="structure", first=18, low=0.0,
-                            high=SHAFT_LARGEST))  # fmt: skip
     return groups
 
 
 def beginnings(unknowns: Unknowns, p: Array) -> list[Array]:
-    """`p` (size,) without and with centres that move across their supports, and those with shafts that twist."""
+    """`p` (size,) without and with centres that move across their supports."""
     moving = p.copy()
     moving[unknowns[ACROSS]] = ACROSS_BEGIN
-    out = [p, moving]
-    for soft in SHAFT_BEGINS if SHAFT in unknowns.slices else ():
-        twisting = moving.copy()
-        twisting[unknowns[SHAFT]] = soft
-        out.append(twisting)
-    return out
+    return [p, moving]
 
 
 def otherwise(unknowns: Unknowns, p: Array) -> Array | None:
     """`p` (size,) with the structure that a fit does not walk to from there: supports that yield across where they are
-    rigid, else no shaft where there is one; None where neither is a question."""
-    trial = p.copy()
-    if ACROSS in unknowns.slices and p[unknowns[ACROSS]].max() <= STIFFEST:
-        trial[unknowns[ACROSS]] = ACROSS_BEGIN
-    elif SHAFT in unknowns.slices and p[unknowns[SHAFT]][0] > SHAFT_FELT:
-        trial[unknowns[SHAFT]] = 0.0
-    else:
+    rigid; None where they are not."""
+    if ACROSS not in unknowns.slices or p[unknowns[ACROSS]].max() > STIFFEST:
         return None
+    trial = p.copy()
+    trial[unknowns[ACROSS]] = ACROSS_BEGIN
     return trial
 
 
@@ -140,8 +126,8 @@ def with_motion(unknowns: Unknowns, p: Array, motion: int, frequency: float, com
     return out
 
 
-def held(rig: Rig, model: NominalModel, unknowns: Unknowns, p: Array, stiffness: float) -> Rig:
-    """The rig with its supports across, housing and output shaft; `stiffness` [N/m] is the mean one of the mesh."""
+def held(rig: Rig, model: NominalModel, unknowns: Unknowns, p: Array) -> Rig:
+    """The rig with its supports across and its housing."""
     soft, cross = p[unknowns[ACROSS]], p[unknowns[CROSS]]
     supports = {}
     for number, side in enumerate(SIDES):
@@ -159,13 +145,6 @@ def held(rig: Rig, model: NominalModel, unknowns: Unknowns, p: Array, stiffness:
     if HOUSING in unknowns.slices and p[unknowns[HOUSING]].max() > NONE:
         values = (p[unknowns[key]] for key in (HOUSING, MODE, SHAPE))
         rig = rig.model_copy(update={"housing": housing_of(model, *values)})
-    if SHAFT in unknowns.slices and p[unknowns[SHAFT]][0] > SHAFT_FELT:
-        soft_shaft = max(float(p[unknowns[SHAFT]][0]), SHAFT_STIFFEST)
-        twist = stiffness * model.base_radius[1] ** 2 / soft_shaft
-        damping = 2 * SHAFT_RATIO * sqrt(twist * model.inertia[1])
-        before = rig.load.coupling.inertia if rig.load.coupling is not None else 0.0
-        shaft = OutputShaft(inertia=before, stiffness=twist, damping=damping)
-        rig = changed(rig, "load", coupling=shaft)
     return rig
 
 

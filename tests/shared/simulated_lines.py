@@ -12,13 +12,16 @@ from gearbench.diagnosis.output.layout import layout_of
 from gearbench.diagnosis.output.simulator import Simulator
 from gearbench.diagnosis.output.target import target_of
 from gearbench.diagnosis.replay.replays import replays
-from gearbench.rig import read_case
+from gearbench.rig import Load, read_case
 
 
-def demonstration() -> Simulator:
-    """Replays of one record of `gap_demo`, whose tooth 3 may be cracked."""
+def demonstration(load: Load | None = None) -> Simulator:
+    """Replays of one record of `gap_demo`, or of it with this load, whose tooth 3 may be cracked."""
     nominal = read_case(case_files()["gap_demo"])
-    record = simulate(nominal.under(nominal.conditions[0]))
+    case = nominal.under(nominal.conditions[0])
+    if load is not None:
+        case = case.model_copy(update={"rig": case.rig.model_copy(update={"load": load})})
+    record = simulate(case)
     measured = measurement(record, "base", nominal)
     problem = problem_of([measured], nominal)
     layout = layout_of(nominal, problem.model, problem.conditions, (3,))

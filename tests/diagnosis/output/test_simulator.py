@@ -11,7 +11,7 @@ from shared.simulated_lines import demonstration, jacobian_at, off
 from gearbench.diagnosis.output.contrast import CONTRAST
 from gearbench.diagnosis.output.layout import Layout
 from gearbench.diagnosis.output.simulator import Simulator
-from gearbench.diagnosis.output.structure import ACROSS, CROSS, ENCODER, GAIN, HOUSING, MODE, PHASE, SHAFT, housings
+from gearbench.diagnosis.output.structure import ACROSS, CROSS, ENCODER, GAIN, HOUSING, MODE, PHASE, housings
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ CLOSE = 0.12  # of the change in any channel: modes beyond the band, and steps o
         ("delay-y_driver", 0, 0.5),
         ("ripple", 3, 0.5),
         (GAIN, 0, 0.1),
-        (ENCODER, 2, 0.5),
+        (ENCODER, 0, 0.5),
     ],
 )
 def test_a_derivative_is_what_two_simulations_differ_by(bench: Bench, key: str, entry: int, part: float) -> None:
@@ -61,7 +61,7 @@ def test_a_derivative_is_what_two_simulations_differ_by(bench: Bench, key: str, 
     assert largest > 0.0
 
 
-@pytest.mark.parametrize(("key", "entries"), [(ACROSS, (0, 1)), (SHAFT, (0,)), (HOUSING, (0,)), (HOUSING, (1,))])
+@pytest.mark.parametrize(("key", "entries"), [(ACROSS, (0, 1)), (HOUSING, (0,)), (HOUSING, (1,))])
 def test_structure_that_is_not_there_has_a_derivative(bench: Bench, key: str, entries: tuple[int, ...]) -> None:
     """A fit that begins with a rigid structure is told that a softer one would come closer: supports across have one
     direction for both, as a rig has them at both gears."""
@@ -90,7 +90,7 @@ def test_unknowns_make_the_rig_that_they_name(bench: Bench) -> None:
     p[unknowns["delay-y_driven"]] = 2e-5
     p[unknowns["ripple"].start : unknowns["ripple"].start + 2] = 0.0, 1.5
     p[unknowns[CROSS]] = 0.1, -0.2
-    p[unknowns[HOUSING]], p[unknowns[MODE].start], p[unknowns[SHAFT]] = 0.06, -0.2, 0.5
+    p[unknowns[HOUSING]], p[unknowns[MODE].start] = 0.06, -0.2
     rig = layout.case(p, "base").rig
     assert rig.support.driver.stiffness == pytest.approx(1e8 * np.exp(0.1))
     assert rig.support.driver.across is not None and rig.support.driven.across is not None
@@ -102,9 +102,6 @@ def test_unknowns_make_the_rig_that_they_name(bench: Bench) -> None:
     assert housing is not None and housing.stiffness == pytest.approx(1e8 / 0.06)
     assert np.sqrt(housing.stiffness / housing.mass) == pytest.approx(frequency)
     assert housing.damping == pytest.approx(2 * 0.05 * frequency * housing.mass)
-    # Half as stiff at the base circle as the mesh of some 3e8 N/m is twice.
-    assert rig.load.coupling is not None and rig.load.coupling.stiffness is not None
-    assert rig.load.coupling.stiffness / layout.model.base_radius[1] ** 2 == pytest.approx(2 * layout.mesh_stiffness)
     assert 2e8 < layout.mesh_stiffness < 5e8
     assert rig.friction.coefficient == pytest.approx(0.05)
     assert rig.driver.runout == pytest.approx(1e-5) and rig.driver.runout_phase == pytest.approx(np.arctan2(4, 3))
@@ -145,17 +142,3 @@ def test_a_mesh_that_changes_more_over_its_phase_is_moved_along_it(key: str, ent
         # Edges of contact zones jump between steps of the grid, which excites what lies beyond the band.
         edges = 0.25 if channel == "torque_driven" else 0.08
         assert 0.0 < error < (edges if key == PHASE else close) * size, channel
-
-
-def test_a_zero_of_the_phase_does_not_hide_that_the_driven_gear_is_held(bench: Bench) -> None:
-    """What a late sensor does to a motion that the simulated gear does not make is that of the measured one."""
-    unknowns, measured = bench.layout.unknowns, bench.simulator.target.measurements[0]
-
-    def dte(zero: float, late: float) -> np.ndarray:
-        p = np.zeros(unknowns.size)
-        p[unknowns[PHASE]], p[unknowns["delay-angle_driven"]] = zero, late
-        return bench.simulator.channels(p, measured)["dte"]
-
-    plain, turned = (dte(zero, 2e-5) - dte(zero, 0.0) for zero in (0.0, 0.004))
-    assert np.std(plain) > 0.0
-    assert turned == pytest.approx(plain, abs=1e-6 * np.ptp(plain))
