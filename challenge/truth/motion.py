@@ -215,7 +215,9 @@ def _derivative(c: Record, mesh: Mesh, time: float, torque: float, s: Array, rat
     twist_rate = c.base_driver * s[d + DRIVER] - c.base_driven * s[d + DRIVEN]
     dte = twist + apart_y * c.cosine + apart_x * c.sine
     dte_rate = twist_rate + apart_w * c.cosine + apart_u * c.sine
-    turn = mesh.driver.shape[0] * angle1 / (2.0 * pi)
+    # Seen from the line of centres, which leans where they move across it, the driver has turned on.
+    leaning = apart_y * c.cosine / (c.base_driver + c.base_driven)
+    turn = mesh.driver.shape[0] * (angle1 + leaning) / (2.0 * pi)
     scale = 1.0 + progress * c.drift.mesh
     force, rub, moment1, moment2 = _working(c, mesh, s, turn, speed1, speed2, dte, dte_rate, scale)
     pull1, pull2 = force * lever1 + moment1, force * lever2 + moment2

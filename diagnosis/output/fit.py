@@ -24,7 +24,10 @@ Flags = NDArray[np.bool_]
 GAIN = 0.5  # nats that are worth a step
 POOR = 0.25  # part of what a step promised, below which the Jacobian is renewed
 HALVINGS = 3
-STEPS = 10
+STEPS = 25
+# Standard deviations that a step may move any unknown by where no part of a longer one is of use: a kink in one of them
+# bends the whole step.
+REACHES = (1.0, 0.3, 0.1, 0.03, 0.01)
 SETTLED = 25.0  # nats that another step may promise: a fit that is close enough not to be gone on with
 
 
@@ -115,6 +118,12 @@ def _standing(unknowns: Unknowns, p: Array) -> tuple[Array, Array]:
     return low, high
 
 
+def _within(bounds: tuple[Array, Array], p: Array, sd: Array, reach: float) -> tuple[Array, Array]:
+    """The bounds (size,), and within them so many standard deviations about `p` (size,)."""
+    low, high = bounds
+    return np.maximum(low, p - reach * sd), np.minimum(high, p + reach * sd)
+
+
 def fit(
     simulator: Simulator, p: Array, sd: Array, sensitivity: Sensitivity, *, renewals: int, chosen: Flags
 ) -> Optimum | None:
@@ -133,7 +142,8 @@ def fit(
         assert lines is not None
         near = sensitivity.quadratic.moved(target.lines - lines, sensitivity.jacobian)
         before = cost
-        for limits in (bounds, _standing(simulator.layout.unknowns, p)):
+        standing = _standing(simulator.layout.unknowns, p)
+        for limits in (bounds, standing, *(_within(standing, p, sd, reach) for reach in REACHES)):
             step, promised, _ = near.best(p, sd, limits)
             p, cost = _stepped(simulator, p, sd, near.active, step, cost) if cost - promised > GAIN else (p, cost)
             if cost < before:

@@ -36,7 +36,7 @@ LOOKED_AT = 8  # hypotheses whose quadratic is followed to its minimum
 WORTH = 2.0  # nats promised from which a hypothesis is simulated
 # Renewals of the Jacobian: of the background, of each promising hypothesis, and of what entered in the end, whose
 # structure has been found beside a gap that the effects now close.
-RENEWALS_BASE, RENEWALS, RENEWALS_LAST = 4, 1, 2
+RENEWALS_BASE, RENEWALS, RENEWALS_LAST = 8, 1, 2
 
 
 @dataclass(frozen=True)

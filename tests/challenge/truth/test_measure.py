@@ -17,6 +17,7 @@ from gearbench.challenge.truth.measure import (
     filtered,
     measure,
     run_condition,
+    sampled,
     steps_per_sample,
 )
 from gearbench.challenge.truth.plant import OUTPUTS
@@ -145,3 +146,14 @@ def test_steps_follow_stiffness_and_damping() -> None:
     damped = plant._replace(teeth=plant.teeth._replace(damping_quadratic=1e-3))
     assert steps_per_sample(damped, 10240.0) > 2 * steps_per_sample(plant, 10240.0)
     assert fastest_decay(damped) > fastest_decay(plant)
+
+
+def test_what_lies_beyond_half_the_sampling_rate_is_not_folded_in() -> None:
+    """Sines beyond half the sampling rate, 1 a second, beside one below it and a large mean."""
+    count = OVERSAMPLED * (200 + 2 * MARGIN)
+    time = np.arange(count) / OVERSAMPLED - MARGIN
+    low = 3e4 + np.sin(2 * np.pi * 0.13 * time + 0.4)
+    for frequency, left in ((0.56, 2e-4), (0.9, 2e-4), (1.13, 2e-4), (1.87, 2e-4)):
+        found = sampled(low + np.sin(2 * np.pi * frequency * time))
+        assert found.shape == (200,)
+        assert found == pytest.approx(low[MARGIN * OVERSAMPLED : -MARGIN * OVERSAMPLED : OVERSAMPLED], abs=left)

@@ -231,7 +231,12 @@ def test_friction_takes_force_times_sliding_velocity(turn: float) -> None:
     masses = inertias(plant)
     forces = masses * (with_it - without)[DEGREES:TWIST]
     velocity = state[DEGREES:TWIST] + np.array([0, 100.0, sound.speed_driven, *[0.0] * 7])
-    slide = sliding_velocity(sound, state, plant.roll_pitch + turn * plant.base_pitch)
+    # The line of centres has turned by gamma = (y1 - y2) / a: the contact lies rb1 gamma further on.
+    one, two = plant.eccentricity_angle.driver + state[DRIVER], plant.eccentricity_angle.driven - state[DRIVEN]
+    apart = plant.eccentricity.driver * np.sin(one) - plant.eccentricity.driven * np.sin(two)
+    apart += state[Y_DRIVER] - state[Y_DRIVEN]
+    gamma = apart * plant.cosine / (plant.base_driver + plant.base_driven)
+    slide = sliding_velocity(sound, state, plant.roll_pitch + turn * plant.base_pitch + plant.base_driver * gamma)
     assert seen.force > 1000.0
     assert forces @ velocity == pytest.approx(-0.1 * seen.force * abs(slide), rel=1e-6)
     assert np.sign(slide) == np.sign(turn)
