@@ -4,33 +4,33 @@ from __future__ import annotations
 
 from gearbench.diagnosis.odds import Calibration, Odds
 
-# Fitted by benchmarks/diagnosis_population.py to 65 drawn rigs of the calibration family (seed 60523): weights
+# Fitted by benchmarks/diagnosis_population.py to 51 drawn rigs of the calibration family (seed 60523): weights
 # of 1, evidence, named, root of the share closed;
 EFFECT = Odds(
-    weights=(-3.673, 1.94, 2.422, 2.298),
+    weights=(-4.962, 0.746, 4.368, 2.598),
     covariance=(
-        (0.08791, 0.006334, -0.08611, -0.01007),
-        (0.006334, 0.4228, -0.4163, -0.07694),
-        (-0.08611, -0.4163, 1.296, -0.8305),
-        (-0.01007, -0.07694, -0.8305, 5.438),
+        (0.3491, 0.05402, -0.4023, -0.058),
+        (0.05402, 0.3141, -0.5255, -0.1527),
+        (-0.4023, -0.5255, 1.905, -0.5559),
+        (-0.058, -0.1527, -0.5559, 3.89),
     ),
-    cases=701,
-    true=36,
+    cases=552,
+    true=18,
 )
 # and of 1, logarithm of the largest sign over its limit.
 UNKNOWN = Odds(
-    weights=(-0.4731, 1.361),
+    weights=(0.6261, 1.363),
     covariance=(
-        (0.2156, 0.05638),
-        (0.05638, 0.2405),
+        (0.3477, 0.1722),
+        (0.1722, 0.2449),
     ),
-    cases=34,
-    true=10,
+    cases=28,
+    true=12,
 )
 
 # Limits: a drift of 0.4 % changes 0.0014 of the nominal gap, sound and slipping rigs of the development family up to
-# 0.006, a support that drifts by 4 % 0.08. Of a channel's fluctuation 23 of 24 sound rigs leave up to 0.18 and not much
+# 0.006, a support that drifts by 4 % 0.08. Of a channel's fluctuation sound rigs leave up to 0.18 and not much
 # at one place; what their reaction holds from beyond half of the sampling rate no simulation has.
 POPULATION = Calibration(
-    source="population", effect=EFFECT, unknown=UNKNOWN, rigs=65, structure=0.2, changing=0.03
+    source="population", effect=EFFECT, unknown=UNKNOWN, rigs=51, structure=0.2, changing=0.03
 )

@@ -141,7 +141,8 @@ class Setup:
     def phases(self, start: int, entries: int) -> Array:
         """Mesh phase (entries,) [cycles] at half steps from sample `start` on."""
         if self.rotation is None:
-            return np.asarray(self.phase_at(start) + np.arange(entries) * (self.cycles_per_sample / (2 * self.substeps)))
+            turned = np.arange(entries) * (self.cycles_per_sample / (2 * self.substeps))
+            return np.asarray(self.phase_at(start) + turned)
         time = start / self.sampling_rate + np.arange(float(entries)) * (self.step / 2)
         return self.rotation.cycles(np.asarray(time, dtype=np.float64))
 

@@ -2,7 +2,8 @@
 
 What teeth, the mesh's series, run-out and ripple do, and what holds the gears, is a small force at an unchanged
 motion, carried through the rig's tangent (`bench.nonlinear.along`), many at once. Delays, gains and encoders act on the
-channels alone. The rest (friction, structure that the rig does not have yet) is moved a little and simulated.
+channels alone. The rest (friction, the delay of the driven angle, structure that the rig does not have yet) is moved a
+little and simulated.
 """
 
 from __future__ import annotations

@@ -66,9 +66,11 @@ def recorded(
         y = np.array([push[0] / rows[0, 0], push[1] / rows[1, 1]])
     else:
         y = np.linalg.solve(np.moveaxis(rows, 2, 0), push.T[..., None])[:, :2, 0].T
-    spectra = {"torque_driver": like.spectra["torque_driver"], "angle_driver": turning,
-               "y_driver": y[0] * np.exp(-s * late), "y_driven": y[1],
-               "torque_driven": m.base_radius[1] * force}  # fmt: skip
+    # The driven gear turns with a load of ten times its inertia, of which it takes its own part of the force.
+    driven = force * m.base_radius[1] ** 2 / (11 * m.inertia[1] * s**2 + (omega == 0))
+    reaction = m.base_radius[1] * force - m.inertia[1] * s**2 * driven / m.base_radius[1]
+    spectra = {"torque_driver": like.spectra["torque_driver"], "angle_driver": turning, "angle_driven": driven,
+               "y_driver": y[0] * np.exp(-s * late), "y_driven": y[1], "torque_driven": reaction}  # fmt: skip
     noise = {name: 1e-8 * float(np.median(np.abs(values[1 : like.bins]) ** 2)) for name, values in spectra.items()}
     return replace(like, spectra=spectra, noise=noise)
 
