@@ -27,6 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammaincinv
 
+from gearbench.bench.nonlinear.followed import follows
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.intake.signals import (
     CHANNELS,
@@ -63,9 +64,9 @@ def gaps(
     """Gaps per channel (DTE first) and band on the held-out record, the nominal rig's beside those of better ones.
 
     `simulate(case, record)` gives one steady repetition (default: the replay on the non-linear lumped model). For each
-    channel: the whole band first, then its parts, then the mean (band [0, 0]) where it is known. Empty for a record
-    whose mesh phase is arbitrary: a replay cannot be held against it. Raises what `simulate` raises, and
-    DiagnosisError for a replay of another length.
+    channel: the whole band first, then its parts, then the mean (band [0, 0]) where it is known. The driven angle has
+    none where the replay turns that gear as recorded. Empty for a record whose mesh phase is arbitrary: a replay cannot
+    be held against it. Raises what `simulate` raises, and DiagnosisError for a replay of another length.
     """
     if not held_out.phase_known:
         return ()
@@ -80,8 +81,9 @@ def gaps(
     parts = bands(held_out)
     shown = ((0.0, parts[-1][1]), *parts) if len(parts) > 1 else parts
     found = []
+    given = "angle_driven" if follows(nominal.rig, held_out.record) else None
     for channel in CHANNELS:
-        if channel not in repetitions or any(channel not in values for values in simulated):
+        if channel == given or channel not in repetitions or any(channel not in values for values in simulated):
             continue
         residuals = [repetitions[channel].mean(axis=0) - values[channel] for values in simulated]
         for band in shown:
