@@ -30,7 +30,7 @@ UNKNOWN = Odds(
 
 # Limits: a drift of 0.4 % changes 0.0014 of the nominal gap, sound and slipping rigs of the development family up to
 # 0.006, a support that drifts by 4 % 0.08. Of a channel's fluctuation sound rigs leave up to 0.18 and not much
-# at one place; what their reaction holds from beyond half of the sampling rate no simulation has.
+# at one place.
 POPULATION = Calibration(
     source="population", effect=EFFECT, unknown=UNKNOWN, rigs=51, structure=0.2, changing=0.03
 )

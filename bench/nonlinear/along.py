@@ -9,9 +9,7 @@ from math import ceil, log
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.bench.nonlinear.followed import Followed
 from gearbench.bench.nonlinear.replay import Steady, resampled
-from gearbench.bench.nonlinear.run import Setup
 from gearbench.lumped.nonlinear.coordinates import IN_MESH, NAMES
 from gearbench.lumped.nonlinear.law import MeshLaw
 from gearbench.lumped.nonlinear.model import NonLinear
@@ -101,14 +99,12 @@ class Along:
 
     @cached_property
     def _lines(self) -> Complex:
-        """Half-spectra (n, K) of all coordinates [m]."""
-        return np.fft.rfft(self.places, axis=0).T
-
-    @cached_property
-    def _turning(self) -> dict[int, Complex | float]:
-        """Half-spectra (K,) by coordinate of what it moves by with the nominal rotation [m]."""
-        lines = np.fft.rfft(self.turned)
-        return {number: lines if number in (U1, U2, W, LOAD) else 0.0 for number in range(self.model.size)}
+        """Half-spectra (n, K) of all coordinates [m], of what turns with the nominal rotation: springs between two such
+        see none of that, masses all."""
+        moved = self.places.copy()
+        turning = [one for one in (U1, U2, W, LOAD) if one < self.model.size]
+        moved[:, turning] += self.turned[:, None]
+        return np.fft.rfft(moved, axis=0).T
 
     def turned_into(self, other: NonLinear) -> dict[int, Array]:
         """Forces (entries,) [N] by coordinate, or in the mesh, that do in first order what turning into `other` does, a
@@ -118,7 +114,7 @@ class Along:
         springs, dampers, masses = (two - one for one, two in zip(here, there, strict=True))
         for number in np.flatnonzero(springs.any(axis=1) | dampers.any(axis=1) | (masses != 0.0)):
             lines = springs[number] @ self._lines + 1j * self._omega * (dampers[number] @ self._lines)
-            lines -= self._omega**2 * masses[number] * (self._lines[number] + self._turning[int(number)])
+            lines -= self._omega**2 * masses[number] * self._lines[number]
             moved[int(number)] = np.fft.irfft(lines, len(self.places))
         for one, two in zip(self.model.support_springs, other.support_springs, strict=True):
             if one != two:
@@ -190,17 +186,9 @@ def along(steady: Steady) -> Along:
         substeps=substeps,
         early=min(ceil(log(1 / TRANSIENT) / decay / step), samples * substeps),
         places=places,
-        turned=_turned(setup, samples),
+        turned=setup.departures(samples) * model.law.base_pitch,
         sampling_rate=setup.sampling_rate,
     )
-
-
-def _turned(setup: Setup, samples: int) -> Array:
-    """What all that turns moves by (samples,) [m] as the nominal rotation departs from a steady one."""
-    if not isinstance(setup.rotation, Followed):
-        return np.zeros(samples)
-    departures = np.resize(setup.rotation.departures, samples)
-    return np.asarray(departures * setup.model.law.base_pitch)
 
 
 def _linear(model: NonLinear) -> tuple[Array, Array, Array]:

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from gearbench.bench.record.sensors import encoder_error, filter_delay, taken_back
+from gearbench.bench.record.sensors import encoder_error, lag, taken_back
 from gearbench.rig import Rig
 
 Array = NDArray[np.float64]
@@ -96,7 +96,7 @@ def followed(
     if samples % 2 == 0:
         lines[-1] = 0.0  # of which half is seen
     if attributes.get("mesh_phase_origin") == "geometry":
-        late = sensors.delay_angle_driven + (filter_delay(sensors.filter) if sensors.filter is not None else 0.0)
+        late = lag(sensors, "angle_driven")
         lines[0] += samples * (cycles_per_sample * rate * late - sensors.mesh_phase_zero)
     else:
         lines[0] = 0.0

@@ -11,7 +11,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from gearbench.bench.errors import BenchError
-from gearbench.bench.nonlinear.followed import Followed, followed, follows
+from gearbench.bench.nonlinear.followed import followed, follows
 from gearbench.bench.nonlinear.law_table import mesh_law
 from gearbench.bench.nonlinear.run import HEADROOM, Setup, make_setup
 from gearbench.bench.plan.schedule import Schedule, schedule
@@ -20,7 +20,7 @@ from gearbench.bench.protocol import Drive
 from gearbench.bench.record.attributes import experiment_attributes, rig_attributes, shown_mean, turning_inertias
 from gearbench.bench.record.channels import mesh_phases, sensed, with_rotation
 from gearbench.bench.record.remarks import joined, lost_contact
-from gearbench.bench.record.sensors import check_delays, filter_delay, imposed, repeated
+from gearbench.bench.record.sensors import check_delays, imposed, lag, repeated
 from gearbench.geometry import pair
 from gearbench.lumped.nonlinear.law import MeshLaw
 from gearbench.lumped.nonlinear.rest import mesh_direction
@@ -95,10 +95,9 @@ def replay(case: Case, record: xr.Dataset, law: MeshLaw | None = None, realisati
     meshing, samples = setup.meshing, plan.samples_per_period
     applied = repeated(steady.torque, len(outputs))
     swings = {**setup.channels(outputs, applied)._asdict(), "torque_driver": applied}
-    if isinstance(setup.rotation, Followed):
-        turned = 2 * np.pi * repeated(setup.rotation.departures, len(outputs))
-        swings["angle_driver"] = swings["angle_driver"] + turned / case.rig.driver.teeth
-        swings["angle_driven"] = swings["angle_driven"] + turned / case.rig.driven.teeth
+    turned = 2 * np.pi * setup.departures(len(outputs))
+    swings["angle_driver"] = swings["angle_driver"] + turned / case.rig.driver.teeth
+    swings["angle_driven"] = swings["angle_driven"] + turned / case.rig.driven.teeth
     rows = {name: values[None] for name, values in swings.items() if values is not None}
     quiet = case.rig.model_copy(update={"sensors": _quiet(case.rig.sensors)})
     shown = sensed(rows, quiet, meshing, plan, samples=len(outputs), seed=0, first=phase)
@@ -148,8 +147,7 @@ def _rotation(case: Case, record: xr.Dataset, realisation: int) -> tuple[float, 
         angle = record["angle_driven"].values[realisation] * case.rig.driven.teeth / (2 * np.pi)
         speed, first = (float(value) for value in np.polyfit(np.arange(angle.size), angle, 1))
         sensors = case.rig.sensors
-        late = sensors.delay_angle_driven + (filter_delay(sensors.filter) if sensors.filter is not None else 0.0)
-        first += speed * rate * late
+        first += speed * rate * lag(sensors, "angle_driven")
     else:
         raise BenchError(
             'the record has no channel mesh_phase, and mesh_phase_origin is not "geometry": its mesh phase is unknown'

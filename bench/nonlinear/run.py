@@ -24,6 +24,7 @@ from gearbench.bench.plan.substeps import runge_kutta_substeps
 from gearbench.bench.protocol import Channels, Drive
 from gearbench.bench.record.attributes import turning_inertias
 from gearbench.bench.record.channels import dte_of, generalised_force, turned_by
+from gearbench.bench.record.sensors import repeated
 from gearbench.bench.refusals.effects import refuse_unknown
 from gearbench.geometry import Pair, pair
 from gearbench.lumped.nonlinear.law import MeshLaw
@@ -115,9 +116,7 @@ class Setup:
 
     def phase_at(self, sample: int) -> float:
         """Mesh phase [cycles] of a sample."""
-        if self.rotation is not None:
-            return float(self.rotation.cycles(np.array([sample / self.sampling_rate]))[0])
-        return self.first_phase + sample * self.cycles_per_sample
+        return float(self.phases(sample, 1)[0])
 
     def table_for(self, start: int, samples: int) -> Table:
         """Table of `samples` samples from sample `start`."""
@@ -142,9 +141,15 @@ class Setup:
         """Mesh phase (entries,) [cycles] at half steps from sample `start` on."""
         if self.rotation is None:
             turned = np.arange(entries) * (self.cycles_per_sample / (2 * self.substeps))
-            return np.asarray(self.phase_at(start) + turned)
+            return np.asarray(self.first_phase + start * self.cycles_per_sample + turned)
         time = start / self.sampling_rate + np.arange(float(entries)) * (self.step / 2)
         return self.rotation.cycles(np.asarray(time, dtype=np.float64))
+
+    def departures(self, samples: int) -> Array:
+        """How far (samples,) [cycles] the rotation of a record that is followed departs from a steady one, from sample
+        0 on; nothing for another."""
+        turning = self.rotation
+        return repeated(turning.departures, samples) if isinstance(turning, Followed) else np.zeros(samples)
 
     def _varied(self, start: int, entries: int) -> Varied | None:
         """The rotation from sample `start` on, where its speed changes."""

@@ -81,6 +81,12 @@ def filter_delay(corner: float) -> float:
     return float((-1.0 / _poles(corner)).real.sum())
 
 
+def lag(sensors: Sensors, channel: str) -> float:
+    """By how much [s] a channel shows a steady motion late: its delay and that of the anti-alias filter."""
+    delay = float(getattr(sensors, f"delay_{channel}"))
+    return delay + (filter_delay(sensors.filter) if sensors.filter is not None else 0.0)
+
+
 def _poles(corner: float) -> NDArray[np.complex128]:
     number = np.arange(FILTER_ORDER)
     return np.asarray(2 * pi * corner * np.exp(1j * pi * (2 * number + 1 + FILTER_ORDER) / (2 * FILTER_ORDER)))

@@ -149,12 +149,19 @@ def _spectra(measured: Measurement, model: NominalModel) -> tuple[dict[str, Comp
     return spectra, noise
 
 
+def force_at_load(model: NominalModel, spectra: Mapping[str, Complex], omega: Array) -> Complex:
+    """Spectrum [N] of the mesh force by the nominal equation of the load: its reaction, and what the driven gear's own
+    inertia takes."""
+    radius = model.base_radius[1]
+    turning = model.inertia[1] * omega**2 * spectra["angle_driven"] / radius
+    return np.asarray((spectra["torque_driven"] - turning) / radius)
+
+
 def _force(model: NominalModel, spectra: Mapping[str, Complex], omega: Array) -> Complex:
     """Spectrum [N] of the mesh force by the nominal equation of the load, or of the drive for a record without it."""
-    rb1, rb2 = model.base_radius
     if "torque_driven" in spectra:
-        turning = model.inertia[1] * omega**2 * spectra["angle_driven"] / rb2
-        return np.asarray((spectra["torque_driven"] - turning) / rb2)
+        return force_at_load(model, spectra, omega)
+    rb1 = model.base_radius[0]
     turning = (model.inertia[0] + model.rotor) * omega**2 * spectra["angle_driver"] / rb1
     return np.asarray((spectra["torque_driver"] + turning) / rb1)
 

@@ -24,7 +24,7 @@ from scipy.optimize import least_squares
 
 from gearbench.diagnosis.effects.effect import SIDES
 from gearbench.diagnosis.effects.sensor_delay import KEYS as DELAYS
-from gearbench.diagnosis.forces.condition import Condition
+from gearbench.diagnosis.forces.condition import Condition, force_at_load
 from gearbench.diagnosis.forces.covariance import KINDS, kinds_of
 from gearbench.diagnosis.forces.nominal import NominalModel
 from gearbench.diagnosis.forces.unknowns import Unknowns
@@ -260,11 +260,9 @@ def _lines_of(model: NominalModel, condition: Condition, wanted: tuple[str, ...]
         return None
     if len(bins) > most:
         bins = bins[np.linspace(0, len(bins) - 1, most).astype(int)]
-    spectra = {name: condition.spectra[name][bins] for name in names}
-    if REACTION in spectra:  # what the driven gear's own inertia takes of the force
-        radius, inertia = model.base_radius[1], model.inertia[1]
-        turning = inertia * condition.omega[bins] ** 2 * condition.spectra["angle_driven"][bins] / radius
-        spectra[REACTION] = spectra[REACTION] - turning
+    spectra, omega = {name: values[bins] for name, values in condition.spectra.items()}, condition.omega[bins]
+    if REACTION in names:
+        spectra[REACTION] = model.base_radius[1] * force_at_load(model, spectra, omega)
     channels = np.stack([spectra[name] for name in names], axis=1)
     width = max(len(bins) // SMOOTHED, 3)
     padded = np.pad(np.abs(channels) ** 2, ((width // 2, width - 1 - width // 2), (0, 0)), mode="edge")
@@ -273,5 +271,4 @@ def _lines_of(model: NominalModel, condition: Condition, wanted: tuple[str, ...]
     still = level.mean(axis=0) + noise == 0.0
     if still.any():  # a channel that shows nothing tells nothing
         return None
-    torque = condition.spectra["torque_driver"][bins]
-    return _Lines(names, condition.omega[bins], channels, torque, noise, level)
+    return _Lines(names, omega, channels, spectra["torque_driver"], noise, level)

@@ -195,7 +195,7 @@ def sensor_columns(
 ) -> dict[int, dict[str, Array]]:
     """Changes of the channels (N,) of a record per unit of the unknowns of its sensors, by their index.
 
-    That the gear turns otherwise where the driven angle's run-out is another shakes the rig a thousand times less.
+    That the gear turns otherwise where the driven angle's run-out is another shakes the rig a hundred times less.
     """
     unknowns, one = layout.unknowns, target.measurements[number]
     samples = one.phase.size

@@ -67,11 +67,6 @@ class Layout:
         return pair(self.nominal.rig)
 
     @cached_property
-    def mesh_stiffness(self) -> float:
-        """Mean stiffness [N/m] of the nominal mesh at the largest load of its table."""
-        return self.model.mesh_stiffness
-
-    @cached_property
     def modulation(self) -> Array:
         """Amplitudes (2, orders) of the nominal mesh's stiffness over its phase."""
         return modulation_of(self.model)

@@ -75,7 +75,7 @@ def smells(case: Case) -> tuple[str, ...]:
             unit = unit_of(type(value), name)
             number = float(format_number(held, unit))
             read = number * usual.factor
-            typed = len(f"{number:.12e}".partition("e")[0].replace(".", "").strip("-0")) <= _TYPED
+            typed = number == float(f"{number:.{_TYPED}g}")
             if typed and not usual.low <= number <= usual.high and usual.low <= read <= usual.high:
                 found.append(
                     f"{where}.{key_of(type(value), name)} = {number:g} is unusual: was {number:g} {usual.other} meant,"
