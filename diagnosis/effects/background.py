@@ -15,7 +15,6 @@ from gearbench.diagnosis.forces.unknowns import Group, group
 
 OFFSET = 0.8  # excess material of all pairs over the deflection of the mesh: the zero of the angles is not known better
 SHAPE = 0.04  # of the stiffness, at each mesh order: tables of finite elements against a meshed rig
-PROFILE = 0.08  # at each mesh order, over the deflection of the mesh: flanks of a good gear
 # Compliance of webs and shafts over that of the mesh: little at low frequencies, where it cannot be told from the
 # mesh's own stiffness.
 YIELDING = 0.01 + 0.07 * np.minimum(1.0, (np.array(KNOTS) / 0.4) ** 2)
@@ -37,7 +36,6 @@ def background(model: NominalModel) -> tuple[Group, ...]:
         _bounded("mesh-ratio", ("mesh",), model.sd_mesh_ratio, RATIO_BOUND),
         group("offset", "m", ("excess",), OFFSET * model.deflection, slot="offset"),
         group("shape", "1", 2 * SHAPE_ORDERS, SHAPE, slot="shape"),
-        group("profile", "m", 2 * SHAPE_ORDERS, PROFILE * model.deflection, slot="profile"),
         group("compliance", "1", complex_knots, np.tile(YIELDING, 2), slot="yielding"),
         _bounded("radial", ("k1", "k2", "c1", "c2"), RADIAL, RADIAL_BOUND),
     )

@@ -11,10 +11,12 @@ from gearbench.diagnosis.effects.contact_nonlinearity import CONTACT_NONLINEARIT
 from gearbench.diagnosis.effects.coupling import COUPLING
 from gearbench.diagnosis.effects.eccentricity import ECCENTRICITY
 from gearbench.diagnosis.effects.effect import Effect, Hypothesis
+from gearbench.diagnosis.effects.encoder_runout import ENCODER_RUNOUT
 from gearbench.diagnosis.effects.free_forms import unknowns as free_unknowns
 from gearbench.diagnosis.effects.friction import FRICTION
 from gearbench.diagnosis.effects.mesh_damping import MESH_DAMPING
 from gearbench.diagnosis.effects.pitch_error import PITCH_ERROR
+from gearbench.diagnosis.effects.profile_error import PROFILE_ERROR
 from gearbench.diagnosis.effects.sensor_delay import SENSOR_DELAY
 from gearbench.diagnosis.effects.support_stiffness import SUPPORT_STIFFNESS
 from gearbench.diagnosis.effects.tooth_crack import TOOTH_CRACK
@@ -37,6 +39,8 @@ LIBRARY: tuple[Effect, ...] = (
     SUPPORT_STIFFNESS,
     MESH_DAMPING,
     CONTACT_NONLINEARITY,
+    PROFILE_ERROR,
+    ENCODER_RUNOUT,
 )
 
 

@@ -49,7 +49,6 @@ def added(old: tuple[float, ...], new: Array) -> tuple[float, ...]:
 def _mesh(rig: Rig, model: NominalModel, fitted: Fitted) -> dict[str, object]:
     """Fields of the mesh correction: nominal plus what the fit adds."""
     shape, profile = fitted.of("shape"), fitted.of("profile")
-
     return {
         "stiffness_scale": float(model.scale * np.exp(fitted.of("scale")[0])),
         "stiffness_cos": added(rig.mesh.stiffness_cos, shape[0::2]),

@@ -160,13 +160,13 @@ def _yielding(at: _Point) -> Array:
 
 def _delays(at: _Point) -> Iterator[tuple[int, Array]]:
     condition, state, n, g = at.condition, at.mesh, at.condition.samples, at.model.support_factor
+    braking = (state.viscosity + 2 * at.departures.dissipation * np.abs(state.rate)) * state.touching
     for number, (channel, sign) in enumerate(zip(DELAYED, (1.0, -1.0, g, -g), strict=True)):
         if channel in at.spectra:
             rate = 1j * condition.omega * at.spectra[channel]
             faster = np.fft.irfft(1j * condition.omega * rate, n) * n
             rate[0] = steady_rate(condition, channel)
-            damping = state.viscosity * state.touching * faster
-            yield number, sign * (state.tangent * (np.fft.irfft(rate, n) * n) + damping)
+            yield number, sign * (state.tangent * (np.fft.irfft(rate, n) * n) + braking * faster)
 
 
 def _teeth(condition: Condition, loss: Array, state: Mesh) -> tuple[Array, Array]:

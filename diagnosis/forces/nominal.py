@@ -55,6 +55,8 @@ class NominalModel:
     scale: float
     hardening: float  # exponent of the mesh force
     reference_force: float  # [N] at which an exponent leaves the mesh force as it is
+    error_cos: tuple[float, ...]  # excess material of all pairs by mesh orders [m]
+    error_sin: tuple[float, ...]
     friction: float
     transition: float  # sliding speed at which friction has changed its direction [m/s]
     law: MeshLaw
@@ -142,6 +144,8 @@ def nominal_model(nominal: Case, load: float, mean: float) -> NominalModel:
         scale=rig.mesh.stiffness_scale,
         hardening=rig.mesh.exponent,
         reference_force=rig.mesh.reference_force if rig.mesh.exponent else abs(mean) / radii[0],
+        error_cos=rig.mesh.error_cos,
+        error_sin=rig.mesh.error_sin,
         friction=rig.friction.coefficient,
         transition=rig.friction.transition_speed,
         law=mesh_law(rig, nominal.simulation, load),

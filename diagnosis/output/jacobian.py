@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 from gearbench.diagnosis.effects.bearing_nonlinearity import KEYS as BEARINGS
 from gearbench.diagnosis.effects.coupling import KEY as COMPLIANCE
 from gearbench.diagnosis.effects.eccentricity import KEYS as RUNOUTS
+from gearbench.diagnosis.effects.encoder_runout import ADDS
+from gearbench.diagnosis.effects.encoder_runout import KEYS as ENCODERS
 from gearbench.diagnosis.effects.friction import KEY as FRICTION
 from gearbench.diagnosis.effects.pitch_error import KEYS as PITCHES
 from gearbench.diagnosis.effects.sensor_delay import KEYS as DELAYS
@@ -26,7 +28,7 @@ from gearbench.diagnosis.effects.torque_ripple import ORDERS
 from gearbench.diagnosis.forces.basis import waves
 from gearbench.diagnosis.output.contrast import CONTRAST, series_at
 from gearbench.diagnosis.output.layout import Layout
-from gearbench.diagnosis.output.structure import ENCODER, GAIN, LEAST_STEP, PHASE, STRUCTURE
+from gearbench.diagnosis.output.structure import GAIN, LEAST_STEP, PHASE, STRUCTURE
 from gearbench.diagnosis.output.target import Target
 from gearbench.diagnosis.output.viscous import LOADED, damping_reference
 from gearbench.lumped.nonlinear.coordinates import IN_MESH
@@ -211,9 +213,8 @@ def sensor_columns(
         found[unknowns[key].start] = {channel: late, "dte": into[channel] * late}
     if "torque_driven" in channels:
         found[unknowns[GAIN].start] = {"torque_driven": channels["torque_driven"]}
-    for side, gear in enumerate(("driver", "driven")):
-        turn = 2 * np.pi * one.phase / layout.model.teeth[side]
+    for (side, key), teeth in zip(ENCODERS.items(), layout.model.teeth, strict=True):
+        turn = 2 * np.pi * one.phase / teeth
         for part, wave in enumerate((np.cos, np.sin)):
-            column = (1.0, -1.0)[side] * wave(turn)
-            found[unknowns[ENCODER].start + 2 * side + part] = {f"angle_{gear}": wave(turn), "dte": column}
+            found[unknowns[key].start + part] = {f"angle_{side}": wave(turn), "dte": ADDS[side] * wave(turn)}
     return {index: {name: parts.get(name, zero) for name in channels} for index, parts in found.items()}

@@ -39,6 +39,8 @@ Array = NDArray[np.float64]
 FORCES_ONLY = ("compliance", "radial")
 NEARLY_RIGID = 1e-3  # compliance of a coupling below this part of its prior is left out of the rig
 LEAST_LOSS = 1e-6
+# Effects that are put into a rig whatever their size.
+PLAIN = ("friction", "eccentricity", "pitch-error", "backlash", "contact-nonlinearity", "encoder-runout")
 
 
 @dataclass(frozen=True)
@@ -78,7 +80,7 @@ class Layout:
         case = recalibrated(self.nominal, fitted)
         rig = case.rig
         for effect in LIBRARY:
-            if effect.name in ("friction", "eccentricity", "pitch-error", "backlash", "contact-nonlinearity"):
+            if effect.name in PLAIN:
                 rig = effect.add(rig, _all_of(effect.name), fitted)[0]
         rig = _cracked(rig, self, p)
         rig = held(_supports(rig, self, p), self.model, self.unknowns, p)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.diagnosis.effects.eccentricity import KEYS as RUNOUTS
+from gearbench.diagnosis.effects.encoder_runout import KEYS as ENCODERS
 from gearbench.diagnosis.effects.pitch_error import KEYS as PITCHES
 from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
 from gearbench.diagnosis.effects.torque_ripple import KEY as RIPPLE
@@ -16,7 +17,7 @@ from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.output.beginning import Around, levelled, seen_by
 from gearbench.diagnosis.output.fit import SETTLED, Optimum, fit, sensitivity_of
 from gearbench.diagnosis.output.simulator import Simulator
-from gearbench.diagnosis.output.structure import ENCODER, otherwise
+from gearbench.diagnosis.output.structure import otherwise
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -26,7 +27,7 @@ RENEWALS = 3
 # Nats an independent line that are left, in the median block, below which no other structure is tried.
 CLOSE = 0.2
 # What moves the rotation's lines alone: it waits until the structure is found.
-ROTATION = (*RUNOUTS.values(), *PITCHES.values(), CRACK, RIPPLE, ENCODER)
+ROTATION = (*RUNOUTS.values(), *PITCHES.values(), CRACK, RIPPLE, *ENCODERS.values())
 
 
 def restructured(simulator: Simulator, found: Optimum, around: Around | None, report: Report) -> Optimum:

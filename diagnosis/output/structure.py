@@ -1,5 +1,5 @@
 """Structure of real rigs that a nominal case leaves out, as unknowns around "nearly none": supports that yield across
-their direction and couple both, a housing behind them, sensor gain, encoders. What holds the load is none of them: the
+their direction and couple both, a housing behind them, sensor gain. What holds the load is none of them: the
 driven gear turns as it was measured.
 
 Every unknown is a ratio to numbers of the nominal rig (compliance over compliance, logarithm of a frequency over that
@@ -40,9 +40,6 @@ SHAPE, SHAPE_SD, SHAPE_LARGEST = "housing-shape", 0.4, pi / 4
 EQUAL = (pi / 4, -pi / 4)
 # Gain of the reaction's sensor: torque sensors are good to a few tenths of a per cent, their mounting to one.
 GAIN, GAIN_SD = "gain", 0.01
-# Encoder run-out along the base circle over the deflection of the mesh: what grating and centring of a good encoder
-# leave.
-ENCODER, ENCODER_SD = "encoder", 0.03
 # Mesh phase [cycles] that the encoders show at that of the gears: zeros are set by a tooth that touches, not better
 # than this.
 PHASE, PHASE_SD, PHASE_LARGEST = "phase", 0.01, 0.05
@@ -75,9 +72,7 @@ def structure_groups(rig: Rig, model: NominalModel) -> list[Group]:
         group(CROSS, "1", SIDES, CROSS_SD, slot="structure", first=4, low=-CROSS_LARGEST, high=CROSS_LARGEST),
         group(GAIN, "1", ("torque_driven",), GAIN_SD, slot="structure", first=2),
         group(PHASE, "1", ("mesh",), PHASE_SD, slot="structure", first=18, low=-PHASE_LARGEST, high=PHASE_LARGEST),
-        group(ENCODER, "m", [f"{s}.{part}" for s in SIDES for part in ("cos", "sin")],
-              ENCODER_SD * model.deflection, slot="structure", first=6),
-    ]  # fmt: skip
+    ]
     if rig.housing is None:
         groups.append(group(HOUSING, "1", MOTIONS, HOUSING_SD, slot="structure", first=10, low=0.0,
                             high=HOUSING_LARGEST))  # fmt: skip
@@ -171,20 +166,13 @@ def housing_of(model: NominalModel, compliance: Array, modes: Array, shapes: Arr
 
 
 def sensed(rig: Rig, model: NominalModel, unknowns: Unknowns, p: Array, delays: Mapping[str, str]) -> Rig:
-    """The rig with its sensors' delays, gain and encoders."""
+    """The rig with its sensors' delays and gain, and its zero of the mesh phase."""
     sensors, update = rig.sensors, {}
     for channel, key in delays.items():
         field = f"delay_{channel}"
         update[field] = getattr(sensors, field) + float(p[unknowns[key]][0])
     update["gain_torque_driven"] = sensors.gain_torque_driven * exp(float(p[unknowns[GAIN]][0]))
     update["mesh_phase_zero"] = sensors.mesh_phase_zero + float(p[unknowns[PHASE]][0])
-    parts = p[unknowns[ENCODER]]
-    for number, side in enumerate(SIDES):
-        field, radius = f"encoder_runout_{side}", model.base_radius[number]
-        phase = getattr(sensors, f"{field}_phase")
-        turning = getattr(sensors, field) * np.exp(1j * phase)
-        turning += (parts[2 * number] + 1j * parts[2 * number + 1]) / radius
-        update[field], update[f"{field}_phase"] = float(abs(turning)), float(np.angle(turning))
     return changed(rig, "sensors", **update)
 
 

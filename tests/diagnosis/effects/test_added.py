@@ -104,6 +104,9 @@ EFFECTS: dict[str, tuple[dict[str, object], float]] = {
     "sensor-delay angle_driven": ({"delay-angle_driven": -40e-6}, 100.0),
     "sensor-delay y_driver": ({"delay-y_driver": 40e-6}, 100.0),
     "sensor-delay y_driven": ({"delay-y_driven": 40e-6}, 100.0),
+    "encoder-runout driver": ({"encoder-driver": (5e-6, -8e-6)}, 100.0),
+    "encoder-runout driven": ({"encoder-driven": (-4e-6, 7e-6)}, 100.0),
+    "profile-error": ({"profile": 1e-6 * np.array([2.0, -1.0, 0.0, 0.5, 0.3, *np.zeros(7)])}, 100.0),
     "torque-ripple": ({"ripple": (1.0, -0.5, 0.3, 0.6, 0.0, -0.4, 0.2, 0.2)}, 20.0),
 }
 

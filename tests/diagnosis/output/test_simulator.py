@@ -11,7 +11,7 @@ from shared.simulated_lines import demonstration, jacobian_at, off
 from gearbench.diagnosis.output.contrast import CONTRAST
 from gearbench.diagnosis.output.layout import Layout
 from gearbench.diagnosis.output.simulator import Simulator
-from gearbench.diagnosis.output.structure import ACROSS, CROSS, ENCODER, GAIN, HOUSING, MODE, PHASE, housings
+from gearbench.diagnosis.output.structure import ACROSS, CROSS, GAIN, HOUSING, MODE, PHASE, housings
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ CLOSE = 0.12  # of the change in any channel: modes beyond the band, and steps o
         ("delay-y_driver", 0, 0.5),
         ("ripple", 3, 0.5),
         (GAIN, 0, 0.1),
-        (ENCODER, 0, 0.5),
+        ("encoder-driver", 0, 0.5),
     ],
 )
 def test_a_derivative_is_what_two_simulations_differ_by(bench: Bench, key: str, entry: int, part: float) -> None:
@@ -63,7 +63,7 @@ def test_a_derivative_is_what_two_simulations_differ_by(bench: Bench, key: str, 
 
 def test_run_out_of_the_driven_encoder_is_seen_in_the_error_alone(bench: Bench) -> None:
     """The simulated gear turns as it was recorded, less that run-out, which shakes the rig a hundred times less."""
-    at = bench.layout.unknowns[ENCODER].start + 2
+    at = bench.layout.unknowns["encoder-driven"].start
     step = 0.5 * bench.layout.unknowns.prior()[at]
     found = off(bench.simulator, bench.jacobian[at], np.zeros(bench.layout.size), at, step)
     error, size = found.pop("dte")
@@ -97,7 +97,7 @@ def test_unknowns_make_the_rig_that_they_name(bench: Bench) -> None:
     p[unknowns["crack"].start + 3] = 0.3
     p[unknowns["crack"].start + 5] = 0.4  # no tooth that may be cracked
     p[unknowns[ACROSS]] = 0.2, 0.1
-    p[unknowns[ENCODER].start + 3] = 1e-6
+    p[unknowns["encoder-driven"].start + 1] = 1e-6
     p[unknowns["delay-y_driven"]] = 2e-5
     p[unknowns["ripple"].start : unknowns["ripple"].start + 2] = 0.0, 1.5
     p[unknowns[CROSS]] = 0.1, -0.2
