@@ -133,6 +133,18 @@ def sentence_of_effect(noun: str, closing: Closing, share: float) -> str:
     )
 
 
+def sentence_of_rivals(causes: Sequence[Hypothesis]) -> str:
+    """That the records speak as well for other causes as for the one that is named."""
+    named, *others = (_which(one) for one in causes)
+    return f"The records cannot tell {named} from {' or '.join(others)}: either explains them as well"
+
+
+def _which(one: Hypothesis) -> str:
+    assert one.effect is not None
+    which = one.name.removeprefix(one.effect.name).strip()
+    return f"{one.effect.noun} ({which})" if which else one.effect.noun
+
+
 def sentences_of_gap(gaps: Sequence[Gap], remaining: Sequence[Part]) -> tuple[str, ...]:
     """How much of the transmission error's gap (else of the first channel's) is explained, and what remains."""
     gap = next((one for one in gaps if one.band_hz[1] > 0), None)

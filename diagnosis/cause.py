@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.diagnosis.account import places_of, sentence_of_effect
+from gearbench.diagnosis.account import places_of, sentence_of_effect, sentence_of_rivals
 from gearbench.diagnosis.chances import Chances, chances_of
 from gearbench.diagnosis.effects.effect import Effect as Library
 from gearbench.diagnosis.effects.effect import Estimate, Fitted, Hypothesis, added
@@ -27,7 +27,7 @@ from gearbench.diagnosis.intake.signals import UNITS, measured_channels
 from gearbench.diagnosis.odds import Calibration, effect_signs
 from gearbench.diagnosis.output.judged import Closing, Judged, itself, judged_on, rms_closed
 from gearbench.diagnosis.output.missing import Missing, missing_forces, nothing_missing
-from gearbench.diagnosis.output.selection import WORTH, only, with_entered
+from gearbench.diagnosis.output.selection import WORTH, Weighed, only, with_entered
 from gearbench.diagnosis.output.simulated import Simulated, simulated
 from gearbench.diagnosis.output.structure import structure_found
 from gearbench.diagnosis.output.verdict_of import Decided, decide_simulated, relative_size, size_needed
@@ -36,7 +36,7 @@ from gearbench.diagnosis.replay.replays import replays
 from gearbench.diagnosis.verdict import NINE_OF_TEN, Candidate, Effect, Found, Outcome, Parameter, Range, Share
 from gearbench.diagnosis.words import SHOWN_UNITS
 from gearbench.rig import Case
-from gearbench.rig.contract import Place
+from gearbench.rig.contract import Place, rank_of
 
 Array = NDArray[np.float64]
 Report = Callable[[str], None]
@@ -131,6 +131,7 @@ def _by_simulation(
               "remains": judged.remains, "changing": changing}  # fmt: skip
     chances = chances_of(judged, decided, known, signs["lines"], (*entered, *judged.dropped))
     kept = [one.hypothesis for one in decided.named]
+    common["indistinguishable"] = with_rivals(common["indistinguishable"], decided.named)
     return Finding(
         verdict=decided.verdict,
         probability=known.probabilities(chances.best, decided.sign),
@@ -194,6 +195,18 @@ def seconded(found: Simulated, forces: Search) -> Simulated:
     return found
 
 
+def with_rivals(groups: Sequence[tuple[str, ...]], named: Sequence[Weighed]) -> tuple[tuple[str, ...], ...]:
+    """Groups of effects that records cannot tell apart, with each named effect and its rivals in one of them."""
+    joined = [set(group) for group in groups]
+    for one in named:
+        names = {cause.effect.name for cause in one.causes if cause.effect is not None}
+        if len(names) < 2:
+            continue
+        touched = [group for group in joined if group & names]
+        joined = [group for group in joined if not group & names] + [names.union(*touched)]
+    return tuple(tuple(sorted(group, key=rank_of)) for group in joined)
+
+
 def judgement(problem: Problem, found: Simulated, held_out: Measurement | None) -> Judged:
     """What was found on the held-out record; without one that can be simulated, on the first record of the search."""
     judged = None
@@ -215,6 +228,7 @@ def _why(judged: Judged, kept: Sequence[Hypothesis]) -> tuple[str, ...]:
         assert one.effect is not None
         closing = judged.closings[one.name]
         said.append(sentence_of_effect(one.effect.noun, closing, judged.share(closing.without)))
+    said += [sentence_of_rivals(one.causes) for one in judged.found.selection.entered if one.rivals]
     for weighed in judged.dropped:
         assert weighed.hypothesis.effect is not None
         noun = weighed.hypothesis.effect.noun

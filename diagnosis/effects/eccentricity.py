@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
-from math import atan2, cos, hypot, pi, sin
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +19,7 @@ from gearbench.diagnosis.effects.effect import (
     changed,
     of_gears,
 )
+from gearbench.diagnosis.effects.once_per_turn import once_of
 from gearbench.diagnosis.forces.condition import Condition
 from gearbench.diagnosis.forces.nominal import NominalModel
 from gearbench.diagnosis.forces.unknowns import Group, group
@@ -58,15 +58,10 @@ def add(rig: Rig, hypothesis: Hypothesis, fitted: Fitted) -> Added:
     out: list[Estimate] = []
     for side, key in KEYS.items():
         gear = getattr(rig, side)
-        cosine = fitted.of(key)[0] + 0.5 * gear.runout * cos(gear.runout_phase)
-        sine = fitted.of(key)[1] + 0.5 * gear.runout * sin(gear.runout_phase)
-        size, phase = hypot(cosine, sine), atan2(sine, cosine)
-        std = float(np.sqrt((fitted.std_of(key) ** 2).mean()))
-        rig = changed(rig, side, runout=2 * size, runout_phase=phase)
+        found = once_of(0.5 * gear.runout, gear.runout_phase, fitted.of(key), fitted.std_of(key))
+        rig = changed(rig, side, runout=2 * found.size, runout_phase=found.angle)
         if side in hypothesis.on:
-            angle = min(std / max(size, 1e-12), pi)
-            out.append(Estimate(f"{side}.runout", 2e6 * size, 2e6 * std, "um"))
-            out.append(Estimate(f"{side}.runout_phase", phase * 180 / pi, angle * 180 / pi, "deg", sized=False))
+            out += found.estimates(f"{side}.runout", 2e6, "um")
     return rig, tuple(out)
 
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
-from math import pi
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.diagnosis.effects.effect import SIDES, Added, Effect, Estimate, Fitted, Hypothesis, Wide, changed
+from gearbench.diagnosis.effects.once_per_turn import once_of
 from gearbench.diagnosis.forces.condition import Condition
 from gearbench.diagnosis.forces.nominal import NominalModel
 from gearbench.diagnosis.forces.unknowns import Group, group
@@ -20,6 +20,8 @@ KEYS = {side: f"encoder-{side}" for side in SIDES}
 # Along the base circle over the deflection of the mesh: what grating and centring of a good encoder leave, and an
 # encoder set on its shaft like a gear of severity 1 on its own.
 SD, WIDE = 0.03, 0.5
+# One in so many gaps of the shape that a run-out leaves is an encoder's: gears stand out by more, as a rule.
+RARE = 10
 # Of what the encoder adds to the transmission error, from which what it lacks in the mesh follows.
 ADDS = {"driver": 1.0, "driven": -1.0}
 
@@ -39,9 +41,11 @@ def unknowns(model: NominalModel, conditions: Sequence[Condition]) -> tuple[Grou
 
 
 def hypotheses(model: NominalModel) -> tuple[Hypothesis, ...]:
-    """One encoder of the two."""
+    """One encoder of the two; to forces alone it looks like a gear's run-out, and represents nothing that they could
+    tell apart."""
     return tuple(
-        Hypothesis(f"encoder-runout {side}", "sensor", (Wide(key),), (side,), len(KEYS)) for side, key in KEYS.items()
+        Hypothesis(f"encoder-runout {side}", "sensor", (Wide(key),), (side,), RARE * len(KEYS), representative=False)
+        for side, key in KEYS.items()
     )
 
 
@@ -51,17 +55,11 @@ def add(rig: Rig, hypothesis: Hypothesis, fitted: Fitted) -> Added:
     update = {}
     for side, key in KEYS.items():
         field, radius = f"encoder_runout_{side}", fitted.model.base_radius[SIDES.index(side)]
-        cosine, sine = fitted.of(key) / radius
-        turning = getattr(rig.sensors, field) * np.exp(1j * getattr(rig.sensors, f"{field}_phase")) + cosine + 1j * sine
-        size, phase = float(abs(turning)), float(np.angle(turning))
-        update[field], update[f"{field}_phase"] = size, phase
+        present = (getattr(rig.sensors, field), getattr(rig.sensors, f"{field}_phase"))
+        found = once_of(*present, fitted.of(key) / radius, fitted.std_of(key) / radius)
+        update[field], update[f"{field}_phase"] = found.size, found.angle
         if side in hypothesis.on:
-            std = float(np.sqrt((fitted.std_of(key) ** 2).mean())) / radius
-            late = min(std / max(size, 1e-15), pi)
-            out.append(Estimate(f"{side}.encoder_runout", 1e6 * size, 1e6 * std, "urad"))
-            out.append(
-                Estimate(f"{side}.encoder_runout_phase", phase * 180 / pi, late * 180 / pi, "deg", sized=False)
-            )
+            out += found.estimates(f"{side}.encoder_runout", 1e6, "urad")
     return changed(rig, "sensors", **update), tuple(out)
 
 

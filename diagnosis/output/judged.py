@@ -151,7 +151,7 @@ def _closings(found: Simulated, target: Target, measured: Measurement) -> Judged
     with_all = target.lines - target.gathered([signals])
     closings = {}
     for one in selection.entered:
-        without = simulator.channels(taken_out(simulator, selection, one.hypothesis).p, measured)
+        without = simulator.channels(taken_out(simulator, selection, one).p, measured)
         rest = target.lines - target.gathered([without])
         gain = target.cost(rest) - target.cost(with_all)
         growth, part = _growth(target, target.energies(rest), target.energies(with_all))

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from gearbench.bench.plan.workers import side_by_side
 from gearbench.diagnosis.effects.effect import BEYOND, Hypothesis, Wide
+from gearbench.diagnosis.evidence.separable import APART
 from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.output.beginning import Around, beginning
 from gearbench.diagnosis.output.fit import SETTLED, Optimum, Sensitivity, cost_of, fit, sensitivity_of
@@ -45,11 +46,18 @@ RENEWALS_BASE, RENEWALS, RENEWALS_LAST = 8, 1, 2
 
 @dataclass(frozen=True)
 class Weighed:
-    """A hypothesis, its log Bayes factor over what was there before it, and its optimum (None: by the quadratic)."""
+    """A hypothesis, its log Bayes factor over what was there before it, its optimum (None: by the quadratic), and of
+    one that entered the `rivals` that explain the records as well."""
 
     hypothesis: Hypothesis
     log_bayes_factor: float
     optimum: Optimum | None
+    rivals: tuple[Hypothesis, ...] = ()
+
+    @property
+    def causes(self) -> tuple[Hypothesis, ...]:
+        """The hypothesis and its rivals."""
+        return (self.hypothesis, *self.rivals)
 
 
 @dataclass(frozen=True)
@@ -106,7 +114,7 @@ def select(
         winner = found[0] if found else None
         if winner is None or winner.optimum is None or winner.log_bayes_factor < limit_of(unknowns, winner.hypothesis):
             break
-        entered.append(winner)
+        entered.append(replace(winner, rivals=rivals_of(winner, found)))
         best = winner.optimum
         renewed = sensitivity_of(simulator, best.p, unknowns.prior(), chosen)
         if renewed is not None:
@@ -116,7 +124,7 @@ def select(
         report("simulating: all together")
         best = fit(simulator, best.p, best.sd, best.sensitivity, renewals=RENEWALS_LAST, chosen=chosen) or best
     best = restructured(simulator, best, around, report) if kept else best
-    bare = _without(simulator, base, [one.hypothesis for one in kept], chosen)
+    bare = _without(simulator, base, kept, chosen)
     return Selection(base, bare, best, kept, tuple(weighed or ()))
 
 
@@ -180,6 +188,17 @@ def weigh(
 
     out = side_by_side(weighed, promised)
     return sorted(out, key=lambda one: -one.log_bayes_factor)
+
+
+def rivals_of(winner: Weighed, weighed: Sequence[Weighed]) -> tuple[Hypothesis, ...]:
+    """Those of the hypotheses weighed beside the winner that explain the records as well, by other unknowns."""
+    return tuple(
+        one.hypothesis
+        for one in weighed
+        if one.optimum is not None
+        and one.log_bayes_factor > winner.log_bayes_factor - APART
+        and not _same(one.hypothesis, winner.hypothesis)
+    )
 
 
 def first_look(base: Optimum, hypotheses: Sequence[Hypothesis], unknowns: Unknowns) -> Array:
@@ -246,7 +265,7 @@ def with_entered(simulator: Simulator, selection: Selection, one: Weighed) -> Se
     """The selection with an effect entered that was weighed and simulated but did not clear the limit."""
     assert one.optimum is not None
     chosen = np.ones(simulator.layout.unknowns.size, dtype=bool)
-    bare = _without(simulator, selection.base, [one.hypothesis], chosen)
+    bare = _without(simulator, selection.base, [one], chosen)
     return replace(selection, bare=bare, best=one.optimum, entered=(one,))
 
 
@@ -262,12 +281,12 @@ def only(simulator: Simulator, selection: Selection, kept: Sequence[Weighed]) ->
     p, near = selection.best.p, selection.best.sensitivity
     p = np.where(sd > 0.0, np.clip(p, -3.0 * sd, 3.0 * sd), 0.0)
     best = fit(simulator, p, sd, near, renewals=0, chosen=chosen) or selection.best
-    bare = _without(simulator, base, [one.hypothesis for one in kept], chosen)
+    bare = _without(simulator, base, kept, chosen)
     return replace(selection, bare=bare, best=best, entered=tuple(kept))
 
 
-def taken_out(simulator: Simulator, selection: Selection, hypothesis: Hypothesis) -> Optimum:
-    """The optimum without any part of one of the effects that entered.
+def taken_out(simulator: Simulator, selection: Selection, effect: Weighed) -> Optimum:
+    """The optimum without any part of one of the effects that entered, or of its rivals.
 
     The rig, its structure and the other effects that entered are fitted again; what a good rig has of all others stays
     as it is: pitch errors that take the shape of the run-out left out would make it seem to close nothing.
@@ -279,14 +298,14 @@ def taken_out(simulator: Simulator, selection: Selection, hypothesis: Hypothesis
     for one in selection.entered:
         held[one.hypothesis.entries(unknowns)] = False
     base = replace(selection.best, sd=np.where(held, 0.0, selection.best.sd))
-    return _without(simulator, base, [hypothesis], np.ones(unknowns.size, dtype=bool))
+    return _without(simulator, base, [effect], np.ones(unknowns.size, dtype=bool))
 
 
-def _without(simulator: Simulator, base: Optimum, effects: Sequence[Hypothesis], chosen: NDArray[np.bool_]) -> Optimum:
-    """The background's optimum with the unknowns of these effects held at zero, and numbers of the nominal rig where
-    its uncertainty ends, within which recalibration moves them; itself where that is no rig."""
+def _without(simulator: Simulator, base: Optimum, effects: Sequence[Weighed], chosen: NDArray[np.bool_]) -> Optimum:
+    """The background's optimum with the unknowns of these effects and their rivals held at zero, and numbers of the
+    nominal rig where its uncertainty ends, within which recalibration moves them; itself where that is no rig."""
     sd, p, unknowns = base.sd.copy(), base.p.copy(), simulator.layout.unknowns
-    for wide in (wide for one in effects for wide in one.wide):
+    for wide in (wide for one in effects for cause in one.causes for wide in cause.wide):
         at = wide.entries(unknowns)
         low, high = (0.0, 0.0) if _is_own(unknowns, wide) else known_within(unknowns.prior()[at])
         sd[at], p[at] = 0.0, np.clip(p[at], low, high)

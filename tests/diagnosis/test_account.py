@@ -8,8 +8,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gearbench.diagnosis.account import parts_of, place_in, places_of, sentence_of_effect, sentences_of_gap, weights
+from gearbench.diagnosis.account import (
+    parts_of,
+    place_in,
+    places_of,
+    sentence_of_effect,
+    sentence_of_rivals,
+    sentences_of_gap,
+    weights,
+)
+from gearbench.diagnosis.effects.eccentricity import ECCENTRICITY
 from gearbench.diagnosis.effects.effect import Hypothesis
+from gearbench.diagnosis.effects.encoder_runout import ENCODER_RUNOUT
+from gearbench.diagnosis.effects.friction import FRICTION
 from gearbench.diagnosis.forces.equations import PLACES
 from gearbench.diagnosis.output.judged import Closing
 from gearbench.diagnosis.output.missing import OUTSTANDING, SILENT, Missing, nothing_missing
@@ -91,3 +102,15 @@ def test_sentences_tell_sizes_band_place_and_noise() -> None:
     words = sentence_of_effect("a cracked tooth", Closing(20.0, 2.53, ("y_driven", "other"), {}), 0.006)
     assert "displacement of the driven gear between the excited lines is 2.5 times as large" in words
     assert "at 0–200 Hz" in sentence_of_effect("friction", Closing(20.0, 2.0, ("dte", "0–200"), {}), 0.5)
+
+
+def test_rivals_are_told_with_what_tells_them_apart() -> None:
+    causes = (
+        Hypothesis("eccentricity driver", "mesh", (), effect=ECCENTRICITY),
+        Hypothesis("encoder-runout driver", "sensor", (), effect=ENCODER_RUNOUT),
+        Hypothesis("friction", "mesh", (), effect=FRICTION),
+    )
+    assert sentence_of_rivals(causes) == (
+        "The records cannot tell run-out of a gear (driver) from run-out of an encoder (driver) or friction between the"
+        " flanks: either explains them as well"
+    )

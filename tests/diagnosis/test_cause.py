@@ -10,8 +10,12 @@ import pytest
 from gearbench.bench import simulate
 from gearbench.bench.nonlinear.replay import replay
 from gearbench.cases import case_files
-from gearbench.diagnosis.cause import find_cause
+from gearbench.diagnosis.cause import find_cause, with_rivals
+from gearbench.diagnosis.effects.eccentricity import ECCENTRICITY
+from gearbench.diagnosis.effects.effect import Hypothesis
+from gearbench.diagnosis.effects.encoder_runout import ENCODER_RUNOUT
 from gearbench.diagnosis.intake.measurements import measurement
+from gearbench.diagnosis.output.selection import Weighed
 from gearbench.rig import read_case
 
 RIPPLE = {"orders": "[6, 12]", "amplitude_nm": "[1.5, 0.8]", "phase_deg": "[30, -60]"}
@@ -55,3 +59,15 @@ def test_torque_ripple_from_records_to_the_rig_that_has_it() -> None:
         left = np.fft.rfft(held_out.mean("angle_driver") - simulated.mean("angle_driver"))
         errors.append(np.linalg.norm(left[[18, 36]]))
     assert errors[1] < 0.1 * errors[0]
+
+
+def test_a_named_effect_and_its_rivals_are_one_group_with_whatever_forces_cannot_tell_from_them() -> None:
+    named, rival = (
+        Hypothesis(effect.name, "mesh", (), effect=effect) for effect in (ECCENTRICITY, ENCODER_RUNOUT)
+    )
+    groups = (("friction", "mesh-damping"), ("eccentricity", "pitch-error"))
+    assert with_rivals(groups, [Weighed(named, 30.0, None, (rival,))]) == (
+        ("friction", "mesh-damping"),
+        ("eccentricity", "pitch-error", "encoder-runout"),
+    )
+    assert with_rivals(groups, [Weighed(named, 30.0, None)]) == groups

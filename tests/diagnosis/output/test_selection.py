@@ -53,6 +53,21 @@ def test_one_effect_enters_with_its_size(number: int, value: float, name: str) -
     assert found.bare.misfit > found.best.misfit + LIMIT
 
 
+def test_what_explains_the_records_as_well_is_a_rival_and_leaves_with_the_one_that_is_named() -> None:
+    """Two teeth whose cracks do the same: each alone explains it, and a good rig's share of the other is no reason to
+    find that the background alone closes the gap."""
+    alike = MATRIX.copy()
+    alike[7] = alike[6]
+    true = np.array([0.08, -0.1, 0.02, 0.0, 0.0, 0.0, 0.3, 0.0])
+    simulator = FakeSimulator(lambda q: q @ alike, target(true @ alike))
+    found = select(simulator, LISTED, [np.zeros(8)], {})
+    assert found is not None
+    (one,) = found.entered
+    assert {one.hypothesis.name, *(other.name for other in one.rivals)} == {"tooth-crack 0", "tooth-crack 1"}
+    assert found.bare.p[6] == found.bare.p[7] == 0.0
+    assert not any(other.rivals for other in selected({7: 0.3}).entered)
+
+
 def test_two_effects_enter_the_larger_first_and_each_is_needed() -> None:
     found = selected({3: 0.5, 4: 0.2, 5: -0.15})
     assert names(found) == ["friction", "torque-ripple"]
