@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from gearbench.diagnosis.forces.basis import hats, waves
 from gearbench.diagnosis.forces.nominal import NominalModel
 from gearbench.diagnosis.intake.measurements import Measurement
+from gearbench.lumped.nonlinear.coordinates import leaning_of
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -111,10 +112,9 @@ def _turned_on(model: NominalModel, spectra: Mapping[str, Complex], samples: int
         lines[0] = 0.0
         return np.asarray(np.fft.irfft(lines, samples) * samples)
 
-    rb1, rb2 = model.base_radius
     closed = swing("y_driver") - swing("y_driven") + _rest(model, spectra)
-    leaning = rb2 / (rb1 + rb2) * model.support_factor if model.cross_factor > 0.0 else 0.0
-    return np.asarray((swing("angle_driven") - leaning * closed) / model.law.base_pitch)
+    leaning = leaning_of(model.base_radius, model.cross_factor > 0.0)
+    return np.asarray((swing("angle_driven") - leaning * model.support_factor * closed) / model.law.base_pitch)
 
 
 def _rest(model: NominalModel, spectra: Mapping[str, Complex]) -> float:

@@ -38,6 +38,17 @@ NAMES = (*Coordinates._fields, *Further._fields)
 IN_MESH = -1  # instead of the number of a coordinate that a force acts on
 
 
+def leaning_of(base_radii: tuple[float, float], tangential: bool) -> float:
+    """How far [m] on the line of action the mesh turns back where a motion of the centres along their supports, which
+    lie across the line between them (`tangential`) or along the line of action, closes it by 1 m.
+
+    Centres that move across the line between them turn that line by gamma = (y1 - y2) / a: seen from it, the driver
+    has turned on by gamma and the driven gear back, rb2 gamma on the line of action. What moves a centre along the
+    line of action leaves that line where it is.
+    """
+    return base_radii[1] / sum(base_radii) if tangential else 0.0
+
+
 def parted(values: Array) -> tuple[Coordinates, Further | tuple[()]]:
     """Coordinates of one half of a state (5,) or (10,); the further ones are empty in the shorter."""
     return Coordinates(*values[:COORDINATES]), Further(*values[COORDINATES:]) if len(values) > COORDINATES else ()

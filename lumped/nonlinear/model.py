@@ -55,7 +55,7 @@ from gearbench.geometry import Pair, body
 from gearbench.lumped.errors import LumpedError
 from gearbench.lumped.linear.model import equivalent_mass
 from gearbench.lumped.nonlinear.constants import Constants, Rubbing
-from gearbench.lumped.nonlinear.coordinates import Coordinates, Further
+from gearbench.lumped.nonlinear.coordinates import Coordinates, Further, leaning_of
 from gearbench.lumped.nonlinear.law import MeshLaw
 from gearbench.lumped.nonlinear.pressing import Instants, travel_under
 from gearbench.lumped.nonlinear.rest import (
@@ -126,15 +126,8 @@ class NonLinear:
 
     @property
     def leaning(self) -> float:
-        """How far [cycles] the mesh turns back where a motion of the centres along their supports closes it by 1 m.
-
-        Centres that move across the line between them turn that line by gamma = (y1 - y2) / a: seen from it, the driver
-        has turned on by gamma and the driven gear back, rb2 gamma on the line of action. What moves a centre along the
-        line of action leaves that line where it is.
-        """
-        if self.rig.support.direction != "tangential":
-            return 0.0
-        return self.base_radii[1] / sum(self.base_radii) / self.teeth.base_pitch
+        """How far [cycles] the mesh turns back where a motion of the centres along their supports closes it by 1 m."""
+        return leaning_of(self.base_radii, self.rig.support.direction == "tangential") / self.teeth.base_pitch
 
     def turned_on(self, places: Array) -> Array:
         """How far [cycles] the centres' motion turns the mesh on beyond its rotation, at the places (..., n) [m]."""
