@@ -332,7 +332,8 @@ def _closes(judged: Judged, closing: Closing) -> dict[str, Range]:
 
 def _candidates(found: Simulated, judged: Measurement | None) -> tuple[Candidate, ...]:
     """The best hypothesis of each effect, the background alone, and what is named together, with the relative gap that
-    each leaves on the held-out record."""
+    each leaves on the held-out record. Evidence is that over the background alone, or beside what else is named where
+    only that shows an effect."""
     selection = found.selection
     measured = measured_channels(judged)["dte"].mean(axis=0) if judged is not None else None
 
@@ -350,6 +351,10 @@ def _candidates(found: Simulated, judged: Measurement | None) -> tuple[Candidate
         assert one.hypothesis.effect is not None
         p = one.optimum.p if one.optimum and one.log_bayes_factor > 0.0 else None
         best.setdefault((one.hypothesis.effect.name,), (one.log_bayes_factor, p))
+    for one in selection.entered:
+        assert one.hypothesis.effect is not None
+        alone, p = best.get((one.hypothesis.effect.name,), (-np.inf, None))
+        best[(one.hypothesis.effect.name,)] = (max(alone, one.log_bayes_factor), p)
     names = tuple(dict.fromkeys(one.hypothesis.effect.name for one in selection.entered if one.hypothesis.effect))
     if len(names) > 1:
         best[names] = (selection.best.evidence - selection.base.evidence, selection.best.p)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import inf
 from typing import NamedTuple
 
 from gearbench.diagnosis.odds import Calibration, effect_signs
@@ -22,8 +23,8 @@ def chances_of(
     judged: Judged, decided: Decided, known: Calibration, lines: float, entered: Sequence[Weighed]
 ) -> Chances:
     """The chances of what was named, and of the best candidate, named or not, that nothing spoke against: of what had
-    `entered` and is not named, its size or the judged record did. Evidence is that over the background alone, as the
-    candidates have it."""
+    `entered` and is not named, its size or the judged record did. Evidence is that of the candidates: over the
+    background alone, or, where that is more, beside the others that are named."""
     told = {one.hypothesis.effect.name for one in decided.named if one.hypothesis.effect is not None}
     dropped = {one.hypothesis.effect.name for one in entered if one.hypothesis.effect is not None} - told
     alone: dict[str, float] = {}
@@ -35,7 +36,7 @@ def chances_of(
     for one in decided.named:
         assert one.hypothesis.effect is not None
         share = judged.share(judged.closings[one.hypothesis.name].without)
-        evidence = alone.get(one.hypothesis.effect.name, one.log_bayes_factor)
+        evidence = max(alone.get(one.hypothesis.effect.name, -inf), one.log_bayes_factor)
         all_signs.append(effect_signs(evidence, lines, True, share))
         named[one.hypothesis.name] = known.effect.of(all_signs[-1]).value
     best = max(all_signs[1:] or all_signs, key=lambda signs: known.effect.of(signs).value)

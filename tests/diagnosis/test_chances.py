@@ -28,3 +28,18 @@ def test_an_effect_that_entered_and_is_not_named_makes_none_likely() -> None:
 
     assert best() == effect_signs(824.0, LINES, False, 0.0)
     assert best(backlash) == effect_signs(1.0, LINES, False, 0.0)
+
+
+def test_what_shows_only_beside_another_effect_is_as_likely_as_it_is_worth_there() -> None:
+    first, second = weighed("coupling", 300.0), weighed("pitch-error", 90.0)
+    selection = SimpleNamespace(weighed=(first, weighed("pitch-error", -4.0)))
+    closing = SimpleNamespace(without=None)
+    judged: Any = SimpleNamespace(
+        found=SimpleNamespace(selection=selection),
+        closings={"coupling": closing, "pitch-error": closing},
+        share=lambda without: 0.4,
+    )
+    decided: Any = SimpleNamespace(named=(first, second))
+    named = chances_of(judged, decided, POPULATION, LINES, ()).named
+    assert named["pitch-error"] == POPULATION.effect.of(effect_signs(90.0, LINES, True, 0.4)).value
+    assert named["coupling"] == POPULATION.effect.of(effect_signs(300.0, LINES, True, 0.4)).value
