@@ -8,6 +8,7 @@ from pathlib import Path
 
 import xarray as xr
 
+from gearbench.bench.refusals.effects import refuse_unknown
 from gearbench.bench.refusals.stated import check_springs, check_stated
 from gearbench.diagnosis.account import parts_of, sentences_of_gap
 from gearbench.diagnosis.advice import advice_of
@@ -109,12 +110,23 @@ def take_in(
     """Read and check the records. Raises DiagnosisError, RecordError or BenchError, one sentence each."""
     check_stated(nominal, "a diagnosis")
     check_springs(nominal, "a diagnosis")
+    nominal = on_finite_elements(nominal)
+    refuse_unknown(nominal.rig, nominal.simulation)
     names = sorted((effect.name for effect in LIBRARY), key=rank_of)
     for name in without:
         if name not in names:
             raise DiagnosisError(f"without = {name} is no effect of the library: {', '.join(names)}")
     rest, out = held_out_of(intake(records, nominal), held_out)
     return Inputs(nominal, rest, out, tuple(dict.fromkeys(without)))
+
+
+def on_finite_elements(nominal: Case) -> Case:
+    """The case with the mesh law of the lumped model, by which records are replayed, from finite elements where its own
+    model is one of them."""
+    if nominal.simulation.model == "lumped":
+        return nominal
+    simulation = nominal.simulation.model_copy(update={"mesh_stiffness": "finite-element"})
+    return nominal.model_copy(update={"simulation": simulation})
 
 
 def diagnosed(inputs: Inputs, progress: Progress | None = None, *, quick: bool = False) -> Diagnosis:

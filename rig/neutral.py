@@ -23,14 +23,19 @@ _GEAR_SHAPES = {
     "iso_seed",
 }
 
-# Fields of a gear that move its flanks, in the order of the gear's fields.
-FLANK_FIELDS = (
+# Fields of a gear that take material off both flanks of all its teeth by design.
+RELIEF_FIELDS = (
     "tip_relief",
     "tip_relief_start_diameter",
     "tip_relief_shape",
     "root_relief",
     "root_relief_start_diameter",
     "root_relief_shape",
+)
+
+# Fields of a gear that move its flanks, in the order of the gear's fields.
+FLANK_FIELDS = (
+    *RELIEF_FIELDS,
     "profile_slope",
     "profile_slope_tooth",
     "profile_form",
@@ -82,6 +87,11 @@ def effects_in(rig: Rig) -> tuple[str, ...]:
 def sound_gear(gear: Gear) -> Gear:
     """The gear without errors and cracks: what is meshed and condensed."""
     return gear.model_copy(update={name: Gear.model_fields[name].default for name in (*FLANK_FIELDS, "crack")})
+
+
+def relieved_gear(gear: Gear) -> Gear:
+    """The gear without errors and cracks, with the reliefs of its design."""
+    return sound_gear(gear).model_copy(update={name: getattr(gear, name) for name in RELIEF_FIELDS})
 
 
 def _gear_effects(gear: Gear) -> list[str]:

@@ -25,7 +25,7 @@ from gearbench.lumped import mesh_stiffness
 from gearbench.lumped.nonlinear.law import MeshLaw, approach_grid
 from gearbench.lumped.stiffness.potential_energy import hertz_compliance, tooth_compliance
 from gearbench.rig import Gear, Rig, Simulation
-from gearbench.rig.neutral import sound_gear
+from gearbench.rig.neutral import relieved_gear
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -40,11 +40,11 @@ OFFSETS = 4  # pairs looked at on either side of the one at the pitch point
 def mesh_law(rig: Rig, simulation: Simulation, load_max_nm: float) -> MeshLaw:
     """Law of the rig's sound, error-free gears up to at least the driver torque `load_max_nm` [N m].
 
-    With simulation.mesh_stiffness = "finite-element" from static contact of the condensed gears, tip-edge contact
-    included, from disk where it has been solved before; else linear in the deflection, with the stiffness k(phase)
-    that the case asks for. Raises GeometryError, ContactError, LumpedError or BenchError.
+    With simulation.mesh_stiffness = "finite-element" from static contact of the condensed gears, tip-edge contact and
+    reliefs included, from disk where it has been solved before; else linear in the deflection, with the stiffness
+    k(phase) that the case asks for. Raises GeometryError, ContactError, LumpedError or BenchError.
     """
-    sound = rig.model_copy(update={"driver": sound_gear(rig.driver), "driven": sound_gear(rig.driven)})
+    sound = rig.model_copy(update={"driver": relieved_gear(rig.driver), "driven": relieved_gear(rig.driven)})
     if simulation.mesh_stiffness != "finite-element":
         return linear_law(sound, simulation)
     meshing = pair(sound)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 
 from gearbench.bench.errors import BenchError
-from gearbench.rig import Case, Gear, Rig
+from gearbench.rig import Case, Gear, Rig, Simulation
 from gearbench.rig.neutral import FLANK_FIELDS, effects_in
 from gearbench.rig.value import key_of
 
@@ -17,6 +17,9 @@ ELASTIC_KEYS = FLANK_KEYS | {f"rig.{side}.crack.length_mm" for side in ("driver"
 
 # What they represent in motion: all but a crack that is a number only.
 MOVING_KEYS = ("rig.support.", "rig.housing", "rig.drive.", "rig.load.", "rig.friction.", "rig.mesh.")
+
+# What the lumped model's law has where it comes from finite elements.
+RELIEF_KEYS = tuple(f"rig.{side}.{name}_um" for side in ("driver", "driven") for name in ("tip_relief", "root_relief"))
 
 # What the non-linear lumped model represents; a key counts with all keys below it.
 LUMPED = tuple(
@@ -69,7 +72,7 @@ def _is_crack(key: str, field: str) -> bool:
     return key in (f"rig.driver.{field}", f"rig.driven.{field}")
 
 
-def refuse_unknown(rig: Rig) -> None:
+def refuse_unknown(rig: Rig, simulation: Simulation) -> None:
     """Raise BenchError for the first effect that the non-linear lumped model does not represent either."""
     for key in effects_in(rig):
         if _is_crack(key, "crack.length_mm"):
@@ -77,5 +80,12 @@ def refuse_unknown(rig: Rig) -> None:
                 f"the lumped model does not represent {key}: give the crack's stiffness_loss in its place (`check`"
                 ' prints it), or set simulation.model = "reduced"'
             )
+        if key in RELIEF_KEYS:
+            if simulation.mesh_stiffness != "finite-element":
+                raise BenchError(
+                    f"the lumped model represents {key} with simulation.mesh_stiffness = \"finite-element\" alone, not"
+                    f' "{simulation.mesh_stiffness}": set it, or leave {key} at its neutral value'
+                )
+            continue
         if not key.startswith(LUMPED):
             raise BenchError(f"the lumped model does not represent {key}: leave it at its neutral value")

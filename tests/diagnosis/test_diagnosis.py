@@ -9,9 +9,12 @@ import xarray as xr
 from shared.fake_diagnosis import at_rest, friction_found
 from shared.measured import channels, nominal, record, written
 
+from gearbench.bench.errors import BenchError
+from gearbench.cases import case_files
 from gearbench.diagnosis import Diagnosis, DiagnosisError, diagnose
 from gearbench.diagnosis import diagnosis as module
 from gearbench.diagnosis.diagnosis import take_in
+from gearbench.rig import Case, read_case
 
 
 @pytest.fixture(autouse=True)
@@ -62,6 +65,21 @@ def test_what_is_asked_is_checked() -> None:
     with pytest.raises(DiagnosisError, match="at least one is needed"):
         diagnose([], nominal())
     assert take_in(sets(), nominal(), without=["friction", "friction"]).without == ("friction",)
+
+
+def demonstration(*settings: str) -> Case:
+    return read_case(case_files()["gap_demo"], list(settings))
+
+
+def test_a_rig_of_finite_elements_is_replayed_on_their_law_and_what_no_replay_has_is_refused_at_once() -> None:
+    law = 'simulation.mesh_stiffness="potential-energy"'
+    reduced = demonstration('simulation.model="reduced"', law)
+    assert take_in(sets(), reduced).nominal.simulation.mesh_stiffness == "finite-element"
+    plain = demonstration(law)
+    assert take_in(sets(), plain).nominal.simulation.mesh_stiffness == "potential-energy"
+    worn = demonstration("rig.driver.profile_slope_um=6")
+    with pytest.raises(BenchError, match=r"lumped model does not represent rig\.driver\.profile_slope_um"):
+        take_in(sets(), worn)
 
 
 def test_two_datasets_without_a_condition_get_names_of_their_own() -> None:
