@@ -197,14 +197,12 @@ def seconded(found: Simulated, forces: Search) -> Simulated:
 
 def with_rivals(groups: Sequence[tuple[str, ...]], named: Sequence[Weighed]) -> tuple[tuple[str, ...], ...]:
     """Groups of effects that records cannot tell apart, with each named effect and its rivals in one of them."""
-    joined = [set(group) for group in groups]
+    joined = list(groups)
     for one in named:
         names = {cause.effect.name for cause in one.causes if cause.effect is not None}
-        if len(names) < 2:
-            continue
-        touched = [group for group in joined if group & names]
-        joined = [group for group in joined if not group & names] + [names.union(*touched)]
-    return tuple(tuple(sorted(group, key=rank_of)) for group in joined)
+        if len(names) > 1 and not any(names <= set(group) for group in joined):
+            joined.append(tuple(sorted(names, key=rank_of)))
+    return tuple(joined)
 
 
 def judgement(problem: Problem, found: Simulated, held_out: Measurement | None) -> Judged:

@@ -6,7 +6,7 @@ evidence of each hypothesis rise? Nothing is simulated, and what was measured de
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,7 +59,8 @@ def _posterior(information: Array, sd: Array) -> tuple[Array, float]:
 def alike(
     fit: Fit, unknowns: Unknowns, hypotheses: Sequence[Hypothesis], limits: Limits = LIMITS
 ) -> tuple[tuple[str, ...], ...]:
-    """Effects that these records cannot tell apart, in groups, under the weights of a fit.
+    """Effects that these records cannot tell apart, under the weights of a fit: all groups in which each explains what
+    each other one leaves.
 
     An effect without weight is in no group: bins in which nothing is heard have none, and silence there tells.
     """
@@ -67,11 +68,24 @@ def alike(
     effects = [h.effect.name for h in hypotheses if h.effect]
     needed = np.array([limits.of(h.effect) for h in hypotheses if h.effect])
     names = sorted(set(effects), key=rank_of)
-    groups: dict[str, set[str]] = {name: {name} for name in names}
+    explains: set[tuple[str, str]] = set()
     for truth in np.flatnonzero(np.diag(factors) > needed):
-        for other in np.flatnonzero(factors[truth] > np.maximum(factors[truth, truth] - APART, needed)):
-            joined = groups[effects[truth]] | groups[effects[other]]
-            for name in joined:
-                groups[name] = joined
-    ordered = dict.fromkeys(tuple(name for name in names if name in groups[first]) for first in names)
-    return tuple(group for group in ordered if len(group) > 1)
+        others = np.flatnonzero(factors[truth] > np.maximum(factors[truth, truth] - APART, needed))
+        explains |= {(effects[other], effects[truth]) for other in others}
+    beside = {one: {other for other in names if {(one, other), (other, one)} <= explains} - {one} for one in names}
+    return tuple(one for one in groups_of(names, beside) if len(one) > 1)
+
+
+def groups_of(names: Sequence[str], beside: Mapping[str, set[str]]) -> list[tuple[str, ...]]:
+    """The largest groups of names, in their order, of which each is `beside` each (Bron and Kerbosch 1973)."""
+    found: list[tuple[str, ...]] = []
+
+    def grow(group: tuple[str, ...], open_to: list[str], done: set[str]) -> None:
+        if not open_to and not done:
+            found.append(group)
+        for number, one in enumerate(open_to):
+            rest = [other for other in open_to[number + 1 :] if other in beside[one]]
+            grow((*group, one), rest, (done | set(open_to[:number])) & beside[one])
+
+    grow((), list(names), set())
+    return found

@@ -10,7 +10,7 @@ from gearbench.diagnosis.effects.effect import Hypothesis, Wide
 from gearbench.diagnosis.effects.friction import FRICTION
 from gearbench.diagnosis.effects.sensor_delay import SENSOR_DELAY
 from gearbench.diagnosis.evidence.fit import Fit
-from gearbench.diagnosis.evidence.separable import alike, expected_factors
+from gearbench.diagnosis.evidence.separable import alike, expected_factors, groups_of
 from gearbench.diagnosis.forces.unknowns import group, unknowns_of
 
 SMALL = unknowns_of(
@@ -65,3 +65,10 @@ def test_what_moves_the_residuals_alike_cannot_be_told_apart() -> None:
 def test_what_moves_other_residuals_or_none_is_told_apart() -> None:
     assert alike(fit_of(np.diag([1.0, 1.0, 30.0, 30.0, 30.0, 30.0])), SMALL, (LOBE, RUB, LAG)) == ()
     assert alike(fit_of(np.diag([1.0, 1.0, 30.0, 30.0, 30.0, 0.01])), SMALL, (LOBE, RUB, LAG)) == ()
+
+
+def test_groups_hold_only_what_each_explains_of_each() -> None:
+    """A chain of neighbours is no group: its ends can be told apart."""
+    pairs = [("a", "b"), ("b", "c"), ("c", "d"), ("b", "d")]
+    beside = {one: {y if x == one else x for x, y in pairs if one in (x, y)} for one in "abcde"}
+    assert groups_of("abcde", beside) == [("a", "b"), ("b", "c", "d"), ("e",)]
