@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.diagnosis.account import places_of, sentence_of_effect, sentence_of_rivals
-from gearbench.diagnosis.chances import Chances, chances_of
-from gearbench.diagnosis.effects.effect import Effect as Library
-from gearbench.diagnosis.effects.effect import Estimate, Fitted, Hypothesis, added
+from gearbench.diagnosis.chances import chances_of
+from gearbench.diagnosis.effects.effect import Fitted, Hypothesis, added
 from gearbench.diagnosis.effects.recalibrated import recalibrated
+from gearbench.diagnosis.effects.temperature_drift import TEMPERATURE_DRIFT
 from gearbench.diagnosis.evidence.calibration import LIMITS, Limits
 from gearbench.diagnosis.evidence.decision import Decision, decide, named
 from gearbench.diagnosis.evidence.fit import Fit
@@ -23,18 +23,19 @@ from gearbench.diagnosis.evidence.separable import alike, representatives
 from gearbench.diagnosis.forces.equations import PLACES
 from gearbench.diagnosis.forces.steadiness import changing_parts, unsteadiness
 from gearbench.diagnosis.intake.measurements import Measurement
-from gearbench.diagnosis.intake.signals import UNITS, measured_channels
+from gearbench.diagnosis.intake.signals import measured_channels
+from gearbench.diagnosis.naming import drifts_of, effects_of, parameters_of
 from gearbench.diagnosis.odds import Calibration, effect_signs
-from gearbench.diagnosis.output.judged import Closing, Judged, itself, judged_on, rms_closed
+from gearbench.diagnosis.output.drift import drift_of
+from gearbench.diagnosis.output.judged import Judged, itself, judged_on
 from gearbench.diagnosis.output.missing import Missing, missing_forces, nothing_missing
 from gearbench.diagnosis.output.selection import WORTH, Weighed, only, with_entered
 from gearbench.diagnosis.output.simulated import Simulated, simulated
 from gearbench.diagnosis.output.structure import structure_found
-from gearbench.diagnosis.output.verdict_of import Decided, decide_simulated, relative_size, size_needed
+from gearbench.diagnosis.output.verdict_of import decide_simulated, relative_size, size_needed
 from gearbench.diagnosis.population import POPULATION
 from gearbench.diagnosis.replay.replays import replays
-from gearbench.diagnosis.verdict import NINE_OF_TEN, Candidate, Effect, Found, Outcome, Parameter, Range, Share
-from gearbench.diagnosis.words import SHOWN_UNITS
+from gearbench.diagnosis.verdict import Candidate, Effect, Found, Outcome, Share
 from gearbench.rig import Case
 from gearbench.rig.contract import Place, rank_of
 
@@ -98,14 +99,14 @@ def find_cause(
         common["audits"] = {"silent": tuple(silent), "unsteady": tuple(unsteady)}
         return _by_forces_alone(problem, nominal, result, decide(result, silent, unsteady), known, common)
     report("judging")
-    searched = Searched(problem, nominal, tuple(measurements), result, fit, unsteady)
+    searched = Searched(problem, nominal, tuple(measurements), result, fit, unsteady, tuple(without))
     return _by_simulation(searched, found, held_out, known, common)
 
 
 @dataclass(frozen=True)
 class Searched:
     """What the search by forces had and found: `fit` is the best effect's, else the background's; `unsteady`
-    (equations + 1,) the excess scatter between repetitions."""
+    (equations + 1,) the excess scatter between repetitions, `without` the effects left out."""
 
     problem: Problem
     nominal: Case
@@ -113,6 +114,7 @@ class Searched:
     result: Search
     fit: Fit
     unsteady: Array
+    without: tuple[str, ...] = ()
 
 
 def _by_simulation(
@@ -126,7 +128,8 @@ def _by_simulation(
     signs = {f"over {place}": float(over) for place, over in zip(PLACES, missing.over, strict=True)}
     missing = replace(missing, factors=np.array([known.outstanding.get(place, 1.0) for place in PLACES]))
     changing = changing_of(judged, changing_parts(of.measurements, of.problem.conditions[0].band))
-    decided = decide_simulated(judged, of.result, missing, of.unsteady, changing, known=known)
+    drift = None if TEMPERATURE_DRIFT.name in of.without else drift_of(found)
+    decided = decide_simulated(judged, of.result, missing, of.unsteady, changing, known=known, drift=drift)
     signs |= {"lines": float(found.simulator.target.counts.sum()), "unknown": decided.sign, "left": judged.left,
               "remains": judged.remains, "changing": changing}  # fmt: skip
     chances = chances_of(judged, decided, known, signs["lines"], (*entered, *judged.dropped))
@@ -136,7 +139,7 @@ def _by_simulation(
         verdict=decided.verdict,
         probability=known.probabilities(chances.best, decided.sign),
         signs=signs,
-        effects=_effects(judged, decided, chances),
+        effects=(*effects_of(judged, decided, chances), *drifts_of(decided, changing, chances)),
         candidates=_candidates(found, held_out if held_out is not None and held_out.phase_known else None),
         place=decided.place,
         where=places_of(judged, kept, missing),
@@ -257,7 +260,7 @@ def _by_forces_alone(
             Effect(
                 name=effect.name,
                 probability=probability["effect"],
-                parameters=_parameters(effect, estimates),
+                parameters=parameters_of(effect, estimates),
             ),
         )
     tried: dict[tuple[str, ...], float] = {(): 0.0}
@@ -284,48 +287,6 @@ def fitted(problem: Problem, fit: Fit) -> Fitted:
     """What a fit says of the unknowns of a problem."""
     means = {condition.name: condition.torque_mean for condition in problem.conditions}
     return Fitted(problem.model, problem.unknowns, fit.p, fit.std, means)
-
-
-def _parameters(effect: Library, estimates: Sequence[Estimate]) -> dict[str, Parameter]:
-    """Values with the interval that a normal distribution of the stated deviation has."""
-    out = {}
-    for e in estimates:
-        reach = NINE_OF_TEN * effect.stated(e)
-        out[e.name] = Parameter(value=e.value, low=e.value - reach, high=e.value + reach, unit=e.unit)
-    return out
-
-
-def _effects(judged: Judged, decided: Decided, chances: Chances) -> tuple[Effect, ...]:
-    """The named effects with their parameters and what they close; one at work in two places counts once."""
-    found = judged.found
-    values = found.layout.fitted(found.selection.best.p, found.std)
-    out: dict[str, Effect] = {}
-    for one in decided.named:
-        effect = one.hypothesis.effect
-        assert effect is not None
-        estimates = effect.add(found.layout.nominal.rig, one.hypothesis, values)[1]
-        before = out[effect.name].parameters if effect.name in out else {}
-        closing = judged.closings[one.hypothesis.name]
-        out[effect.name] = Effect(
-            name=effect.name,
-            probability=chances.named[one.hypothesis.name],
-            due=closing.due,
-            parameters={**before, **_parameters(effect, estimates)},
-            share=judged.share(closing.without),
-            closes=_closes(judged, closing),
-        )
-    return tuple(out.values())
-
-
-def _closes(judged: Judged, closing: Closing) -> dict[str, Range]:
-    """By channel, rms in um or N m that comes back without an effect."""
-    out = {}
-    for channel in judged.sizes:
-        sizes = rms_closed(judged.measured, channel, closing.without[channel], judged.signals[channel])
-        scale = SHOWN_UNITS.get(UNITS[channel], (1.0, ""))[0]
-        value, low, high = (scale * size for size in sizes)
-        out[channel] = Range(value=value, low=low, high=high)
-    return out
 
 
 def _candidates(found: Simulated, judged: Measurement | None) -> tuple[Candidate, ...]:

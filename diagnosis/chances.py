@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from math import inf
 from typing import NamedTuple
 
+from gearbench.diagnosis.effects.temperature_drift import TEMPERATURE_DRIFT
 from gearbench.diagnosis.odds import Calibration, effect_signs
 from gearbench.diagnosis.output.judged import Judged
 from gearbench.diagnosis.output.selection import Weighed
@@ -39,5 +40,8 @@ def chances_of(
         evidence = max(alone.get(one.hypothesis.effect.name, -inf), one.log_bayes_factor)
         all_signs.append(effect_signs(evidence, lines, True, share))
         named[one.hypothesis.name] = known.effect.of(all_signs[-1]).value
+    if decided.drift is not None:
+        all_signs.append(effect_signs(decided.drift.nats, lines, True, decided.drift.share))
+        named[TEMPERATURE_DRIFT.name] = known.effect.of(all_signs[-1]).value
     best = max(all_signs[1:] or all_signs, key=lambda signs: known.effect.of(signs).value)
     return Chances(named, best)

@@ -13,7 +13,7 @@ from gearbench.bench.refusals.stated import check_springs, check_stated
 from gearbench.diagnosis.account import parts_of, sentences_of_gap
 from gearbench.diagnosis.advice import advice_of
 from gearbench.diagnosis.cause import Finding, find_cause
-from gearbench.diagnosis.effects.library import LIBRARY
+from gearbench.diagnosis.effects.library import CHANGING, LIBRARY
 from gearbench.diagnosis.errors import DiagnosisError
 from gearbench.diagnosis.intake.measurements import Measurement, held_out_of, intake
 from gearbench.diagnosis.intake.signals import simulated_channels
@@ -112,7 +112,7 @@ def take_in(
     check_springs(nominal, "a diagnosis")
     nominal = on_finite_elements(nominal)
     refuse_unknown(nominal.rig, nominal.simulation)
-    names = sorted((effect.name for effect in LIBRARY), key=rank_of)
+    names = sorted((effect.name for effect in (*LIBRARY, *CHANGING)), key=rank_of)
     for name in without:
         if name not in names:
             raise DiagnosisError(f"without = {name} is no effect of the library: {', '.join(names)}")

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from math import floor, isfinite, log10
 from typing import TYPE_CHECKING
 
-from gearbench.diagnosis.effects.library import LIBRARY
+from gearbench.diagnosis.effects.library import CHANGING, LIBRARY
 from gearbench.diagnosis.words import CHANNELS, PLACES, SHOWN_UNITS, band_in_words, length, number, percent
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ __all__ = [
     "with_std",
 ]
 
-EFFECTS = {effect.name: effect for effect in LIBRARY}
+EFFECTS = {effect.name: effect for effect in (*LIBRARY, *CHANGING)}
 SHORT_CHANNELS = {
     "dte": "TE",
     "angle_driver": "angle, driver",
@@ -109,6 +109,8 @@ def headline(verdict: Verdict) -> str:
     if verdict.verdict == "effects":
         words = effects_in_words([effect.name for effect in verdict.effects])
         one = len(verdict.effects) == 1
+        if {effect.name for effect in verdict.effects} <= {effect.name for effect in CHANGING}:
+            return f"{words[:1].upper()}{words[1:]} {'is' if one else 'are'} at work while the records are taken."
         said = f"{'explains' if one else 'explain'} the gap"
         if _beside(verdict):
             said = f"{'is' if one else 'are'} at work, beside a recalibration that explains most of the gap"

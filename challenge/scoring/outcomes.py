@@ -4,8 +4,8 @@
   class of indistinguishable effects that holds both the named and the true one. `part`: it names one of two.
   `wrong`: it names anything else. `missed`: it says none. `refused`: it says unknown.
 * None was. `right`: it says none. `named`: it names an effect (a false alarm). `flagged`: it says unknown.
-* A foreign one was, or one that was taken out of the library. `refused`: it says unknown. `blamed`: it names an
-  effect. `missed`: it says none.
+* A foreign one was, or one that was taken out of the library. `refused`: it says unknown. `blamed`: it names another
+  effect; `right`: it knows that one. `missed`: it says none.
 * `failed`: there is no verdict, because the diagnosis of the case failed.
 
 The place is right when the verdict's equals the answer's, whatever the verdict; the answer of two effects gives the
@@ -70,11 +70,11 @@ def _result(answer: Answer, verdict: Verdict) -> str:
         return {"none": "right", "effect": "named", "unknown": "flagged"}[word]
     if word != "effect":
         return {"none": "missed", "unknown": "refused"}[word]
-    if answer.kind == "foreign":
-        return "blamed"
     named, true = set(named_effects(verdict)), set(answer.effects)
     if named == true:
         return "right"
+    if answer.kind == "foreign":
+        return "blamed"
     if _in_one_class(true, named, verdict.get("indistinguishable", ())):
         return "class"
     return "part" if named < true else "wrong"

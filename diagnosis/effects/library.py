@@ -19,6 +19,7 @@ from gearbench.diagnosis.effects.pitch_error import PITCH_ERROR
 from gearbench.diagnosis.effects.profile_error import PROFILE_ERROR
 from gearbench.diagnosis.effects.sensor_delay import SENSOR_DELAY
 from gearbench.diagnosis.effects.support_stiffness import SUPPORT_STIFFNESS
+from gearbench.diagnosis.effects.temperature_drift import TEMPERATURE_DRIFT
 from gearbench.diagnosis.effects.tooth_crack import TOOTH_CRACK
 from gearbench.diagnosis.effects.torque_ripple import TORQUE_RIPPLE
 from gearbench.diagnosis.forces.condition import Condition
@@ -42,6 +43,8 @@ LIBRARY: tuple[Effect, ...] = (
     PROFILE_ERROR,
     ENCODER_RUNOUT,
 )
+# What is read off between repetitions.
+CHANGING: tuple[Effect, ...] = (TEMPERATURE_DRIFT,)
 
 
 def hypotheses(model: NominalModel, without: Sequence[str] = ()) -> tuple[Hypothesis, ...]:

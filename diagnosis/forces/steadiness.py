@@ -96,13 +96,18 @@ def changing_parts(measurements: Sequence[Measurement], band: float) -> dict[str
         for name, repetitions in measured_channels(measured).items():
             last = int(band * repetitions.shape[-1] / measured.sampling_rate)
             lines = np.fft.rfft(repetitions, axis=-1)[:, 1 : max(last, 2)]
-            apart = (np.abs(lines - lines.mean(axis=0)) ** 2).sum(axis=0) / (len(lines) - 1)
-            white = float(np.median(apart)) / np.log(2.0)
+            apart, white = scatter_of(lines)
             coloured = float(apart[apart > COLOURED * white].sum())
             level = float((np.abs(lines.mean(axis=0)) ** 2).sum())
             if level > 0.0:
                 largest[name] = max(largest.get(name, 0.0), float(np.sqrt(coloured / level)))
     return largest
+
+
+def scatter_of(lines: Complex) -> tuple[Array, float]:
+    """Variance (K,) of lines (P, K) between repetitions, and that of the white noise which most of them have."""
+    apart = (np.abs(lines - lines.mean(axis=0)) ** 2).sum(axis=0) / (len(lines) - 1)
+    return apart, float(np.median(apart)) / float(np.log(2.0))
 
 
 def excess_of(scatter: Complex, mesh_factor: Complex, variance: Array) -> Array:

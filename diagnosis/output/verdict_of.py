@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from gearbench.diagnosis.evidence.decision import at_place, worst
 from gearbench.diagnosis.evidence.search import Search
 from gearbench.diagnosis.forces.equations import PLACES
 from gearbench.diagnosis.odds import Calibration
+from gearbench.diagnosis.output.drift import Drift
 from gearbench.diagnosis.output.judged import Judged
 from gearbench.diagnosis.output.missing import Missing
 from gearbench.diagnosis.output.selection import Weighed
@@ -36,13 +37,15 @@ CLOSES = 0.5
 @dataclass(frozen=True)
 class Decided:
     """`verdict` effects, none or unknown; `place`; what is named (effects only); the largest `sign` of something
-    unknown over its limit; `because` says in sentences what decided."""
+    unknown over its limit; `because` says in sentences what decided; `drift`: what is named of what changes between
+    repetitions (effects only)."""
 
     verdict: Outcome
     place: Place
     named: tuple[Weighed, ...]
     sign: float
     because: tuple[str, ...]
+    drift: Drift | None = None
 
 
 def decide_simulated(
@@ -53,10 +56,32 @@ def decide_simulated(
     changing: float,
     limits: Limits = LIMITS,
     known: Calibration = POPULATION,
+    drift: Drift | None = None,
 ) -> Decided:
     """The decision on what was kept on the judged record. `missing` are the forces that the final rig lacks; `unsteady`
     (equations + 1,) the excess scatter between repetitions, by place, and `changing` the largest rms of what changes
-    over that of the nominal gap; `known`: what sound rigs leave."""
+    over that of the nominal gap, `drift` what explains most of it; `known`: what sound rigs leave."""
+    _, over = worst(unsteady, limits.unsteady)
+    if drift is None or over <= 1.0 or changing <= known.changing:
+        return _decided(judged, forces, missing, unsteady, changing, limits, known)
+    # What a drift explains speaks neither for something unknown nor against an effect.
+    rest = _decided(judged, forces, missing, np.zeros_like(unsteady), changing, limits, known)
+    said = (
+        f"{percent(drift.share)} of the energy of what changes from one repetition to the next is what a stiffness"
+        f" {at_place(drift.place)} makes that changes by {percent(drift.value)} over a record"
+    )
+    if rest.verdict == "unknown":
+        return replace(rest, because=(*rest.because, said))
+    place = rest.place if rest.named else drift.place
+    because = (*(rest.because if rest.named else ()), said)
+    return replace(rest, verdict="effects", place=place, because=because, drift=drift)
+
+
+def _decided(
+    judged: Judged, forces: Search, missing: Missing, unsteady: Array, changing: float, limits: Limits,
+    known: Calibration,
+) -> Decided:  # fmt: skip
+    """The decision without a drift."""
     selection = judged.found.selection
     named = selection.entered
     share = max((judged.share(judged.closings[one.hypothesis.name].without) for one in named), default=0.0)

@@ -20,7 +20,7 @@ def weighed(name: str, evidence: float) -> Any:
 def test_an_effect_that_entered_and_is_not_named_makes_none_likely() -> None:
     backlash, friction = weighed("backlash", 824.0), weighed("friction", 1.0)
     selection = SimpleNamespace(weighed=(backlash, friction))
-    decided: Any = SimpleNamespace(named=())
+    decided: Any = SimpleNamespace(named=(), drift=None)
 
     def best(*entered: Any) -> tuple[float, ...]:
         judged: Any = SimpleNamespace(found=SimpleNamespace(selection=selection), closings={})
@@ -39,7 +39,7 @@ def test_what_shows_only_beside_another_effect_is_as_likely_as_it_is_worth_there
         closings={"coupling": closing, "pitch-error": closing},
         share=lambda without: 0.4,
     )
-    decided: Any = SimpleNamespace(named=(first, second))
+    decided: Any = SimpleNamespace(named=(first, second), drift=None)
     named = chances_of(judged, decided, POPULATION, LINES, ()).named
     assert named["pitch-error"] == POPULATION.effect.of(effect_signs(90.0, LINES, True, 0.4)).value
     assert named["coupling"] == POPULATION.effect.of(effect_signs(300.0, LINES, True, 0.4)).value

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gearbench.diagnosis.effects.library import LIBRARY
+from gearbench.diagnosis.effects.library import CHANGING, LIBRARY
 from gearbench.diagnosis.intake.signals import CHANNELS
 from gearbench.diagnosis.verdict import Effect, Gap, Parameter, Probabilities, Range, Verdict
 from gearbench.figures.gaps.diagnosis_gap import octave_bands
@@ -74,18 +74,18 @@ def test_only_certainty_is_called_certain(value: float, text: str) -> None:
 
 def test_every_effect_place_and_channel_has_words() -> None:
     assert set(PLACES) == set(PLACE_WORDS)
-    for effect in LIBRARY:
+    for effect in (*LIBRARY, *CHANGING):
         assert effects_in_words([effect.name]) == effect.noun
         assert effect.meaning.endswith(".") and effect.parameters
     assert set(CHANNELS) <= set(CHANNEL_WORDS) == set(SHORT_CHANNELS)
     assert effects_in_words([]) == "the nominal rig"
     assert effects_in_words(["friction", "tooth-crack"]) == "friction between the flanks and a cracked tooth"
-    assert effects_in_words(["profile-error"]) == "profile error"
+    assert effects_in_words(["loose-foot"]) == "loose foot"  # as another program may name it
     assert parameter_in_words("friction", "coefficient") == "coefficient of friction"
     assert parameter_in_words("sensor-delay", "angle_driver.delay") == "delay (angle of the driver)"
     ripple = parameter_in_words("torque-ripple", "order_6.relative_amplitude")
     assert ripple == "amplitude over the mean torque (order 6)"
-    assert parameter_in_words("profile-error", "driven.slope") == "slope (driven)"
+    assert parameter_in_words("loose-foot", "driven.slope") == "slope (driven)"
 
 
 def gap(channel: str, band: tuple[float, float], nominal: float, with_effect: float | None) -> Gap:

@@ -10,7 +10,7 @@ from shared.synthetic import measurement
 from gearbench.diagnosis.effects.background import background
 from gearbench.diagnosis.effects.effect import Effect, Estimate, Hypothesis, Wide
 from gearbench.diagnosis.effects.free_forms import free_forms
-from gearbench.diagnosis.effects.library import LIBRARY, all_unknowns, hypotheses
+from gearbench.diagnosis.effects.library import CHANGING, LIBRARY, all_unknowns, hypotheses
 from gearbench.diagnosis.evidence.prediction import starts
 from gearbench.diagnosis.forces.condition import prepare
 from gearbench.diagnosis.forces.nominal import NominalModel, nominal_model
@@ -75,7 +75,7 @@ def test_names_and_places_are_the_contract(model: NominalModel) -> None:
     found = hypotheses(model)
     names = [effect.name for effect in LIBRARY]
     assert {h.effect.name for h in found if h.effect} == set(names) and len(set(names)) == len(names)
-    assert set(names) <= set(EFFECTS) and len(EFFECTS) == 15
+    assert {*names, *(effect.name for effect in CHANGING)} == set(EFFECTS) and len(EFFECTS) == 15
     assert len({h.name for h in (*found, *free_forms())}) == len(found) + len(free_forms())
     assert {h.place for h in (*found, *free_forms())} <= set(PLACES)
     places = {h.effect.name: h.place for h in found if h.effect}

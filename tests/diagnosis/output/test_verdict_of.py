@@ -12,6 +12,7 @@ import pytest
 from gearbench.diagnosis.effects.effect import Hypothesis, Wide
 from gearbench.diagnosis.effects.library import LIBRARY
 from gearbench.diagnosis.evidence.calibration import LIMITS
+from gearbench.diagnosis.output.drift import Drift
 from gearbench.diagnosis.output.missing import OUTSTANDING, Missing
 from gearbench.diagnosis.output.verdict_of import GREATER, VISIBLE, Decided, decide_simulated
 from gearbench.diagnosis.population import POPULATION
@@ -33,6 +34,7 @@ def decided(
     excess: np.ndarray = QUIET,
     unsteady: np.ndarray = QUIET,
     changing: float = 0.0,
+    drift: Drift | None = None,
 ) -> Decided:
     """`worth` nats of friction (None: nothing was kept), which closes `share` of the gap; `left` of the nominal gap,
     `remains` of a channel's fluctuation in the end."""
@@ -49,7 +51,8 @@ def decided(
     form = SimpleNamespace(hypothesis=Hypothesis("free drive", "drive", ()), log_bayes_factor=free)
     forces: Any = SimpleNamespace(best_free=form if free else None, tried=())
     missing = Missing(excess, ((0.0, 100.0),), np.ones((1, 5)))
-    return decide_simulated(judged, forces, missing, unsteady, changing, HAND, replace(POPULATION, changing=0.03))
+    known = replace(POPULATION, changing=0.03)
+    return decide_simulated(judged, forces, missing, unsteady, changing, HAND, known, drift)
 
 
 def at(number: int, value: float) -> np.ndarray:
@@ -104,3 +107,18 @@ def test_what_changes_counts_by_its_part_of_the_gap() -> None:
     assert "2.0 % of the gap" in quiet.because[-1] and len(decided(None).because) == 1
     assert decided(None, unsteady=out, changing=0.04).place == "driven-support"
     assert decided(900.0, unsteady=out, changing=0.3, share=0.8).verdict == "effects"
+
+
+def test_a_drift_that_explains_what_changes_is_named_and_speaks_against_nothing() -> None:
+    support, drift = at(1, 1e4), Drift("driver-support", -0.07, 0.002, 0.98, 200.0)
+    unknown = decided(None, unsteady=support, changing=0.2)
+    assert (unknown.verdict, unknown.place, unknown.drift) == ("unknown", "driver-support", None)
+    alone = decided(None, unsteady=support, changing=0.2, drift=drift)
+    assert (alone.verdict, alone.place, alone.named, alone.drift) == ("effects", "driver-support", (), drift)
+    assert "98 %" in alone.because[0] and "-7" in alone.because[0]
+    both = decided(40.0, unsteady=support, changing=0.2, drift=drift)
+    assert both.verdict == "effects" and both.place == "mesh" and both.drift is drift and len(both.named) == 1
+    # Records that hardly change need none, and a gap that stays is not closed by one.
+    assert decided(None, unsteady=support, changing=0.01, drift=drift).verdict == "none"
+    left = decided(None, unsteady=support, changing=0.2, drift=drift, left=0.9, remains=0.9)
+    assert left.verdict == "unknown" and left.drift is None and "98 %" in left.because[-1]

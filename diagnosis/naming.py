@@ -1,0 +1,75 @@
+"""The named effects as a verdict tells them: how likely, with which parameters, and what each closes of the gap."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from gearbench.diagnosis.chances import Chances
+from gearbench.diagnosis.effects.effect import Effect as Library
+from gearbench.diagnosis.effects.effect import Estimate
+from gearbench.diagnosis.effects.temperature_drift import TEMPERATURE_DRIFT
+from gearbench.diagnosis.intake.signals import UNITS
+from gearbench.diagnosis.output.judged import Closing, Judged, rms_closed
+from gearbench.diagnosis.output.verdict_of import Decided
+from gearbench.diagnosis.verdict import NINE_OF_TEN, Effect, Parameter, Range
+from gearbench.diagnosis.words import SHOWN_UNITS
+
+
+def parameters_of(effect: Library, estimates: Sequence[Estimate]) -> dict[str, Parameter]:
+    """Values with the interval that a normal distribution of the stated deviation has."""
+    out = {}
+    for e in estimates:
+        reach = NINE_OF_TEN * effect.stated(e)
+        out[e.name] = Parameter(value=e.value, low=e.value - reach, high=e.value + reach, unit=e.unit)
+    return out
+
+
+def effects_of(judged: Judged, decided: Decided, chances: Chances) -> tuple[Effect, ...]:
+    """The named effects with their parameters and what they close; one at work in two places counts once."""
+    found = judged.found
+    values = found.layout.fitted(found.selection.best.p, found.std)
+    out: dict[str, Effect] = {}
+    for one in decided.named:
+        effect = one.hypothesis.effect
+        assert effect is not None
+        estimates = effect.add(found.layout.nominal.rig, one.hypothesis, values)[1]
+        before = out[effect.name].parameters if effect.name in out else {}
+        closing = judged.closings[one.hypothesis.name]
+        out[effect.name] = Effect(
+            name=effect.name,
+            probability=chances.named[one.hypothesis.name],
+            due=closing.due,
+            parameters={**before, **parameters_of(effect, estimates)},
+            share=judged.share(closing.without),
+            closes=_closes(judged, closing),
+        )
+    return tuple(out.values())
+
+
+def drifts_of(decided: Decided, changing: float, chances: Chances) -> tuple[Effect, ...]:
+    """The drift that is named; of the gap it has what changes."""
+    drift, effect = decided.drift, TEMPERATURE_DRIFT
+    if drift is None:
+        return ()
+    of = "" if drift.place == "mesh" else f"{drift.place.removesuffix('-support')}."
+    estimate = Estimate(f"{of}stiffness_drift", drift.value, drift.std, "1")
+    return (
+        Effect(
+            name=effect.name,
+            probability=chances.named[effect.name],
+            due=True,
+            parameters=parameters_of(effect, (estimate,)),
+            share=min(changing**2 * drift.share, 1.0),
+        ),
+    )
+
+
+def _closes(judged: Judged, closing: Closing) -> dict[str, Range]:
+    """By channel, rms in um or N m that comes back without an effect."""
+    out = {}
+    for channel in judged.sizes:
+        sizes = rms_closed(judged.measured, channel, closing.without[channel], judged.signals[channel])
+        scale = SHOWN_UNITS.get(UNITS[channel], (1.0, ""))[0]
+        value, low, high = (scale * size for size in sizes)
+        out[channel] = Range(value=value, low=low, high=high)
+    return out

@@ -1,0 +1,116 @@
+"""A stiffness that drifts over a record, read off what differs between its repetitions.
+
+Repetition r of P is the rig at the mean stiffness of its time: about the mean of all, its lines move by
+tau_r delta dY/d(ln k), tau_r = (r + 1/2)/P - 1/2, where delta is the change of ln k from the first sample to the last.
+The derivative is that of the rig found. One number explains all lines of all channels and records, or none.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.diagnosis.effects.effect import SIDES, SUPPORT_PLACES
+from gearbench.diagnosis.forces.steadiness import COLOURED, scatter_of
+from gearbench.diagnosis.forces.unknowns import Unknowns
+from gearbench.diagnosis.intake.signals import measured_channels
+from gearbench.diagnosis.output.simulated import Simulated
+from gearbench.diagnosis.output.target import INDEPENDENT
+from gearbench.rig.contract import Place
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+# Part of what changes, by energy, from which a drift is its cause: a torque that is not locked to the rotation or a
+# coupling that slips leave less than 0.2 to it, a support that softens by 7 % less than 0.01 to anything else.
+EXPLAINS = 0.5
+
+
+@dataclass(frozen=True)
+class Drift:
+    """Relative change of the stiffness at `place` from the first sample of a record to the last, with its standard
+    deviation, the part of all that changes between repetitions that it explains, by energy, and nats of evidence."""
+
+    place: Place
+    value: float
+    std: float
+    share: float
+    nats: float
+
+
+@dataclass(frozen=True)
+class _Part:
+    """What changes of a channel of a record: repetitions' departures (P, n) from their mean in units of the noise, at
+    the lines that change, and tau_r (P, 1); derivatives of the same lines (n,) by place."""
+
+    departures: Complex
+    time: Array
+    derivatives: dict[Place, Complex]
+
+    def slope(self, place: Place) -> tuple[float, float]:
+        """Of the energy that is left with a drift there, half the slope and half the curvature."""
+        column = self.time * self.derivatives[place]
+        return float(np.vdot(column, self.departures).real), float(np.vdot(column, column).real)
+
+    def left(self, place: Place, value: float) -> float:
+        """Energy that is left with that drift there."""
+        return float((np.abs(self.departures - value * self.time * self.derivatives[place]) ** 2).sum())
+
+
+def drift_of(found: Simulated) -> Drift | None:
+    """The drift that explains most of what changes between repetitions of the records of the search; None where that
+    is less than half, or nothing changes beyond noise."""
+    parts = _parts(found)
+    whole = sum(float((np.abs(one.departures) ** 2).sum()) for one in parts)
+    if whole == 0.0:
+        return None
+    drifts = [_drift_at(parts, whole, place) for place in parts[0].derivatives]
+    best = max(drifts, key=lambda one: one.share)
+    return best if best.share > EXPLAINS else None
+
+
+def _drift_at(parts: list[_Part], whole: float, place: Place) -> Drift:
+    """The drift at one place, from all parts; its scatter over them is how well it is known."""
+    slopes = np.array([one.slope(place) for one in parts])
+    total, weight = slopes.sum(axis=0)
+    if weight == 0.0:
+        return Drift(place, 0.0, 0.0, 0.0, 0.0)
+    value, seen = total / weight, slopes[:, 1] > 0.0
+    apart = slopes[seen, 0] / slopes[seen, 1] - value
+    std = float(np.sqrt((slopes[seen, 1] * apart**2).sum() / weight / max(seen.sum() - 1, 1)))
+    nats = 0.0
+    for one in parts:
+        energy, lines = float((np.abs(one.departures) ** 2).sum()), one.departures.shape[1]
+        nats += min(INDEPENDENT, lines) * float(np.log(energy / max(one.left(place, value), float(lines))))
+    left = sum(one.left(place, value) for one in parts)
+    return Drift(place, float(value), std, 1.0 - left / whole, nats)
+
+
+def _parts(found: Simulated) -> list[_Part]:
+    """The channels of all records in which lines change between repetitions."""
+    target, jacobian = found.simulator.target, found.selection.best.sensitivity.jacobian
+    rows, out, start = _rows(found.layout.unknowns), [], 0
+    for number, channel, bins in target.plan:
+        stop = start + len(bins)
+        repetitions = measured_channels(target.measurements[number])[channel]
+        count = len(repetitions)
+        if count > 1:
+            lines = np.fft.rfft(repetitions, axis=-1)[:, bins] / repetitions.shape[-1]
+            apart, white = scatter_of(lines)
+            changing = apart > COLOURED * white
+            unit = np.sqrt(white) if white > 0.0 else 1.0
+            columns = {place: jacobian[row, start:stop][changing] / unit for place, row in rows.items()}
+            time = ((np.arange(count) + 0.5) / count - 0.5)[:, None]
+            departures = (lines - lines.mean(axis=0))[:, changing] / unit
+            if changing.any():
+                out.append(_Part(departures, time, columns))
+        start = stop
+    return out
+
+
+def _rows(unknowns: Unknowns) -> dict[Place, int]:
+    """The unknown that is the logarithm of the stiffness, by place."""
+    supports = {SUPPORT_PLACES[side]: unknowns["stiffness"].start + n for n, side in enumerate(SIDES)}
+    return {"mesh": unknowns["scale"].start, **supports}
