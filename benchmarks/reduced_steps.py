@@ -1,11 +1,11 @@
 """How fast the reduced rig of paper_fe runs: rig time over processor time, and where the time goes; one core.
 
-    python benchmarks/reduced_steps.py [--peers]
+    OMP_NUM_THREADS=1 python benchmarks/reduced_steps.py
 
 Parts are timed alone, in loops of their own, at a position of the run: search of tooth pairs; modes (prediction,
 effective mass, one solution); output of a sample, once in eight steps. Contact is the rest.
 
---peers: a step of the reduced model beside one of the full model and an increment of CalculiX (`*DYNAMIC`, contact by
+Below, a step of the reduced model beside one of the full model and an increment of CalculiX (`*DYNAMIC`, contact by
 surfaces) on one pair, a step of torque from rest (`tests/validation/calculix/torque_step.py`), all in steps of 20 us.
 CalculiX runs on the mesh of the full model, whose local answer to contact is found analytically, and on one that
 resolves the width of contact, which CalculiX needs. It takes minutes, and wants ccx on the path.
@@ -19,8 +19,10 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
-from typing import Any
+from statistics import median
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -51,8 +53,10 @@ from validation.calculix import torque_step
 STEPS = 65536
 SUBSTEPS = 8
 INCREMENT = 2e-5  # [s]: a 36th of the course that CalculiX was run over
-INCREMENTS = 2  # that CalculiX solves
+INCREMENTS = 2  # that CalculiX solves beside the first
+REDUCED_STEPS = 4000
 FULL_STEPS = 20
+ROUNDS = 3
 
 
 @compiled
@@ -86,28 +90,39 @@ def output(law: Law, samples: int) -> int:
 def spent(job: Callable[[], Any], repeats: int = 5) -> float:
     """Least processor time [s] of a job, which is run once before."""
     job()
-    times = []
-    for _ in range(repeats):
-        began = time.process_time()
-        job()
-        times.append(time.process_time() - began)
-    return min(times)
+    return min(timed(job) for _ in range(repeats))
 
 
-def step_of_reduced() -> tuple[float, int]:
-    """Processor time [s] of a step of the reduced model after a step of torque, and its unknowns."""
+def timed(job: Callable[[], Any]) -> float:
+    """Processor time [s] of a job."""
+    began = time.process_time()
+    job()
+    return time.process_time() - began
+
+
+class Peer(NamedTuple):
+    """A program beside the others: its name, and a step taken: processor time [s], and what it solves for."""
+
+    name: str
+    step: Callable[[], tuple[float, str]]
+
+
+def reduced_peer() -> Peer:
+    """The reduced model after a step of torque."""
     machine, scheme = machine_for(elastic(), 0.0), make_scheme(INCREMENT, 0.9)
-    start, torque = initial_state(machine, REST), np.full(4000, TORQUE)
-    return spent(lambda: advance(machine, scheme, start, torque, 1)) / len(torque), len(machine.mass)
+    start, torque = initial_state(machine, REST), np.full(REDUCED_STEPS, TORQUE)
+    advance(machine, scheme, start, torque, 1)  # compiles
+    job = partial(advance, machine, scheme, start, torque, 1)
+    return Peer("reduced", lambda: (timed(job) / REDUCED_STEPS, f"{len(machine.mass)} unknowns"))
 
 
-def step_of_full() -> tuple[float, int]:
-    """Likewise of the full model."""
+def full_peer() -> Peer:
+    """Likewise the full model."""
     case = read_case(FOLDER / "torque_step.toml")
     machine = full_machine(elastic(), full_gears(case.rig, case.simulation, lambda note: None), 0.0)
     integrator, start = make_integrator(machine, make_scheme(INCREMENT, 0.9)), full_start.initial_state(machine, REST)
-    torque = np.full(FULL_STEPS, TORQUE)
-    return spent(lambda: record.advance(integrator, start, torque), 1) / FULL_STEPS, machine.unknowns
+    job = partial(record.advance, integrator, start, np.full(FULL_STEPS, TORQUE))
+    return Peer("full", lambda: (timed(job) / FULL_STEPS, f"{machine.unknowns} unknowns"))
 
 
 def meshes_of_full() -> tuple[GearMesh, GearMesh]:
@@ -117,39 +132,48 @@ def meshes_of_full() -> tuple[GearMesh, GearMesh]:
     return full_mesh(one.sector), full_mesh(two.sector)
 
 
-def increment_of_calculix(meshes: tuple[GearMesh, GearMesh] | None = None) -> tuple[float, int]:
-    """Likewise of an increment of CalculiX, the whole process over its increments, and its nodes; on a mesh that
-    resolves the width of contact, or on other meshes of the gears."""
-    torque_step.DURATION = INCREMENTS * INCREMENT
-    settings = {"across": 3.0, "size": 1.0, "penalty": 1.0, "steps": INCREMENTS, "alpha": -0.05}
+def calculix_peer(name: str, meshes: tuple[GearMesh, GearMesh] | None) -> Peer:
+    """CalculiX, on these meshes of the gears or on its own: what more increments cost than the first alone, so that
+    reading the model and setting up do not count."""
+
+    def step() -> tuple[float, str]:
+        (first, nodes), (more, _) = run_of_calculix(meshes, 1), run_of_calculix(meshes, 1 + INCREMENTS)
+        return (more - first) / INCREMENTS, f"{nodes} nodes"
+
+    return Peer(name, step)
+
+
+def run_of_calculix(meshes: tuple[GearMesh, GearMesh] | None, increments: int) -> tuple[float, int]:
+    """Processor time [s] of the whole process, and nodes."""
+    settings = {"across": 3.0, "size": 1.0, "penalty": 1.0, "steps": increments, "alpha": -0.05}
+    case = read_case(FOLDER / "torque_step.toml")
     with tempfile.TemporaryDirectory() as folder:
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        run = torque_step.run(Path(folder), read_case(FOLDER / "torque_step.toml"), settings, meshes)
+        run = torque_step.run(Path(folder), case, settings, meshes, increments * INCREMENT)
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    seconds = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-    return seconds / INCREMENTS, int(run["nodes"])
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, int(run["nodes"])
 
 
-def peers() -> None:
-    """Print a step of each program on the same pair."""
-    ours, unknowns = step_of_reduced()
-    print(f"a step of {1e6 * INCREMENT:.0f} us of a pair of 20 and 20 teeth, processor time:")
-    print(f"  reduced   {1e6 * ours:8.2f} us, {unknowns} unknowns")
-    full, unknowns = step_of_full()
-    print(f"  full      {1e3 * full:8.2f} ms, {unknowns} unknowns: {full / ours:.0f} times the reduced model's")
-    if shutil.which("ccx") is None:
-        print("  CalculiX  not run: CalculiX is not installed (no ccx on the path)")
-        return
-    for words, meshes in (("on the full model's mesh", meshes_of_full()), ("on a mesh that resolves contact", None)):
-        seconds, nodes = increment_of_calculix(meshes)
+def side_by_side() -> None:
+    """Print the medians of a step of each program on the same pair, all of them taking turns."""
+    peers, missing = [reduced_peer(), full_peer()], shutil.which("ccx") is None
+    if not missing:
+        peers += [calculix_peer("CalculiX", meshes_of_full()), calculix_peer("CalculiX, own mesh", None)]
+    rounds = [[peer.step() for peer in peers] for _ in range(ROUNDS)]
+    turns = [[seconds for seconds, _ in steps] for steps in zip(*rounds, strict=True)]
+    medians = [median(times) for times in turns]
+    print(f"a step of {1e6 * INCREMENT:.0f} us, 20 and 20 teeth, processor time, medians of {ROUNDS} in turn:")
+    for peer, middle, times, (_, size) in zip(peers, medians, turns, rounds[0], strict=True):
         print(
-            f"  CalculiX  {seconds:8.2f} s, {nodes} nodes {words}: {seconds / full:.0f} times the full model's,"
-            f" {seconds / ours:.2g} times the reduced model's"
+            f"  {peer.name:18} {1e3 * middle:11.4f} ms ({1e3 * min(times):.4f} to {1e3 * max(times):.4f}), {size};"
+            f" {middle / medians[0]:.3g} times reduced, {middle / medians[1]:.3g} times full"
         )
+    if missing:
+        print("  CalculiX not run: it is not installed (no ccx on the path)")
 
 
 def main() -> None:
-    """Print the real-time factor and the shares, and where asked for the peers."""
+    """Print the real-time factor and the shares, then the other programs beside it."""
     case = read_case(case_path("paper_fe"))
     machine = machine_for(elastic_rig(case.rig, case.simulation), 2.0)
     scheme, start, torque = make_scheme(1 / STEPS, 0.9), initial_state(machine, 2.0), np.full(STEPS, 2.0)
@@ -163,8 +187,7 @@ def main() -> None:
     print(f"{STEPS} steps, 1 s of rig time: {total:.3f} s of processor time, {1 / total:.1f} times real time")
     for name, seconds in parts.items():
         print(f"  {name:8} {1e6 * seconds / STEPS:6.2f} us a step {seconds / total:6.0%}")
-    if "--peers" in sys.argv[1:]:
-        peers()
+    side_by_side()
 
 
 if __name__ == "__main__":

@@ -95,9 +95,10 @@ def dynamic_deck(
     steps: int,
     alpha: float,
     meshes: tuple[GearMesh, GearMesh] | None = None,
+    duration: float = DURATION,
 ) -> tuple[str, float, int]:
     """The input of CalculiX, the static transmission error [m] of the torque, and the number of nodes; `meshes` of both
-    gears in place of those made here."""
+    gears in place of those made here; `duration` [s] of all steps together."""
     _coarsen(across, size)
     model = calculix.contact_model(case, 0.0, torque=TORQUE)
     deck = replace(model.deck, head=("A step of torque on a pair in contact.",))
@@ -114,16 +115,16 @@ def dynamic_deck(
     head, *_ = re.split(r"(?=\*\* Step \d)", text)
     head = re.sub(r"(PRESSURE-OVERCLOSURE=LINEAR\n)(\S+)", lambda m: f"{m[1]}{penalty * float(m[2]):.6g}", head)
     nodes = sum(len(placed.mesh.points) for placed in deck.gears)
-    return head + "\n".join(_dynamic_step(steps, alpha)) + "\n", model.dte, nodes
+    return head + "\n".join(_dynamic_step(steps, alpha, duration)) + "\n", model.dte, nodes
 
 
-def _dynamic_step(steps: int, alpha: float) -> list[str]:
+def _dynamic_step(steps: int, alpha: float, duration: float) -> list[str]:
     held = [line for name in ("DRIVER", "DRIVEN") for line in (f"HUB_{name}, 1, 1", f"MOMENT_{name}, 2, 3")]
     held += [f"ANGLE_{name}, 2, 3" for name in ("DRIVER", "DRIVEN")] + ["MOMENT_DRIVEN, 1, 1"]
     return [
         f"*STEP, INC={2 * steps}, NLGEOM",
         f"*DYNAMIC, DIRECT, ALPHA={alpha:g}",
-        f"{DURATION / steps:.12g}, {DURATION:.12g}",
+        f"{duration / steps:.12g}, {duration:.12g}",
         "*CONTROLS, PARAMETERS=TIME INCREMENTATION",
         "4, 8, 9, 150, 10, 4, , 5, , ",
         "*BOUNDARY",
@@ -150,11 +151,15 @@ def angles_in(text: str) -> tuple[list[float], list[float]]:
 
 
 def run(
-    work: Path, case: Case, settings: dict[str, Any], meshes: tuple[GearMesh, GearMesh] | None = None
+    work: Path,
+    case: Case,
+    settings: dict[str, Any],
+    meshes: tuple[GearMesh, GearMesh] | None = None,
+    duration: float = DURATION,
 ) -> dict[str, Any]:
     """One run of CalculiX. Raises RuntimeError where it fails."""
     work.mkdir(parents=True, exist_ok=True)
-    text, dte, nodes = dynamic_deck(case, **settings, meshes=meshes)
+    text, dte, nodes = dynamic_deck(case, **settings, meshes=meshes, duration=duration)
     (work / "step.inp").write_text(text)
     before = time.perf_counter()
     done = subprocess.run(["ccx", "step"], cwd=work, capture_output=True, text=True, check=False)
@@ -163,7 +168,7 @@ def run(
     if len(times) < settings["steps"]:
         raise RuntimeError(f"CalculiX stopped after {len(times)} of {settings['steps']} increments")
     base = profile(case.rig.driver).base_radius
-    start = times[0] - DURATION / settings["steps"]
+    start = times[0] - duration / settings["steps"]
     return {
         **settings,
         "nodes": nodes,
