@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gearbench.files import fingerprint
-from gearbench.shell.failure import InputError, say
+from gearbench.shell.failure import InputError
 from gearbench.shell.output import Output, claimed
 from gearbench.shell.progress import Silent, Steps
 from gearbench.studies import member_text, reader
@@ -147,10 +147,6 @@ class _Search:
             valley = minimise(points.at, self.bounds, self.over, points.ahead)
         except BenchError as error:
             raise BenchError(f"{error}{': ' if points.said else ''}{points.said}") from error
-        except KeyboardInterrupt:
-            if output is not None:
-                say(f"what is done is kept in {output.folder}: the same command goes on from there")
-            raise
         finally:
             points.finish()
         name, loads = self.ask.of[0], self.ask.loads

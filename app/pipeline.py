@@ -147,7 +147,7 @@ def _simulate_together(jobs: list[Job], workers: int | None) -> None:
     progress, paths = missing[0].progress, [job.output.path(job.name("record.nc")) for job in missing]
     progress.step(f"records of {len(missing)} conditions")
     with ExitStack() as folders:
-        kept = [folders.enter_context(checkpoints_of(path)) for path in paths]
+        kept = [folders.enter_context(checkpoints_of(path, within=True)) for path in paths]
         cases = [job.case for job in missing]
         simulate_all_to(cases, paths, take, progress=progress, checkpoints=kept, workers=workers)
 
@@ -173,7 +173,7 @@ def run_experiment(job: Job) -> tuple[dict[str, Any], RunPart | None]:
     )
     if not job.output.has(job.name("record.nc")):
         progress.step(job.name("record.nc"))
-        with checkpoints_of(job.output.path(job.name("record.nc"))) as kept:
+        with checkpoints_of(job.output.path(job.name("record.nc")), within=True) as kept:
             # Piece by piece into its file: memory then holds the record, not what it is made of besides.
             simulating = partial(simulate_to, case, progress=progress, checkpoints=kept, workers=job.workers)
             job.output.write(job.name("record.nc"), simulating)

@@ -173,20 +173,16 @@ def members(
             found[task.number] = kept
     missing = [task for task in plan.tasks if task.number not in found]
     teller.step("members")
-    try:
-        for one in _found(plan, missing, workers, cluster):
-            found[one.number] = one
-            # One whose process died says nothing of its case: the same command tries it again.
-            if one.sources:
-                names = [factor.name for factor in plan.design.factors]
-                values = dict(zip(names, plan.design.members[one.number], strict=True))
-                shelf.save(plan.tasks[one.number], one, values, plan.study.seed)
-            failed = sum(bool(each.sentence) for each in found.values())
-            note = f"{len(found)} of {len(plan.tasks)}" + (f", {failed} failed" if failed else "")
-            teller(len(found) / len(plan.tasks), note)
-    except KeyboardInterrupt:
-        say(f"what is done is kept in {output.folder}: the same command goes on from there")
-        raise
+    for one in _found(plan, missing, workers, cluster):
+        found[one.number] = one
+        # One whose process died says nothing of its case: the same command tries it again.
+        if one.sources:
+            names = [factor.name for factor in plan.design.factors]
+            values = dict(zip(names, plan.design.members[one.number], strict=True))
+            shelf.save(plan.tasks[one.number], one, values, plan.study.seed)
+        failed = sum(bool(each.sentence) for each in found.values())
+        note = f"{len(found)} of {len(plan.tasks)}" + (f", {failed} failed" if failed else "")
+        teller(len(found) / len(plan.tasks), note)
     return _table(plan, [found[number] for number in range(len(plan.tasks))]), bool(missing)
 
 

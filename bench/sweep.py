@@ -7,7 +7,9 @@ Whatever the model: it needs to hand a state on to another speed and to tell the
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from math import ceil, log, pi
+from pathlib import Path
 from threading import Event, Lock
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
@@ -24,11 +26,14 @@ from gearbench.bench.plan.workers import READY, processors, realisations
 from gearbench.bench.protocol import Model, Prepared
 from gearbench.bench.record.attributes import turning_inertias
 from gearbench.bench.refusals.gears import check_gears
+from gearbench.bench.tape import Shelf, Tape
+from gearbench.files import fingerprint
 from gearbench.geometry import pair
 from gearbench.geometry.tooth.iso1328 import drawn_gear
 from gearbench.lumped.stiffness.dynamic_factor import deviations, dynamic_factor, resonance_speed
 from gearbench.lumped.stiffness.iso6336 import iso_stiffness
-from gearbench.rig import Case, Rig
+from gearbench.records.provenance import source_digest
+from gearbench.rig import Case, Rig, dump_case
 
 Array = NDArray[np.float64]
 
@@ -77,6 +82,7 @@ def sweep(
     model: str | None = None,
     progress: ProgressReport | None = None,
     *,
+    checkpoints: str | Path | None = None,
     workers: int | None = None,
 ) -> xr.Dataset:
     """Steady answer to the mean torque at driver speeds [rad/s], upwards and downwards.
@@ -84,8 +90,9 @@ def sweep(
     Variables over (direction, speed): dte_rms, dte_mean [m], dynamic_factor, contact_loss, beyond_model, residual,
     settled; and dte_amplitude (direction, speed, order) [m], order in mesh orders. iso_dynamic_factor (speed): K_v by
     ISO 6336-1 Method B. Both directions run side by side unless `workers` (absent: as many as there are processors) is
-    1; the result is the same to the last bit. `progress` is called from any of their threads. Raises BenchError for a
-    model that cannot be swept.
+    1; the result is the same to the last bit. `progress` is called from any of their threads. `checkpoints`: a folder
+    for the speeds that are done, from which the same sweep goes on, as in `simulate`. Raises BenchError for a model
+    that cannot be swept, FileError for a folder of another origin.
     """
     report = progress or (lambda fraction, note: None)
     case, solver = model_for(_still(case), model)
@@ -96,31 +103,41 @@ def sweep(
         raise BenchError("a sweep needs at least one speed above 0")
     if workers is not None and workers < 1:
         raise BenchError(f"workers = {workers} must be at least 1")
-    ways = _both_ways(case, solver, rising, report, processors() if workers is None else workers)
+    shelf = None if checkpoints is None else Shelf(Path(checkpoints), _identity(case, rising))
+    ways = _both_ways(case, solver, rising, report, processors() if workers is None else workers, shelf)
     return _dataset(case, solver, np.array(rising), dict(zip(DIRECTIONS, ways, strict=True)))
 
 
 def _both_ways(
-    case: Case, solver: Model, rising: Sequence[float], report: ProgressReport, workers: int
+    case: Case, solver: Model, rising: Sequence[float], report: ProgressReport, workers: int, shelf: Shelf | None
 ) -> list[list[Look]]:
-    """Looks at rising speeds, upwards and downwards, each direction begun at rest."""
+    """Looks at rising speeds, upwards and downwards, each direction begun at rest, or where the shelf has it ended."""
     done = np.zeros(len(DIRECTIONS))
     lock, stop = Lock(), Event()
 
     def run(number: int) -> list[Look]:
-        direction, last, found = DIRECTIONS[number], None, []
+        direction = DIRECTIONS[number]
         order = rising if direction == "up" else rising[::-1]
-        for at, speed in enumerate(order):
+        tape = None if shelf is None else shelf.tape(direction, _prepared(_at(case, order[0]), solver).start(0))
+        found = [] if tape is None else _kept(tape)
+        last = tape.state if tape is not None and found else None
 
-            def tell(share: float, at: int = at, note: str = f"{direction}, {speed * 30 / pi:.0f} rpm") -> None:
-                if stop.is_set():
-                    raise InterruptedError("the other direction has failed, or the sweep was interrupted")
-                with lock:
-                    done[number] = (at + share) / len(order)
-                    report(float(done.mean()), note)
+        def tell(share: float, at: int, speed: float) -> None:
+            if stop.is_set():
+                raise InterruptedError("the other direction has failed, or the sweep was interrupted")
+            with lock:
+                done[number] = (at + share) / len(order)
+                report(float(done.mean()), f"{direction}, {speed * 30 / pi:.0f} rpm")
 
-            look, last = _look(case, solver, speed, last, tell)
-            found.append(look)
+        try:
+            for at in range(len(found), len(order)):
+                look, last = _look(case, solver, order[at], last, partial(tell, at=at, speed=order[at]))
+                found.append(look)
+                if tape is not None:
+                    tape.put(last, _row(look))
+        finally:
+            if tape is not None:
+                tape.flush()
         return found if direction == "up" else found[::-1]
 
     if len(rising) == 1:
@@ -128,6 +145,26 @@ def _both_ways(
     if workers == 1:
         return [run(number) for number in range(2)]  # here, where an interruption arrives at once
     return realisations(run, 2, stop, workers)
+
+
+def _identity(case: Case, speeds: Sequence[float]) -> str:
+    return fingerprint(dump_case(case), source_digest(), *(speed.hex() for speed in speeds))
+
+
+def _row(look: Look) -> Array:
+    """A look as one row (1, n) of numbers."""
+    return np.concatenate([look[:-1], look.spectrum])[None]
+
+
+def _kept(tape: Tape) -> list[Look]:
+    """The looks that a tape holds, its state being that at the end of the last one."""
+    found: list[Look] = []
+    while (rows := tape.take(1)) is not None:
+        names = Look._fields[:-1]
+        values: dict[str, Any] = dict(zip(names, rows[0, : len(names)].tolist(), strict=True))
+        values["hurried"] = bool(values["hurried"])
+        found.append(Look(**values, spectrum=rows[0, len(names) :]))
+    return found
 
 
 def _still(case: Case) -> Case:
@@ -142,14 +179,18 @@ def _at(case: Case, speed: float) -> Case:
     return case.model_copy(update={"experiment": case.experiment.at_speed(speed).model_copy(update=values)})
 
 
+def _prepared(there: Case, solver: Model) -> Prepared[Any]:
+    with READY:
+        return solver.prepare(there, schedule(there.experiment, there.rig), lambda note: None)
+
+
 def _look(
     case: Case, solver: Model, speed: float, before: Any, tell: Callable[[float], None]
 ) -> tuple[Look, Any]:
     """One speed, from the state `before` that another one ended with (None: from rest), and the state at its end;
     `tell` hears of the fraction done that is certain."""
     there = _at(case, speed)
-    with READY:
-        prepared = solver.prepare(there, schedule(there.experiment, there.rig), lambda note: None)
+    prepared = _prepared(there, solver)
     if not isinstance(prepared, Sweepable):
         raise BenchError(
             f"the {solver.title} of this case cannot be swept over speed: set simulation.model = \"reduced\", or"

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from gearbench.files import digest_of, remove_strays, write_text, write_whole
-from gearbench.shell.failure import InputError
+from gearbench.shell.failure import InputError, say
 
 _MARK = "run.json"
 
@@ -74,7 +74,7 @@ def claimed(folder: Path, command: str, identity: str, force: bool = False) -> I
 
     A new or empty folder is taken. One that the same command with the same identity left is resumed. Anything
     else is refused with InputError, unless `force`: then the files that the former run wrote are removed, and
-    nothing else. Two runs into one folder at the same time are refused too.
+    nothing else. Two runs into one folder at the same time are refused too. An interruption says what it leaves.
     """
     if folder.exists() and not folder.is_dir():
         raise InputError(f"--out {folder} is a file; it must be a folder")
@@ -88,7 +88,12 @@ def claimed(folder: Path, command: str, identity: str, force: bool = False) -> I
         remove_strays(folder)
         output = Output(folder)
         _take(output, command, identity, force)
-        yield output
+        try:
+            yield output
+        except KeyboardInterrupt:
+            if any(path.name != _MARK for path in folder.iterdir()):
+                say(f"what is done is kept in {folder}: the same command goes on from there")
+            raise
     finally:
         os.close(handle)
 

@@ -23,6 +23,7 @@ from shared.fake_diagnosis import at_rest, friction_found
 from shared.fake_verdicts import verdict
 from shared.hunting import command, generator, hunt, scale, told
 from shared.measured import channels, written
+from shared.rectangular import NONLINEAR
 from shared.small_run import SMALL_RUN
 
 from gearbench.bench.tape import Shelf
@@ -132,6 +133,7 @@ def kills() -> Got:
         measured = _measured(folder)
         jobs = (
             Job("simulate", _simulate, lambda home: {"record": home / "r.nc"}),
+            Job("sweep", _sweep, lambda home: {"sweep": home / "s.nc"}),
             Job("run", lambda home: command(["run", *SMALL_RUN, "--out", str(home / "run")])[0], _files("run")),
             Job("diagnose", lambda home: _diagnose(measured, home), _files("diagnosis")),
             Job("score", _score_at, _verdicts, lambda home: _challenge(home / "challenge")),
@@ -217,6 +219,12 @@ def _simulate(home: Path) -> int:
     return command(["simulate", *SMALL_RUN, "--out", str(home / "r.nc")])[0]
 
 
+def _sweep(home: Path) -> int:
+    settings = [word for setting in (*NONLINEAR, "rig.damping.mesh_ratio=0.1") for word in ("--set", setting)]
+    span = ["--from-rpm", "300", "--to-rpm", "900", "--points", "12", "--no-report"]
+    return command(["sweep", "rig_62", "--out", str(home / "s.nc"), *span, *settings])[0]
+
+
 def _diagnose(measured: Sequence[str], home: Path) -> int:
     return command(["diagnose", *measured, "--rig", "gap_demo", "--out", str(home / "diagnosis")])[0]
 
@@ -284,7 +292,7 @@ CHECKS = [
     Check("fuzz-full-disk", "writers that a full disk makes crash, fall silent or leave something", 0, "", full_disk),
     Check(
         "fuzz-kills",
-        "products that a kill at a random moment changes: run, simulate, challenge make; score and diagnose from"
+        "products that a kill at a random moment changes: run, simulate, sweep, challenge make; score and diagnose from"
         " their finding on",
         0,
         "",

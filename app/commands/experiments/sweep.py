@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from gearbench.shell.checkpoints import checkpoints_of
 from gearbench.shell.options import (
     CaseArgument,
     JsonOption,
@@ -43,7 +44,8 @@ def sweep(
     """Run a rig up and down in speed under its mean torque: DTE, dynamic factor and contact loss at every speed.
 
     Each speed begins where the one before ended, so that jumps show as differences between up and down, which run side
-    by side. Beside the dynamic factor stands K_v of ISO 6336-1, Method B.
+    by side. Beside the dynamic factor stands K_v of ISO 6336-1, Method B. A sweep that was interrupted or killed goes
+    on at the speed where it was when the same command is given again.
     """
     loaded = load_case(case, settings)
     check_out(out, [case])
@@ -60,10 +62,10 @@ def sweep(
     from gearbench.bench.sweep import sweep as swept
     from gearbench.records import write_dataset
 
-    with Progress(f"sweep {loaded.name}") as progress:
+    with checkpoints_of(out) as kept, Progress(f"sweep {loaded.name}") as progress:
         progress.step("speeds")
         speeds = [float(one) for one in np.linspace(low, high, points) * pi / 30]
-        result = swept(loaded, speeds, model, progress, workers=workers)
+        result = swept(loaded, speeds, model, progress, checkpoints=kept, workers=workers)
         write_dataset(result, out)
         _draw(result, figure, waterfall)
         summary = sweep_summary(result, out)

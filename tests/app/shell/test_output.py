@@ -112,3 +112,14 @@ def test_a_damaged_mark_takes_nothing_for_done(tmp_path: Path, mark: str) -> Non
         assert not output.has("record.nc")
         output.write_text("record.nc", "new")
         assert output.has("record.nc")
+
+
+def test_an_interruption_says_what_it_leaves(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(KeyboardInterrupt), claimed(tmp_path / "out", "run", "a"):
+        raise KeyboardInterrupt
+    assert capsys.readouterr().err == ""  # nothing to go on from
+    with pytest.raises(KeyboardInterrupt), claimed(tmp_path / "out", "run", "a") as output:
+        output.write_text("record.nc", "first")
+        raise KeyboardInterrupt
+    kept = f"gearbench: what is done is kept in {tmp_path / 'out'}: the same command goes on from there\n"
+    assert capsys.readouterr().err == kept
