@@ -125,6 +125,17 @@ def test_multipliers_take_over_from_the_penalty() -> None:
     assert found[0].force == pytest.approx(found[1].force, abs=1e-8)
 
 
+def test_points_that_the_mesh_hardly_tells_apart_are_found() -> None:
+    """Two points whose difference moves a thousandth as far as the penalty gives way: the forces are those of the two
+    equations, solved by hand."""
+    soft, apart, over = 1.0, 1e-3, np.array([1.0, 1.0 - 2e-4])
+    flexibility = np.array([[2.0, 2.0 - apart], [2.0 - apart, 2.0]])
+    found = closed_points(flexibility, over, soft, np.zeros(2), np.full(2, 1e-9))
+    total, difference = over.sum() / (4.0 - apart), (over[0] - over[1]) / apart
+    assert found.found
+    assert found.force == pytest.approx([(total + difference) / 2, (total - difference) / 2], rel=1e-5)
+
+
 def test_projection_finds_the_nearest_place(coarse_gear: FullGear) -> None:
     """Points off the outline against a search among ten thousand places on it; normals point out of the tooth."""
     sides = sides_of(coarse_gear, 3, 0.4, np.array([0.01, -0.02]))
