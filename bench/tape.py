@@ -30,6 +30,9 @@ State = TypeVar("State")
 # Seconds between two looks at the disk: what an interruption may cost; bytes that wait for the next one.
 INTERVAL = 5.0
 WAITING = 2**26
+# Of the time since its begin that a tape may lose where states are larger than what lies between them (every unknown of
+# finite elements): a look every few seconds would fill the disk in hours.
+SHARE = 0.02
 
 _ABOUT = "about.json"
 _BROKEN = (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, NotImplementedError, SyntaxError)
@@ -191,7 +194,7 @@ class Tape:
         self._played: Array | None = None
         self._pending: list[Array] = []
         self._size = 0
-        self._flushed = time.monotonic()
+        self._begun = self._flushed = time.monotonic()
 
     def take(self, count: int) -> Array | None:
         """The next `count` samples (count, n) that were kept; None where there are no more."""
@@ -207,8 +210,15 @@ class Tape:
         self._pending.append(outputs)
         self._size += outputs.nbytes
         self.state = state
-        if time.monotonic() - self._flushed >= self._shelf.interval or self._size >= self._shelf.waiting:
+        if self._due(time.monotonic()) or self._size >= self._shelf.waiting:
             self.flush()
+
+    def _due(self, now: float) -> bool:
+        waited = now - self._flushed
+        if waited < self._shelf.interval:
+            return False
+        heavy = sum(leaf.nbytes for leaf in leaves(self.state)) > self._size
+        return not heavy or waited >= SHARE * (now - self._begun)
 
     def flush(self) -> None:
         """Write what is not on disk yet."""

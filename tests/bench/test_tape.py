@@ -12,6 +12,7 @@ import xarray as xr
 
 import gearbench as gb
 from gearbench.bench import experiment
+from gearbench.bench import tape as tape_module
 from gearbench.bench.tape import Shelf, discard, leaves, restored
 from gearbench.files import FileError
 from gearbench.rig import Case
@@ -143,3 +144,21 @@ def test_states_come_back_as_they_were() -> None:
     assert back.inner.values.dtype.isalignedstruct
     with pytest.raises(ValueError, match="too few"):
         restored(state, iter(leaves(state)[:-1]))
+
+
+@pytest.mark.parametrize(("size", "least", "most"), [(1, 790, 800), (4000, 100, 200)])
+def test_large_states_are_kept_less_often_as_time_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, size: int, least: int, most: int
+) -> None:
+    """Over 4000 s a small state is kept every 5 s. A large one is kept so often that a fiftieth of the time may be
+    lost: 50 + 50 ln(4000/250) = 189 times at most."""
+    clock = [0.0]
+    monkeypatch.setattr(tape_module.time, "monotonic", lambda: clock[0])
+    kept = [0.0]
+    monkeypatch.setattr(Shelf, "write", lambda *given: kept.append(clock[0]))
+    tape = Shelf(tmp_path / "part", "a").tape("0", np.zeros(size))
+    for second in range(4000):
+        clock[0] = float(second)
+        tape.put(np.full(size, clock[0]), np.array([[clock[0]]]))
+        assert clock[0] - kept[-1] < max(5.0, 0.02 * second) + 1.0
+    assert least <= len(kept) <= most
