@@ -129,6 +129,18 @@ def test_exit_codes_of_the_process() -> None:
     assert bad.stderr == 'gearbench: rig.driver.teeth = "x" must be a number\n'
 
 
+def test_ctrl_c_is_130_whatever_was_at_work(tmp_path: Path) -> None:
+    """While a text is executed too: Python's own exit is then a death by SIGINT."""
+    (tmp_path / "held.py").write_text(
+        "import sys\nfrom gearbench import cli\n"
+        "def stopped(*given, **named):\n    exec('raise KeyboardInterrupt')\n"
+        "cli.application = lambda names=(): stopped\nsys.argv = ['gearbench', 'check', 'quick_fe']\ncli.main()\n",
+        encoding="utf-8",
+    )
+    done = subprocess.run([sys.executable, "-m", "held"], cwd=tmp_path, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (130, "gearbench: interrupted\n")
+
+
 def test_help_and_registration_import_nothing_heavy() -> None:
     code = (
         "import sys; from gearbench.cli import run_command_line; run_command_line(['--help']);"
