@@ -22,9 +22,12 @@ from gearbench.kernels.identity import identity
 CONFIG: Any = numba.config
 # Division by zero gives infinity, as in numpy; nobody calls these through C function pointers.
 OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+# Of what compiled code alone calls: the entrance from Python unpacks every array of every named tuple, which takes as
+# long to compile as a small function does. Called from Python all the same, it is compiled anew with one.
+INNER: dict[str, Any] = {"no_cpython_wrapper": True}
 # Of a helper of one loop: part of its caller's machine code, so that handing over named tuples of arrays costs nothing
-# (a call counts references to each array and copies them all), and not to be called from Python.
-INLINED: dict[str, Any] = {"forceinline": True, "no_cpython_wrapper": True}
+# (a call counts references to each array and copies them all).
+INLINED: dict[str, Any] = {"forceinline": True} | INNER
 # For `fastmath`: only what cannot change a result beyond rounding, which is fused multiply-add, free order of sums,
 # signs of zero, reciprocals.
 ROUNDING = {"contract", "reassoc", "nsz", "arcp"}
@@ -45,7 +48,18 @@ def compiled(function: Callable[..., Any] | None = None, /, **options: Any) -> A
     if not CONFIG.DISABLE_JIT:
         with suppress(OSError, RuntimeError):
             dispatcher._cache = _kept(function, code_folder(f"{function.__module__}.{function.__qualname__}", key))
+        if chosen.get("no_cpython_wrapper"):
+            _enter_elsewhere(dispatcher, numba.njit(function, **chosen | {"no_cpython_wrapper": False}))
     return dispatcher
+
+
+def _enter_elsewhere(inner: Any, entered: Any) -> None:
+    """Let Python's calls of `inner`, which has no entrance, compile and call `entered`: Numba would jump to nowhere."""
+
+    def add_overload(result: Any) -> None:
+        inner.overloads[tuple(result.signature.args)] = result  # for compiled callers; Python's calls never find it
+
+    inner.add_overload, inner._compile_for_args = add_overload, entered._compile_for_args
 
 
 def _kept(function: Callable[..., Any], folder: Path) -> FunctionCache:

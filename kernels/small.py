@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.kernels.compiled import compiled
+from gearbench.kernels.compiled import INNER, compiled
 
 Array = NDArray[np.float64]
 
@@ -41,7 +41,7 @@ def eliminate(system: Array) -> Array:
     return out
 
 
-@compiled(forceinline=True)
+@compiled(forceinline=True, **INNER)
 def solve_in_place(system: Array, n: int) -> None:
     """Solve [A | b], the first n rows and n + 1 columns of `system`, by Gaussian elimination with row pivoting; the
     solution stands in column n. A singular A gives infinities or NaN."""
@@ -64,7 +64,7 @@ def solve_in_place(system: Array, n: int) -> None:
         system[k, n] /= system[k, k]
 
 
-@compiled(forceinline=True)
+@compiled(forceinline=True, **INNER)
 def invert(matrix: Array, inverse: Array) -> None:
     """Write the inverse (n, n) of a matrix (n, n) by Gauss and Jordan's method with row pivoting; `matrix` is
     overwritten. A singular one gives infinities or NaN."""

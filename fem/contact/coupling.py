@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from gearbench.fem.contact.kernel import Place, crack_between, cross_between, grid_position, place_at
 from gearbench.fem.contact.law import Law, Meetings
-from gearbench.kernels.compiled import compiled
+from gearbench.kernels.compiled import INNER, compiled
 
 Array = NDArray[np.float64]
 Places = NDArray[np.void]  # of PLACE
@@ -18,7 +18,7 @@ PLACE = np.dtype(
 )
 
 
-@compiled(forceinline=True)
+@compiled(forceinline=True, **INNER)
 def find_places(law: Law, pairs: Meetings, n: int, places: Places) -> None:
     """Write where the first n pairs touch into `places` (n or more,)."""
     for p in range(n):
@@ -29,21 +29,21 @@ def find_places(law: Law, pairs: Meetings, n: int, places: Places) -> None:
         at.node2, at.w02, at.w12, at.w22, at.w32 = two.node, two.w0, two.w1, two.w2, two.w3
 
 
-@compiled(forceinline=True)
+@compiled(forceinline=True, **INNER)
 def on_driver(places: Places, p: int) -> Place:
     """Where pair p touches on the driver."""
     at = places[p]
     return Place(at.node1, at.w01, at.w11, at.w21, at.w31)
 
 
-@compiled(forceinline=True)
+@compiled(forceinline=True, **INNER)
 def on_driven(places: Places, p: int) -> Place:
     """Where pair p touches on the driven gear."""
     at = places[p]
     return Place(at.node2, at.w02, at.w12, at.w22, at.w32)
 
 
-@compiled(forceinline=True)
+@compiled(forceinline=True, **INNER)
 def couple(law: Law, pairs: Meetings, n: int, places: Places, q: int, out: Array) -> None:
     """Write the approach at the first n pairs per force on pair q [m/N] into column q of `out`; of the pair itself,
     besides its own curve, only what a crack adds."""

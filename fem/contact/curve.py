@@ -13,7 +13,7 @@ from gearbench.fem.contact.kernel import Kernel, lagrange
 from gearbench.fem.contact.kinematics import CORNER1, CORNER2, CORNER_SEPARATION, EDGE1, EDGE2, Contact, Tooth
 from gearbench.fem.contact.line import gap_to_master, line_contact, touching_point
 from gearbench.fem.limits import LOAD_RANGE
-from gearbench.kernels.compiled import compiled
+from gearbench.kernels.compiled import INNER, compiled
 
 Array = NDArray[np.float64]
 
@@ -149,7 +149,7 @@ def _finest(slave: Tooth) -> float:
     return min(max(0.1 * fine, 1e-6), 2e-5)
 
 
-@compiled(forceinline=True)
+@compiled(forceinline=True, **INNER)
 def lagrange_slopes(t: float):
     """Derivatives of `lagrange`'s weights."""
     return (
@@ -179,7 +179,7 @@ class Interval(NamedTuple):
     part: float
 
 
-@compiled(forceinline=True)
+@compiled(forceinline=True, **INNER)
 def interval_of(nodes: Array, xi: float) -> Interval:
     """Where a roll length [m], clipped to the nodes, lies."""
     n = len(nodes)
@@ -201,14 +201,14 @@ def largest_force(curve: Curve) -> float:
     return exp(curve.log_low + (curve.value.shape[0] - 1) * curve.log_step)
 
 
-@compiled(forceinline=True)
+@compiled(forceinline=True, **INNER)
 def load_node(curve: Curve, force: float) -> int:
     """First of the four loads between which the approach under a force [N] is read."""
     y = (log(max(force, SMALLEST)) - curve.log_low) / curve.log_step
     return min(max(int(y) - 1, 0), curve.value.shape[0] - 4)
 
 
-@compiled(forceinline=True)
+@compiled(forceinline=True, **INNER)
 def curve_cut(curve: Curve, xi: float, node: int) -> Cut:
     """The curve at a roll length [m], four loads from number `node` on."""
     at = interval_of(curve.xi, xi)
@@ -225,7 +225,7 @@ def curve_cut(curve: Curve, xi: float, node: int) -> Cut:
     )
 
 
-@compiled(forceinline=True)
+@compiled(forceinline=True, **INNER)
 def along_cut(curve: Curve, cut: Cut, force: float):
     """Approach [m] and slope [m/N] under a force [N] for which `cut` holds; beyond all loads linear in ln F."""
     f = max(force, SMALLEST)
@@ -252,7 +252,7 @@ def curve_at(curve: Curve, xi: float, force: float):
     return along_cut(curve, curve_cut(curve, xi, load_node(curve, force)), force)
 
 
-@compiled(forceinline=True)
+@compiled(forceinline=True, **INNER)
 def pair_cut(curves: Curves, k: Contact, node: int) -> Cut:
     """The curve of a lone pair where it touches, four loads from number `node` on.
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from gearbench.fem.contact.kinematics import CORNER1, CORNER2, EDGE1, EDGE2, ON_LINE, Contact, Tooth
 from gearbench.geometry.tooth.micro import profile_excess, relief, teeth_alike
 from gearbench.geometry.tooth.profile import Profile
-from gearbench.kernels.compiled import compiled
+from gearbench.kernels.compiled import INNER, compiled
 from gearbench.rig import Gear
 
 Array = NDArray[np.float64]
@@ -141,7 +141,7 @@ def _vertex(places: Array, values: Array) -> Array:
     return np.asarray(np.where(inner, f0 + rise * (top - x0) + bend * (top - x0) * (top - x1), highest))
 
 
-@compiled
+@compiled(**INNER)
 def deviation(flanks: Flanks, side: int, tooth: int, rho: float):
     """Excess [m] of a tooth's flank (0: working, 1: back) at a roll length, and its derivative; cubic Hermite."""
     n = flanks.front.shape[1]
@@ -167,7 +167,7 @@ def deviation(flanks: Flanks, side: int, tooth: int, rho: float):
     return value + whole, inside * slope / flanks.step
 
 
-@compiled
+@compiled(**INNER)
 def edge_deviation(
     slave: Tooth, master: Tooth, flanks: Flanks, side: int, tooth: int, line: float, rho: float, slope: float,
     lever: float, xi: float, s: float, foot: float, s_foot: float,

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import RectBivariateSpline, make_interp_spline
 
 from gearbench.fem.gear.body import CondensedGear
-from gearbench.kernels.compiled import compiled
+from gearbench.kernels.compiled import INNER, compiled
 
 Array = NDArray[np.float64]
 
@@ -115,7 +115,7 @@ def grid_position(kernel: Kernel, s: float) -> float:
     return ARC_POINTS + min(zeta / kernel.zeta_max, 1.0) * (FLANK_POINTS - 1)
 
 
-@compiled(forceinline=True)
+@compiled(forceinline=True, **INNER)
 def lagrange(t: float):
     """Cubic Lagrange weights at t for nodes 0, 1, 2, 3."""
     return (
@@ -126,7 +126,7 @@ def lagrange(t: float):
     )
 
 
-@compiled(forceinline=True)
+@compiled(forceinline=True, **INNER)
 def first_node(x: float) -> int:
     """First of the four nodes of the piece that holds grid position x."""
     if x < ARC_POINTS:
@@ -144,7 +144,7 @@ class Place(NamedTuple):
     w3: float
 
 
-@compiled(forceinline=True)
+@compiled(forceinline=True, **INNER)
 def place_at(x: float) -> Place:
     """Place of grid position x."""
     node = first_node(x)
@@ -152,14 +152,14 @@ def place_at(x: float) -> Place:
     return Place(node, w0, w1, w2, w3)
 
 
-@compiled(forceinline=True)
+@compiled(forceinline=True, **INNER)
 def row_between(table: Array, n: int, at: Place) -> float:
     """Cubic value along row n of a table (n, n)."""
     j = at.node
     return at.w0 * table[n, j] + at.w1 * table[n, j + 1] + at.w2 * table[n, j + 2] + at.w3 * table[n, j + 3]
 
 
-@compiled(forceinline=True)
+@compiled(forceinline=True, **INNER)
 def table_between(table: Array, one: Place, two: Place) -> float:
     """Bicubic value of a (n, n) table."""
     i = one.node
@@ -175,7 +175,7 @@ def table_at(table: Array, x: float, y: float) -> float:
     return table_between(table, place_at(x), place_at(y))
 
 
-@compiled(forceinline=True)
+@compiled(forceinline=True, **INNER)
 def cross_between(kernel: Kernel, side_load: int, load: Place, side: int, at: Place, teeth_apart: int) -> float:
     """Inward displacement at a place of one flank per total force at another, `teeth_apart` teeth ccw [m/N].
 
@@ -195,7 +195,7 @@ def cross_flexibility(kernel: Kernel, side_load: int, x_load: float, side: int, 
     return cross_between(kernel, side_load, place_at(x_load), side, place_at(x), teeth_apart)
 
 
-@compiled(forceinline=True)
+@compiled(forceinline=True, **INNER)
 def crack_between(kernel: Kernel, side_load: int, load: int, at_load: Place, side: int, tooth: int, at: Place):
     """What a crack adds to the inward displacement at a place of one flank per total force at one of another, or of the
     same [m/N]; teeth `load` and `tooth` by their numbers counter-clockwise."""

@@ -14,7 +14,7 @@ import numpy as np
 
 from gearbench.geometry.pair.kinematics import Pair
 from gearbench.geometry.tooth.profile import Profile
-from gearbench.kernels.compiled import compiled
+from gearbench.kernels.compiled import INNER, compiled
 
 # Where a pair touches, `Contact.slave`: on the line of action, or with a tip edge or an undercut corner, of the driver
 # (1) or of the driven gear (2).
@@ -156,7 +156,7 @@ def edge_contact(
     return EdgeContact(to_centre - slave.edge_radius, phi, foot, lever, moved)
 
 
-@compiled
+@compiled(**INNER)
 def corner_contact(
     slave: Tooth, master: Tooth, c_slave: float, c_master: float, dx: float, dy: float
 ) -> CornerContact:
@@ -191,7 +191,7 @@ def corner_contact(
     return CornerContact(gap, phi, foot, at, wx * ny - wy * nx, vx * ny - vy * nx)
 
 
-@compiled(forceinline=True)
+@compiled(forceinline=True, **INNER)
 def on_edge(tooth: Tooth, moved: float) -> float:
     """Arc length [m] of the tip edge's point by whose angle `moved` the contact has moved along it."""
     return min(tooth.s_end + tooth.edge_radius * min(max(moved, 0.0), 1.5), tooth.s_tip)

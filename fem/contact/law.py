@@ -28,7 +28,7 @@ from gearbench.fem.limits import EDGE_SEPARATION, LOAD_RANGE, elastic_pair
 from gearbench.geometry.pair.kinematics import Pair
 from gearbench.geometry.tooth.iso1328 import drawn_gear
 from gearbench.geometry.tooth.micro import check_micro
-from gearbench.kernels.compiled import compiled
+from gearbench.kernels.compiled import INNER, compiled
 from gearbench.rig import Gear, Material, sound_gear
 
 __all__ = ["EDGE_SEPARATION", "LOAD_RANGE", "PAIRS", "Curve", "Law", "elastic_pair", "make_law"]
@@ -106,7 +106,7 @@ def _deviations(meshing: Pair, gears: tuple[Gear, Gear] | None, reach1: float, r
     return found[0], found[1]
 
 
-@compiled(forceinline=True)
+@compiled(forceinline=True, **INNER)
 def near_teeth(t1: Tooth, t2: Tooth, reach1: float, reach2: float, side: int, theta1: float, at: Facing):
     """First and last driver tooth whose involute lies within NEAR of the path of contact; others touch nothing."""
     pitch = t1.rb * t1.pitch
@@ -119,14 +119,14 @@ def near_teeth(t1: Tooth, t2: Tooth, reach1: float, reach2: float, side: int, th
     return ceil((low - rho) / pitch), floor((high - rho) / pitch)
 
 
-@compiled(forceinline=True)
+@compiled(forceinline=True, **INNER)
 def modelled(law: Law, k: Contact) -> bool:
     """Whether a contact lies on involutes, or on a tip edge as far as it is followed."""
     beyond = (k.slave == EDGE1 and k.xi1 > law.reach1) or (k.slave == EDGE2 and k.xi2 > law.reach2)
     return not beyond and k.s1 >= law.driver.s_form and k.s2 >= law.driven.s_form
 
 
-@compiled(forceinline=True)
+@compiled(forceinline=True, **INNER)
 def line_gap(t1: Tooth, t2: Tooth, side: int, theta1: float, theta2: float, front: Facing) -> float:
     """Gap [m] of ideal flanks of a side on the line of action, the same for all its teeth; none of them is closer.
     `front` is that of the working flanks."""

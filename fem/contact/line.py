@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from gearbench.fem.contact.kernel import Kernel, grid_position, place_at, table_at, table_between
 from gearbench.fem.contact.kinematics import Tooth, edge_contact
-from gearbench.kernels.compiled import compiled
+from gearbench.kernels.compiled import INNER, compiled
 from gearbench.kernels.small import eliminate
 
 Array = NDArray[np.float64]
@@ -59,7 +59,7 @@ class Line(NamedTuple):
     force: Array
 
 
-@compiled
+@compiled(**INNER)
 def boundary_point(tooth: Tooth, s: float):
     """Point (x, y) of the working boundary at arc length s, in the tooth's frame (tooth centre at polar angle 0)."""
     if s <= tooth.s_end:
@@ -102,7 +102,7 @@ def touching_point(slave: Tooth, master: Tooth, xi: float, a: float) -> Touch:
     return Touch(c, s, reference)
 
 
-@compiled
+@compiled(**INNER)
 def window(slave: Tooth, master: Tooth, xi: float, a: float, force: float, compliance: float) -> Window:
     """First guess of the loaded stretch of the slave's boundary.
 
@@ -136,7 +136,7 @@ def cell_edges(low: float, high: float, n: int) -> Array:
     return out
 
 
-@compiled(forceinline=True)
+@compiled(forceinline=True, **INNER)
 def log_antiderivative(t: float) -> float:
     """t ln|t|: an integral of ln|t| but for -t."""
     return t * log(abs(t)) if t != 0.0 else 0.0
@@ -148,7 +148,7 @@ def log_integral(a: float, b: float) -> float:
     return log_antiderivative(b) - log_antiderivative(a) - (b - a)
 
 
-@compiled
+@compiled(**INNER)
 def flexibility_matrix(
     k_slave: Kernel, k_master: Kernel, edges: Array, centres: Array, feet: Array, s0: float, half_plane: float
 ) -> Array:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from gearbench.fem.contact.curve import Curves, Cut, along_cut, load_node, pair_cut
 from gearbench.fem.contact.law import PAIRS, Meetings, contact_in
-from gearbench.kernels.compiled import compiled
+from gearbench.kernels.compiled import INNER, compiled
 from gearbench.kernels.small import solve_in_place
 
 Array = NDArray[np.float64]
@@ -67,7 +67,7 @@ def desk() -> Desk:
     return Desk(active, known, np.zeros(PAIRS, CUT), own, slope, alone, left, square, wide, change)
 
 
-@compiled(forceinline=True)
+@compiled(forceinline=True, **INNER)
 def own_approach(curves: Curves, pairs: Meetings, cuts: NDArray[np.void], p: int, force: float):
     """Approach [m] of pair p alone under a force [N], and its slope [m/N], by its cut, renewed where it must be."""
     node = load_node(curves.driver, force)
@@ -79,11 +79,11 @@ def own_approach(curves: Curves, pairs: Meetings, cuts: NDArray[np.void], p: int
     return along_cut(curves.driver, Cut(at.node, at.c0, at.c1, at.c2, at.c3), force)
 
 
-@compiled(forceinline=True)
+@compiled(forceinline=True, **INNER)
 def newton_change(n: int, left: Array, tangent: Array, active: Flags, system: Array, change: Array) -> None:
     """Write the change of the active forces that closes what is left of the first n overlaps, to first order, into
     `change`; zero for the others."""
-    m = 0
+    m = 0 * n  # to Numba a plain 0 is a type of its own, for which the solver would be compiled once more
     for p in range(n):
         m += active[p]
     row = 0
@@ -105,7 +105,7 @@ def newton_change(n: int, left: Array, tangent: Array, active: Flags, system: Ar
             row += 1
 
 
-@compiled
+@compiled(**INNER)
 def newton_step(left: Array, tangent: Array, active: Flags) -> Array:
     """Change (n,) of the active forces that closes what is left (n,) to first order; zero elsewhere."""
     n = len(left)
@@ -114,7 +114,7 @@ def newton_step(left: Array, tangent: Array, active: Flags) -> Array:
     return out
 
 
-@compiled(forceinline=True)
+@compiled(forceinline=True, **INNER)
 def improve(n: int, force: Array, desk: Desk, turn: int) -> bool:
     """One step of Newton's method; whether it hardly changed the forces."""
     newton_change(n, desk.left, desk.tangent, desk.active, desk.system, desk.change)

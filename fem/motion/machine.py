@@ -21,7 +21,7 @@ from gearbench.fem.gear.body import CondensedGear
 from gearbench.fem.motion.hubs import ABSENT, Springs, Unknowns, hubs_of
 from gearbench.geometry.pair.kinematics import Pair
 from gearbench.geometry.tooth.body import Body
-from gearbench.kernels.compiled import compiled
+from gearbench.kernels.compiled import INNER, compiled
 from gearbench.rig import Rig
 
 Array = NDArray[np.float64]
@@ -240,7 +240,7 @@ class Vector(NamedTuple):
     y: float
 
 
-@compiled(forceinline=True)
+@compiled(forceinline=True, **INNER)
 def seen_from(x: float, y: float, chi: float) -> Vector:
     """World direction in the frame of a gear turned by chi."""
     return Vector(x * cos(chi) + y * sin(chi), -x * sin(chi) + y * cos(chi))
@@ -325,7 +325,7 @@ def pace_on(course: Course, speed1: float, speed2: float, t: float) -> Pace:
     return Pace(angle, ratio * angle, speed, ratio * speed, slope, ratio * slope)
 
 
-@compiled(forceinline=True)
+@compiled(forceinline=True, **INNER)
 def pace(machine: Machine, t: float) -> Pace:
     """The nominal rotation of a machine at time t [s]."""
     return pace_on(machine.course, machine.speed1, machine.speed2, t)

@@ -248,7 +248,8 @@ def try_step(
     if len(machine.course.time) > 0:
         lag(machine, nominal, room.outer)
     predict(machine, scheme, old, room)
-    n, gain, soft, factor, found, looks, look, fresh = 0, 1.0, 1.0, 1.0, False, 0, True, True
+    # To Numba a plain 0 is a type of its own, for which helpers would be compiled once more.
+    n, gain, soft, factor, found, looks, look, fresh = 0 * known, 1.0, 1.0, 1.0, False, 0, True, True
     # The first pass finds the pairs, and another one where the step led far from there; where forces are not linear
     # others follow until they are linearised where it leads. Each helper is called at one place: every other one would
     # be compiled once more.

@@ -13,9 +13,10 @@ import types
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from gearbench.kernels.compiled import OPTIONS, ROUNDING, compiled
+from gearbench.kernels.compiled import INNER, OPTIONS, ROUNDING, compiled
 from gearbench.kernels.folders import KEPT
 from gearbench.kernels.identity import identity
 
@@ -283,3 +284,21 @@ def test_every_kernel_is_found_again_by_the_next_process() -> None:
     one, two = here["found"], json.loads(done.stdout)
     assert len(one) > 50
     assert [name for name in one if one[name] != two[name]] == []
+
+
+@compiled(**INNER)
+def _doubled(values):
+    return 2.0 * values
+
+
+@compiled
+def _quadrupled(values):
+    return _doubled(_doubled(values))
+
+
+def test_function_without_entrance_answers_python_too() -> None:
+    values = np.arange(3.0)
+    assert _quadrupled(values).tolist() == [0.0, 4.0, 8.0]
+    # Twice: before and after the compilation that has an entrance.
+    assert _doubled(values).tolist() == _doubled(values).tolist() == [0.0, 2.0, 4.0]
+    assert _doubled(1.5) == 3.0
