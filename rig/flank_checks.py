@@ -30,7 +30,10 @@ def check_flank(gear: Gear) -> None:
             )
     for name in ("tip_relief", "root_relief"):
         if getattr(gear, name) and getattr(gear, f"{name}_start_diameter") is None:
-            raise ValueError(f"{_key(gear, f'{name}_start_diameter')} is missing: {_key(gear, name)} is given")
+            usual = ""
+            if name == "tip_relief":
+                usual = "; long relief starts at the outer point of single contact, which `check` prints"
+            raise ValueError(f"{_key(gear, f'{name}_start_diameter')} is missing: {_key(gear, name)} is given{usual}")
     if gear.profile_form_diameter and gear.profile_form_roll:
         raise ValueError("profile_form_diameter_mm and profile_form_roll_deg are both given: one of them")
     axis = "profile_form_diameter" if gear.profile_form_diameter else "profile_form_roll"

@@ -100,9 +100,12 @@ def _flank_rows(meshing: Pair, which: int) -> list[Datum]:
     sliding = meshing.specific_sliding[which]
     base = tooth.base_radius
     undercut = 2 * (tooth.form_radius - base) if tooth.undercut else 0.0
+    pitch = meshing.base_pitch if stop - start < 2 * meshing.base_pitch else nan  # else no tooth carries alone
     clear = fillet_clearance(tooth, mate, meshing.centre_distance, meshing.working_pressure_angle)
     return [
         Datum("start of active profile diameter", 2e3 * hypot(base, start), "mm"),
+        Datum("inner point of single contact diameter", 2e3 * hypot(base, stop - pitch), "mm"),
+        Datum("outer point of single contact diameter", 2e3 * hypot(base, start + pitch), "mm"),
         Datum("end of active profile diameter", 2e3 * hypot(base, stop), "mm"),
         Datum("involute lost to undercut, on the diameter", 1e3 * undercut, "mm"),
         Datum("roll angle at the root form circle", degrees(tooth.rho_form / base), "deg"),

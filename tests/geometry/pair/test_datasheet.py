@@ -65,6 +65,8 @@ def test_flanks_and_backlash_of_a_pair(gear: MakeGear, rig: MakeRig) -> None:
         "driver start of active profile diameter": (2 * hypot(base[0], start[0]), "mm"),
         "driven start of active profile diameter": (2 * hypot(base[1], start[1]), "mm"),
         "driven end of active profile diameter": (84.0, "mm"),
+        "driver inner point of single contact diameter": (2 * hypot(base[0], end[0] - 2 * pi * cos(alpha)), "mm"),
+        "driver outer point of single contact diameter": (2 * hypot(base[0], start[0] + 2 * pi * cos(alpha)), "mm"),
         "driver roll angle at the start of active profile": (degrees(start[0] / base[0]), "deg"),
         "driven roll angle at the pitch point": (degrees(tan(alpha)), "deg"),
         "driven roll angle at the end of active profile": (degrees(end[1] / base[1]), "deg"),
