@@ -32,7 +32,8 @@ class Optimum:
     """What `optimise` finds. best: value of each key; value: the worst (or mean) of `at_loads`, the results at `loads`
     [N m]; unit; before: the same of the case as it stands, NaN where it has no result; flat: for each key the interval
     in which the result stays within 10 %; textbook: tip relief [um] by the rule of thumb at each load, empty where no
-    tip relief varies; valley: all that was computed; case: the case with the best values."""
+    tip relief varies; valley: all that was computed; lacking: why the last point without a result has none, empty where
+    all have; case: the case with the best values."""
 
     case: Case
     names: tuple[str, ...]
@@ -47,6 +48,7 @@ class Optimum:
     bounds: tuple[tuple[float, float], ...]
     textbook: tuple[float, ...]
     valley: Valley
+    lacking: str = ""
 
 
 def optimise(
@@ -150,13 +152,17 @@ class _Search:
         finally:
             points.finish()
         name, loads = self.ask.of[0], self.ask.loads
+        answered = int(np.isfinite(valley.aim).sum())
+        if answered < 2:
+            looked = f"one point of {len(valley.aim)} has a result, which leaves nothing to search"
+            raise BenchError(f"{looked}: {points.said}")
         before = _before(self.base, loads, name, self.column, self.ask)
         best = tuple(float(one) for one in valley.points[valley.best])
         found = Optimum(
             self.case_at(best).model_copy(update={"study": None}), tuple(factor.name for factor in self.factors),
             self.column, self.over, loads, best, float(valley.aim[valley.best]),
             tuple(map(float, valley.values[valley.best])), before, valley.flat, self.bounds,
-            textbook_relief(self.base, self.factors, loads), valley,
+            textbook_relief(self.base, self.factors, loads), valley, points.said if answered < len(valley.aim) else "",
         )  # fmt: skip
         if output is not None:
             teller.step("files")

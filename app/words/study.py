@@ -58,9 +58,9 @@ def span_title(table: xr.Dataset, result: str) -> str:
 
 
 def decider(effects: Effects) -> str:
-    """Which factor decides a result; nothing where there is only one or nothing is known."""
+    """Which factor decides a result; nothing where fewer than two are known that could."""
     known = [one for one in effects.each if isfinite(one.first)]
-    if len(effects.each) < 2 or not known:
+    if len(known) < 2:
         return ""
     ranked = sorted(known, key=lambda one: -(one.total if isfinite(one.total) else one.first))
     first = ranked[0]

@@ -29,6 +29,9 @@ def optimum_lines(found: Optimum) -> list[str]:
         before = max(found.before) if found.over == "worst" else sum(found.before) / len(found.before)
         lines.append(f"the case as it stands has {before:.4g}{shown}")
     lines += [_flat_line(found, place) for place in range(len(found.names))]
+    if found.lacking:
+        empty = sum(not isfinite(one) for one in found.valley.aim)
+        lines.append(f"{empty} of {len(found.valley.aim)} points have no result, the last because: {found.lacking}")
     if found.textbook:
         parts = [f"{one:.3g} um at {load:g} N m" for one, load in zip(found.textbook, found.loads, strict=True)]
         lines.append(

@@ -65,11 +65,15 @@ class Effects:
 
 
 def effects_of(design: Design, dataset: xr.Dataset, result: str, seed: int = 0) -> Effects:
-    """The effects of all factors on a result of a study's table. Without two different numbers they are NaN."""
+    """The effects of all factors on a result of a study's table. Without two different numbers they are NaN, as are the
+    indices of a factor of which one value alone has results."""
     values = np.asarray(dataset[result].values, dtype=float)
     good = np.isfinite(values)
     groups = [_groups(design, dataset, place) for place in range(len(design.factors))]
     first, total, intervals, method, counted = _indices(design, values, good, groups, seed)
+    moved = np.array([len(np.unique(group[good])) > 1 for group in groups])
+    first, total = (np.where(moved, one, np.nan) for one in (first, total))
+    intervals = [one if known else (NOTHING, NOTHING) for one, known in zip(intervals, moved, strict=True)]
     each = []
     for place, factor in enumerate(design.factors):
         means = _means(groups[place][good], values[good])

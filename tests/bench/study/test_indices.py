@@ -15,6 +15,7 @@ from gearbench.bench.study.indices import Effects, between_bins, effects_of, on_
 from gearbench.bench.study.quantities import Column
 from gearbench.bench.study.table import study_dataset
 from gearbench.rig import Study
+from gearbench.words.study import decider
 
 # Any keys that may be negative stand for the variables.
 KEYS = ("rig.driver.profile_shift", "rig.driven.profile_shift", "rig.driver.profile_slope_um")
@@ -132,6 +133,14 @@ def test_what_does_not_vary_has_no_indices() -> None:
     for options in ({}, {"sample": "lhs", "size": 8}, {"sample": "sobol", "size": 8}):
         effects = found(lambda x: np.full(len(x), 2.0), ["-1,1", "0,1"], **options)
         assert all(np.isnan(one.first) for one in effects.each)
+
+
+def test_a_factor_of_which_one_value_has_results_has_no_indices() -> None:
+    effects = found(lambda x: np.where(x[:, 1] > 0, np.nan, x[:, 0]), ["-1,1", "0,1,2"])
+    one, two = effects.each
+    assert one.first == one.total == 1.0
+    assert np.isnan(two.first) and np.isnan(two.total)
+    assert decider(effects) == ""
 
 
 def test_on_grid_of_an_additive_function_sums_to_one() -> None:

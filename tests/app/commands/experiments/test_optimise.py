@@ -34,6 +34,14 @@ def test_the_answer_is_on_the_screen_and_in_the_folder(tmp_path: Path, capsys: p
     assert (out / "valley.png").read_bytes().startswith(b"\x89PNG") and len(rows) == data["points"]
 
 
+def test_a_range_without_results_has_no_optimum(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Relief wants a diameter where it starts: without one, only the point without relief has a result."""
+    asked = ["--vary", "rig.driver.tip_relief_um=0:40", "--at-nm", "100", "--out", str(tmp_path / "out")]
+    assert run_command_line(["optimise", "quick_fe", *asked]) == 2
+    said = capsys.readouterr().err
+    assert "one point of" in said and "tip_relief_start_diameter_mm is missing" in said
+
+
 def test_textbook_relief_is_the_deflection_of_one_pair() -> None:
     """By hand: 100 N m on r_b = 58.26 mm over 20 mm gives F/b = 85.8 N/mm; ISO's c' of 62/62 teeth is 13.7 there."""
     from gearbench.bench.study.design import factor_of
