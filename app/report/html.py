@@ -21,7 +21,7 @@ table { border-collapse: collapse; margin: .5rem 0; font-size: .9rem; }
 th, td { padding: .25rem .7rem .25rem 0; text-align: left; vertical-align: top; border-bottom: 1px solid #e6e9ed; }
 th { font-weight: 600; } td.n, th.n { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
 tr.best td { font-weight: 600; } td.code { font-family: "DejaVu Sans Mono", Consolas, monospace; font-size: .8rem;
-  overflow-wrap: anywhere; }
+  overflow-wrap: anywhere; } td.code:first-child { white-space: nowrap; }
 .bar { display: flex; height: 1.7rem; margin: .8rem 0 .2rem; border-radius: 3px; overflow: hidden; }
 .bar div { min-width: 2px; } .legend span { margin-right: 1.4rem; white-space: nowrap; }
 .legend i { display: inline-block; width: .8em; height: .8em; margin-right: .4em; border-radius: 2px; }
@@ -30,7 +30,8 @@ summary { cursor: pointer; font-size: .85rem; color: #0b5c9e; } .wide { overflow
 ul { margin: .3rem 0; padding-left: 1.2rem; }
 h1, h2, p, li, figcaption { overflow-wrap: anywhere; } figure img { max-width: 100%; height: auto; }
 .live .plots { display: none; } .live.drawn .plots { display: block; } .live.drawn .still { display: none; }
-.live .plot { width: 100%; } .pair { display: flex; flex-wrap: wrap; } .pair .plot { flex: 1 1 20rem; min-width: 0; }
+.live .plot { width: 100%; margin-top: 1.7rem; } .live .modebar-container { top: -1.7rem !important; }
+.pair { display: flex; flex-wrap: wrap; } .pair .plot { flex: 1 1 20rem; min-width: 0; }
 .sliders { display: flex; flex-wrap: wrap; gap: .2rem 1.5rem; font-size: .85rem; margin: .4rem 0; }
 .sliders label { flex: 1 1 20rem; }
 .sliders input { width: 45%; vertical-align: middle; }

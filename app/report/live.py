@@ -148,8 +148,8 @@ def axes(
 
 
 def log_axis(low: float, high: float) -> dict[str, Any]:
-    """Keys of a logarithmic axis for values from `low` to `high`: ticks at 1, 2, 5, or only at decades."""
-    return {"type": "log", "dtick": "D2" if high < 1e3 * low else 1}
+    """Keys of a logarithmic axis for values from `low` to `high`: ticks at every digit, at 1, 2, 5, or at decades."""
+    return {"type": "log", "dtick": "D1" if high < 10 * low else "D2" if high < 1e3 * low else 1}
 
 
 def thinned(values: Array, most: int = MOST) -> tuple[NDArray[np.int64], Array]:
@@ -202,8 +202,8 @@ def _largest(sheets: Sequence[Sheet]) -> float:
 
 
 def _decades(low: float, high: float) -> dict[str, Any]:
-    """Ticks of a logarithmic bar of colours: 1, 2, 5 in each decade, or decades where there are many."""
-    steps = (1, 2, 5) if high - low < 3 else (1,)
+    """Ticks of a logarithmic bar of colours: more digits of each decade where there are few, else decades alone."""
+    steps = (1, 2, 3, 4, 5, 6, 8) if high - low < 1 else (1, 2, 5) if high - low < 3 else (1,)
     powers = range(int(np.floor(low)), int(np.ceil(high)) + 1)
     ticks = [step * 10.0**power for power in powers for step in steps]
     inside = [tick for tick in ticks if low <= np.log10(tick) <= high]

@@ -55,7 +55,7 @@ def static_page(
         text("How far to trust it", "h2"),
         text(
             "Hub centres are held and nothing moves: this is the limit of slow rotation. What finite elements reach"
-            " against an outside program is printed by `gearbench validate`."
+            " against an outside program is printed by gearbench validate."
         ),
         text(te_source(str(result.attrs["model"]), case.simulation.mesh_stiffness)),
         *limits(str(result.attrs["model"])),
@@ -177,7 +177,7 @@ def _roots(result: xr.Dataset, roots: Sequence[Mapping[str, Any]]) -> list[str]:
             traces.append(curve(ends, [iso, iso], f"{name}, sigma_F0", colour, line=line))
     iso_values = {key: one["sigma_f0_mpa"] for key, one in data["gears"].items() if one["sigma_f0_mpa"]}
     still = drawing(partial(plot_root_stress, result, iso=iso_values), "roots")
-    layout = axes("mesh phase since the tooth's contact at the pitch point [cycles]", "tension in the root [MPa]")
+    layout = axes("mesh phase after the pitch point [cycles]", "tension in the root [MPa]")
     words = f"Largest tension in the working root of one tooth of each gear at {data['torque_nm']:.4g} N m."
     rows = [
         (words_, *("–" if (v := data["gears"][key][field]) is None else f"{v:.1f}" for key, *_ in GEARS))

@@ -132,7 +132,7 @@ def plot_root_stress(result: xr.Dataset, path: Path, iso: dict[str, float]) -> N
         torque = float(result["torque"].values[load].mean())
         axes.set(
             title=f"Tension in the tooth root at {torque:.4g} N m",
-            xlabel="mesh phase since the tooth's contact at the pitch point [cycles]",
+            xlabel="mesh phase after the pitch point [cycles]",
             ylabel="largest tension in the working root [MPa]",
         )
         axes.set_ylim(top=ROOM * largest if largest > 0.0 else None)
