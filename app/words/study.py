@@ -67,7 +67,8 @@ def decider(effects: Effects) -> str:
     low, high = first.first_interval
     sure = f" (90 %: {percent(low)[:-2]} to {percent(high)})" if isfinite(low) else ""
     line = f"{first.factor} decides {percent(first.first)}{sure} of the variance of {effects.result}"
-    line += f", {percent(first.total)} with its interactions" if first.total > first.first + 0.005 else ""
+    more = first.total > first.first and percent(first.total) != percent(first.first)
+    line += f", {percent(first.total)} with its interactions" if more else ""
     if len(ranked) > 1:
         second = ranked[1]
         line += f"; then {second.factor} ({percent(second.total if isfinite(second.total) else second.first)})"
