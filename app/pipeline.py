@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -125,15 +125,30 @@ def run(
             Job(one, output, progress or Silent(), f"-{name}" if name else "", workers)
             for name, one in case.experiments()
         ]
-        _simulate_together(jobs, workers)
-        done = [run_experiment(job) for job in jobs]
+        with _compiling(jobs) as ready:
+            _simulate_together(jobs, workers, ready)
+            done = [run_experiment(job, ready) for job in jobs]
         if not output.has(REPORT):
             jobs[0].progress.step(REPORT)
             _write_report(case, output, [part for _, part in done if part is not None])
         return [numbers for numbers, _ in done]
 
 
-def _simulate_together(jobs: list[Job], workers: int | None) -> None:
+@contextmanager
+def _compiling(jobs: list[Job]) -> Iterator[Callable[[], None]]:
+    """The loop in time being compiled while gears are condensed and static positions found, where a record is still to
+    be made of finite elements; what is given returns when the loop is there."""
+    lacking = any(not job.output.has(job.name("record.nc")) for job in jobs)
+    if not lacking or jobs[0].case.simulation.model != "reduced":
+        yield lambda: None
+        return
+    from gearbench.bench.elastic.ahead import compiled_ahead
+
+    with compiled_ahead(jobs[0].case.rig) as ahead:
+        yield ahead.wait
+
+
+def _simulate_together(jobs: list[Job], workers: int | None, ready: Callable[[], None]) -> None:
     """Records of several conditions side by side, those that an earlier run has not left."""
     from gearbench.bench.conditions import simulate_all_to
 
@@ -146,14 +161,16 @@ def _simulate_together(jobs: list[Job], workers: int | None) -> None:
 
     progress, paths = missing[0].progress, [job.output.path(job.name("record.nc")) for job in missing]
     progress.step(f"records of {len(missing)} conditions")
+    ready()
     with ExitStack() as folders:
         kept = [folders.enter_context(checkpoints_of(path, within=True)) for path in paths]
         cases = [job.case for job in missing]
         simulate_all_to(cases, paths, take, progress=progress, checkpoints=kept, workers=workers)
 
 
-def run_experiment(job: Job) -> tuple[dict[str, Any], RunPart | None]:
-    """All products of one experiment; the numbers of its summary, and its part of a report that is still to be made."""
+def run_experiment(job: Job, ready: Callable[[], None]) -> tuple[dict[str, Any], RunPart | None]:
+    """All products of one experiment; the numbers of its summary, and its part of a report that is still to be made.
+    `ready` is called before loops in time are."""
     from gearbench.bench import simulate_to
     from gearbench.bench.models import model_for
     from gearbench.bench.results.responses import identify_case, linearised_modes, reference_results
@@ -173,6 +190,7 @@ def run_experiment(job: Job) -> tuple[dict[str, Any], RunPart | None]:
     )
     if not job.output.has(job.name("record.nc")):
         progress.step(job.name("record.nc"))
+        ready()
         with checkpoints_of(job.output.path(job.name("record.nc")), within=True) as kept:
             # Piece by piece into its file: memory then holds the record, not what it is made of besides.
             simulating = partial(simulate_to, case, progress=progress, checkpoints=kept, workers=job.workers)

@@ -20,8 +20,9 @@ from gearbench.kernels.folders import code_folder
 from gearbench.kernels.identity import identity
 
 CONFIG: Any = numba.config
-# Division by zero gives infinity, as in numpy; nobody calls these through C function pointers.
-OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+# Division by zero gives infinity, as in numpy; nobody calls these through C function pointers. What a function does not
+# say of fast mathematics it would have from whichever caller it is first compiled for.
+OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True, "fastmath": False}
 # Of what compiled code alone calls: the entrance from Python unpacks every array of every named tuple, which takes as
 # long to compile as a small function does. Called from Python all the same, it is compiled anew with one.
 INNER: dict[str, Any] = {"no_cpython_wrapper": True}
@@ -51,6 +52,17 @@ def compiled(function: Callable[..., Any] | None = None, /, **options: Any) -> A
         if chosen.get("no_cpython_wrapper"):
             _enter_elsewhere(dispatcher, numba.njit(function, **chosen | {"no_cpython_wrapper": False}))
     return dispatcher
+
+
+def is_kept(function: Any) -> bool:
+    """Whether machine code of a compiled function is on disk, for whatever arguments."""
+    folder = getattr(function._cache, "cache_path", None)
+    return folder is not None and any(Path(folder).glob("*.nbc"))
+
+
+def compile_like(function: Any, arguments: tuple[Any, ...]) -> None:
+    """Compile a compiled function for arguments like these, without calling it."""
+    function.compile(tuple(numba.typeof(one) for one in arguments))
 
 
 def _enter_elsewhere(inner: Any, entered: Any) -> None:

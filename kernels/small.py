@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.kernels.compiled import INNER, compiled
+from gearbench.kernels.compiled import INNER, ROUNDING, compiled
 
 Array = NDArray[np.float64]
 
@@ -64,7 +64,7 @@ def solve_in_place(system: Array, n: int) -> None:
         system[k, n] /= system[k, k]
 
 
-@compiled(forceinline=True, **INNER)
+@compiled(fastmath=ROUNDING, forceinline=True, **INNER)
 def invert(matrix: Array, inverse: Array) -> None:
     """Write the inverse (n, n) of a matrix (n, n) by Gauss and Jordan's method with row pivoting; `matrix` is
     overwritten. A singular one gives infinities or NaN."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gearbench.fem.contact.law import Meetings
 from gearbench.fem.motion.machine import Correction, Machine, Pace
-from gearbench.kernels.compiled import INLINED, compiled
+from gearbench.kernels.compiled import INLINED, ROUNDING, compiled
 
 Array = NDArray[np.float64]
 
@@ -96,7 +96,7 @@ def common_excess(correction: Correction, phase: float) -> Excess:
     return Excess(value, slope)
 
 
-@compiled(**INLINED)
+@compiled(fastmath=ROUNDING, **INLINED)
 def thicken(pairs: Meetings, n: int, excess: float, slope: float) -> None:
     """Move the working ones of n pairs together by an excess [m] whose derivative by the driven rotation is `slope`:
     what tilts the common normal changes the driven gear's lever."""
@@ -107,7 +107,7 @@ def thicken(pairs: Meetings, n: int, excess: float, slope: float) -> None:
             k.lever2 -= slope
 
 
-@compiled(**INLINED)
+@compiled(fastmath=ROUNDING, **INLINED)
 def lean(machine: Machine, pairs: Meetings, n: int, out: Array) -> None:
     """Write what the load's torque takes up per force of each of n pairs [m], where nothing else holds both rotations:
     off the line of action the gears' levers are not in the ratio of their base circles."""

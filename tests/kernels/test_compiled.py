@@ -302,3 +302,19 @@ def test_function_without_entrance_answers_python_too() -> None:
     # Twice: before and after the compilation that has an entrance.
     assert _doubled(values).tolist() == _doubled(values).tolist() == [0.0, 2.0, 4.0]
     assert _doubled(1.5) == 3.0
+
+
+@compiled
+def _rounded(value):
+    return (value + 1e16) - 1e16
+
+
+@compiled(fastmath=ROUNDING)
+def _asked_in_haste(value):
+    return _rounded(value)
+
+
+def test_fast_mathematics_is_not_inherited() -> None:
+    """1e16 swallows the 1, whoever calls first; sums in any order would give it back. Numba hands such freedom down to
+    what says nothing of it."""
+    assert _asked_in_haste(1.0) == _rounded(1.0) == 0.0
