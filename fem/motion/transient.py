@@ -16,7 +16,7 @@ from gearbench.fem.motion.stage import Room, Stage, make_room, make_stage
 from gearbench.fem.motion.start import State
 from gearbench.fem.motion.step import Tried, torques, try_step
 from gearbench.kernels.borrowed import borrowed
-from gearbench.kernels.compiled import INLINED, compiled
+from gearbench.kernels.compiled import INLINED, compile_like, compiled
 
 Array = NDArray[np.float64]
 
@@ -112,6 +112,14 @@ def advance(machine: Machine, scheme: Scheme, state: State, torque: Array, subst
     begin = Run(state.t, state.lately, state.torque, len(state.pairs), -1, False)
     run = integrate(machine, scheme, *stages, begin, torque, substeps, columns(samples), make_room(machine))
     return state_of(stages[0], run), samples, run
+
+
+def compile_for(machine: Machine, scheme: Scheme) -> None:
+    """Compile what `advance` calls for machines like this one, without a step."""
+    unknowns, samples = len(machine.mass), np.zeros((CHANNELS, 1)).T
+    stages, begin = (make_stage(unknowns), make_stage(unknowns)), Run(0.0, 0.0, 0.0, 0, -1, False)
+    called = machine, scheme, *stages, begin, np.zeros(1), 1, columns(samples), make_room(machine)
+    compile_like(integrate, called)
 
 
 def columns(samples: Array) -> Samples:
