@@ -6,7 +6,6 @@ either process has compiled the other finds in the folder of kept code; the call
 
 from __future__ import annotations
 
-import pickle
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -64,7 +63,7 @@ def _begin(rig: Rig) -> subprocess.Popen[bytes] | None:
     with suppress(OSError):
         process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=silent, stderr=silent, start_new_session=True)
         with process.stdin as pipe:  # type: ignore[union-attr]
-            pipe.write(pickle.dumps(rig))
+            pipe.write(rig.model_dump_json().encode())
         return process
     return None
 
@@ -82,4 +81,4 @@ def compile_ahead(rig: Rig) -> None:
 
 
 if __name__ == "__main__":
-    compile_ahead(pickle.load(sys.stdin.buffer))
+    compile_ahead(Rig.model_validate_json(sys.stdin.buffer.read()))
