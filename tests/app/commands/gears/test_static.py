@@ -24,7 +24,7 @@ def test_a_picture_beside_the_result(tmp_path: Path) -> None:
         (["--cycles", "3"], "cycles = 3 must be 1"),
         (
             ["--set", "rig.driver.tip_relief_um=9", "--set", "rig.driver.tip_relief_start_diameter_mm=126"],
-            "does not represent rig.driver.tip_relief_um",
+            "represents rig.driver.tip_relief_um with",
         ),
     ],
 )
