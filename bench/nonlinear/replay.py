@@ -71,7 +71,7 @@ def steady_motion(case: Case, record: xr.Dataset, law: MeshLaw | None = None, re
     turning = None
     if follows(case.rig, record) and plan.repeat_periods == 1:
         turning = followed(case.rig, record, realisation, plan.cycles_per_sample, phase)
-    setup = make_setup(case, plan, law, phase, turning)
+    setup = make_setup(case, plan, law, phase, turning, nominal="mesh_phase" in record and turning is None)
     drive = Drive(torque, resampled(torque, 2 * setup.substeps * samples) / meshing.driver.base_radius)
     outputs, residual = _settled(setup, drive)
     return Steady(setup, drive, outputs, residual, plan, torque, frequency, phase)

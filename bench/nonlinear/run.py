@@ -64,6 +64,7 @@ class Setup:
     warnings: tuple[str, ...]
     table: Table | None = None
     first_phase: float = 0.0
+    twisted_on: float = 0.0  # cycles by which the driven gear stands beyond the nominal rotation at rest
     record_samples: int = 1  # over which the mesh stiffness drifts
     rotation: Rotation | Followed | None = None  # where the speed changes
 
@@ -141,9 +142,9 @@ class Setup:
         """Mesh phase (entries,) [cycles] at half steps from sample `start` on."""
         if self.rotation is None:
             turned = np.arange(entries) * (self.cycles_per_sample / (2 * self.substeps))
-            return np.asarray(self.first_phase + start * self.cycles_per_sample + turned)
+            return np.asarray(self.first_phase + self.twisted_on + start * self.cycles_per_sample + turned)
         time = start / self.sampling_rate + np.arange(float(entries)) * (self.step / 2)
-        return self.rotation.cycles(np.asarray(time, dtype=np.float64))
+        return self.rotation.cycles(np.asarray(time, dtype=np.float64)) + self.twisted_on
 
     def departures(self, samples: int) -> Array:
         """How far (samples,) [cycles] the rotation of a record that is followed departs from a steady one, from sample
@@ -158,7 +159,8 @@ class Setup:
             return None
         time = start / self.sampling_rate + np.arange(-1.0, entries + 2) * (self.step / 2)
         along = self.meshing.driver.base_radius * turning.acceleration(time[1:-1])
-        return Varied(turning.cycles(time), turning.frequency(time[1:-1]) / self.mesh_frequency, along)
+        cycles, pace = turning.cycles(time) + self.twisted_on, turning.frequency(time[1:-1]) / self.mesh_frequency
+        return Varied(cycles, pace, along)
 
     def drive(self, torque: Torque) -> Drive:
         period = torque.samples_of(self.samples_per_period)
@@ -266,10 +268,12 @@ def largest_load(experiment: Experiment) -> float:
 
 
 def make_setup(
-    case: Case, plan: Schedule, law: MeshLaw | None = None, first_phase: float = 0.0, followed: Followed | None = None
-) -> Setup:
-    """Model, step and tables of an experiment that begins at `first_phase` [cycles], with the mesh law given or solved,
-    and the rotation of a record in place of a constant speed's.
+    case: Case, plan: Schedule, law: MeshLaw | None = None, first_phase: float = 0.0, followed: Followed | None = None,
+    nominal: bool = True,
+) -> Setup:  # fmt: skip
+    """Model, step and tables of an experiment that begins at `first_phase` [cycles] of the `nominal` rotation, else of
+    the driven gear's own, with the mesh law given or solved, and the rotation of a record in place of a constant
+    speed's.
 
     Raises LumpedError, BenchError, GeometryError or ContactError.
     """
@@ -277,7 +281,8 @@ def make_setup(
     refuse_unknown(rig, simulation)
     law = law or mesh_law(rig, simulation, largest_load(experiment))
     model = nonlinear_model(rig, meshing, law)
-    fastest = model.fastest_rate(experiment.torque_mean / meshing.driver.base_radius, np.pi * plan.sampling_rate)
+    force = experiment.torque_mean / meshing.driver.base_radius
+    fastest = model.fastest_rate(force, np.pi * plan.sampling_rate)
     tabled = simulation.mesh_stiffness == "potential-energy"
     setup = Setup(
         model=model,
@@ -290,6 +295,7 @@ def make_setup(
         block_samples=(plan.periods if plan.drifts or plan.rotation else plan.repeat_periods) * plan.samples_per_period,
         warnings=tuple(outside_foundation_fit(rig, meshing)) if tabled else (),
         first_phase=first_phase,
+        twisted_on=model.twisted_on(force) if nominal else 0.0,
         record_samples=plan.record_samples,
         rotation=plan.rotation or followed,
     )

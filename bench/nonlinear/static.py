@@ -71,8 +71,9 @@ def linearised_matrices(case: Case, meshing: Pair, phases: int) -> tuple[Array, 
     force = case.experiment.torque_mean / meshing.driver.base_radius
     law = mesh_law(rig, case.simulation, 2 * case.experiment.torque_mean)
     model = nonlinear_model(rig, meshing, law)
-    table = tables(model, Motion(cycles=1.0, entries=phases, step=1.0))
-    at = instants(model, table, np.arange(phases) / phases, -1)
+    twisted = model.twisted_on(force)
+    table = tables(model, Motion(cycles=1.0, entries=phases, step=1.0, first_phase=twisted))
+    at = instants(model, table, twisted + np.arange(phases) / phases, -1)
     tangent = pressed(model.law, at, travel_under(model.law, at, np.array(force))).tangent
     seen = _relative(model)
     back = np.linalg.pinv(seen)

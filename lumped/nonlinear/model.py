@@ -57,7 +57,7 @@ from gearbench.lumped.linear.model import equivalent_mass
 from gearbench.lumped.nonlinear.constants import Constants, Rubbing
 from gearbench.lumped.nonlinear.coordinates import Coordinates, Further, leaning_of
 from gearbench.lumped.nonlinear.law import MeshLaw
-from gearbench.lumped.nonlinear.pressing import Instants, travel_under
+from gearbench.lumped.nonlinear.pressing import Instants, alike, travel_under
 from gearbench.lumped.nonlinear.rest import (
     Around,
     SupportSpring,
@@ -85,11 +85,14 @@ RESOLVED = 0.125
 # its damping ratio to 0.01, far from where Runge-Kutta becomes unstable.
 UNSEEN = 0.5
 
+REST_PHASES = 16  # over which the place at rest is averaged
+
 LIMITS = (
     "forces of unbalance, also of eccentric gears, are left out",
     "a pair deflects as between sound neighbours: what the neighbours of an uneven tooth carry does not bend it",
     "back flanks are free of friction, pitch errors and cracks",
-    "mesh phase is that of the steady rotation, turned on by the centres along their supports alone",
+    "mesh phase is that of the steady rotation, turned on by the centres along their supports and by where the driven"
+    " gear stands at rest: what it vibrates beside does not turn the mesh on",
 )
 ONE_DIRECTION = "the centres move along the support direction only: friction acts on rotations and tangential supports"
 
@@ -132,6 +135,16 @@ class NonLinear:
     def turned_on(self, places: Array) -> Array:
         """How far [cycles] the centres' motion turns the mesh on beyond its rotation, at the places (..., n) [m]."""
         return np.asarray(-self.leaning * self.factor * (places[..., 1] - places[..., 2]))
+
+    def twisted_on(self, force: float) -> float:
+        """How far [cycles] the driven gear at rest under the mesh force [N] stands beyond its steady rotation, where
+        the speed of either end is held: by the twist of a shaft behind it, and what lies between the driver and it."""
+        if self.structure is None or not (self.structure.held or self.rig.drive.boundary == "speed"):
+            return 0.0
+        gain = np.array([self.rig.mesh.stiffness_scale])
+        phases = (alike(np.array([n / REST_PHASES]), np.zeros(1), gain) for n in range(REST_PHASES))
+        rest = [Coordinates(*self.equilibrium(force, at)[: len(Coordinates._fields)]).u2 for at in phases]
+        return float(np.mean(rest)) / self.teeth.base_pitch
 
     @property
     def structure(self) -> Structure | None:

@@ -27,13 +27,16 @@ EFFECTS: dict[str, tuple[list[str], float, float]] = {
     "ripple": ([f"rig.drive.coupling={SHAFT}", RIPPLE], 5e-4, 3e-3),
     "series": (["rig.mesh.stiffness_cos=[0.1]", "rig.mesh.stiffness_sin=[0.05]"], 5e-4, 3e-3),
     "error": (["rig.mesh.error_cos_um=[1.0]", "rig.mesh.error_sin_um=[0.5]", "rig.mesh.error_mean_um=2.0"], 5e-4, 3e-3),
-    "shaft": ([f"rig.load.coupling={SHAFT}"], 5e-4, 0.1),  # handovers ring in it
+    "shaft": ([f"rig.load.coupling={SHAFT}"], 5e-4, 3e-3),
     "housing": (["rig.housing={mass_kg=20.0, stiffness_n_per_m=1e8, damping_n_s_per_m=1e5}"], 5e-4, 3e-3),
     "rocking": ([f"rig.housing={ROCKING}"], 5e-4, 3e-3),
     # Teeth that bear 800 N in the mean: the force at which nothing changes lies far below.
     "hardening": (["rig.mesh.exponent=0.2", "rig.mesh.reference_force_n=300"], 5e-4, 3e-3),
     "across": ([f"rig.support.driver.across={SIDE}"], 2e-3, 1e-2),
-    "held": (["rig.load.boundary=torque", "rig.drive.boundary=speed"], 5e-4, 2e-2),
+    "held": (["rig.load.boundary=torque", "rig.drive.boundary=speed"], 5e-4, 4e-3),
+    "held by a shaft": (
+        [f"rig.drive.coupling={SHAFT}", "rig.load.boundary=torque", "rig.drive.boundary=speed"], 5e-4, 4e-3
+    ),
 }
 
 
