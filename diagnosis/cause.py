@@ -26,6 +26,7 @@ from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.intake.signals import measured_channels
 from gearbench.diagnosis.naming import drifts_of, effects_of, parameters_of
 from gearbench.diagnosis.odds import Calibration, effect_signs
+from gearbench.diagnosis.output.contrast import other_flanks
 from gearbench.diagnosis.output.drift import drift_of
 from gearbench.diagnosis.output.judged import Judged, itself, judged_on
 from gearbench.diagnosis.output.missing import Missing, missing_forces, nothing_missing
@@ -145,7 +146,7 @@ def _by_simulation(
         where=places_of(judged, kept, missing),
         recalibrated=found.recalibrated if kept else found.layout.case(found.selection.base.p),
         with_effect=found.with_effects if decided.named else None,
-        because=(*decided.because, *_why(judged, kept)),
+        because=(*decided.because, *_why(judged, kept), *other_flanks(found.layout.unknowns, found.selection.best.p)),
         structure=structure_found(found.layout.unknowns, found.selection.best.p, found.std),
         missing=missing,
         places=tuple(one.place for one in kept),

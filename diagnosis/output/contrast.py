@@ -28,6 +28,17 @@ def contrast_groups() -> list[Group]:
     return [group(CONTRAST, "1", ("mesh",), CONTRAST_SD, slot="contrast", low=CONTRAST_LEAST, high=CONTRAST_LARGEST)]
 
 
+def other_flanks(unknowns: Unknowns, p: Array) -> tuple[str, ...]:
+    """A sentence where the change of the mesh stiffness ends at its bound: no body, rim or web does that."""
+    more = float(p[unknowns[CONTRAST]][0])
+    if CONTRAST_LEAST < more < CONTRAST_LARGEST:
+        return ()
+    return (
+        f"The stiffness of the mesh would have to change over its phase by {'less' if more < 0.0 else 'more'} than"
+        f" {1.0 + more:g} of what the nominal teeth make: check whether reliefs and profiles are those of the rig",
+    )
+
+
 def modulation_of(model: NominalModel) -> Array:
     """Cosine and sine amplitudes (2, ORDERS) of the nominal mesh's stiffness over its mean, at the mean torque."""
     law = model.hardened
