@@ -56,8 +56,8 @@ class Hypothesis:
     """An effect (None: a free form) at a place, by the priors that it makes `wide`.
 
     `name` tells it from others of the same effect, `on` says which gears or channels it is about, `choices` out of how
-    many like it it was picked, more where it is rare. Of those that differ by a tooth's number only one for each gear
-    is `representative` of what forces can tell apart.
+    many like it it was picked. Of those that differ by a tooth's number only one for each gear is `representative` of
+    what forces can tell apart. A `rare` one is not named where a usual one explains the records as well.
     """
 
     name: str
@@ -66,6 +66,7 @@ class Hypothesis:
     on: tuple[str, ...] = ()
     choices: int = 1
     representative: bool = True
+    rare: bool = False
     effect: Effect | None = None
 
     def entries(self, unknowns: Unknowns) -> NDArray[np.int64]:

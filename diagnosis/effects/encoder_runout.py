@@ -20,8 +20,6 @@ KEYS = {side: f"encoder-{side}" for side in SIDES}
 # Along the base circle over the deflection of the mesh: what grating and centring of a good encoder leave, and an
 # encoder set on its shaft like a gear of severity 1 on its own.
 SD, WIDE = 0.03, 0.5
-# One in so many gaps of the shape that a run-out leaves is an encoder's: gears stand out by more, as a rule.
-RARE = 10
 # Of what the encoder adds to the transmission error, from which what it lacks in the mesh follows.
 ADDS = {"driver": 1.0, "driven": -1.0}
 
@@ -41,10 +39,11 @@ def unknowns(model: NominalModel, conditions: Sequence[Condition]) -> tuple[Grou
 
 
 def hypotheses(model: NominalModel) -> tuple[Hypothesis, ...]:
-    """One encoder of the two; to forces alone it looks like a gear's run-out, and represents nothing that they could
-    tell apart."""
+    """One encoder of the two. To forces alone it looks like a gear's run-out, and represents nothing that they could
+    tell apart; in simulation both differ by what inertias make of the latter, and gears stand out by more, as a
+    rule."""
     return tuple(
-        Hypothesis(f"encoder-runout {side}", "sensor", (Wide(key),), (side,), RARE * len(KEYS), representative=False)
+        Hypothesis(f"encoder-runout {side}", "sensor", (Wide(key),), (side,), len(KEYS), False, rare=True)
         for side, key in KEYS.items()
     )
 

@@ -26,6 +26,8 @@ Complex = NDArray[np.complex128]
 # Part of what changes, by energy, from which a drift is its cause: a torque that is not locked to the rotation or a
 # coupling that slips leave less than 0.2 to it, a support that softens by 7 % less than 0.01 to anything else.
 EXPLAINS = 0.5
+# Of the energy that the next best place leaves, the part that the best one may leave for the place to be told.
+TOLD = 0.5
 
 
 @dataclass(frozen=True)
@@ -61,14 +63,15 @@ class _Part:
 
 def drift_of(found: Simulated) -> Drift | None:
     """The drift that explains most of what changes between repetitions of the records of the search; None where that
-    is less than half, or nothing changes beyond noise."""
+    is less than half, where another place would explain nearly as much, or nothing changes beyond noise."""
     parts = _parts(found)
     whole = sum(float((np.abs(one.departures) ** 2).sum()) for one in parts)
     if whole == 0.0:
         return None
-    drifts = [_drift_at(parts, whole, place) for place in parts[0].derivatives]
-    best = max(drifts, key=lambda one: one.share)
-    return best if best.share > EXPLAINS else None
+    drifts = sorted((_drift_at(parts, whole, place) for place in parts[0].derivatives), key=lambda one: -one.share)
+    best, following = drifts[:2]
+    told = 1.0 - best.share < TOLD * (1.0 - following.share)
+    return best if best.share > EXPLAINS and told else None
 
 
 def _drift_at(parts: list[_Part], whole: float, place: Place) -> Drift:

@@ -111,7 +111,7 @@ def select(
         rest = [one for one in hypotheses if not any(_same(one, other) for other in taken)]
         found = weigh(simulator, best, rest, starts, report)
         weighed = found if weighed is None else weighed
-        winner = found[0] if found else None
+        winner = usual_of(found)
         if winner is None or winner.optimum is None or winner.log_bayes_factor < limit_of(unknowns, winner.hypothesis):
             break
         entered.append(replace(winner, rivals=rivals_of(winner, found)))
@@ -188,6 +188,15 @@ def weigh(
 
     out = side_by_side(weighed, promised)
     return sorted(out, key=lambda one: -one.log_bayes_factor)
+
+
+def usual_of(weighed: Sequence[Weighed]) -> Weighed | None:
+    """The most usual of those that explain the records as well as the best one does; None of none."""
+    if not weighed:
+        return None
+    best = weighed[0]
+    rivals = rivals_of(best, weighed)
+    return min((one for one in weighed if one is best or one.hypothesis in rivals), key=lambda one: one.hypothesis.rare)
 
 
 def rivals_of(winner: Weighed, weighed: Sequence[Weighed]) -> tuple[Hypothesis, ...]:

@@ -33,9 +33,12 @@ def derivatives() -> np.ndarray:
     return lines.reshape(3, -1)
 
 
-def found(changes: np.ndarray, monkeypatch: pytest.MonkeyPatch, seed: int = 7) -> Drift | None:
-    """`changes` (repetitions, lines of two channels): what each repetition has beside the others and noise."""
-    rng, channels = np.random.default_rng(seed), {}
+def found(
+    changes: np.ndarray, monkeypatch: pytest.MonkeyPatch, columns: np.ndarray | None = None
+) -> Drift | None:
+    """`changes` (repetitions, lines of two channels): what each repetition has beside the others and noise; `columns`
+    (3, lines): what the rig is said to do, if not what it does."""
+    rng, channels = np.random.default_rng(7), {}
     for number, name in enumerate(("dte", "y_driver")):
         spectrum = np.zeros((REPETITIONS, SAMPLES // 2 + 1), dtype=complex)
         spectrum[:, BINS] = 3.0 + changes[:, number * BINS.size : (number + 1) * BINS.size]
@@ -43,7 +46,7 @@ def found(changes: np.ndarray, monkeypatch: pytest.MonkeyPatch, seed: int = 7) -
         channels[name] = np.fft.irfft((spectrum + noise) * SAMPLES, SAMPLES)
     monkeypatch.setattr(module, "measured_channels", lambda one: channels)
     target = SimpleNamespace(plan=((0, "dte", BINS), (0, "y_driver", BINS)), measurements=(None,))
-    optimum = SimpleNamespace(sensitivity=SimpleNamespace(jacobian=derivatives()))
+    optimum = SimpleNamespace(sensitivity=SimpleNamespace(jacobian=derivatives() if columns is None else columns))
     simulated: Any = SimpleNamespace(
         simulator=SimpleNamespace(target=target),
         selection=SimpleNamespace(best=optimum),
@@ -77,3 +80,10 @@ def test_noise_alone_and_what_comes_and_goes_are_no_drift(monkeypatch: pytest.Mo
     assert found(0.02 * turns * derivatives()[DRIVER], monkeypatch) is None
     # Up and down again: what a drift would make of it is less than half.
     assert found(0.05 * np.array([[1.0], [-1.0], [1.0], [-1.0]]) * derivatives()[MESH], monkeypatch) is None
+
+
+def test_a_place_that_another_explains_nearly_as_well_is_not_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    alike = derivatives()
+    alike[MESH] = alike[DRIVER] + 0.05 * alike[MESH]
+    changes = drifting(DRIVER, -0.07) + drifting(DRIVEN, 0.03)
+    assert found(changes, monkeypatch) is not None and found(changes, monkeypatch, alike) is None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -66,6 +67,11 @@ def test_what_explains_the_records_as_well_is_a_rival_and_leaves_with_the_one_th
     assert {one.hypothesis.name, *(other.name for other in one.rivals)} == {"tooth-crack 0", "tooth-crack 1"}
     assert found.bare.p[6] == found.bare.p[7] == 0.0
     assert not any(other.rivals for other in selected({7: 0.3}).entered)
+    # Of the two the usual one is named, whichever explains a little more.
+    for number, other in (0, 1), (1, 0):
+        listed = (FRICTION, RIPPLE, *(replace(CRACKS[one], rare=one == number) for one in range(2)))
+        named = select(simulator, listed, [np.zeros(8)], {})
+        assert named is not None and names(named) == [f"tooth-crack {other}"]
 
 
 def test_two_effects_enter_the_larger_first_and_each_is_needed() -> None:
