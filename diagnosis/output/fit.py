@@ -26,7 +26,7 @@ POOR = 0.25  # part of what a step promised, below which the Jacobian is renewed
 HALVINGS = 3
 STEPS = 25
 # Standard deviations that a step may move any unknown by where no part of a longer one is of use: a kink in one of them
-# bends the whole step.
+# bends the whole step. Each is tried once, as the next is shorter.
 REACHES = (1.0, 0.3, 0.1, 0.03, 0.01)
 SETTLED = 25.0  # nats that another step may promise: a fit that is close enough not to be gone on with
 
@@ -93,11 +93,11 @@ def prior_cost(p: Array, sd: Array) -> float:
 
 
 def _stepped(
-    simulator: Simulator, p: Array, sd: Array, active: NDArray[np.int64], step: Array, cost: float
+    simulator: Simulator, p: Array, sd: Array, active: NDArray[np.int64], step: Array, cost: float, halvings: int
 ) -> tuple[Array, float]:
     """`p` (size,) after as much of the step of its active unknowns as lowers the cost, and that cost; itself where
     nothing does."""
-    for halving in range(HALVINGS + 1):
+    for halving in range(halvings + 1):
         trial = p.copy()
         trial[active] += 0.5**halving * step
         value = cost_of(simulator, trial, sd)
@@ -143,9 +143,11 @@ def fit(
         near = sensitivity.quadratic.moved(target.lines - lines, sensitivity.jacobian)
         before = cost
         standing = _standing(simulator.layout.unknowns, p)
-        for limits in (bounds, standing, *(_within(standing, p, sd, reach) for reach in REACHES)):
+        short = [(_within(standing, p, sd, reach), 0) for reach in REACHES]
+        for limits, halvings in ((bounds, HALVINGS), (standing, HALVINGS), *short):
             step, promised, _ = near.best(p, sd, limits)
-            p, cost = _stepped(simulator, p, sd, near.active, step, cost) if cost - promised > GAIN else (p, cost)
+            if cost - promised > GAIN:
+                p, cost = _stepped(simulator, p, sd, near.active, step, cost, halvings)
             if cost < before:
                 break
         gain = before - cost

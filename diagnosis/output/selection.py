@@ -166,7 +166,9 @@ def weigh(
         sd = widened_prior(unknowns, base.sd, one)
         step, cost, information = quadratic.best(base.p, sd, unknowns.bounds())
         evidence = quadratic.evidence(cost, information, sd) - base.evidence - np.log(one.choices)
-        promised.append((float(evidence), one, step))
+        there = base.p.copy()
+        there[quadratic.active] += step
+        promised.append((min(float(evidence), relief(unknowns, base.sd, one, there, sd)), one, step))
     promised.sort(key=lambda item: -item[0])
     ranked = [one.name for _, one, _ in promised]
     by_force = sorted((s for s in starts.values() if s.hypothesis.name in ranked), key=lambda s: -s.log_bayes_factor)
@@ -184,7 +186,7 @@ def weigh(
         if optimum is None:
             return Weighed(one, min(value, 0.0), None)
         factor = optimum.evidence - base.evidence - float(np.log(one.choices))
-        return Weighed(one, min(factor, relief(unknowns, base.sd, one, optimum)), optimum)
+        return Weighed(one, min(factor, relief(unknowns, base.sd, one, optimum.p, optimum.sd)), optimum)
 
     out = side_by_side(weighed, promised)
     return sorted(out, key=lambda one: -one.log_bayes_factor)
@@ -261,13 +263,13 @@ def widened_prior(unknowns: Unknowns, sd: Array, hypothesis: Hypothesis) -> Arra
     return out
 
 
-def relief(unknowns: Unknowns, narrow: Array, hypothesis: Hypothesis, optimum: Optimum) -> float:
-    """What widening its own prior can add to the evidence at most (`evidence.search`); no limit for what the background
-    holds at zero."""
+def relief(unknowns: Unknowns, narrow: Array, hypothesis: Hypothesis, p: Array, sd: Array) -> float:
+    """What widening its own prior from `narrow` to `sd` (size,) can add to the evidence at most where the unknowns are
+    `p` (size,) (`evidence.search`); no limit for what the background holds at zero."""
     at = hypothesis.entries(unknowns)
     if not narrow[at].all():
         return np.inf
-    return 0.5 * float((optimum.p[at] ** 2 * (narrow[at] ** -2.0 - optimum.sd[at] ** -2.0)).sum())
+    return 0.5 * float((p[at] ** 2 * (narrow[at] ** -2.0 - sd[at] ** -2.0)).sum())
 
 
 def with_entered(simulator: Simulator, selection: Selection, one: Weighed) -> Selection:
