@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.diagnosis.intake.measurements import Measurement
-from gearbench.geometry import body, pair
+from gearbench.geometry import Body, Pair, body, pair
 from gearbench.lumped.linear.model import equivalent_mass
 from gearbench.lumped.nonlinear.law import MeshLaw
-from gearbench.rig import Case, Support
+from gearbench.rig import Case, Rig, Support
 
 Array = NDArray[np.float64]
 
@@ -109,11 +109,7 @@ def nominal_model(nominal: Case, load: float, mean: float) -> NominalModel:
 
     rig = nominal.rig
     meshing = pair(rig)
-    density = rig.material.density
-    bodies = (
-        body(meshing.driver, rig.driver, density, "rig.driver"),
-        body(meshing.driven, rig.driven, density, "rig.driven"),
-    )
+    bodies = _bodies(rig, meshing)
     supports = (rig.support.driver, rig.support.driven)
     held = [support.holding(one.mass) for support, one in zip(supports, bodies, strict=True)]
     coupling = rig.drive.coupling
@@ -159,6 +155,12 @@ def nominal_model(nominal: Case, load: float, mean: float) -> NominalModel:
         noise=(rig.sensors.noise_angle, rig.sensors.noise_displacement, rig.sensors.noise_torque),
         torque_mean=mean,
     )
+
+
+def _bodies(rig: Rig, meshing: Pair) -> tuple[Body, Body]:
+    """Mass and inertia of driver and driven gear."""
+    one = body(meshing.driver, rig.driver, rig.material.density, "rig.driver")
+    return one, body(meshing.driven, rig.driven, rig.material.density, "rig.driven")
 
 
 def table_load(measurements: Sequence[Measurement]) -> float:
