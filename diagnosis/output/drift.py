@@ -51,6 +51,11 @@ class _Part:
     time: Array
     derivatives: dict[Place, Complex]
 
+    @property
+    def energy(self) -> float:
+        """All that changes."""
+        return float((np.abs(self.departures) ** 2).sum())
+
     def slope(self, place: Place) -> tuple[float, float]:
         """Of the energy that is left with a drift there, half the slope and half the curvature."""
         column = self.time * self.derivatives[place]
@@ -65,16 +70,15 @@ def drift_of(found: Simulated) -> Drift | None:
     """The drift that explains most of what changes between repetitions of the records of the search; None where that
     is less than half, where another place would explain nearly as much, or nothing changes beyond noise."""
     parts = _parts(found)
-    whole = sum(float((np.abs(one.departures) ** 2).sum()) for one in parts)
-    if whole == 0.0:
+    if not parts:
         return None
-    drifts = sorted((_drift_at(parts, whole, place) for place in parts[0].derivatives), key=lambda one: -one.share)
+    drifts = sorted((_drift_at(parts, place) for place in parts[0].derivatives), key=lambda one: -one.share)
     best, following = drifts[:2]
     told = 1.0 - best.share < TOLD * (1.0 - following.share)
     return best if best.share > EXPLAINS and told else None
 
 
-def _drift_at(parts: list[_Part], whole: float, place: Place) -> Drift:
+def _drift_at(parts: list[_Part], place: Place) -> Drift:
     """The drift at one place, from all parts; its scatter over them is how well it is known."""
     slopes = np.array([one.slope(place) for one in parts])
     total, weight = slopes.sum(axis=0)
@@ -83,12 +87,11 @@ def _drift_at(parts: list[_Part], whole: float, place: Place) -> Drift:
     value, seen = total / weight, slopes[:, 1] > 0.0
     apart = slopes[seen, 0] / slopes[seen, 1] - value
     std = float(np.sqrt((slopes[seen, 1] * apart**2).sum() / weight / max(seen.sum() - 1, 1)))
-    nats = 0.0
-    for one in parts:
-        energy, lines = float((np.abs(one.departures) ** 2).sum()), one.departures.shape[1]
-        nats += min(INDEPENDENT, lines) * float(np.log(energy / max(one.left(place, value), float(lines))))
-    left = sum(one.left(place, value) for one in parts)
-    return Drift(place, float(value), std, 1.0 - left / whole, nats)
+    energies = np.array([one.energy for one in parts])
+    left = np.array([one.left(place, value) for one in parts])
+    lines = np.array([one.departures.shape[1] for one in parts])
+    nats = np.minimum(INDEPENDENT, lines) * np.log(energies / np.maximum(left, lines))
+    return Drift(place, float(value), std, float(1.0 - left.sum() / energies.sum()), float(nats.sum()))
 
 
 def _parts(found: Simulated) -> list[_Part]:
