@@ -54,6 +54,10 @@ FLANK_FIELDS = (
 )
 
 
+# Of those, what differs from tooth to tooth.
+_UNEVEN = ("profile_slope_tooth", "profile_form_tooth", "wear_tooth", "pitch_error", "runout", "iso_grade")
+
+
 def effects_in(rig: Rig) -> tuple[str, ...]:
     """Dotted TOML keys ("rig.driver.runout_um") of all effects that the rig has, in the order of a dumped case.
 
@@ -92,6 +96,22 @@ def sound_gear(gear: Gear) -> Gear:
 def relieved_gear(gear: Gear) -> Gear:
     """The gear without errors and cracks, with the reliefs of its design."""
     return sound_gear(gear).model_copy(update={name: getattr(gear, name) for name in RELIEF_FIELDS})
+
+
+def even_gear(gear: Gear) -> Gear:
+    """The gear with all teeth alike: without cracks, and without errors that differ from tooth to tooth."""
+    return gear.model_copy(update={name: Gear.model_fields[name].default for name in (*_UNEVEN, "crack")})
+
+
+def without_reliefs(gear: Gear) -> Gear:
+    """The gear without the reliefs of its design."""
+    return gear.model_copy(update={name: Gear.model_fields[name].default for name in RELIEF_FIELDS})
+
+
+def is_formed(gear: Gear) -> bool:
+    """Whether all teeth of the gear depart from their involutes alike."""
+    depths = (gear.tip_relief, gear.root_relief, gear.profile_slope, gear.wear, *gear.profile_form, *gear.wear_depth)
+    return any(depths)
 
 
 def _gear_effects(gear: Gear) -> list[str]:

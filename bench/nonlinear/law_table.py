@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 from math import ceil, log, pi
 from pathlib import Path
@@ -19,13 +20,15 @@ from gearbench.fem.contact.static import position, static_cycle
 from gearbench.fem.gear.store import cached, key_for
 from gearbench.files import digest_of
 from gearbench.geometry import Pair, pair
+from gearbench.geometry.tooth.micro import profile_excess
 from gearbench.geometry.tooth.profile import involute
 from gearbench.kernels.compiled import compiled
 from gearbench.lumped import mesh_stiffness
+from gearbench.lumped.nonlinear.forms import formed
 from gearbench.lumped.nonlinear.law import MeshLaw, approach_grid
 from gearbench.lumped.stiffness.potential_energy import hertz_compliance, tooth_compliance
 from gearbench.rig import Gear, Rig, Simulation
-from gearbench.rig.neutral import relieved_gear
+from gearbench.rig.neutral import is_formed, relieved_gear, without_reliefs
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -38,12 +41,37 @@ OFFSETS = 4  # pairs looked at on either side of the one at the pitch point
 
 
 def mesh_law(rig: Rig, simulation: Simulation, load_max_nm: float) -> MeshLaw:
-    """Law of the rig's sound, error-free gears up to at least the driver torque `load_max_nm` [N m].
+    """Law of the rig's gears up to at least the driver torque `load_max_nm` [N m], with what all teeth of a gear lack
+    or have beside their involutes.
 
     With simulation.mesh_stiffness = "finite-element" from static contact of the condensed gears, tip-edge contact and
     reliefs included, from disk where it has been solved before; else linear in the deflection, with the stiffness
     k(phase) that the case asks for. Raises GeometryError, ContactError, LumpedError or BenchError.
     """
+    teeth = teeth_law(rig, simulation, load_max_nm)
+    return with_flanks(teeth, flank_excess(teeth, rig, simulation))
+
+
+def with_flanks(teeth: MeshLaw, excess: Array | None) -> MeshLaw:
+    """The `teeth_law` with the `flank_excess` of a rig."""
+    return teeth if excess is None else formed(teeth, excess)
+
+
+def flank_excess(teeth: MeshLaw, rig: Rig, simulation: Simulation) -> Array | None:
+    """What each pair's flanks have (phases, n_o) [m] that is not in the `teeth_law`, all teeth of a gear alike: slope,
+    form and wear, and reliefs where the law does not come from finite elements; None for involutes."""
+    gears = [rig.driver, rig.driven]
+    if simulation.mesh_stiffness == "finite-element":
+        gears = [without_reliefs(gear) for gear in gears]
+    if not any(is_formed(gear) for gear in gears):
+        return None
+    meshing = pair(rig)
+    excess = profile_excess(meshing.driver, gears[0], 0, teeth.rho1)
+    return excess + profile_excess(meshing.driven, gears[1], 0, teeth.rho2)
+
+
+def teeth_law(rig: Rig, simulation: Simulation, load_max_nm: float) -> MeshLaw:
+    """Law of the rig's sound, error-free gears; arguments and refusals as those of `mesh_law`."""
     sound = rig.model_copy(update={"driver": relieved_gear(rig.driver), "driven": relieved_gear(rig.driven)})
     if simulation.mesh_stiffness != "finite-element":
         return linear_law(sound, simulation)
@@ -60,7 +88,8 @@ def mesh_law(rig: Rig, simulation: Simulation, load_max_nm: float) -> MeshLaw:
         "source": _source(),
     }
     arrays = cached(key_for("mesh-law", values), lambda: _solve(elastic_rig(sound, simulation), load))
-    return _assemble(sound, meshing, arrays["approach"], arrays["force"], arrays["share"], arrays["parts"])
+    law = _assemble(sound, meshing, arrays["approach"], arrays["force"], arrays["share"], arrays["parts"])
+    return replace(law, shared=float(arrays["shared"]))
 
 
 def linear_law(rig: Rig, simulation: Simulation) -> MeshLaw:
@@ -121,8 +150,10 @@ def _force_table(law: Law, phases: Array, dte: Array, first: int, force: Array, 
 
 
 @compiled
-def _tangent_shares(law: Law, phases: Array, dte: Array, first: int, share: Array) -> None:
-    """Fill share (phases, offsets): part of each working pair in the tangent stiffness at the given deflections."""
+def _tangent_shares(law: Law, phases: Array, dte: Array, first: int, share: Array) -> float:
+    """Fill share (phases, offsets): part of each working pair in the tangent stiffness at the given deflections.
+    Returns the mean compliance [m/N] from one pair's force to the next one's deflection, 0 where none has a next."""
+    shared, seen = 0.0, 0
     for i in range(len(phases)):
         theta1 = phases[i] * law.driver.pitch + dte[i] / law.driver.rb
         found = position(law, theta1, phases[i] * law.driven.pitch, 0.0, 0.0, 0.0, 0.0, np.zeros(PAIRS))
@@ -135,10 +166,15 @@ def _tangent_shares(law: Law, phases: Array, dte: Array, first: int, share: Arra
                 total += stiff[p]
         for column in range(share.shape[1]):
             share[i, column] /= total
+        for p in range(1, len(found.pairs)):
+            if found.active[p] and found.active[p - 1] and found.pairs[p].side + found.pairs[p - 1].side == 0:
+                shared += found.flexibility[p, p - 1]
+                seen += 1
+    return shared / max(seen, 1)
 
 
 def _solve(elastic: ElasticRig, load: float) -> dict[str, Array]:
-    """Arrays approach, force and share of the elastic pair."""
+    """Arrays approach, force, share and shared of the elastic pair."""
     law, phase = elastic.law, np.arange(PHASES) / PHASES
     coarse = phase[:: PHASES // 64]
     deepest = float(static_cycle(law, coarse, torque=[load]).transmission_error.max())
@@ -152,8 +188,8 @@ def _solve(elastic: ElasticRig, load: float) -> dict[str, Array]:
     reference = REFERENCE * load / elastic.pair.driver.base_radius
     dte = np.array([np.interp(reference, row, approach) for row in force])
     share = np.zeros((PHASES, 2 * OFFSETS + 1))
-    _tangent_shares(law, phase, dte, -OFFSETS, share)
-    return {"approach": approach, "force": force, "share": share, "parts": parts}
+    shared = _tangent_shares(law, phase, dte, -OFFSETS, share)
+    return {"approach": approach, "force": force, "share": share, "parts": parts, "shared": np.array(shared)}
 
 
 def _travel(meshing: Pair, phase: Array) -> Array:

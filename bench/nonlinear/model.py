@@ -29,7 +29,7 @@ class NonLinear(Model):
     elastic = False
 
     def refuse(self, case: Case) -> None:
-        refuse_unknown(case.rig, case.simulation)
+        refuse_unknown(case.rig)
         if case.simulation.mesh_stiffness == "finite-element":
             from gearbench.bench.refusals.load_range import check_mean_torque
 

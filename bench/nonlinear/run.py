@@ -278,7 +278,7 @@ def make_setup(
     Raises LumpedError, BenchError, GeometryError or ContactError.
     """
     rig, experiment, simulation, meshing = case.rig, case.experiment, case.simulation, pair(case.rig)
-    refuse_unknown(rig, simulation)
+    refuse_unknown(rig)
     law = law or mesh_law(rig, simulation, largest_load(experiment))
     model = nonlinear_model(rig, meshing, law)
     force = experiment.torque_mean / meshing.driver.base_radius

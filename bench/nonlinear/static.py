@@ -18,7 +18,7 @@ from gearbench.lumped.nonlinear.pressing import pressed, travel_under
 from gearbench.lumped.nonlinear.rest import inverse_masses, mesh_direction
 from gearbench.lumped.nonlinear.tables import Motion, instants, tables
 from gearbench.rig import Case
-from gearbench.rig.neutral import relieved_gear
+from gearbench.rig.neutral import even_gear
 
 Array = NDArray[np.float64]
 
@@ -29,7 +29,7 @@ STIFFEST = 20e9  # stiffness of the stiffest imaginable teeth per face width [N/
 
 def static_nonlinear(case: Case, loads: Loads, phase: Array) -> xr.Dataset:
     """Static response with errors and cracks as the first pairs have them, from mesh phase 0; no friction."""
-    refuse_unknown(case.rig, case.simulation)
+    refuse_unknown(case.rig)
     meshing = pair(case.rig)
     radius = meshing.driver.base_radius
     unit, values = loads
@@ -66,7 +66,7 @@ def linearised_matrices(case: Case, meshing: Pair, phases: int) -> tuple[Array, 
     States: relative displacements that the rig's springs see, then their rates; the motion of both gears together,
     which changes nothing, is left out.
     """
-    gears = {"driver": relieved_gear(case.rig.driver), "driven": relieved_gear(case.rig.driven)}
+    gears = {"driver": even_gear(case.rig.driver), "driven": even_gear(case.rig.driven)}
     rig = case.rig.model_copy(update=gears)
     force = case.experiment.torque_mean / meshing.driver.base_radius
     law = mesh_law(rig, case.simulation, 2 * case.experiment.torque_mean)

@@ -71,6 +71,12 @@ class Pair:
         return self.line_of_action - stop, self.line_of_action - start
 
     @property
+    def path(self) -> tuple[float, float]:
+        """Start and end of the path of contact behind the pitch point, in base pitches."""
+        start, stop = ((rho - self.rho_pitch[0]) / self.base_pitch for rho in self.active_driver)
+        return start, stop
+
+    @property
     def contact_ratio(self) -> float:
         """Transverse contact ratio of the involutes, which end where the tip-edge arcs begin."""
         start, stop = self.active_driver

@@ -37,7 +37,9 @@ class MeshLaw:
     up to 1. parts (n_p, n_d, n_o) [N]: what each pair carries of the force; they add up to it. rho1, rho2 (n_p, n_o):
     roll lengths [m] of those pairs' contacts. bending (n_p, n_o, 2): part that the driver's and the driven tooth's
     flexibility, without their local contact, has in their pair's. backlash [m]: along the line of action.
-    base_pitch [m]. mirror: phase at which a pair's back flanks pass the pitch point.
+    base_pitch [m]. mirror: phase at which a pair's back flanks pass the pitch point. shared [m/N]: compliance through
+    which the force of one pair bends the next. lead [m]: excess material at the first touch, from which deflections
+    count.
     """
 
     approach: Array
@@ -51,6 +53,8 @@ class MeshLaw:
     backlash: float
     base_pitch: float
     mirror: float = 0.5
+    shared: float = 0.0
+    lead: float = 0.0
 
     def __post_init__(self) -> None:
         nodes = len(self.approach)
@@ -71,9 +75,9 @@ class MeshLaw:
         """The law F (F / reference)^exponent of the force F of this one; `reference` [N] > 0."""
         if exponent == 0.0:
             return self
-        # Force over deflection is tabulated from the first node on: at none there is no force.
+        # Where there is no force, none becomes stiffer.
         level = np.ones_like(self.force)
-        level[:, 1:] = (self.force[:, 1:] / reference) ** exponent
+        np.power(self.force / reference, exponent, out=level, where=self.force > 0.0)
         return replace(self, force=self.force * level, parts=self.parts * level[..., None])
 
     @property

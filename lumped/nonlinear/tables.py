@@ -155,7 +155,7 @@ def tables(model: NonLinear, motion: Motion) -> Table:
     correction = Correction(
         mesh.stiffness_scale,
         _series(mesh.stiffness_cos, mesh.stiffness_sin),
-        mesh.error_mean,
+        mesh.error_mean + law.lead,
         _series(mesh.error_cos, mesh.error_sin),
     )
     varied = motion.varied

@@ -158,7 +158,7 @@ def test_harris_map(file: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("settings", "model", "error", "words"),
     [
-        (RELIEF, "lumped", BenchError, r"tip_relief_um with .* = \"finite-element\" alone, not \"potential"),
+        (["rig.driver.profile_slope_tooth_um=[1,0,0,0,0,0,0,0,0,0,0,0]"], "lumped", BenchError, "slope_tooth_um"),
         (["rig.driven.iso_grade=6"], "lumped", BenchError, r"rig\.driven\.iso_grade"),
         (["rig.driver.crack={tooth=1, stiffness_loss=0.2}"], "reduced", BenchError, r"represent rig\.driver\.crack"),
         (["rig.mesh.error_mean_um=1"], "reduced", BenchError, r"represent rig\.mesh\.error_mean_um"),

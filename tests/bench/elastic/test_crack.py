@@ -14,7 +14,7 @@ from gearbench.bench.refusals.effects import ELASTIC_KEYS, refuse_effects, refus
 from gearbench.fem.gear.body import condense
 from gearbench.geometry.tooth.profile import profile
 from gearbench.lumped.stiffness.potential_energy import tooth_compliance
-from gearbench.rig import Crack, Gear, Material, Rig, Simulation, Support, Supports
+from gearbench.rig import Crack, Gear, Material, Rig, Support, Supports
 
 
 def gear(crack: Crack | None = None) -> Gear:
@@ -49,9 +49,9 @@ def test_each_model_takes_its_kind_of_crack() -> None:
     refuse_effects(rig(CUT), "model", represented=ELASTIC_KEYS)
     with pytest.raises(BenchError, match=r"rig\.driver\.crack\.stiffness_loss: give the crack itself, length_mm"):
         refuse_effects(rig(Crack(tooth=3, stiffness_loss=0.2)), "model", represented=ELASTIC_KEYS)
-    refuse_unknown(rig(Crack(tooth=3, stiffness_loss=0.2)), Simulation())
+    refuse_unknown(rig(Crack(tooth=3, stiffness_loss=0.2)))
     with pytest.raises(BenchError, match=r"rig\.driven\.crack\.length_mm: give the crack's stiffness_loss"):
-        refuse_unknown(rig(None, CUT), Simulation())
+        refuse_unknown(rig(None, CUT))
 
 
 def test_a_crack_passes_once_a_revolution() -> None:

@@ -1,0 +1,109 @@
+"""The mesh law of teeth whose flanks depart from those that it was made for, all teeth of a gear alike.
+
+A pair n whose flanks have the excess e_n where they touch carries its part g_n of the force as if it were pressed
+further by e_n. What bends beside it, the gears' bodies, yields under the force of all pairs together:
+
+    F = sum over pairs of g_n(u + e_n),   delta = u + c F,   g_n(delta - c F_0(delta)) = F_n(delta)
+
+delta is the deflection, u what is left of it for the pairs, c the compliance that the pairs share, F_0 the force of the
+law's own flanks and F_n what pair n carries of it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.kernels.compiled import INNER, compiled
+from gearbench.lumped.errors import LumpedError
+from gearbench.lumped.nonlinear.law import MeshLaw, approach_grid
+
+Array = NDArray[np.float64]
+
+NODES = 97  # deflections of the table: flanks that come into contact one after another bend it more often
+FINE = 4  # steps between two nodes, where forces are found before the table is read off
+REFERENCE = 0.3  # of the largest force, where the shares of the pairs are taken
+
+
+def formed(law: MeshLaw, excess: Array) -> MeshLaw:
+    """The law with the excess (n_p, n_o) [m] on each pair's working flanks beside what it has already.
+
+    Deflections count from the first touch, `lead` says where that is. Back flanks are taken to be formed as the working
+    ones. Raises LumpedError for excess of another shape, or beyond reason.
+    """
+    if excess.shape != law.share.shape:
+        raise LumpedError(f"the excess on a mesh law's flanks has shape {excess.shape}, not {law.share.shape}")
+    touching = law.parts[:, -1] > 0.0
+    if not np.isfinite(excess).all() or not touching.any(axis=1).all():
+        raise LumpedError("the excess on a mesh law's flanks must be finite, and some pair must touch at any phase")
+    lead = float(excess[touching].max())
+    lower = excess - lead
+    if not lower[touching].any():
+        return replace(law, lead=law.lead + lead)
+    deepest = law.approach[-1] - float(np.where(touching, lower, -np.inf).max(axis=1).min())
+    approach = approach_grid(deepest, NODES)
+    trial = approach_grid(deepest, FINE * (NODES - 1) + 1)
+    parts = np.zeros((law.phases, NODES, len(law.offsets)))
+    _press(law.approach, law.parts, lower, law.shared, trial, approach, parts)
+    force = parts.sum(axis=2)
+    return replace(
+        law,
+        approach=approach,
+        force=force,
+        parts=parts,
+        share=_shares(force, parts),
+        lead=law.lead + lead,
+    )
+
+
+@compiled(**INNER)
+def _carried(places: Array, parts: Array, o: int, lower: float, trial: Array, found: Array) -> None:
+    """Fill found[:, o] with the force of pair o, which stands back by `lower` <= 0, at rising deflections `trial`: by
+    straight lines through (places, parts[:, o]), beyond their end as between the last two."""
+    last, k = len(places) - 1, 1
+    for n in range(len(trial)):
+        u = trial[n] + lower
+        while k < last and places[k] < u:
+            k += 1
+        slope = (parts[k, o] - parts[k - 1, o]) / (places[k] - places[k - 1])
+        found[n, o] = max(parts[k - 1, o] + slope * (u - places[k - 1]), 0.0) if u > 0.0 else 0.0
+
+
+@compiled
+def _press(
+    approach: Array, parts: Array, excess: Array, shared: float, trial: Array, wanted: Array, out: Array
+) -> None:
+    """Fill `out` (phases, wanted, n_o) with what each pair carries at the `wanted` deflections, from forces `parts`
+    at `approach`; excess (phases, n_o) <= 0; trial: deflections of the pairs, beside what they share, to begin with."""
+    count = parts.shape[2]
+    found = np.zeros((len(trial), count))
+    depth, places = np.zeros(len(trial)), np.zeros(len(approach))
+    for i in range(parts.shape[0]):
+        for j in range(len(approach)):
+            places[j] = approach[j]
+            for o in range(count):
+                places[j] -= shared * parts[i, j, o]
+        for o in range(count):
+            _carried(places, parts[i], o, excess[i, o], trial, found)
+        for n in range(len(trial)):
+            depth[n] = trial[n]
+            for o in range(count):
+                depth[n] += shared * found[n, o]
+        n = 1
+        for j in range(len(wanted)):
+            while n < len(trial) - 1 and depth[n] < wanted[j]:
+                n += 1
+            weight = (wanted[j] - depth[n - 1]) / (depth[n] - depth[n - 1])
+            for o in range(count):
+                out[i, j, o] = max(found[n - 1, o] + weight * (found[n, o] - found[n - 1, o]), 0.0)
+
+
+def _shares(force: Array, parts: Array) -> Array:
+    """Parts (phases, n_o) of the pairs in the tangent stiffness at the node below the reference force."""
+    level = REFERENCE * float(force[:, -1].max())
+    node = np.clip((force < level).sum(axis=1) - 1, 0, force.shape[1] - 2)
+    rows = np.arange(len(force))
+    tangent = np.maximum(parts[rows, node + 1] - parts[rows, node], 0.0)
+    return np.asarray(tangent / tangent.sum(axis=1, keepdims=True))
