@@ -88,7 +88,7 @@ def find_cause(
     report("steadiness")
     band = problem.conditions[0].band
     unsteady = unsteadiness(problem.model, measurements, problem.unknowns, fit.p, band)
-    simulate = replays(problem.model.law)
+    simulate = replays(problem.model.sound)
     found = simulated(problem, result, measurements, nominal, simulate, without, report)
     common: dict[str, Any] = {
         "indistinguishable": alike(fit, problem.unknowns, representatives(problem, without)),

@@ -111,7 +111,7 @@ def take_in(
     check_stated(nominal, "a diagnosis")
     check_springs(nominal, "a diagnosis")
     nominal = on_finite_elements(nominal)
-    refuse_unknown(nominal.rig, nominal.simulation)
+    refuse_unknown(nominal.rig)
     names = sorted((effect.name for effect in (*LIBRARY, *CHANGING)), key=rank_of)
     for name in without:
         if name not in names:

@@ -130,17 +130,24 @@ def no_starts(group: Group) -> tuple[float, ...]:
     return ()
 
 
+def no_shapes(model: NominalModel) -> Array:
+    """Of an effect that simulation finds from zero."""
+    return np.empty((0, 0))
+
+
 @dataclass(frozen=True)
 class Effect:
     """An effect that a simulation may leave out.
 
-    Words: `name` as verdicts have it, `noun` as a sentence does, `meaning` what it is and where to look, `parameters`
-    the last part of a parameter's name in an engineer's words. Rig: `fields`, dotted from the case, that `add(rig,
-    hypothesis, fitted)` moves when it puts what was fitted into a rig. Model: `unknowns(model, conditions)` with bounds
-    and priors, `hypotheses_of(model)` where it may be, and `starts(group)`, values of the group of a hypothesis to
-    begin the search from besides zero. Search: it is refitted whatever the background's quadratic predicts (`always`),
-    in `most_refits` of its hypotheses at most. Decision: `limit` of its evidence and `least_size`, if they are not
-    those of all effects. `model_error`: relative error of a rightly named one beyond that of the fit.
+    Words: `name` as verdicts have it, `noun` as a sentence does, `meaning` what it is and where to look,
+    `parameters` the last part of a parameter's name in an engineer's words. Rig: `fields`, dotted from the case,
+    that `add(rig, hypothesis, fitted)` moves when it puts what was fitted into a rig. Model: `unknowns(model,
+    conditions)` with bounds and priors, `hypotheses_of(model)` where it may be, and `starts(group)`, values of the
+    group of a hypothesis to begin the search from besides zero; `shapes(model)`, values (n, entries) of `shaped`,
+    the group that simulation begins from where following the slope from zero does not get there. Search: it is
+    refitted whatever the background's quadratic predicts (`always`), in `most_refits` of its hypotheses at most.
+    Decision: `limit` of its evidence and `least_size`, if they are not those of all effects. `model_error`:
+    relative error of a rightly named one beyond that of the fit.
     """
 
     name: str
@@ -152,6 +159,8 @@ class Effect:
     add: Callable[[Rig, Hypothesis, Fitted], Added]
     unknowns: Callable[[NominalModel, Sequence[Condition]], tuple[Group, ...]] = no_unknowns
     starts: Callable[[Group], tuple[float, ...]] = no_starts
+    shapes: Callable[[NominalModel], Array] = no_shapes
+    shaped: str = ""
     always: bool = False
     most_refits: int | None = None
     limit: float | None = None

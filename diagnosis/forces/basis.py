@@ -11,10 +11,21 @@ SHAPE_ORDERS = 6  # mesh orders of the free part of stiffness shape and profile 
 # Where the pieces meet, as parts of the band: denser at low frequencies, where the supports resonate.
 KNOTS = (0.0, 0.05, 0.12, 0.2, 0.3, 0.42, 0.55, 0.7, 0.85, 1.0)
 
+# Places along the path of contact, as parts of it, between which an error of the flanks is taken for straight: closer
+# where teeth come into mesh and leave it, as reliefs are there.
+PLACES_ON_PATH = (0.0, 0.1, 0.25, 0.5, 0.75, 0.9, 1.0)
+
 
 def hats(frequency: Array, band: float) -> Array:
     """Piecewise linear basis (knots, K) over frequencies [Hz] of 0 .. `band`; constant beyond the last knot."""
     return np.stack([np.interp(frequency, band * np.array(KNOTS), column) for column in np.eye(len(KNOTS))])
+
+
+def on_path(travel: Array, path: tuple[float, float]) -> Array:
+    """Piecewise linear basis (places, ...) over distances behind the pitch point [base pitches] of a path of contact
+    from its start to its end; constant beyond them."""
+    places = path[0] + (path[1] - path[0]) * np.array(PLACES_ON_PATH)
+    return np.stack([np.interp(travel, places, column) for column in np.eye(len(places))])
 
 
 def waves(phase: Array) -> Array:

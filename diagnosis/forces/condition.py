@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.diagnosis.forces.basis import hats, waves
+from gearbench.diagnosis.forces.basis import hats, on_path, waves
 from gearbench.diagnosis.forces.nominal import NominalModel
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.lumped.nonlinear.coordinates import leaning_of
@@ -32,10 +32,11 @@ class Condition:
     `phase` (N,) mesh phase [cycles] with the centres' motion; `tooth` (2, N, n_o) tooth numbers of the pairs that
     touch, `load_share` (N, n_o) their shares of the load, `bending` (N, n_o, 2) the teeth's parts of their flexibility;
     `lever_arms` (3, N) of friction over base radius, for driver rotation, y and driven rotation; `waves` (2 orders, N)
-    of the rotation's mesh phase, `lobes` (2, 2, N) cosine and sine of both rotations; `pitch_speed` rb speed [m/s];
-    `force_level` [N] and `stiffness_level` [N/m] of the mesh at the mean torque; `force_full` (N/2 + 1,) spectrum of
-    the mesh force that a nominal equation gives, zero beyond the used bins; `hats_full` basis of smooth functions of
-    frequency (knots, N/2 + 1).
+    of the rotation's mesh phase, `flanks` (places, N) what the mesh as a whole has of a unit of excess at each of the
+    `basis.PLACES_ON_PATH` of all pairs, `lobes` (2, 2, N) cosine and sine of both rotations; `pitch_speed`
+    rb speed [m/s]; `force_level` [N] and `stiffness_level` [N/m] of the mesh at the mean torque; `force_full` (N/2
+    + 1,) spectrum of the mesh force that a nominal equation gives, zero beyond the used bins; `hats_full` basis of
+    smooth functions of frequency (knots, N/2 + 1).
     """
 
     name: str
@@ -52,6 +53,7 @@ class Condition:
     bending: Array
     lever_arms: Array
     waves: Array
+    flanks: Array
     lobes: Array
     pitch_speed: float
     teeth: tuple[int, int]
@@ -90,6 +92,7 @@ def prepare(measured: Measurement, model: NominalModel, band: float) -> Conditio
         bending=model.law.bending_of(phase),
         lever_arms=_lever_arms(model, measured.mesh_frequency, phase, spectra, omega),
         waves=waves(measured.phase),
+        flanks=(on_path(phase[:, None] - numbers, model.path) * share).sum(axis=-1),
         lobes=np.stack([(np.cos(turn), np.sin(turn)) for turn in turns]),
         pitch_speed=2 * np.pi * measured.mesh_frequency / model.teeth[0] * rb1,
         teeth=model.teeth,

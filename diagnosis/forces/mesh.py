@@ -90,7 +90,7 @@ def mesh(model: NominalModel, condition: Condition, departures: Departures, spec
     dte = closing(model, spectra)
     filtered = dte + _yielding(model, condition, departures)
     n = condition.samples
-    common = departures.offset + departures.excess + departures.profile @ condition.waves
+    common = model.law.lead + departures.offset + departures.excess + departures.profile @ condition.waves
     delta = np.fft.irfft(filtered, n) * n + common
     rate = np.fft.irfft(1j * condition.omega * dte, n) * n
     law = replace(model.hardened, backlash=max(model.law.backlash + departures.backlash, 0.0))

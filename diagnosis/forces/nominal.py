@@ -60,6 +60,8 @@ class NominalModel:
     friction: float
     transition: float  # sliding speed at which friction has changed its direction [m/s]
     law: MeshLaw
+    sound: MeshLaw  # of teeth without what `law` knows of their flanks
+    path: tuple[float, float]  # of contact, behind the pitch point [base pitches]
     sd_stiffness: tuple[float, float]
     sd_damping: tuple[float, float]
     sd_mass: tuple[float, float]
@@ -105,9 +107,10 @@ def nominal_model(nominal: Case, load: float, mean: float) -> NominalModel:
     there.
     """
     # Solving it compiles loops on import, which not every user of this module wants.
-    from gearbench.bench.nonlinear.law_table import mesh_law
+    from gearbench.bench.nonlinear.law_table import flank_excess, teeth_law, with_flanks
 
     rig = nominal.rig
+    sound = teeth_law(rig, nominal.simulation, load)
     meshing = pair(rig)
     bodies = _bodies(rig, meshing)
     supports = (rig.support.driver, rig.support.driven)
@@ -144,7 +147,9 @@ def nominal_model(nominal: Case, load: float, mean: float) -> NominalModel:
         error_sin=rig.mesh.error_sin,
         friction=rig.friction.coefficient,
         transition=rig.friction.transition_speed,
-        law=mesh_law(rig, nominal.simulation, load),
+        law=with_flanks(sound, flank_excess(sound, rig, nominal.simulation)),
+        sound=sound,
+        path=meshing.path,
         sd_stiffness=known.both("rig.support.{}.stiffness", [one.stiffness for one in held], "support_stiffness"),
         sd_damping=known.both("rig.support.{}.damping", [s.damping for s in supports], "support_damping"),
         sd_mass=known.both("rig.{}.mass", [b.mass for b in bodies], "mass"),

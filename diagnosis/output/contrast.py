@@ -20,12 +20,19 @@ Array = NDArray[np.float64]
 # Over the nominal change: none at -1; discs with webs and rims against solid ones differ by some tenths.
 CONTRAST, CONTRAST_SD, CONTRAST_LEAST, CONTRAST_LARGEST = "contrast", 0.12, -0.5, 0.6
 CONTRAST_NAME = "change of the mesh stiffness over its phase, beyond the nominal one over it"
+BEYOND = 2.0  # standard deviations, from which other flanks are tried
 ORDERS = 16  # of the mesh: a pair comes and goes within a sixteenth of its cycle
 
 
 def contrast_groups() -> list[Group]:
     """The one mesh."""
     return [group(CONTRAST, "1", ("mesh",), CONTRAST_SD, slot="contrast", low=CONTRAST_LEAST, high=CONTRAST_LARGEST)]
+
+
+def is_strange(unknowns: Unknowns, p: Array) -> bool:
+    """Whether the mesh stiffness of unknowns (size,) changes as that of no body, rim or web does, so that the flanks
+    may be others."""
+    return bool(abs(p[unknowns[CONTRAST]][0]) > BEYOND * CONTRAST_SD) if CONTRAST in unknowns.slices else False
 
 
 def other_flanks(unknowns: Unknowns, p: Array) -> tuple[str, ...]:

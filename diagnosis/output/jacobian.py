@@ -21,11 +21,12 @@ from gearbench.diagnosis.effects.encoder_runout import ADDS
 from gearbench.diagnosis.effects.encoder_runout import KEYS as ENCODERS
 from gearbench.diagnosis.effects.friction import KEY as FRICTION
 from gearbench.diagnosis.effects.pitch_error import KEYS as PITCHES
+from gearbench.diagnosis.effects.profile_error import FLANKS
 from gearbench.diagnosis.effects.sensor_delay import KEYS as DELAYS
 from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
 from gearbench.diagnosis.effects.torque_ripple import KEY as RIPPLE
 from gearbench.diagnosis.effects.torque_ripple import ORDERS
-from gearbench.diagnosis.forces.basis import waves
+from gearbench.diagnosis.forces.basis import on_path, waves
 from gearbench.diagnosis.output.contrast import CONTRAST, series_at
 from gearbench.diagnosis.output.layout import Layout
 from gearbench.diagnosis.output.structure import GAIN, LEAST_STEP, PHASE, STRUCTURE
@@ -117,6 +118,7 @@ def mesh_forces(layout: Layout, along: Along, chosen: Flags) -> tuple[Array, Int
     put(PHASE, -(turned + along.of_excess(error_slope[:, None])))
     put("offset", along.of_excess(np.ones((len(phase), 1))))
     put("profile", along.of_excess(wave))
+    put(FLANKS, _of_flanks(along, numbers, layout.model.path))
     for side, key in enumerate(RUNOUTS.values()):
         turn = 2 * np.pi * phase / (z1, z2)[side]
         put(key, along.of_excess(np.stack([np.cos(turn), np.sin(turn)], axis=1)))
@@ -136,6 +138,13 @@ def mesh_forces(layout: Layout, along: Along, chosen: Flags) -> tuple[Array, Int
         parts.append(np.stack(soft, axis=1)[:, keep])
         at.extend(indices[keep])
     return np.concatenate(parts, axis=1), np.array(at)
+
+
+def _of_flanks(along: Along, numbers: NDArray[np.int64], path: tuple[float, float]) -> Array:
+    """Force (entries, places) [N] per unit of excess at places along the path of contact, of the pairs `numbers`
+    (entries, n_o) that touch."""
+    shape = on_path(along.phase[:, None] - numbers, path)
+    return np.asarray((shape * along.pairs.tangent).sum(axis=-1).T)
 
 
 def _by_tooth(tooth: NDArray[np.int64], stiffness: Array, count: int) -> Array:

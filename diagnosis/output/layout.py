@@ -40,7 +40,8 @@ FORCES_ONLY = ("compliance", "radial")
 NEARLY_RIGID = 1e-3  # compliance of a coupling below this part of its prior is left out of the rig
 LEAST_LOSS = 1e-6
 # Effects that are put into a rig whatever their size.
-PLAIN = ("friction", "eccentricity", "pitch-error", "backlash", "contact-nonlinearity", "encoder-runout")
+PLAIN = ("friction", "eccentricity", "pitch-error", "profile-error", "backlash", "contact-nonlinearity",
+         "encoder-runout")  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -15,12 +15,15 @@ from numpy.typing import NDArray
 
 from gearbench.bench.plan.workers import side_by_side
 from gearbench.diagnosis.effects.effect import BEYOND, Hypothesis, Wide
-from gearbench.diagnosis.evidence.separable import APART
+from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
 from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.output.beginning import Around, beginning
+from gearbench.diagnosis.output.contrast import is_strange
 from gearbench.diagnosis.output.fit import SETTLED, Optimum, Sensitivity, cost_of, fit, sensitivity_of
 from gearbench.diagnosis.output.jacobian import FOLLOWED
+from gearbench.diagnosis.output.reshaped import has_shapes, reshaped
 from gearbench.diagnosis.output.restructured import better, is_close, restructured
+from gearbench.diagnosis.output.rivals import is_same, rivals_of, usual_of
 from gearbench.diagnosis.output.simulator import Simulator
 
 Array = NDArray[np.float64]
@@ -108,7 +111,7 @@ def select(
     entered: list[Weighed] = []
     while len(entered) < MOST:
         taken = [one.hypothesis for one in entered]
-        rest = [one for one in hypotheses if not any(_same(one, other) for other in taken)]
+        rest = [one for one in hypotheses if not any(is_same(one, other) for other in taken)]
         found = weigh(simulator, best, rest, starts, report)
         weighed = found if weighed is None else weighed
         winner = usual_of(found)
@@ -141,7 +144,8 @@ def _fitted(
 def prior_of(simulator: Simulator, sd: Array) -> Array:
     """The prior `sd` (size,) with what no rig of the background has held at zero: cracked teeth."""
     out = sd.copy()
-    out[simulator.layout.unknowns["crack"]] = 0.0
+    unknowns = simulator.layout.unknowns
+    out[unknowns[CRACK]] = 0.0
     return out
 
 
@@ -174,6 +178,8 @@ def weigh(
     by_force = sorted((s for s in starts.values() if s.hypothesis.name in ranked), key=lambda s: -s.log_bayes_factor)
     names = [s.hypothesis.name for s in by_force[:BY_FORCES] if s.log_bayes_factor > WORTH]
     names = list(dict.fromkeys([*names, *(one.name for value, one, _ in promised[:TRIED] if value > WORTH)]))[:TRIED]
+    shaped = [one.name for one in hypotheses if has_shapes(one)] if is_strange(unknowns, base.p) else []
+    names += [name for name in shaped if name not in names]
 
     def weighed(item: tuple[float, Hypothesis, Array]) -> Weighed:
         value, one, step = item
@@ -183,6 +189,9 @@ def weigh(
         # What any further step from there promises says nothing for this one.
         renewals = RENEWALS if value - base.left > LIMIT else 0
         optimum = _refit(simulator, base, one, step, starts.get(one.name), renewals)
+        if one.name in shaped:
+            other = reshaped(simulator, one, widened_prior(unknowns, base.sd, one))
+            optimum = other if optimum is None else better(optimum, other)
         if optimum is None:
             return Weighed(one, min(value, 0.0), None)
         factor = optimum.evidence - base.evidence - float(np.log(one.choices))
@@ -190,26 +199,6 @@ def weigh(
 
     out = side_by_side(weighed, promised)
     return sorted(out, key=lambda one: -one.log_bayes_factor)
-
-
-def usual_of(weighed: Sequence[Weighed]) -> Weighed | None:
-    """The most usual of those that explain the records as well as the best one does; None of none."""
-    if not weighed:
-        return None
-    best = weighed[0]
-    rivals = rivals_of(best, weighed)
-    return min((one for one in weighed if one is best or one.hypothesis in rivals), key=lambda one: one.hypothesis.rare)
-
-
-def rivals_of(winner: Weighed, weighed: Sequence[Weighed]) -> tuple[Hypothesis, ...]:
-    """Those of the hypotheses weighed beside the winner that explain the records as well, by other unknowns."""
-    return tuple(
-        one.hypothesis
-        for one in weighed
-        if one.optimum is not None
-        and one.log_bayes_factor > winner.log_bayes_factor - APART
-        and not _same(one.hypothesis, winner.hypothesis)
-    )
 
 
 def first_look(base: Optimum, hypotheses: Sequence[Hypothesis], unknowns: Unknowns) -> Array:
@@ -363,8 +352,3 @@ def _bounds_at(unknowns: Unknowns, wanted: Array, here: Array, sd: Array) -> tup
     low, high = unknowns.bounds()
     fixed = (sd == 0.0) & (wanted != here)
     return np.where(fixed, wanted, low), np.where(fixed, wanted, high)
-
-
-def _same(one: Hypothesis, other: Hypothesis) -> bool:
-    """Whether two hypotheses move the same unknowns."""
-    return any(a.key == b.key and (a.at is None or b.at is None or a.at == b.at) for a in one.wide for b in other.wide)

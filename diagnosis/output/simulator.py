@@ -119,7 +119,7 @@ class Simulator:
         def one(item: tuple[int, Measurement]) -> tuple[Integers, dict[str, Array], dict[int, dict[str, Array]]]:
             number, measured = item
             case = self.layout.case(p, measured.name)
-            tangent = along(steady_motion(case, measured.record, law_of(self.layout.model.law, case)))
+            tangent = along(steady_motion(case, measured.record, law_of(self.layout.model.sound, case)))
             forces = forces_of(self.layout, tangent, measured.name, chosen, others)
             answers = tangent.answers(forces.values, forces.on)
             answers["torque_driven"] = self.layout.model.base_radius[1] * answers.pop("reaction")

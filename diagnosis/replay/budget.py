@@ -194,8 +194,7 @@ def contact_zones(meshing: Pair, phase: Array) -> tuple[tuple[str, ...], Integer
     Zones: around the instants at which a pair's involutes enter and leave the path of contact ("entry", "exit"), and
     elsewhere by the pairs in contact. Where both reach, the nearer instant counts.
     """
-    pitch, origin = meshing.base_pitch, meshing.rho_pitch[0]
-    start, end = ((rho - origin) / pitch for rho in meshing.active_driver)
+    start, end = meshing.path
     touching = np.floor(phase - start) - np.ceil(phase - end) + 1
     after_start = (phase - start + 0.5) % 1.0 - 0.5
     after_end = (phase - end + 0.5) % 1.0 - 0.5

@@ -1,4 +1,4 @@
-"""Replays of records that share one mesh force law: it is loaded once, and only its backlash follows the rig."""
+"""Replays of records that share one law of sound teeth: it is loaded once, and backlash and flanks follow the rig."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import lru_cache
 
+import numpy as np
 import xarray as xr
 
 from gearbench.diagnosis.forces.nominal import table_load
@@ -14,12 +15,24 @@ from gearbench.geometry import pair
 from gearbench.lumped.nonlinear.law import MeshLaw
 from gearbench.rig import Case
 
-LAWS = 8  # of different backlash whose secants are kept: most replays have the nominal one
+LAWS = 8  # of different backlash or flanks whose secants are kept: most replays have the nominal ones
 
 
-def law_of(law: MeshLaw, case: Case) -> MeshLaw:
-    """The law with the backlash of the case's rig."""
-    return _with_backlash(law, max(pair(case.rig).backlash_normal, 0.0))
+def law_of(sound: MeshLaw, case: Case) -> MeshLaw:
+    """The law of sound teeth with the backlash and the flanks of the case's rig."""
+    # Solving it compiles loops on import, which not every user of this module wants.
+    from gearbench.bench.nonlinear.law_table import flank_excess
+
+    law = _with_backlash(sound, max(pair(case.rig).backlash_normal, 0.0))
+    excess = flank_excess(sound, case.rig, case.simulation)
+    return law if excess is None else _with_flanks(law, excess.tobytes())
+
+
+@lru_cache(maxsize=LAWS)
+def _with_flanks(law: MeshLaw, excess: bytes) -> MeshLaw:
+    from gearbench.lumped.nonlinear.forms import formed
+
+    return formed(law, np.frombuffer(excess).reshape(law.share.shape))
 
 
 @lru_cache(maxsize=LAWS)
@@ -27,21 +40,21 @@ def _with_backlash(law: MeshLaw, backlash: float) -> MeshLaw:
     return replace(law, backlash=backlash)
 
 
-def replays(law: MeshLaw) -> Callable[[Case, xr.Dataset], xr.Dataset]:
+def replays(sound: MeshLaw) -> Callable[[Case, xr.Dataset], xr.Dataset]:
     """`simulate(case, record)`: one steady repetition of the case's rig under the record's torque, on the non-linear
-    lumped model with this law. Rigs may differ in everything but what changes the teeth's shape."""
+    lumped model with this law of sound teeth. Rigs may differ in everything but the teeth that it was made for."""
 
     def simulate(case: Case, record: xr.Dataset) -> xr.Dataset:
         # Its time loop is compiled on import, which not every user of this module wants.
         from gearbench.bench.nonlinear.replay import replay
 
-        return replay(case, record, law_of(law, case))
+        return replay(case, record, law_of(sound, case))
 
     return simulate
 
 
 def replays_of(nominal: Case, measurements: Sequence[Measurement]) -> Callable[[Case, xr.Dataset], xr.Dataset]:
     """The replays of these measurements on the nominal rig's law."""
-    from gearbench.bench.nonlinear.law_table import mesh_law
+    from gearbench.bench.nonlinear.law_table import teeth_law
 
-    return replays(mesh_law(nominal.rig, nominal.simulation, table_load(measurements)))
+    return replays(teeth_law(nominal.rig, nominal.simulation, table_load(measurements)))

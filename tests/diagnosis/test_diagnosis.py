@@ -77,8 +77,9 @@ def test_a_rig_of_finite_elements_is_replayed_on_their_law_and_what_no_replay_ha
     assert take_in(sets(), reduced).nominal.simulation.mesh_stiffness == "finite-element"
     plain = demonstration(law)
     assert take_in(sets(), plain).nominal.simulation.mesh_stiffness == "potential-energy"
-    worn = demonstration("rig.driver.profile_slope_um=6")
-    with pytest.raises(BenchError, match=r"lumped model does not represent rig\.driver\.profile_slope_um"):
+    assert take_in(sets(), demonstration("rig.driver.profile_slope_um=6")).nominal.rig.driver.profile_slope == 6e-6
+    worn = demonstration(f"rig.driver.profile_slope_tooth_um={[1.0] * 19 + [0.0]}")
+    with pytest.raises(BenchError, match=r"lumped model does not represent rig\.driver\.profile_slope_tooth_um"):
         take_in(sets(), worn)
 
 

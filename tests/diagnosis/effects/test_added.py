@@ -107,6 +107,7 @@ EFFECTS: dict[str, tuple[dict[str, object], float]] = {
     "encoder-runout driver": ({"encoder-driver": (5e-6, -8e-6)}, 100.0),
     "encoder-runout driven": ({"encoder-driven": (-4e-6, 7e-6)}, 100.0),
     "profile-error": ({"profile": 1e-6 * np.array([2.0, -1.0, 0.0, 0.5, 0.3, *np.zeros(7)])}, 100.0),
+    "profile-error flanks": ({"flanks": 1e-6 * np.array([-3.0, -1.5, 0.2, 0.5, 0.0, -0.8, -2.0])}, 4.0),
     "torque-ripple": ({"ripple": (1.0, -0.5, 0.3, 0.6, 0.0, -0.4, 0.2, 0.2)}, 20.0),
 }
 

@@ -61,6 +61,17 @@ def test_a_derivative_is_what_two_simulations_differ_by(bench: Bench, key: str, 
     assert largest > 0.0
 
 
+@pytest.mark.parametrize("place", [0, 3, 6])
+def test_the_derivative_by_a_form_of_the_flanks_is_close(bench: Bench, place: int) -> None:
+    """Between the nodes of two tables; supports feel what is left where the error takes up nearly all of the form."""
+    at = bench.layout.unknowns["flanks"].start + place
+    step = 0.5 * bench.layout.unknowns.prior()[at]
+    found = off(bench.simulator, bench.jacobian[at], np.zeros(bench.layout.size), at, step)
+    for channel, within in (("dte", 0.06), ("y_driver", 0.2), ("y_driven", 0.2)):
+        error, size = found[channel]
+        assert error < within * size, channel
+
+
 def test_run_out_of_the_driven_encoder_is_seen_in_the_error_alone(bench: Bench) -> None:
     """The simulated gear turns as it was recorded, less that run-out, which shakes the rig a hundred times less."""
     at = bench.layout.unknowns["encoder-driven"].start
