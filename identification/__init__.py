@@ -1,9 +1,9 @@
 """Frequency-domain identification: multisines, DTE, periodically time-varying frequency responses and their truth.
 
 `excitation`: multisines and residue combs. `spectra`: from records to spectra of force and DTE. `lpm`: the local
-polynomial method. `truth`: periodic systems whose exact response is known. `response`: the dataset of a time-varying
-frequency response, natural frequencies against mesh phase. `feedback`: the mesh-feedback estimator. `nonlinear`:
-noise, even and odd distortion, operating response.
+polynomial method. `smooth`: the local method with smooth random branches, for short records. `truth`: periodic systems
+whose exact response is known. `response`: the dataset of a time-varying frequency response, natural frequencies against
+mesh phase. `feedback`: the mesh-feedback estimator. `nonlinear`: noise, even and odd distortion, operating response.
 """
 
 from __future__ import annotations

@@ -12,15 +12,15 @@ import xarray as xr
 from gearbench.identification.feedback.estimate import mesh_feedback
 from gearbench.identification.feedback.frf import feedback_frf
 from gearbench.identification.feedback.varying_frf import signals_of, varying_frf
+from gearbench.identification.local import by_local_method, by_polynomials_at_varying_speed
 from gearbench.identification.lpm.local_solve import LpmError
 from gearbench.identification.lpm.selection import LADDER
-from gearbench.identification.polynomials import by_polynomials, by_polynomials_at_varying_speed
 from gearbench.identification.spectra.course import LOST, SIDEBANDS, VARIES, course_spectra, speed_varies
 from gearbench.identification.spectra.joint import Spectra, SpectraError, require_mesh_periods
 from gearbench.identification.spectra.records import record_spectra
 from gearbench.identification.task import IdentificationSettings, Progress, Task, attributes_of, output_lines
 from gearbench.records import RecordError
-from gearbench.records.checks import check_record, same_samples
+from gearbench.records.checks import angles_keep_mesh_period, check_record, same_samples
 from gearbench.records.record import require_finite
 
 # Expected error of mesh-feedback beyond which the local polynomial method is tried as well.
@@ -62,9 +62,15 @@ def identify(
     if _not_averaged(records):
         return _polynomials_at_varying_speed(records, settings, report)
     sidebands = settings.harmonics if settings.harmonics is not None else LADDER[-1]
-    spectra, excited, notes = record_spectra(
-        records, top=settings.band[1] if settings.band else None, sidebands=sidebands
-    )
+    try:
+        spectra, excited, notes = record_spectra(
+            records, top=settings.band[1] if settings.band else None, sidebands=sidebands
+        )
+    except SpectraError:
+        # A mesh period that the angles contradict says more than that the record's length is unlucky.
+        for record in records:
+            check_record(record, checks=[angles_keep_mesh_period])
+        raise
     require_mesh_periods(spectra)
     report(0.05, "what the records say about themselves")
     doubts, cost = _doubts(records)
@@ -96,9 +102,9 @@ def identify_spectra(
         frf = by_feedback(task)
         if frf.attrs["expected_error"] > SECOND_OPINION:
             alone = replace(task, settings=_as_polynomials(settings))
-            frf = _second_opinion(frf, partial(by_polynomials, alone))
+            frf = _second_opinion(frf, partial(by_local_method, alone))
     else:
-        frf = by_polynomials(task)
+        frf = by_local_method(task)
     report(1.0, "identified")
     return frf
 

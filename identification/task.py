@@ -18,6 +18,7 @@ Progress = Callable[[float, str], None]
 # About this many output frequencies unless a step is given.
 OUTPUT_LINES = 1500
 METHODS = ("lpm", "mesh-feedback")
+BRANCHES = ("auto", "polynomials", "smooth")
 
 
 @dataclass(frozen=True)
@@ -28,7 +29,9 @@ class IdentificationSettings:
     (half-width in lines); or "mesh-feedback": `harmonics` of the mesh stiffness, order and window unused; `band`
     [Hz]: output frequencies (default: the excited band); `step`: lines between them; `phases`: of the ITF;
     `transient`: "estimate" polynomials for it, "none", or "auto": only where the record does not prove its
-    steady state; `modes`: at most that many.
+    steady state; `modes`: at most that many; `branches` of the local method "lpm": "polynomials" in each window,
+    "smooth" random functions, or "auto": whichever predicts the lesser error (polynomials where any of L, R, n is
+    given).
     """
 
     method: Literal["lpm", "mesh-feedback"] = "lpm"
@@ -40,6 +43,7 @@ class IdentificationSettings:
     phases: int = 256
     transient: Literal["auto", "estimate", "none"] = "auto"
     modes: int | None = None
+    branches: Literal["auto", "polynomials", "smooth"] = "auto"
 
     def __post_init__(self) -> None:
         if self.method not in METHODS:
@@ -47,6 +51,13 @@ class IdentificationSettings:
         for name in ("order", "window"):
             if self.method != "lpm" and getattr(self, name) is not None:
                 raise LpmError(f"{name} = {getattr(self, name)} belongs to method 'lpm', not to {self.method!r}")
+        if self.branches not in BRANCHES:
+            raise LpmError(f"branches = {self.branches!r} must be 'auto', 'polynomials' or 'smooth'")
+        if self.branches != "auto" and self.method != "lpm":
+            raise LpmError(f"branches = {self.branches!r} belongs to method 'lpm', not to {self.method!r}")
+        for name in ("order", "window"):
+            if self.branches == "smooth" and getattr(self, name) is not None:
+                raise LpmError(f"{name} = {getattr(self, name)} belongs to branches = 'polynomials', not to 'smooth'")
         if self.transient not in ("auto", "estimate", "none"):
             raise LpmError(f"transient = {self.transient!r} must be 'auto', 'estimate' or 'none'")
         limits = {"harmonics": 0, "order": 0, "window": 1, "step": 1, "phases": 1, "modes": 0}

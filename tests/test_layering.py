@@ -42,7 +42,7 @@ ROOMS: dict[str, tuple[str, ...]] = {
         *("plan", "record", "refusals", "linear", "elastic", "full", "nonlinear", "stress", "export", "results"),
         "study",
     ),
-    "identification": ("excitation", "spectra", "lpm", "truth", "response", "feedback", "nonlinear"),
+    "identification": ("excitation", "spectra", "lpm", "smooth", "truth", "response", "feedback", "nonlinear"),
     "diagnosis": ("intake", "forces", "effects", "evidence", "replay", "output"),
     "challenge": ("truth", "making", "scoring"),
     "app": ("shell", "words", "figures", "report", "commands"),

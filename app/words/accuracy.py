@@ -52,6 +52,12 @@ def limit_and_advice(found: dict[str, Any]) -> tuple[str, str]:
             f"missing branches{size}{noise}: it has {branches} a side{asked}{smear}",
             "more realisations or longer periods carry more of them, and mesh feedback needs none",
         )
+    if "smooth_bandwidth" in found:
+        return (
+            f"too few equations{size} for {branches} branches a side of a bandwidth of"
+            f" {found['smooth_bandwidth']:.3g} Hz",
+            "more realisations or longer periods bring more of them, and mesh feedback needs none",
+        )
     return f"the width of its windows{size}, in which {_window(found)} do not follow the response", (
         "more realisations or longer periods allow narrower ones, and mesh feedback needs none"
     )
@@ -101,6 +107,16 @@ def _polynomial_fit(found: dict[str, Any]) -> list[str]:
             f" (noise {found['noise_error']:.2%}, branches that it lacks {found['branches_error']:.2%}, polynomials"
             f" that do not follow {found['window_error']:.2%})"
         )
+    if "smooth_bandwidth" in found:
+        return [
+            f"Local method with {found['harmonics']} smooth branches on each side of a bandwidth of"
+            f" {found['smooth_bandwidth']:.3g} Hz: {found['unknowns']} unknowns determined by {found['equations']}"
+            f" equations in each of {found['windows']} windows.",
+            f"Expected error of the ITF: {found['expected_error']:.2%} of its rms (noise {found['noise_error']:.2%},"
+            f" branches that it lacks {found['branches_error']:.2%}, left open for lack of equations"
+            f" {found['window_error']:.2%}); at most {found['expected_error_bound']:.2%} if the whole residual is"
+            " missing response.",
+        ]
     return [
         f"Local polynomial method with {found['harmonics']} branches on each side, order {found['order']} and"
         f" {2 * found['window'] + 1} lines a window: {found['unknowns']} unknowns from {found['equations']} equations"

@@ -61,7 +61,8 @@ def expected_accuracy(result: LpmResult, record: float = 0.0) -> Accuracy:
     """
     power = np.sum(np.abs(result.htf) ** 2, axis=0).sum()
     spread = float(result.itf_covariance[0].real.sum())
-    signal = max(power - spread, 0.1 * power)
+    # Errors of least squares add to the power; those of a prior's mean, which is drawn to nothing, are missing in it.
+    signal = max(power - spread, 0.1 * power) if result.open_share is None else power + spread
     variance = np.sqrt(spread / signal)
     truncation, missing = (np.sqrt(value / signal) for value in (result.missing, result.missing_bound))
     return Accuracy(

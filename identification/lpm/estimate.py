@@ -19,6 +19,7 @@ from gearbench.identification.lpm.gathered import rows_around
 from gearbench.identification.lpm.gram import batches, grams
 from gearbench.identification.lpm.local_solve import LocalFits, LpmError, solve_windows
 from gearbench.identification.lpm.missing import MissingPower
+from gearbench.identification.lpm.output import OutputLines
 from gearbench.identification.lpm.regression import Regression, Window, prepare
 from gearbench.identification.lpm.rows import Lines, WindowRows
 from gearbench.identification.spectra.joint import Complexes, Floats, Spectra
@@ -43,7 +44,8 @@ class LpmResult:
     the residual over that of the response in the windows (degrees of freedom accounted for); `condition`:
     largest estimated condition number; `unknowns`, `equations`, `freedom`: of an inner window, transients
     included; `windows`: how many; `variance_sampled`: windows per computed variance; `cross_terms`:
-    "exact", "none" (no windows overlap), "omitted".
+    "exact", "none" (no windows overlap), "omitted"; `open_share`: part of the variance that is no noise but what a
+    prior leaves open; None: there is no prior.
     """
 
     lines: Lines
@@ -61,6 +63,7 @@ class LpmResult:
     variance_sampled: int
     cross_terms: str
     coherence: Floats
+    open_share: float | None = None
 
     @property
     def harmonics(self) -> int:
@@ -173,12 +176,8 @@ class _Pass:
     ) -> None:
         self.regression, self.window, self.lines, self.centres = regression, window, lines, centres
         self.noise = noise
-        # Column of each output line at [line + offset], -1 for every other line that a branch of a row may lead to.
-        self.offset = int(max(r[-1] for _, r in centres)) + window.harmonics * regression.mesh_lines
-        self.column = np.full(2 * self.offset + 1, -1)
-        self.column[lines + self.offset] = np.arange(lines.size)
-        self.htf = np.zeros((window.branches, lines.size), dtype=complex)
-        self.variance = np.zeros((window.branches, lines.size))
+        last = int(max(r[-1] for _, r in centres))
+        self.output = OutputLines(lines, window.harmonics, regression.mesh_lines, last)
         unknowns, rows = window.unknowns, sum(r.size for _, r in centres)
         work = len(centres) * 4 / 3 * unknowns**3
         self.sampled = max(1, int(np.ceil(work / VARIANCE_WORK)))
@@ -189,10 +188,8 @@ class _Pass:
         self.cross_terms = "none" if not shifts else "omitted"
         if shifts and self.sampled == 1 and cross_work <= CROSS_WORK:
             self.cross_terms = "exact"
-            place = self.column[self.offset : self.offset + int(lines[-1]) + 1]
-            self.cross = CrossCovariance(regression, window, place, shifts)
+            self.cross = CrossCovariance(regression, window, self.output.place, shifts)
         self.residual = self.power = 0.0
-        self.coherence = np.zeros(lines.size)
         self.missing = MissingPower(regression, lines, window.harmonics)
         self.condition = 0.0
 
@@ -218,7 +215,7 @@ class _Pass:
             rows = [self.centres[index][1] for index in indices]
             noise = self._account(fits, source, rows)
             self._read(fits.coefficients, source.centres, rows, noise[:, None, None, None] * variance[latest])
-            self.missing.add(fits, rows, self.window.width)
+            self.missing.add(fits.residual / fits.freedom, fits.freedom / self.window.width, rows)
             if self.cross is not None:
                 for i, own in enumerate(rows):
                     self.cross.add(fits.roots[i], source.part(i), own, float(noise[i]))
@@ -235,39 +232,29 @@ class _Pass:
         self.residual += float(noise.sum())
         self.power += float(power.sum())
         explained = np.maximum(1.0 - noise / np.where(power > 0, power, 1.0), 0.0) * (power > 0)
-        all_rows = np.concatenate(rows)
-        column = self.column[all_rows + self.offset]
-        self.coherence[column[column >= 0]] = np.repeat(explained, [own.size for own in rows])[column >= 0]
+        self.output.explain(np.concatenate(rows), np.repeat(explained, [own.size for own in rows]))
         return noise
 
     def _read(self, coefficients: Complexes, centres: Lines, rows: list[Lines], variance: Floats) -> None:
-        """Put Gs_j(m) and its mirror Gs_j(-m) = conj Gs_{-j}(m) where they belong: G_l(k), l = -j, k = m + j d."""
-        window, d = self.window, self.regression.mesh_lines
-        basis = window.basis()
+        """Put the windows' polynomials, at their rows, where they belong."""
+        window, basis = self.window, self.window.basis()
         values, spreads = [], []
         for own, centre, found, unit in zip(rows, centres, coefficients, variance, strict=True):
             weight = basis[own - centre + window.half_width]
             values.append(weight @ found)
             pairs = (weight[:, :, None] * weight[:, None, :]).reshape(own.size, -1)
             spreads.append(pairs @ unit.reshape(-1, window.branches))
-        value, spread, m = np.concatenate(values), np.concatenate(spreads), np.concatenate(rows)
-        j = np.arange(-window.harmonics, window.harmonics + 1)
-        for sign in (1, -1):
-            column = self.column[sign * (m[:, None] + j * d) + self.offset]
-            row, branch = np.nonzero(column >= 0)
-            at = window.harmonics - sign * j[branch], column[row, branch]
-            self.htf[at] = value[row, branch] if sign > 0 else value[row, branch].conj()
-            self.variance[at] = spread[row, branch]
+        self.output.put(np.concatenate(rows), np.concatenate(values), np.concatenate(spreads))
 
     def _result(self) -> LpmResult:
-        diagonal = self.variance.sum(axis=0)[None, :].astype(complex)
+        diagonal = self.output.variance.sum(axis=0)[None, :].astype(complex)
         cross = self.cross.sums if self.cross is not None else diagonal[:0]
         middle = rows_around(self.regression, np.array([self.centres[len(self.centres) // 2][0]]), self.window)
         transient = self.regression.experiments * (self.window.order + 1) if self.window.transient else 0
         return LpmResult(
             self.lines,
-            self.htf,
-            self.variance,
+            self.output.htf,
+            self.output.variance,
             np.concatenate([diagonal, cross]),
             self.missing.total(self.missing.quietest() if self.noise is None else self.noise),
             self.missing.total(0.0 if self.noise is None else self.noise),
@@ -279,5 +266,5 @@ class _Pass:
             len(self.centres),
             self.sampled,
             self.cross_terms,
-            self.coherence,
+            self.output.coherence,
         )

@@ -3,7 +3,8 @@
 The residual is noise and missing response (branches beyond L, what polynomials do not follow). Variance comes from the
 whole of it and divides as it does; what biases the response beside that is missing response alone. Of this the
 branches beyond L hold what the outermost known ones foretell, if powers go on falling like 1/l^2; polynomials that do
-not follow have the rest. On five rigs the branches beyond L truly held half to nine tenths of what is told here.
+not follow have the rest. What a prior leaves open, for lack of equations, is put down to the windows. On five rigs the
+branches beyond L truly held half to nine tenths of what is told here.
 """
 
 from __future__ import annotations
@@ -45,11 +46,13 @@ class Limits:
 def limits_of(result: LpmResult, accuracy: Accuracy) -> Limits:
     """The expected error of a result in parts; their squares add to its square."""
     share = min(result.missing / result.residual_missing, 1.0) if result.residual_missing > 0 else 0.0
-    noise = (1.0 - share) * accuracy.variance**2
-    missing = share * accuracy.variance**2 + accuracy.truncation**2
+    left_open = (result.open_share or 0.0) * accuracy.variance**2
+    spread = accuracy.variance**2 - left_open
+    noise = (1.0 - share) * spread
+    missing = share * spread + accuracy.truncation**2
     power = float(np.sum(np.abs(result.htf) ** 2) - result.htf_variance.sum())
     beyond = min(_beyond(result) / max(power, np.finfo(float).tiny), missing)
-    return Limits(sqrt(noise), sqrt(beyond), sqrt(missing - beyond), accuracy.record)
+    return Limits(sqrt(noise), sqrt(beyond), sqrt(missing - beyond + left_open), accuracy.record)
 
 
 def _beyond(result: LpmResult) -> float:

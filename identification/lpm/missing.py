@@ -25,7 +25,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
-from gearbench.identification.lpm.local_solve import LocalFits
 from gearbench.identification.lpm.regression import Regression
 from gearbench.identification.spectra.joint import Floats
 
@@ -70,9 +69,9 @@ class MissingPower:
         self.freedom = np.zeros(self.rows.size + 1)
         self.step = int(np.min(np.diff(lines))) if lines.size > 1 else 1
 
-    def add(self, fits: LocalFits, rows: list[Lines], width: int) -> None:
-        """Take in the residuals of windows of `width` lines for the `rows` that are read from each."""
-        level, freedom = fits.residual / fits.freedom, fits.freedom / width
+    def add(self, level: Floats, freedom: Floats, rows: list[Lines]) -> None:
+        """Take in the residual variances `level` [m^2] of windows and their degrees of `freedom` for each line, for the
+        `rows` that are read from each."""
         for index, own in enumerate(rows):
             served = slice(int(own[0]), int(own[-1]) + self.step)
             self.level[served] = level[index]
@@ -81,21 +80,39 @@ class MissingPower:
 
     def quietest(self) -> float:
         """Noise [m^2] of a line and experiment from the quietest part of the excited band."""
+        means, freedom, response = self._parts()
+        if not freedom.size:
+            return 0.0
+        least = int(np.argmin(means))
+        found = means[least] * (1.0 + LEAST_OF_PARTS / np.sqrt(freedom[least]))
+        return float(max(found - means.mean() / response.mean() * response[least], 0.0))
+
+    def apart(self) -> float:
+        """Noise [m^2] as the most that a part of the excited band holds beyond its share of what would be missing if
+        all residuals were, and no more than the quietest part's: of models that lack little, whose residuals are flat.
+        """
+        means, freedom, response = self._parts()
+        if not freedom.size:
+            return 0.0
+        least = int(np.argmin(means))
+        beyond = float(np.max(means - means.mean() / response.mean() * response))
+        return max(min(beyond, float(means[least] * (1.0 + LEAST_OF_PARTS / np.sqrt(freedom[least])))), 0.0)
+
+    def _parts(self) -> tuple[Floats, Floats, Floats]:
+        """Residual level, degrees of freedom and mean response of each part of the excited band; none if small."""
         driven = np.flatnonzero(self.covered & (np.arange(self.covered.size) <= np.flatnonzero(self.excited)[-1]))
         driven = driven[driven > 0]
         driven = driven[~self.operating[driven - 1]]
+        nothing: Floats = np.zeros(0)
         if driven.size < PARTS:
-            return 0.0
+            return nothing, nothing, nothing
         parts = np.array_split(driven, PARTS)
         freedom = np.array([self.freedom[part].sum() for part in parts])
         sums = np.array([np.sum(self.level[part] * self.freedom[part]) for part in parts])
         response = np.array([self.power[part].mean() for part in parts])
         if not freedom.min() > 0:
-            return 0.0
-        means = sums / freedom
-        least = int(np.argmin(means))
-        found = means[least] * (1.0 + LEAST_OF_PARTS / np.sqrt(freedom[least]))
-        return float(max(found - means.mean() / response.mean() * response[least], 0.0))
+            return nothing, nothing, nothing
+        return sums / freedom, freedom, response
 
     def total(self, noise: Floats | float) -> float:
         """The sum with the noise [m^2] of every row (lines 0, 1, ..) or of all."""

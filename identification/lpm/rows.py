@@ -57,10 +57,15 @@ class WindowRows:
         return np.stack([self.regression.transient_basis(int(centre), self.window) for centre in self.centres])
 
     @cached_property
+    def observed(self) -> Complexes:
+        """Y (B, E, 2n+1) as it was recorded."""
+        residue, position = self._place
+        return np.asarray(self.regression.dte[residue, :, position].transpose(0, 2, 1))
+
+    @cached_property
     def data(self) -> Complexes:
         """Y (B, E, 2n+1), transients projected out; without transients rows that no input excites are 0."""
-        residue, position = self._place
-        data = self.regression.dte[residue, :, position].transpose(0, 2, 1)
+        data = self.observed
         if not self.window.transient:
             data = data * np.asarray(self.excited.any(axis=2))[:, None]
         return self.project(data)
@@ -68,8 +73,7 @@ class WindowRows:
     @cached_property
     def power(self) -> Floats:
         """Mean (B,) of |Y|^2 over rows and experiments [m^2]."""
-        residue, position = self._place
-        return np.asarray(np.mean(np.abs(self.regression.dte[residue, :, position]) ** 2, axis=(1, 2)))
+        return np.asarray(np.mean(np.abs(self.observed) ** 2, axis=(1, 2)))
 
     def project(self, data: Complexes) -> Complexes:
         """`data` (B, E, 2n+1) without its part in the space of the transients' polynomials."""

@@ -101,7 +101,7 @@ def choose_among(
     """The candidate of least predicted error with branches of the `ladder`, the `order` or those that are `tried`, and
     the `half_width`, if given, of a `regression` that holds so many branches. Raises LpmError if there is none."""
     harmonics = ladder[0] if len(ladder) == 1 else None
-    search = _search(spectra, lines, transient, max(ladder, default=0), regression)
+    search = search_of(spectra, lines, transient, max(ladder, default=0), regression)
 
     @cache
     def best_width(branches: int, polynomial: int) -> Choice | None:
@@ -157,7 +157,7 @@ def _climb(
 
 
 @dataclass(frozen=True)
-class _Search:
+class Search:
     """What all candidates share: the regression, the output lines, and of each row (1, 2, ..) that output lines reach
     its `relevance`, the part of its sources that are output lines, and the `density` of trial windows."""
 
@@ -234,15 +234,19 @@ class _Search:
         """Rows drawn evenly from their density, as many as the window needs."""
         middle = rows_around(self.regression, self.lines[self.lines.size // 2][None], window)
         free = int(middle.equations[0] - middle.unknowns[0])
-        count = int(np.clip(FREEDOM / max(free, 1), TRIALS, TRIALS_MAX))
+        return self.spread_rows(int(np.clip(FREEDOM / max(free, 1), TRIALS, TRIALS_MAX)), window.half_width)
+
+    def spread_rows(self, count: int, half_width: int) -> list[int]:
+        """At most `count` rows drawn evenly from their density, around which windows stay inside the spectra."""
         sums = np.cumsum(self.density)
         centres = 1 + np.searchsorted(sums, (np.arange(count) + 0.5) / count * sums[-1])
-        return sorted({min(int(row), self.regression.highest - window.half_width) for row in centres})
+        return sorted({min(int(row), self.regression.highest - half_width) for row in centres})
 
 
-def _search(
+def search_of(
     spectra: Spectra, lines: NDArray[np.int64], transient: bool, harmonics: int, regression: Regression
-) -> _Search:
+) -> Search:
+    """What candidates of up to so many `harmonics` of a `regression` share."""
     d = spectra.mesh_lines
     rows = np.arange(1, min(spectra.highest, int(lines[-1]) + harmonics * d) + 1)
     read, excited = np.zeros((2, rows.size))
@@ -258,7 +262,7 @@ def _search(
     power = relevance * np.mean(np.abs(spectra.dte[:, rows]) ** 2, axis=0) * (rows % d != 0 if d > 1 else 1.0)
     even = relevance > 0
     density = EVEN * even / even.sum() + (1.0 - EVEN) * power / power.sum()
-    return _Search(regression, lines, transient, relevance, density, regression.input_power())
+    return Search(regression, lines, transient, relevance, density, regression.input_power())
 
 
 def _least(holds: Callable[[int], bool], low: int, high: int) -> int | None:

@@ -112,9 +112,9 @@ def test_choice_of_branches_and_progress(record: xr.Dataset) -> None:
 
 
 def test_short_record_says_so() -> None:
-    """One realisation: the error is large, expected to be, and warned of."""
+    """One realisation, polynomials: the error is large, expected to be, and warned of."""
     short = reference_record(RIG, realisations=1, duration=0.5, band=(2.0, 2600.0), noise=0.01)
-    frf = identify([short], IdentificationSettings(band=(900.0, 1300.0), phases=64))
+    frf = identify([short], IdentificationSettings(band=(900.0, 1300.0), phases=64, branches="polynomials"))
     error = relative(itf(frf).values, truth(frf))
     assert error > 0.1
     assert frf.attrs["expected_error"] == pytest.approx(error, rel=0.5)
@@ -303,3 +303,12 @@ def test_requests_beyond_the_record_are_refused(record: xr.Dataset, changes: dic
 def test_settings_are_checked(changes: dict, words: str) -> None:
     with pytest.raises(LpmError, match=words):
         IdentificationSettings(**changes)
+
+
+def test_a_wrong_number_of_teeth_is_named_before_the_record_is_found_too_long() -> None:
+    """The mesh period of one tooth less than there is: no other length of the record would help."""
+    right = reference_record(RIG, realisations=1, duration=0.5, band=(2.0, 2600.0))
+    turned = right.assign(angle_driver=(2 * np.pi / 62 * right.mesh_phase).assign_attrs(units="rad"))
+    wrong = turned.assign_attrs(teeth_driver=62, mesh_period=right.attrs["mesh_period"] * 62 / 61)
+    with pytest.raises(ValueError, match="teeth_driver = 62 give a mesh frequency of"):
+        identify([wrong], IdentificationSettings(band=(900.0, 1300.0)))

@@ -44,7 +44,10 @@ COURSES: tuple[tuple[Literal["wander", "ramp"], str], ...] = (
 )
 COURSE_RIG = ReferenceRig(mesh_frequency=20.0, edge=0.05)
 Pair = tuple[float, float]
-METHODS: tuple[tuple[Literal["lpm", "mesh-feedback"], float], ...] = (("lpm", 0.025), ("mesh-feedback", 0.01))
+METHODS: tuple[tuple[Literal["lpm", "mesh-feedback"], str, float], ...] = (
+    ("lpm", "local method, polynomials or smooth branches by its own choice", 0.025),
+    ("mesh-feedback", "mesh-feedback", 0.01),
+)
 # Part of a window that sdynpy's local model reads unless told otherwise, and errors that count as equal.
 DEFAULT_RATIO, MORE_ERROR = 0.1, 1.05
 
@@ -202,8 +205,8 @@ CHECKS = [
     Check("mesh-feedback-30db", "mesh-feedback ITF, 1 s, 2 Hz, 30 dB", 0.04, "", lambda: feedback(10**-1.5)[0]),
     Check("mesh-feedback-time", "the same at 40 dB: processor time", 15.0, "s", lambda: feedback(0.01)[1]),
     *(
-        Check(f"{method}-{mesh}hz", f"{method}, {mesh} Hz mesh, 4 s, 40 dB", reach, "", partial(at_speed, mesh, method))
-        for method, reach in METHODS
+        Check(f"{method}-{mesh}hz", f"{words}, {mesh} Hz mesh, 4 s, 40 dB", reach, "", partial(at_speed, mesh, method))
+        for method, words, reach in METHODS
         for mesh in (50, 200, 500)
     ),
     *(

@@ -33,6 +33,10 @@ def identify(
     window: Annotated[
         int | None, typer.Option("--window", help="half-width n of the local window in lines; absent: chosen")
     ] = None,
+    branches: Annotated[
+        Literal["auto", "polynomials", "smooth"],
+        typer.Option("--branches", help="of lpm: polynomials in windows, smooth random functions, or the better"),
+    ] = "auto",
     export: Annotated[
         list[Path] | None, typer.Option("--export", metavar="FILE", help="write it as .uff or .mat too; repeatable")
     ] = None,
@@ -46,11 +50,13 @@ def identify(
     from gearbench.figures.responses.of_identified import draw_identified
 
     _check_files(records, out, export or [], pictures)
-    settings = gb.IdentificationSettings(method=method, harmonics=harmonics, order=order, window=window, band=band_hz)
+    settings = gb.IdentificationSettings(
+        method=method, harmonics=harmonics, order=order, window=window, band=band_hz, branches=branches
+    )
     with Progress("identify") as progress:
         progress.step("reading")
         loaded = [gb.read_record(path) for path in records]
-        progress.step("mesh feedback" if method == "mesh-feedback" else "local polynomial method")
+        progress.step("mesh feedback" if method == "mesh-feedback" else "local method")
         found = gb.identify(loaded, settings, progress=progress)
         gb.write_frf(found, out)
         split = gb.identification.distortion(loaded) if gb.identification.is_coset(loaded) else None
@@ -93,7 +99,7 @@ def frf_summary(found: xr.Dataset, path: Path) -> dict[str, Any]:
     """What a frequency response says about itself."""
     from gearbench.bench.results.measures import mode_range
 
-    keys = ("harmonics", "order", "window", "unknowns", "equations", "condition_number", "expected_error")
+    keys = ("branches", "harmonics", "order", "window", "unknowns", "equations", "condition_number", "expected_error")
     numbers = {key: found.attrs[key] for key in keys if key in found.attrs}
     warnings = [line for line in str(found.attrs.get("warnings", "")).splitlines() if line]
     return {"file": str(path), "first_mode_hz": mode_range(found), **numbers, "warnings": warnings}

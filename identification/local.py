@@ -1,7 +1,13 @@
-"""A task by the local polynomial method: branches, order and window chosen, the result as a dataset."""
+"""A task by the local method: polynomials or smooth branches, their numbers chosen, the result as a dataset.
+
+Polynomials cost (2L+1)(R+1) equations a window, which a short record does not have; smooth branches (`smooth/`) cost
+what the data say of them, and processor time. They are tried where polynomials expect to err by more than ENOUGH; the
+one that expects to err less is the result.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,11 +18,12 @@ from gearbench.identification.lpm.at_varying import polynomials_at_varying_speed
 from gearbench.identification.lpm.estimate import LpmResult, local_polynomial
 from gearbench.identification.lpm.limits import Limits, limits_of
 from gearbench.identification.lpm.local_solve import LpmError
-from gearbench.identification.lpm.regression import Window
 from gearbench.identification.lpm.selection import choose_window
 from gearbench.identification.response.frf import make_frf
 from gearbench.identification.response.mode_spread import natural_frequency_deviation
 from gearbench.identification.response.modes import itf_modes
+from gearbench.identification.smooth.choice import choose_smooth
+from gearbench.identification.smooth.estimate import smooth_branches
 from gearbench.identification.spectra.course import Course
 from gearbench.identification.spectra.joint import Spectra
 from gearbench.identification.task import Task
@@ -24,24 +31,89 @@ from gearbench.identification.truth.periodic import itf_from_htf
 
 # Results beyond this expected error carry a warning.
 DOUBTFUL = 0.1
+# Expected error of polynomials beyond which smooth branches are tried as well.
+ENOUGH = 0.01
 
 
-def by_polynomials(task: Task) -> xr.Dataset:
-    """Dataset of kind "identified". Raises LpmError for what the record does not support."""
+@dataclass(frozen=True)
+class Fitted:
+    """What was fitted, as the result says it: branches a side, order of the polynomials or None, half-width [lines],
+    bandwidth [lines] of smooth branches or None, estimated transient."""
+
+    harmonics: int
+    order: int | None
+    half_width: int
+    bandwidth: float | None
+    transient: bool
+
+    @property
+    def alike(self) -> float:
+        """Lines whose estimates err together: a window has about as many independent errors as a polynomial has
+        coefficients, a smooth function one in pi B lines."""
+        if self.bandwidth is not None:
+            return float(np.pi * self.bandwidth)
+        return (2 * self.half_width + 1) / ((self.order or 0) + 1)
+
+
+def by_local_method(task: Task) -> xr.Dataset:
+    """Dataset of kind "identified", by polynomials or by smooth branches. Raises LpmError for what the record does not
+    support."""
     settings, spectra = task.settings, task.spectra
     transient = settings.transient == "estimate" or (settings.transient == "auto" and not spectra.steady)
+    prescribed = (settings.harmonics, settings.order, settings.window) != (None, None, None)
+    if settings.branches == "smooth":
+        found = _by_smooth_branches(task, transient)
+    elif settings.branches == "polynomials" or prescribed:
+        found = _by_polynomials(task, transient)
+    else:
+        found = _by_the_better(task, transient)
+    task.report(0.9, "modes")
+    return _dataset(task, *found)
+
+
+def _by_the_better(task: Task, transient: bool) -> tuple[Fitted, LpmResult]:
+    """Polynomials, and where they expect to err by more than ENOUGH the better of them and of smooth branches."""
+    found, refused = [], ""
+    try:
+        found.append(_by_polynomials(task, transient))
+    except LpmError as error:
+        refused = str(error)
+    if not found or _expects(found[0]) > ENOUGH:
+        try:
+            found.append(_by_smooth_branches(task, transient))
+        except LpmError:
+            if not found:
+                raise LpmError(refused) from None
+    return min(found, key=_expects)
+
+
+def _expects(found: tuple[Fitted, LpmResult]) -> float:
+    """Expected error of a result."""
+    return expected_accuracy(found[1]).expected
+
+
+def _by_polynomials(task: Task, transient: bool) -> tuple[Fitted, LpmResult]:
+    """Polynomials of what is given and the best choice of the rest. Raises LpmError."""
+    settings = task.settings
     task.report(0.1, "choosing branches, order and window")
     window = choose_window(
-        spectra,
+        task.spectra,
         task.lines,
         transient=transient,
         harmonics=settings.harmonics,
         order=settings.order,
         half_width=settings.window,
     )
-    result = local_polynomial(spectra, task.lines, window, progress=task.part(0.2, 0.7))
-    task.report(0.9, "modes")
-    return _dataset(task, window, result)
+    result = local_polynomial(task.spectra, task.lines, window, progress=task.part(0.15, 0.25))
+    return Fitted(window.harmonics, window.order, window.half_width, None, transient), result
+
+
+def _by_smooth_branches(task: Task, transient: bool) -> tuple[Fitted, LpmResult]:
+    """Smooth branches with the best choice of bandwidth and number. Raises LpmError."""
+    task.report(0.4, "choosing bandwidth and number of smooth branches")
+    model = choose_smooth(task.spectra, task.lines, transient=transient, harmonics=task.settings.harmonics)
+    result = smooth_branches(task.spectra, task.lines, model, progress=task.part(0.5, 0.4))
+    return Fitted(model.harmonics, None, model.half_width, model.bandwidth, transient), result
 
 
 def by_polynomials_at_varying_speed(task: Task, course: Course) -> xr.Dataset:
@@ -49,6 +121,8 @@ def by_polynomials_at_varying_speed(task: Task, course: Course) -> xr.Dataset:
     settings = task.settings
     if settings.transient == "none":
         raise LpmError("transient = 'none' belongs to a constant speed; at one that varies it is always estimated")
+    if settings.branches == "smooth":
+        raise LpmError("branches = 'smooth' belongs to a constant speed; at one that varies they are polynomials")
     task.report(0.1, "choosing branches, order and window at a speed that varies")
     result, window, free = polynomials_at_varying_speed(
         task.spectra,
@@ -61,7 +135,8 @@ def by_polynomials_at_varying_speed(task: Task, course: Course) -> xr.Dataset:
     )
     task.report(0.9, "modes")
     speeds = (task.spectra.mesh_lines + np.array([course.shift.min(), course.shift.max()])) * task.spectra.spacing
-    return _dataset(task, window, result).assign_attrs(
+    fitted = Fitted(window.harmonics, window.order, window.half_width, None, True)
+    return _dataset(task, fitted, result).assign_attrs(
         speed="varying",
         mesh_frequency_lowest=float(speeds[0]),
         mesh_frequency_highest=float(speeds[1]),
@@ -69,19 +144,19 @@ def by_polynomials_at_varying_speed(task: Task, course: Course) -> xr.Dataset:
     )
 
 
-def _dataset(task: Task, window: Window, result: LpmResult) -> xr.Dataset:
+def _dataset(task: Task, fitted: Fitted, result: LpmResult) -> xr.Dataset:
     settings, spectra = task.settings, task.spectra
     frequency = np.asarray(result.lines * spectra.spacing, dtype=float)
     response = itf_from_htf(result.htf, settings.phases)
     variance = result.itf_variance(settings.phases)
     modes = itf_modes(frequency, response, variance, modes=settings.modes)
-    # A window's estimates have about as many independent errors as a polynomial has coefficients.
-    step = int(result.lines[1] - result.lines[0])
-    together = max(1.0, window.width / (window.order + 1) / step)
+    together = max(1.0, fitted.alike / int(result.lines[1] - result.lines[0]))
     accuracy = expected_accuracy(result, task.record_error)
     limits = limits_of(result, accuracy)
-    rule = record_rule(spectra, window.harmonics, window.order, *modes, accuracy.truncation)
-    attributes = task.attributes() | _about_fit(window, result, accuracy, limits)
+    rule = None
+    if fitted.order is not None:
+        rule = record_rule(spectra, fitted.harmonics, fitted.order, *modes, accuracy.truncation)
+    attributes = task.attributes() | _about_fit(fitted, spectra, result, accuracy, limits)
     if rule is not None:
         attributes |= {
             "record_duration": rule.duration,
@@ -89,7 +164,7 @@ def _dataset(task: Task, window: Window, result: LpmResult) -> xr.Dataset:
             "bandwidth": rule.bandwidth,
             "harmonics_needed": rule.harmonics_needed,
         }
-    attributes["warnings"] = "\n".join([*task.notes, *_warnings(accuracy, limits, rule, spectra, task.simulated)])
+    attributes["warnings"] = "\n".join([*task.notes, *_warnings(accuracy, limits, rule, task)])
     return make_frf(
         "identified",
         frequency=frequency,
@@ -104,17 +179,21 @@ def _dataset(task: Task, window: Window, result: LpmResult) -> xr.Dataset:
     )
 
 
-def _about_fit(window: Window, result: LpmResult, accuracy: Accuracy, limits: Limits) -> dict[str, Any]:
+def _about_fit(
+    fitted: Fitted, spectra: Spectra, result: LpmResult, accuracy: Accuracy, limits: Limits
+) -> dict[str, Any]:
     """Attributes that say what was fitted, and how well."""
     return {
-        "harmonics": window.harmonics,
-        "order": window.order,
-        "window": window.half_width,
-        "transient": "estimated" if window.transient else "none",
+        "branches": "polynomials" if fitted.bandwidth is None else "smooth",
+        "harmonics": fitted.harmonics,
+        "order": fitted.order,
+        "window": fitted.half_width,
+        "smooth_bandwidth": None if fitted.bandwidth is None else fitted.bandwidth * spectra.spacing,
+        "transient": "estimated" if fitted.transient else "none",
         "unknowns": result.unknowns,
         "equations": result.equations,
         "windows": result.windows,
-        "condition_number": result.condition,
+        "condition_number": None if fitted.bandwidth is not None else result.condition,
         "residual": result.residual,
         "variance_error": accuracy.variance,
         "truncation_error": accuracy.truncation,
@@ -130,13 +209,11 @@ def _about_fit(window: Window, result: LpmResult, accuracy: Accuracy, limits: Li
     }
 
 
-def _warnings(
-    accuracy: Accuracy, limits: Limits, rule: RecordRule | None, spectra: Spectra, simulated: bool
-) -> list[str]:
-    notes = []
+def _warnings(accuracy: Accuracy, limits: Limits, rule: RecordRule | None, task: Task) -> list[str]:
+    notes, spectra = [], task.spectra
     if accuracy.expected >= 1.0:
         period = 1.0 / (spectra.mesh_lines * spectra.spacing)
-        help_ = "more realisations help" if simulated else f"is the mesh period of {period:g} s right?"
+        help_ = "more realisations help" if task.simulated else f"is the mesh period of {period:g} s right?"
         notes.append(
             f"the expected error of {accuracy.expected:.0%} exceeds the response: this result says nothing; {help_}"
         )
@@ -144,7 +221,7 @@ def _warnings(
         doubtful = f", doubtful channels {accuracy.record:.0%}" if accuracy.record else ""
         notes.append(
             f"expected error of the ITF: {accuracy.expected:.0%} (noise {limits.noise:.0%}, missing branches"
-            f" {limits.branches:.0%}, polynomials that do not follow {limits.window:.0%}{doubtful}); nothing has been"
+            f" {limits.branches:.0%}, what windows leave open {limits.window:.0%}{doubtful}); nothing has been"
             " smoothed"
         )
     if rule is not None:
