@@ -23,8 +23,8 @@ def test_a_picture_beside_the_result(tmp_path: Path) -> None:
         (["--figure", "{folder}/none/static.png"], "must exist"),
         (["--cycles", "3"], "cycles = 3 must be 1"),
         (
-            ["--set", "rig.driver.tip_relief_um=9", "--set", "rig.driver.tip_relief_start_diameter_mm=126"],
-            "represents rig.driver.tip_relief_um with",
+            ["--set", f"rig.driver.profile_slope_tooth_um={[1.0] + 61 * [0.0]}"],
+            "does not represent rig.driver.profile_slope_tooth_um",
         ),
     ],
 )
