@@ -27,7 +27,7 @@ KEY, FLANKS = "profile", "flanks"
 # load, which is as large as the deflection.
 SD, WIDE = 0.08, 0.4
 # Likewise at each place along the path of contact, where other teeth than the nominal ones differ in stiffness too.
-SD_FORM, WIDE_FORM = 0.12, 0.6
+SD_FORM, WIDE_FORM = 0.2, 1.2
 PHASES = 128
 # Of reliefs to begin from: depths over the deflection of the mesh, and parts of the path of contact that they take.
 DEPTHS, LENGTHS = (1.0, 2.0, 3.0, 4.5), (0.25, 0.5)
