@@ -20,7 +20,7 @@ from gearbench.fem.contact.static import position, static_cycle
 from gearbench.fem.gear.store import cached, key_for
 from gearbench.files import digest_of
 from gearbench.geometry import Pair, pair
-from gearbench.geometry.tooth.micro import profile_excess
+from gearbench.geometry.pair.touching import touching_excess
 from gearbench.geometry.tooth.profile import involute
 from gearbench.kernels.compiled import compiled
 from gearbench.lumped import mesh_stiffness
@@ -65,9 +65,7 @@ def flank_excess(teeth: MeshLaw, rig: Rig, simulation: Simulation) -> Array | No
         gears = [without_reliefs(gear) for gear in gears]
     if not any(is_formed(gear) for gear in gears):
         return None
-    meshing = pair(rig)
-    excess = profile_excess(meshing.driver, gears[0], 0, teeth.rho1)
-    return excess + profile_excess(meshing.driven, gears[1], 0, teeth.rho2)
+    return touching_excess(pair(rig), (gears[0], gears[1]), teeth.rho1)
 
 
 def teeth_law(rig: Rig, simulation: Simulation, load_max_nm: float) -> MeshLaw:

@@ -8,6 +8,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from gearbench.diagnosis.effects.eccentricity import KEYS as RUNOUTS
 from gearbench.diagnosis.effects.effect import SIDES, Added, Effect, Estimate, Fitted, Hypothesis, Wide, changed
 from gearbench.diagnosis.effects.once_per_turn import once_of
 from gearbench.diagnosis.forces.condition import Condition
@@ -43,7 +44,9 @@ def hypotheses(model: NominalModel) -> tuple[Hypothesis, ...]:
     tell apart; in simulation both differ by what inertias make of the latter, and gears stand out by more, as a
     rule."""
     return tuple(
-        Hypothesis(f"encoder-runout {side}", "sensor", (Wide(key),), (side,), len(KEYS), False, rare=True)
+        Hypothesis(
+            f"encoder-runout {side}", "sensor", (Wide(key),), (side,), len(KEYS), False, (RUNOUTS[side], -ADDS[side])
+        )
         for side, key in KEYS.items()
     )
 

@@ -71,24 +71,27 @@ def shapes(model: NominalModel) -> Array:
 
 
 def add(rig: Rig, hypothesis: Hypothesis, fitted: Fitted) -> Added:
-    """Gives the mesh the error over its phase that was fitted, and the driver's flanks the form, which may as well be
-    their mates'; sizes are told from peak to valley."""
+    """Gives the mesh the error over its phase that was fitted, and each gear the form from the pitch point to its tip,
+    which its mate's root may have as well; sizes are told from peak to valley."""
     model, values, form = fitted.model, fitted.of(KEY), fitted.of(FLANKS)
     cosine, sine = added(model.error_cos, values[0::2]), added(model.error_sin, values[1::2])
     rig = changed(rig, "mesh", error_cos=cosine, error_sin=sine)
     if form.any():
-        rig = changed(rig, "driver", **_formed(rig.driver, model, form))
+        path, middle = model.path, np.arange(len(form)) < MIDDLE
+        travel = model.law.base_pitch * (path[0] + (path[1] - path[0]) * np.array(PLACES_ON_PATH))
+        of_driver = np.where(middle, form[MIDDLE], form)
+        rig = changed(rig, "driver", **_formed(rig.driver, model, 0, travel, of_driver))
+        rig = changed(rig, "driven", **_formed(rig.driven, model, 1, -travel[::-1], (form - of_driver)[::-1]))
     if any(wide.key == FLANKS for wide in hypothesis.wide):
         return rig, _along_path(form, fitted.std_of(FLANKS))
     size, std = _peak_to_valley(values, fitted.std_of(KEY))
     return rig, (Estimate("peak_to_valley", 1e6 * size, 1e6 * std, "um"),)
 
 
-def _formed(gear: Gear, model: NominalModel, form: Array) -> dict[str, object]:
-    """Fields of the driver's form with that at the places along the path added."""
-    path, radius = np.array(model.path), model.base_radius[0]
-    travel = path[0] + (path[1] - path[0]) * np.array(PLACES_ON_PATH)
-    roll = np.maximum((model.law.pitch_roll[0] + travel * model.law.base_pitch) / radius, LEAST_ROLL)
+def _formed(gear: Gear, model: NominalModel, side: int, travel: Array, form: Array) -> dict[str, object]:
+    """Fields of the form of driver (0) or driven gear (1), that at distances towards its tip [m] added."""
+    radius = model.base_radius[side]
+    roll = np.maximum((model.law.pitch_roll[side] + travel) / radius, LEAST_ROLL)
     roll[1:] = np.maximum(roll[1:], roll[0] + LEAST_ROLL * np.arange(1, len(roll)))
     places, height = roll, form
     if gear.profile_form:

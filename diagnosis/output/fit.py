@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gearbench.diagnosis.effects.profile_error import FLANKS
 from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.output.quadratic import Quadratic, quadratic_of
 from gearbench.diagnosis.output.simulator import Simulator
@@ -124,6 +125,15 @@ def _within(bounds: tuple[Array, Array], p: Array, sd: Array, reach: float) -> t
     return np.maximum(low, p - reach * sd), np.minimum(high, p + reach * sd)
 
 
+def _unseen(unknowns: Unknowns, sensitivity: Sensitivity) -> Flags:
+    """Which unknowns (size,) these records do not show. Flanks that stand back behind all contact are not felt, but
+    would be if they came forward."""
+    out = np.isin(np.arange(unknowns.size), sensitivity.quadratic.active, invert=True)
+    if FLANKS in unknowns.slices:
+        out[unknowns[FLANKS]] = False
+    return out
+
+
 def fit(
     simulator: Simulator, p: Array, sd: Array, sensitivity: Sensitivity, *, renewals: int, chosen: Flags
 ) -> Optimum | None:
@@ -132,7 +142,7 @@ def fit(
     target, bounds = simulator.target, simulator.layout.unknowns.bounds()
     p = np.clip(p, *bounds)
     # What these records do not show is left at nothing.
-    p[np.isin(np.arange(p.size), sensitivity.quadratic.active, invert=True)] = 0.0
+    p[_unseen(simulator.layout.unknowns, sensitivity)] = 0.0
     cost = cost_of(simulator, p, sd)
     if not np.isfinite(cost):
         return None

@@ -3,26 +3,65 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from gearbench.diagnosis.effects.effect import Hypothesis
 from gearbench.diagnosis.evidence.separable import APART
+from gearbench.diagnosis.output.fit import Optimum, fit
+from gearbench.diagnosis.output.simulator import Simulator
 
 if TYPE_CHECKING:
     from gearbench.diagnosis.output.selection import Weighed
 
 MOST_LEFT = 6.0  # nats still promised by fits that count for comparing them
+# Part of a rare effect's evidence that its usual counterpart must have: what both explain is nine tenths of it, and the
+# rest is told by resonances that no model has to the per cent.
+NEARLY = 0.75
+RENEWALS = 1
 
 
 def usual_of(weighed: Sequence[Weighed]) -> Weighed | None:
-    """The best of those weighed; in place of a rare one the best usual one that explains the records as well, as far as
-    fits tell that still promise something. None of none."""
+    """The best of those weighed; in place of a rare one its usual counterpart where that explains the records nearly as
+    well. None of none."""
     if not weighed:
         return None
     best = weighed[0]
-    if not best.hypothesis.rare:
+    usual = _counterpart(best, weighed)
+    if usual is None:
         return best
-    return next((one for one in weighed if not one.hypothesis.rare and _as_good(one, best, _left(one, best))), best)
+    needed = min(NEARLY * best.log_bayes_factor, best.log_bayes_factor - APART - _left(usual, best))
+    return usual if usual.optimum is not None and usual.log_bayes_factor > needed else best
+
+
+def compared(simulator: Simulator, base: Optimum, weighed: Sequence[Weighed]) -> list[Weighed]:
+    """Those weighed beside `base`, the best first; where a rare one is ahead its usual counterpart is fitted again from
+    where that one got, with what it explains handed over."""
+    best = weighed[0] if weighed else None
+    usual = _counterpart(best, weighed) if best else None
+    if best is None or best.optimum is None or best.hypothesis.usual is None or usual is None:
+        return list(weighed)
+    unknowns, p, sd = simulator.layout.unknowns, best.optimum.p.copy(), base.sd.copy()
+    own = best.hypothesis.entries(unknowns)
+    p[usual.hypothesis.entries(unknowns)] += best.hypothesis.usual[1] * p[own]
+    p[own] = 0.0
+    for wide in usual.hypothesis.wide:
+        wide.into(unknowns, sd)
+    chosen = np.ones(unknowns.size, dtype=bool)
+    found = fit(simulator, p, sd, best.optimum.sensitivity, renewals=RENEWALS, chosen=chosen)
+    if found is None:
+        return list(weighed)
+    factor = found.evidence - base.evidence - float(np.log(usual.hypothesis.choices))
+    better = usual if factor <= usual.log_bayes_factor else replace(usual, log_bayes_factor=factor, optimum=found)
+    return sorted((better if one is usual else one for one in weighed), key=lambda one: -one.log_bayes_factor)
+
+
+def _counterpart(rare: Weighed, weighed: Sequence[Weighed]) -> Weighed | None:
+    """The usual one like a rare one, None of what is not rare."""
+    key = rare.hypothesis.usual[0] if rare.hypothesis.usual else None
+    return next((one for one in weighed if one is not rare and one.hypothesis.wide[0].key == key), None)
 
 
 def rivals_of(winner: Weighed, weighed: Sequence[Weighed]) -> tuple[Hypothesis, ...]:
@@ -31,11 +70,11 @@ def rivals_of(winner: Weighed, weighed: Sequence[Weighed]) -> tuple[Hypothesis, 
     return tuple(one.hypothesis for one in weighed if _as_good(one, winner))
 
 
-def _as_good(one: Weighed, winner: Weighed, less: float = 0.0) -> bool:
-    """Whether one explains the records as another cause does, or worse by no more than `less` nats."""
+def _as_good(one: Weighed, winner: Weighed) -> bool:
+    """Whether one explains the records as another cause does."""
     return (
         one.optimum is not None
-        and one.log_bayes_factor > winner.log_bayes_factor - APART - less
+        and one.log_bayes_factor > winner.log_bayes_factor - APART
         and not is_same(one.hypothesis, winner.hypothesis)
         and not _same_cause(one.hypothesis, winner.hypothesis)
     )

@@ -24,6 +24,7 @@ Array = NDArray[np.float64]
 
 NODES = 97  # deflections of the table: flanks that come into contact one after another bend it more often
 FINE = 4  # steps between two nodes, where forces are found before the table is read off
+NOTHING = 1e-12  # m, by which flanks may differ that are alike
 REFERENCE = 0.3  # of the largest force, where the shares of the pairs are taken
 
 
@@ -40,7 +41,7 @@ def formed(law: MeshLaw, excess: Array) -> MeshLaw:
         raise LumpedError("the excess on a mesh law's flanks must be finite, and some pair must touch at any phase")
     lead = float(excess[touching].max())
     lower = excess - lead
-    if not lower[touching].any():
+    if lower[touching].min() > -NOTHING:
         return replace(law, lead=law.lead + lead)
     deepest = law.approach[-1] - float(np.where(touching, lower, -np.inf).max(axis=1).min())
     approach = approach_grid(deepest, NODES)

@@ -11,7 +11,8 @@ from shared.fake_simulator import LINES, FakeSimulator, sensitivities, target
 
 from gearbench.diagnosis.effects.effect import Hypothesis, Wide
 from gearbench.diagnosis.forces.unknowns import group, unknowns_of
-from gearbench.diagnosis.output.selection import LIMIT, Selection, Start, known_within, select
+from gearbench.diagnosis.output.rivals import compared, usual_of
+from gearbench.diagnosis.output.selection import LIMIT, Selection, Start, Weighed, known_within, select
 
 MATRIX = sensitivities(3)
 FRICTION = Hypothesis("friction", "mesh", (Wide("friction"),))
@@ -69,9 +70,38 @@ def test_what_explains_the_records_as_well_is_a_rival_and_leaves_with_the_one_th
     assert not any(other.rivals for other in selected({7: 0.3}).entered)
     # Of the two the usual one is named, whichever explains a little more.
     for number, other in (0, 1), (1, 0):
-        listed = (FRICTION, RIPPLE, *(replace(CRACKS[one], rare=one == number) for one in range(2)))
+        rare = {number: ("crack", 1.0)}
+        listed = (FRICTION, RIPPLE, *(replace(CRACKS[one], usual=rare.get(one)) for one in range(2)))
         named = select(simulator, listed, [np.zeros(8)], {})
         assert named is not None and names(named) == [f"tooth-crack {other}"]
+
+
+def test_a_rare_effect_gives_way_to_a_usual_one_that_explains_nearly_as_much() -> None:
+    optimum = selected({3: 0.4}).best
+    rare = Weighed(replace(FRICTION, usual=("ripple", -0.5)), 100.0, optimum)
+    assert usual_of((rare, Weighed(RIPPLE, 80.0, None))) is rare
+    for nats, named in (80.0, "torque-ripple"), (70.0, "friction"):
+        found = usual_of((rare, Weighed(CRACKS[0], 99.0, optimum), Weighed(RIPPLE, nats, optimum)))
+        assert found is not None and found.hypothesis.name == named
+    assert usual_of(()) is None
+
+
+def test_the_usual_one_is_fitted_from_where_the_rare_one_got() -> None:
+    """A second tooth whose crack does half of what the first one's does; its own fit had stopped short."""
+    alike = MATRIX.copy()
+    alike[7] = 0.5 * alike[6]
+    simulator = FakeSimulator(lambda q: q @ alike, target(0.2 * alike[6] + 0.08 * alike[0]))
+    simulator.jacobian = lambda p, sd, chosen: alike  # type: ignore[method-assign, assignment]
+    found = select(simulator, (CRACKS[0],), [np.zeros(8)], {})
+    assert found is not None and names(found) == ["tooth-crack 0"]
+    first = Weighed(replace(CRACKS[0], usual=("crack", 2.0)), 1e6, found.best)
+    one, other = compared(simulator, found.base, [first, Weighed(CRACKS[1], 2.0, None)])
+    assert one.optimum is found.best and other.hypothesis.name == "tooth-crack 1"
+    assert other.optimum is not None and other.optimum.p[6] == pytest.approx(0.0, abs=0.02)
+    assert other.optimum.p[7] == pytest.approx(0.4, abs=0.05) and other.log_bayes_factor > LIMIT
+    # Nothing is handed over where the one ahead is usual.
+    plain = [replace(first, hypothesis=CRACKS[0]), Weighed(CRACKS[1], 2.0, None)]
+    assert compared(simulator, found.base, plain) == plain
 
 
 def test_two_effects_enter_the_larger_first_and_each_is_needed() -> None:
