@@ -90,6 +90,13 @@ def is_same(one: Hypothesis, other: Hypothesis) -> bool:
     return any(a.key == b.key and (a.at is None or b.at is None or a.at == b.at) for a in one.wide for b in other.wide)
 
 
+def is_like(one: Hypothesis, entered: Hypothesis) -> bool:
+    """Whether one has nothing to add to what entered: the same unknowns, or those of its rare counterpart, which would
+    share between them what either explains."""
+    keys = {wide.key for wide in entered.wide}
+    return is_same(one, entered) or (one.usual is not None and one.usual[0] in keys)
+
+
 def _same_cause(one: Hypothesis, other: Hypothesis) -> bool:
     """Whether two hypotheses are an effect in the same part, by other unknowns: not one tooth or another."""
     whole = all(wide.at is None for wide in (*one.wide, *other.wide))

@@ -23,7 +23,7 @@ from gearbench.diagnosis.output.fit import SETTLED, Optimum, Sensitivity, cost_o
 from gearbench.diagnosis.output.jacobian import FOLLOWED
 from gearbench.diagnosis.output.reshaped import has_shapes, reshaped
 from gearbench.diagnosis.output.restructured import better, is_close, restructured
-from gearbench.diagnosis.output.rivals import compared, is_same, rivals_of, usual_of
+from gearbench.diagnosis.output.rivals import compared, is_like, rivals_of, usual_of
 from gearbench.diagnosis.output.simulator import Simulator
 
 Array = NDArray[np.float64]
@@ -111,7 +111,7 @@ def select(
     entered: list[Weighed] = []
     while len(entered) < MOST:
         taken = [one.hypothesis for one in entered]
-        rest = [one for one in hypotheses if not any(is_same(one, other) for other in taken)]
+        rest = [one for one in hypotheses if not any(is_like(one, other) for other in taken)]
         found = compared(simulator, best, weigh(simulator, best, rest, starts, report))
         weighed = found if weighed is None else weighed
         winner = usual_of(found)

@@ -11,7 +11,7 @@ from shared.fake_simulator import LINES, FakeSimulator, sensitivities, target
 
 from gearbench.diagnosis.effects.effect import Hypothesis, Wide
 from gearbench.diagnosis.forces.unknowns import group, unknowns_of
-from gearbench.diagnosis.output.rivals import compared, usual_of
+from gearbench.diagnosis.output.rivals import compared, is_like, usual_of
 from gearbench.diagnosis.output.selection import LIMIT, Selection, Start, Weighed, known_within, select
 
 MATRIX = sensitivities(3)
@@ -84,6 +84,9 @@ def test_a_rare_effect_gives_way_to_a_usual_one_that_explains_nearly_as_much() -
         found = usual_of((rare, Weighed(CRACKS[0], 99.0, optimum), Weighed(RIPPLE, nats, optimum)))
         assert found is not None and found.hypothesis.name == named
     assert usual_of(()) is None
+    # Beside the usual one the rare one is not weighed again.
+    assert is_like(rare.hypothesis, RIPPLE) and not is_like(RIPPLE, rare.hypothesis) and is_like(RIPPLE, RIPPLE)
+    assert not is_like(rare.hypothesis, CRACKS[0])
 
 
 def test_the_usual_one_is_fitted_from_where_the_rare_one_got() -> None:
