@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from gearbench.bench.design import design
+from gearbench.bench.design import _first_mode, _known_htf, _spectra, design
 from gearbench.bench.errors import BenchError
 from gearbench.bench.experiment import simulate
 from gearbench.bench.results.exact import lumped_periodic_system
@@ -53,6 +53,20 @@ def test_error_is_told_before_the_record_is_made(window: tuple[int, int, int]) -
     error = float(np.linalg.norm(itf(frf).values[::3] - exact) / np.linalg.norm(exact))
     assert told.actual == pytest.approx(error, rel=0.2)
     assert told.expected == pytest.approx(frf.attrs["expected_error"], rel=0.2)
+
+
+def test_planned_spectra_are_those_of_the_record() -> None:
+    """Line by line, up to half the sampling rate: the sidebands beyond it come back mirrored."""
+    # A whole number of samples in a mesh period: the operating response's mirrors stay on its own lines.
+    changed = ["experiment.sampling_rate_hz=16000", "experiment.samples_per_period=8000", "experiment.periods=1"]
+    changed += ["experiment.realisations=1", "experiment.mesh_frequency_hz=400"]
+    case = read_case(case_path("quick_lumped"), [*changed, "experiment.multisine.band_hz=[1.0, 6000.0]"])
+    system = lumped_periodic_system(case)
+    clean, _, _ = _spectra(case, _known_htf(system, (1.0, 6000.0), _first_mode(system)[1]))
+    lines = np.arange(1, clean.highest)
+    lines = lines[(lines % clean.mesh_lines != 0) & (lines * clean.spacing > 7000.0)]
+    measured = np.fft.rfft(simulate(case)["dte"].values[0])[lines] / case.experiment.samples_per_period
+    assert np.linalg.norm(clean.dte[0, lines] - measured) < 2e-3 * np.linalg.norm(measured)
 
 
 def test_plan_is_that_of_the_case() -> None:
