@@ -24,9 +24,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
+from scipy.optimize import nnls
 
 from gearbench.identification.lpm.regression import Regression
-from gearbench.identification.spectra.joint import Floats
+from gearbench.identification.spectra.joint import Complexes, Floats
 
 Lines = NDArray[np.int64]
 
@@ -34,6 +35,8 @@ Lines = NDArray[np.int64]
 # below their mean [standard deviations].
 PARTS = 12
 LEAST_OF_PARTS = 1.63
+# Parts of all rows whose residuals are compared, and how much noise may differ between them.
+EVERYWHERE, EVEN = 32, 2.0
 # Rows in which sources are counted, at most, and part of all lines over which the response of sources is averaged.
 COUNTED = 300
 AVERAGED = 0.004
@@ -41,8 +44,28 @@ AVERAGED = 0.004
 VARIATION = 0.03
 # Groups of rows with windows that rows without are held against.
 NEAR = 8
+# Largest part of an octave of orders that the next one holds: powers like 1/l^2.
+SLOWEST = 0.5
 # Sources that are looked at together, over all rows.
 TOGETHER = 500_000
+
+
+def power_beyond(htf: Complexes, variance: Floats) -> float:
+    """Sum over the lines of |G_l|^2 of the branches beyond an HTF (2L+1, F) of that variance, by its last two octaves.
+
+    Each octave of orders holds as much less than the one before as the last but one octave foretells, and at most the
+    half, as where powers fall like 1/l^2. Infinite below L = 2.
+    """
+    known = htf.shape[0] // 2
+    if known < 2:
+        return float("inf")
+    power = np.sum(np.abs(htf) ** 2 - variance, axis=1)
+    order = np.abs(np.arange(-known, known + 1))
+    inner, outer = (float(power[(order > known / (2 * n)) & (order <= known / n)].sum()) for n in (2, 1))
+    if outer <= 0.0:
+        return 0.0
+    fall = min(outer / inner, SLOWEST) if inner > 0.0 else SLOWEST
+    return outer * fall / (1.0 - fall)
 
 
 class MissingPower:
@@ -97,6 +120,29 @@ class MissingPower:
         least = int(np.argmin(means))
         beyond = float(np.max(means - means.mean() / response.mean() * response))
         return max(min(beyond, float(means[least] * (1.0 + LEAST_OF_PARTS / np.sqrt(freedom[least])))), 0.0)
+
+    def flat(self) -> float:
+        """Noise [m^2] as what the residuals of the parts of the excited band hold alike, beside what goes with their
+        response, by least squares and less one standard deviation; at least what `apart` tells."""
+        means, freedom, response = self._parts()
+        if not freedom.size:
+            return 0.0
+        weight = np.sqrt(freedom) / means
+        columns = np.stack([np.ones(means.size), response / response.mean()], axis=1) * weight[:, None]
+        found, _ = nnls(columns, means * weight)
+        # Missing response is no more even than chance is: its scatter tells how well the two are told apart.
+        kept = columns[:, found > 0]
+        scatter = float(np.sum((means * weight - columns @ found) ** 2)) / (means.size - kept.shape[1])
+        spread = np.linalg.pinv(kept.T @ kept)[0, 0] * max(scatter, 1.0) if found[0] > 0 else 0.0
+        return max(float(found[0] - np.sqrt(spread)), self.apart())
+
+    @property
+    def even(self) -> bool:
+        """Whether the residuals are as even as white noise over all rows, beyond the excited band too, where missing
+        branches lead just as well."""
+        rows = self.rows[~self.operating]
+        levels = np.array([self.level[part].mean() for part in np.array_split(rows, EVERYWHERE) if part.size])
+        return bool(levels.max() <= EVEN * levels.min())
 
     def _parts(self) -> tuple[Floats, Floats, Floats]:
         """Residual level, degrees of freedom and mean response of each part of the excited band; none if small."""

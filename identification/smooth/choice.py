@@ -58,7 +58,7 @@ def choose_smooth(
     narrow = SmoothModel(begin, max(NARROWEST // 2, round(PART * width)), float(width), transient)
     narrow = replace(narrow, bandwidth=_bandwidth(regression, search, narrow, width))
     narrow = replace(narrow, harmonics=_branches(regression, search, narrow, ladder))
-    model = replace(narrow, half_width=width)
+    model = replace(narrow, half_width=width, enough=narrow.harmonics < max(ladder))
     while _work(regression, lines, model) > WORK:
         model = replace(model, half_width=int(NARROWER * model.half_width))
         if model.half_width < NARROWEST:

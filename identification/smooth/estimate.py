@@ -16,7 +16,7 @@ import numpy as np
 from gearbench.identification.lpm.estimate import LpmResult, needed_rows, plan_centres, require_lines
 from gearbench.identification.lpm.gathered import rows_around
 from gearbench.identification.lpm.local_solve import LpmError
-from gearbench.identification.lpm.missing import MissingPower
+from gearbench.identification.lpm.missing import MissingPower, power_beyond
 from gearbench.identification.lpm.output import OutputLines
 from gearbench.identification.lpm.regression import Regression, Window, prepare
 from gearbench.identification.lpm.rows import Lines
@@ -38,12 +38,14 @@ FEWEST = 8
 
 @dataclass(frozen=True)
 class SmoothModel:
-    """Branches -L..L, half-width n of a window [lines], bandwidth [lines] of the branches, estimated transient."""
+    """Branches -L..L, half-width n of a window [lines], bandwidth [lines] of the branches, estimated transient;
+    `enough`: more branches were tried, and promised nothing."""
 
     harmonics: int
     half_width: int
     bandwidth: float
     transient: bool
+    enough: bool = False
 
     @property
     def window(self) -> Window:
@@ -147,6 +149,21 @@ class _Pass:
         self.residual += noise
         self.power += power
 
+    def _missing(self, output: OutputLines) -> float:
+        """Missing response: the residual above the noise.
+
+        Of a single period, whose residual may be either, where nobody has tried more branches: half of that, and half
+        of what the known branches foretell of those beyond and the residual can hold, unless it is even like noise.
+        """
+        missing = self.missing
+        if self.noise is not None:
+            return missing.total(self.noise)
+        seen = missing.total(missing.flat())
+        if self.model.enough or missing.even:
+            return seen
+        foretold = min(power_beyond(output.htf, output.variance), missing.total(0.0))
+        return max(seen, 0.5 * (seen + foretold))
+
     def _result(self, output: OutputLines, windows: int) -> LpmResult:
         missing = self.missing
         determined, count = self.determined[len(self.determined) // 2]
@@ -155,7 +172,7 @@ class _Pass:
             output.htf,
             output.variance,
             output.variance.sum(axis=0)[None, :].astype(complex),
-            missing.total(missing.apart() if self.noise is None else self.noise),
+            self._missing(output),
             missing.total(0.0 if self.noise is None else self.noise),
             missing.total(0.0),
             float(np.sqrt(self.residual / self.power)),

@@ -38,6 +38,12 @@ def test_a_short_record_is_left_to_smooth_branches() -> None:
     assert np.linalg.norm(parts) == pytest.approx(frf.attrs["expected_error"], rel=1e-6)
 
 
+def test_branches_that_nobody_tried_count_as_missing() -> None:
+    """Three branches a side, of some twelve: as noise, what is missing would go on hiding in an even residual."""
+    frf, error = found(branches="smooth", harmonics=3)
+    assert 0.75 < frf.attrs["expected_error"] / error < 1.6
+
+
 def test_error_bars_hold_over_records() -> None:
     """Other multisines and noise: rms of the stated deviations of the ITF over rms of its errors."""
     stated = actual = 0.0
