@@ -20,7 +20,7 @@ from scipy.linalg import expm
 from gearbench.identification.truth.periodic import Complexes, Floats, PeriodicSystem, PeriodicSystemError
 
 # Smooth coefficients: largest step times the fastest frozen eigenvalue [rad].
-SMOOTH_STEP = 2.0
+SMOOTH_STEP = 1.0
 # States kept at once (pieces x states x frequencies): 64 MB of complex numbers.
 STATES_AT_ONCE = 4_000_000
 # Change of phase and size within a piece below which the series of the exponentials is taken.
@@ -52,7 +52,7 @@ def exact_itf(system: PeriodicSystem, frequency: ArrayLike, phase: ArrayLike, *,
     """Exact ITF (frequency, phase) [output/input] at the frequencies [Hz] and phases [cycles].
 
     `steps` per period matters for trigonometric systems only (default: SMOOTH_STEP, at least one per grid point;
-    good to about 1e-6);
+    good to 5e-6);
     piecewise systems are exact. Raises PeriodicSystemError if the system is unstable (no steady state
     exists).
     """

@@ -53,6 +53,13 @@ def test_monodromy_and_harmonic_balance_agree(mesh_frequency: float) -> None:
     assert relative(first, second) < 1e-8
 
 
+@pytest.mark.parametrize("mesh_frequency", [2.0, 50.0, 200.0])
+def test_default_steps_are_good_to_five_millionths(mesh_frequency: float) -> None:
+    system = oscillator(smooth(np.arange(64) / 64), period=1 / mesh_frequency, interpolation="trigonometric")
+    truth = harmonic_balance_itf(system, FREQUENCIES, PHASES, tolerance=1e-11)
+    assert relative(exact_itf(system, FREQUENCIES, PHASES), truth) < 5e-6
+
+
 def test_smooth_monodromy_converges_with_order_four() -> None:
     system = oscillator(smooth(np.arange(64) / 64), period=1 / 200, interpolation="trigonometric")
     truth = harmonic_balance_itf(system, FREQUENCIES, PHASES, tolerance=1e-12)
