@@ -209,4 +209,11 @@ def _doubts(records: Sequence[xr.Dataset]) -> tuple[list[str], float]:
         for finding in check_record(record, source):
             sentences.append(f"{source}: {finding.sentence}" if source else finding.sentence)
             power += finding.error**2 / len(records)
+        if lost := int(record.attrs.get("contact_lost_samples", 0)):
+            total = record.sizes["realisation"] * record.sizes["time"]
+            sentence = (
+                f"the teeth are out of contact in {lost} of {total} samples: the response depends on the excitation's"
+                " size, which no error here counts; a coset multisine tells how much"
+            )
+            sentences.append(f"{source}: {sentence}" if source else sentence)
     return sentences, sqrt(power)

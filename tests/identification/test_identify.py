@@ -264,6 +264,13 @@ def test_values_that_are_not_finite_are_named(channel: str, value: float) -> Non
         identify([record])
 
 
+def test_lost_contact_is_told_with_the_response(record: xr.Dataset) -> None:
+    lost = record.assign_attrs(contact_lost_samples=12)
+    total = record["dte"].size
+    assert f"the teeth are out of contact in 12 of {total} samples" in identify([lost], NARROW).attrs["warnings"]
+    assert "contact" not in identify([record], NARROW).attrs["warnings"]
+
+
 def test_result_that_says_nothing_says_so() -> None:
     """A mesh period that is 1/7 too long: the expected error exceeds the response."""
     record = reference_record(RIG, realisations=1, duration=0.25, band=(4.0, 2600.0)).drop_vars("mesh_phase")
