@@ -22,6 +22,8 @@ FOLLOWED = 40
 FEWEST_HELD = 100
 # Equations of a window in which residuals are compared with the inputs.
 COMPARED = 80
+# Quiet windows, and the deviations above these from which on residuals are more than even noise leaves.
+QUIET, LEAST_OF_WINDOWS = 0.25, 1.5
 # A part of the response that no mesh force explains, beyond this and twice what chance makes, speaks against it.
 UNEXPLAINED = 0.03
 
@@ -135,7 +137,8 @@ def unexplained(found: Feedback, band: tuple[int, int]) -> float:
     """Estimated sum over the lines k of the `band` and all branches of |error of G_l(k)|^2 [m^2/N^2].
 
     It is what the residuals share with the inputs, less what noise would (docs/identification.md, "How far a result
-    goes").
+    goes"); and, where a window has more branches than equations, so that chance hides much, one deviation of chance as
+    far as residuals exceed those of quiet windows.
     """
     data, d = found.data, found.data.mesh_lines
     size = 2 * data.top + 1
@@ -145,7 +148,7 @@ def unexplained(found: Feedback, band: tuple[int, int]) -> float:
         target[-data.lines[data.valid] + data.top] = source[data.valid].conj()
     counted = np.abs(left) > 0
     width = max(3, COMPARED // data.dte.shape[2])
-    total = 0.0
+    total, chance, above = 0.0, 0.0, []
     for first in range(data.top + 1, size - width + 1, width):
         rows = np.arange(first, first + width)
         middle = first + width // 2 - data.top
@@ -162,6 +165,15 @@ def unexplained(found: Feedback, band: tuple[int, int]) -> float:
         good = power > 0
         share = np.sum((np.abs(product[good]) ** 2 / power[good] - noise) / power[good])
         total += width * float(share)
+        if good.any():
+            fewer = min(int(good.sum()), int(counted[rows].sum()))
+            chance += (width * noise * float(np.sum(1.0 / power[good]))) ** 2 / max(fewer, 1)
+            above.append((noise, width * int(counted[rows].sum()) / float(power[good].mean())))
+    if above:
+        levels, weights = np.array(above).T
+        quietest = np.quantile(levels, QUIET) * (1.0 + LEAST_OF_WINDOWS / np.sqrt(width * left.shape[1]))
+        hidden = max(float((levels - quietest) @ weights), 0.0)
+        total = max(total, 0.0) + min(float(np.sqrt(chance)), hidden)
     return total / data.stiffness_unit**2
 
 
