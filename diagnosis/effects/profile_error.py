@@ -143,7 +143,10 @@ PROFILE_ERROR = Effect(
         "driven_tip": "excess where the driven gear's tips come into mesh, over that in the middle of the path",
         "driver_tip": "excess where the driver's tips leave the mesh, over that in the middle of the path",
     },
-    fields=("rig.mesh.error_cos", "rig.mesh.error_sin", "rig.driver.profile_form", "rig.driver.profile_form_roll"),
+    fields=(
+        *("rig.mesh.error_cos", "rig.mesh.error_sin"),
+        *(f"rig.{gear}.profile_form{of}" for gear in ("driver", "driven") for of in ("", "_roll")),
+    ),
     hypotheses_of=hypotheses,
     add=add,
     unknowns=unknowns,

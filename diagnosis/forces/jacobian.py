@@ -1,10 +1,11 @@
 """Jacobian of the force residuals: derivatives to the departures by hand, taken to the unknowns that move them.
 
 Departures are linear in the unknowns, so no effect has a derivative of its own. Left out are friction's and the
-filters' modulation of a column and the change of the damping with the stiffness: below 3 % of a column at the
-background's size. Steps that do not help are refused, so that this costs steps, not truth. With all of it in, descents
-went further, into optima where supports and filters absorb friction, and verdicts on the calibration family became
-worse: differences of the residuals, which have all of it in, are what the tests compare with, not what the search uses.
+filters' modulation of a column and, but for backlash, the change of the damping with the stiffness: below 3 % of a
+column at the background's size. Steps that do not help are refused, so that this costs steps, not truth. With all of it
+in, descents went further, into optima where supports and filters absorb friction, and verdicts on the calibration
+family became worse: differences of the residuals, which have all of it in, are what the tests compare with, not what
+the search uses.
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ from gearbench.diagnosis.forces.unknowns import Unknowns
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-BACKLASH_STEP = 1e-7  # [m]
+BACKLASH_STEP = 1e-11  # [m]; beyond a nanometre samples cease to touch
 
 
 @dataclass(frozen=True)
@@ -192,14 +193,20 @@ def _of_teeth(condition: Condition, weights: Array) -> Array:
 
 
 def _backlash(at: _Point) -> Array:
-    law, state, phase = at.model.hardened, at.mesh, at.condition.phase
+    """As a difference, of the damping too: flanks that hardly touch have most of their force from it."""
+    law, phase = at.model.hardened, at.condition.phase
     present = max(law.backlash + at.departures.backlash, 0.0)
-    if not np.any(state.delta < -present):
+    if not np.any(at.mesh.delta < -present):
         return np.zeros(at.condition.samples)
-    wider = replace(law, backlash=present + BACKLASH_STEP).evaluate(state.delta, phase)[0]
-    now = replace(law, backlash=present).evaluate(state.delta, phase)[0]
     factor = at.model.scale * stiffness_factor(at.condition, at.departures)
-    return np.asarray(factor * (wider - now) / BACKLASH_STEP)
+    ratio = at.model.mesh_ratio * np.exp(at.departures.mesh_ratio)
+
+    def carried(backlash: float) -> Array:
+        force, slope = replace(law, backlash=backlash).evaluate(at.mesh.delta, phase)
+        viscosity = 2 * ratio * np.sqrt(np.maximum(factor * slope, 0.0) * at.model.mesh_mass)
+        return np.asarray(factor * force + viscosity * at.mesh.rate * at.mesh.touching)
+
+    return (carried(present + BACKLASH_STEP) - carried(present)) / BACKLASH_STEP
 
 
 def _support_columns(at: _Point, put: _Put) -> None:
