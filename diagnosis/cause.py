@@ -89,7 +89,8 @@ def find_cause(
     band = problem.conditions[0].band
     unsteady = unsteadiness(problem.model, measurements, problem.unknowns, fit.p, band)
     simulate = replays(problem.model.sound)
-    found = simulated(problem, result, measurements, nominal, simulate, without, report)
+    apart = held_out is not None and held_out.phase_known
+    found = simulated(problem, result, measurements, nominal, simulate, without, report, apart=apart)
     common: dict[str, Any] = {
         "indistinguishable": alike(fit, problem.unknowns, representatives(problem, without)),
         "evidence": {one.hypothesis.name: one.log_bayes_factor for one in result.tried},

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,17 +37,19 @@ SEEN = 0.05
 @dataclass(frozen=True)
 class Closing:
     """What an effect closes of the judged record: nats gained, the largest factor by which the gap of some part grows
-    without it, that part in words (channel, kind of line or band), and the signals (channel -> (N,)) without it."""
+    without it, that part in words (channel, kind of line or band), the signals (channel -> (N,)) without it, and the
+    nats that the search lacked up to its limit, which are to be gained here besides."""
 
     gain: float
     growth: float
     part: tuple[str, str]
     without: Mapping[str, Array]
+    lacking: float = 0.0
 
     @property
     def due(self) -> bool:
         """Whether the effect closes a part of the gap that the record can see."""
-        return self.gain > GAIN and self.growth > DUE
+        return self.gain > GAIN + self.lacking and self.growth > DUE
 
 
 @dataclass(frozen=True)
@@ -150,12 +153,15 @@ def _closings(found: Simulated, target: Target, measured: Measurement) -> Judged
     signals = simulator.channels(selection.best.p, measured)
     with_all = target.lines - target.gathered([signals])
     closings = {}
+    # A record that had part in the search cannot make up for what it lacked.
+    apart = not any(measured is searched for searched in simulator.target.measurements)
     for one in selection.entered:
         without = simulator.channels(taken_out(simulator, selection, one).p, measured)
         rest = target.lines - target.gathered([without])
         gain = target.cost(rest) - target.cost(with_all)
         growth, part = _growth(target, target.energies(rest), target.energies(with_all))
-        closings[one.hypothesis.name] = Closing(gain, growth, part, without)
+        lacking = inf if one.lacking and not apart else one.lacking
+        closings[one.hypothesis.name] = Closing(gain, growth, part, without, lacking)
     nothing = np.zeros(simulator.layout.size)
     nominal, plain = (simulator.channels(p, measured) for p in (nothing, selection.bare.p))
     return Judged(measured, found, closings, nominal, plain, signals)

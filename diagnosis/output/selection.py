@@ -36,6 +36,9 @@ LIMIT_NUMBER = 3.0
 # Of a delay of the driven angle, which replays are given: it shows by little but the mesh phase, whose zero is free,
 # and sound rigs of the calibration family had up to 9.4.
 LIMIT_GIVEN = 12.0
+# Nats from which an effect enters to be held against a record that had no part in the search: what it lacks up to its
+# limit must be made up for there.
+PROVISIONAL = 4.0
 NOTHING = 1e-3  # of a number's nominal value: as good as none
 TRIED = 4  # hypotheses that are simulated, at each step
 BY_FORCES = 2  # of them at least, by the force residuals' ranking
@@ -50,12 +53,13 @@ RENEWALS_BASE, RENEWALS, RENEWALS_LAST = 8, 1, 2
 @dataclass(frozen=True)
 class Weighed:
     """A hypothesis, its log Bayes factor over what was there before it, its optimum (None: by the quadratic), and of
-    one that entered the `rivals` that explain the records as well."""
+    one that entered the `rivals` that explain the records as well and the nats that it is `lacking` up to its limit."""
 
     hypothesis: Hypothesis
     log_bayes_factor: float
     optimum: Optimum | None
     rivals: tuple[Hypothesis, ...] = ()
+    lacking: float = 0.0
 
     @property
     def causes(self) -> tuple[Hypothesis, ...]:
@@ -92,10 +96,12 @@ def select(
     starts: Mapping[str, Start],
     report: Report = lambda step: None,
     around: Around | None = None,
+    *,
+    apart: bool = False,
 ) -> Selection | None:
     """The effects of the hypotheses that the records call for; `background`: where to begin without any (size,),
-    `starts`: by a hypothesis' name; `around`: the rig around its mesh, as the records show it. None where no start is
-    a rig."""
+    `starts`: by a hypothesis' name; `around`: the rig around its mesh, as the records show it; `apart`: a record that
+    has no part in this judges what enters. None where no start is a rig."""
     unknowns = simulator.layout.unknowns
     sd = prior_of(simulator, unknowns.prior())
     chosen = np.ones(unknowns.size, dtype=bool)
@@ -115,14 +121,15 @@ def select(
         found = compared(simulator, best, weigh(simulator, best, rest, starts, report))
         weighed = found if weighed is None else weighed
         winner = usual_of(found)
-        if winner is None or winner.optimum is None or winner.log_bayes_factor < limit_of(unknowns, winner.hypothesis):
+        winner = entering(unknowns, winner, apart) if winner else None
+        if winner is None or winner.optimum is None:
             break
         entered.append(replace(winner, rivals=rivals_of(winner, found)))
         best = winner.optimum
         renewed = sensitivity_of(simulator, best.p, unknowns.prior(), chosen)
         if renewed is not None:
             best = fit(simulator, best.p, best.sd, renewed, renewals=0, chosen=chosen) or best
-    best, kept = _needed(simulator, best, entered)
+    best, kept = _needed(simulator, best, entered, apart)
     if kept and best.left > SETTLED:
         report("simulating: all together")
         best = fit(simulator, best.p, best.sd, best.sensitivity, renewals=RENEWALS_LAST, chosen=chosen) or best
@@ -319,8 +326,17 @@ def known_within(sd: Array) -> tuple[Array, Array]:
     return np.log(np.maximum(1.0 - edge, NOTHING)), edge
 
 
+def entering(unknowns: Unknowns, one: Weighed, apart: bool) -> Weighed | None:
+    """What was weighed, if it enters, with what it lacks; where a record that had no part in it judges (`apart`) less
+    evidence is enough."""
+    limit = limit_of(unknowns, one.hypothesis)
+    if one.log_bayes_factor < (min(limit, PROVISIONAL) if apart else limit):
+        return None
+    return replace(one, lacking=max(limit - one.log_bayes_factor, 0.0))
+
+
 def limit_of(unknowns: Unknowns, one: Hypothesis) -> float:
-    """Nats from which a hypothesis enters."""
+    """Nats from which a hypothesis enters where no other record speaks."""
     if any(wide.key == FOLLOWED for wide in one.wide):
         return LIMIT_GIVEN
     return LIMIT if any(_is_own(unknowns, wide) for wide in one.wide) else LIMIT_NUMBER
@@ -332,9 +348,11 @@ def _is_own(unknowns: Unknowns, wide: Wide) -> bool:
     return bool((group.wide > group.sd).any())
 
 
-def _needed(simulator: Simulator, best: Optimum, entered: Sequence[Weighed]) -> tuple[Optimum, tuple[Weighed, ...]]:
+def _needed(
+    simulator: Simulator, best: Optimum, entered: Sequence[Weighed], apart: bool
+) -> tuple[Optimum, tuple[Weighed, ...]]:
     """The optimum without what the other effects make needless, and each effect that stays with what it is worth."""
-    unknowns, kept = simulator.layout.unknowns, []
+    unknowns, kept = simulator.layout.unknowns, list[Weighed | None]()
     for one in entered:
         sd = best.sd.copy()
         at = one.hypothesis.entries(unknowns)
@@ -343,8 +361,9 @@ def _needed(simulator: Simulator, best: Optimum, entered: Sequence[Weighed]) -> 
         quadratic = best.sensitivity.quadratic
         _, cost, information = quadratic.best(best.p, sd, _bounds_at(unknowns, p, best.p, sd))
         worth = best.evidence - quadratic.evidence(cost, information, sd)
-        kept.append(replace(one, log_bayes_factor=float(worth) if len(entered) > 1 else one.log_bayes_factor))
-    return best, tuple(one for one in kept if one.log_bayes_factor > limit_of(unknowns, one.hypothesis))
+        now = replace(one, log_bayes_factor=float(worth) if len(entered) > 1 else one.log_bayes_factor)
+        kept.append(entering(unknowns, now, apart))
+    return best, tuple(one for one in kept if one is not None)
 
 
 def _bounds_at(unknowns: Unknowns, wanted: Array, here: Array, sd: Array) -> tuple[Array, Array]:

@@ -19,7 +19,7 @@ from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.output.around import around
 from gearbench.diagnosis.output.layout import Layout, layout_of
-from gearbench.diagnosis.output.selection import LIMIT, WORTH, Selection, Start, Weighed, select
+from gearbench.diagnosis.output.selection import WORTH, Selection, Start, Weighed, entering, select
 from gearbench.diagnosis.output.simulator import Simulate, Simulator
 from gearbench.diagnosis.output.structure import beginnings
 from gearbench.diagnosis.output.target import target_of
@@ -63,9 +63,11 @@ def simulated(
     simulate: Simulate,
     without: Sequence[str] = (),
     report: Report = lambda step: None,
+    *,
+    apart: bool = False,
 ) -> Simulated | None:
     """Which effects the records call for, by simulation; None where the nominal rig cannot be simulated at all, or
-    records do not tell the mesh phase."""
+    records do not tell the mesh phase. `apart`: another record judges what enters."""
     smooth = smooth_records(nominal, measurements, simulate)
     if not smooth:
         return None
@@ -87,6 +89,7 @@ def simulated(
         starts,
         report,
         lambda held: around(layout, [problem.conditions[number] for number in smooth], held),
+        apart=apart,
     )
     if selection is None:
         return None
@@ -98,14 +101,14 @@ def simulated(
         target = target_of(
             [measurements[number] for number in rough], [problem.conditions[number] for number in rough]
         )
-        opened = _opened(Simulator(layout, target, simulate), selection, start)
+        opened = _opened(Simulator(layout, target, simulate), selection, start, apart)
         if opened is not None:
             selection = opened
             std[layout.unknowns[BACKLASH]] = SPACING * selection.best.p[layout.unknowns[BACKLASH]]
     return Simulated(layout, simulator, selection, std)
 
 
-def _opened(simulator: Simulator, selection: Selection, start: Start) -> Selection | None:
+def _opened(simulator: Simulator, selection: Selection, start: Start, apart: bool) -> Selection | None:
     """The selection with backlash, if the records whose flanks part call for it: followed downhill they would lead
     astray, so that backlash alone is tried there, around where the force residuals have it."""
     unknowns = simulator.layout.unknowns
@@ -128,9 +131,10 @@ def _opened(simulator: Simulator, selection: Selection, start: Start) -> Selecti
     optimum = replace(selection.best, p=p)
     found = Weighed(start.hypothesis, worth, optimum)
     weighed = tuple(sorted((*selection.weighed, found), key=lambda one: -one.log_bayes_factor))
-    if worth < LIMIT:
+    entered_now = entering(unknowns, found, apart)
+    if entered_now is None:
         return replace(selection, weighed=weighed)
-    entered = tuple(sorted((*selection.entered, found), key=lambda one: -one.log_bayes_factor))
+    entered = tuple(sorted((*selection.entered, entered_now), key=lambda one: -one.log_bayes_factor))
     return replace(selection, best=optimum, entered=entered, weighed=weighed)
 
 
