@@ -195,10 +195,13 @@ def weigh(
         report(f"simulating: {one.name}")
         # What any further step from there promises says nothing for this one.
         renewals = RENEWALS if value - base.left > LIMIT else 0
-        optimum = _refit(simulator, base, one, step, starts.get(one.name), renewals)
-        if one.name in shaped:
-            other = reshaped(simulator, one, widened_prior(unknowns, base.sd, one))
-            optimum = other if optimum is None else better(optimum, other)
+        try:
+            optimum = _refit(simulator, base, one, step, starts.get(one.name), renewals)
+            if one.name in shaped:
+                other = reshaped(simulator, one, widened_prior(unknowns, base.sd, one))
+                optimum = other if optimum is None else better(optimum, other)
+        except ValueError:  # a fit that leads nowhere costs its hypothesis, not the verdict
+            optimum = None
         if optimum is None:
             return Weighed(one, min(value, 0.0), None)
         factor = optimum.evidence - base.evidence - float(np.log(one.choices))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -13,8 +13,8 @@ from shared.fake_simulator import LINES, FakeSimulator, sensitivities, target
 
 from gearbench.diagnosis.effects.effect import Hypothesis, Wide
 from gearbench.diagnosis.output import judged as module
-from gearbench.diagnosis.output.judged import Judged, Sizes, judged_on, rms_closed
-from gearbench.diagnosis.output.selection import Selection, select
+from gearbench.diagnosis.output.judged import GAIN, Judged, Sizes, judged_on, rms_closed
+from gearbench.diagnosis.output.selection import LIMIT, PROVISIONAL, Selection, select
 from gearbench.diagnosis.output.simulated import Simulated
 from gearbench.diagnosis.output.target import Target
 
@@ -42,8 +42,10 @@ def noisy(lines: np.ndarray, seed: int) -> np.ndarray:
     return lines + 0.02 * (rng.standard_normal(LINES) + 1j * rng.standard_normal(LINES))
 
 
-def judged(searched: dict[int, float], there: dict[int, float], monkeypatch: pytest.MonkeyPatch) -> Judged:
-    """Effects of these sizes in the records of the search, and in the judged one."""
+def judged(
+    searched: dict[int, float], there: dict[int, float], monkeypatch: pytest.MonkeyPatch, *, apart: bool = False
+) -> Judged:
+    """Effects of these sizes in the records of the search, and in the judged one, which is waited for (`apart`)."""
     p, q = BACKGROUND.copy(), BACKGROUND.copy()
     for number, value in searched.items():
         p[number] = value
@@ -51,7 +53,7 @@ def judged(searched: dict[int, float], there: dict[int, float], monkeypatch: pyt
         q[number] = value
     simulator = Answering(lambda one: one @ MATRIX, target(noisy(p @ MATRIX, 11)))
     simulator.layout.size = 8
-    selection = select(simulator, (FRICTION, RIPPLE), [np.zeros(8)], {})
+    selection = select(simulator, (FRICTION, RIPPLE), [np.zeros(8)], {}, apart=apart)
     assert isinstance(selection, Selection)
     plain = target(noisy(q @ OTHER, 12))
     held = OfLines(**{one.name: getattr(plain, one.name) for one in fields(plain)})
@@ -86,6 +88,28 @@ def test_an_effect_that_leaves_the_judged_record_as_it_was_is_not(monkeypatch: p
     assert abs(best[4]) < 0.05 and best[3] == pytest.approx(0.4, abs=0.05)
     none = judged({4: 0.3, 5: -0.2}, {}, monkeypatch)
     assert not none.found.selection.entered and none.found.selection.best is none.found.selection.base
+
+
+def test_what_weak_evidence_lacks_is_made_up_for_on_the_judged_record(monkeypatch: pytest.MonkeyPatch) -> None:
+    weak = {3: 0.045}  # of a good rig 0.01: widening its prior is worth ten nats and costs four
+    assert not judged(weak, weak, monkeypatch).found.selection.entered
+    found = judged(weak, weak, monkeypatch, apart=True)
+    (one,) = found.found.selection.entered
+    assert PROVISIONAL < one.log_bayes_factor < LIMIT and one.lacking == LIMIT - one.log_bayes_factor
+    closing = found.closings["friction"]
+    assert closing.due and not replace(closing, gain=GAIN + 0.5 * one.lacking).due
+    none = judged(weak, {}, monkeypatch, apart=True)
+    assert names(none.dropped) == ["friction"] and not none.found.selection.entered
+
+
+def test_a_record_of_the_search_makes_up_for_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    weak = {3: 0.045}
+    plain = judged(weak, weak, monkeypatch, apart=True)
+    simulator: Any = plain.found.simulator
+    object.__setattr__(simulator.target, "measurements", (plain.measured,))
+    problem: Any = SimpleNamespace(model=None, conditions=[SimpleNamespace(band=1.0)])
+    again = judged_on(problem, plain.found, plain.measured)
+    assert again is not None and names(again.dropped) == ["friction"]
 
 
 def test_each_of_two_effects_is_taken_out_alone(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,6 +11,7 @@ from shared.fake_simulator import LINES, FakeSimulator, sensitivities, target
 
 from gearbench.diagnosis.effects.effect import Hypothesis, Wide
 from gearbench.diagnosis.forces.unknowns import group, unknowns_of
+from gearbench.diagnosis.output import selection as module
 from gearbench.diagnosis.output.rivals import compared, is_like, usual_of
 from gearbench.diagnosis.output.selection import LIMIT, Selection, Start, Weighed, known_within, select
 
@@ -112,6 +113,20 @@ def test_two_effects_enter_the_larger_first_and_each_is_needed() -> None:
     assert names(found) == ["friction", "torque-ripple"]
     assert found.best.p[[3, 4, 5]] == pytest.approx([0.5, 0.2, -0.15], abs=0.03)
     assert all(one.log_bayes_factor > LIMIT for one in found.entered)
+
+
+def test_a_fit_that_fails_costs_its_hypothesis_and_nothing_else(monkeypatch: pytest.MonkeyPatch) -> None:
+    refit = module._refit
+
+    def failing(simulator: object, base: object, one: Hypothesis, *rest: object) -> object:
+        if one is RIPPLE:
+            raise np.linalg.LinAlgError("not positive definite")
+        return refit(simulator, base, one, *rest)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(module, "_refit", failing)
+    found = selected({3: 0.5, 4: 0.2, 5: -0.15})
+    assert names(found) == ["friction"]
+    assert next(one for one in found.weighed if one.hypothesis is RIPPLE).optimum is None
 
 
 def test_a_start_of_the_force_residuals_is_tried_even_if_the_quadratic_does_not_see_it() -> None:
