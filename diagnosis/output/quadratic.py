@@ -44,7 +44,7 @@ class Quadratic:
         return float(np.sum(self.target.counts * self.target.nats(self._energies(step))))
 
     def _energies(self, step: Array) -> Array:
-        whole = self.energy - 2 * self.slopes @ step + np.einsum("bij,i,j->b", self.squares, step, step, optimize=True)
+        whole = self.energy - 2 * self.slopes @ step + (self.squares @ step) @ step
         return np.asarray(np.maximum(whole, 0.0) / self.target.sizes)
 
     def weights(self, step: Array) -> Array:

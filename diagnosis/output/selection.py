@@ -1,8 +1,8 @@
 """Which effects the records call for: forward one by one, backward what the others make needless.
 
-The background, its nuisances and structure are fitted alone. At its optimum the quadratic weighs every hypothesis; the
-few of most evidence, by it or by the force residuals, are simulated to convergence. The best one enters when its
-evidence clears the limit, and the others are weighed again beside it.
+At the optimum of the background (`background`) the quadratic weighs every hypothesis; the few of most evidence, by it
+or by the force residuals, are simulated to convergence. The best one enters when its evidence clears the limit, and the
+others are weighed again beside it.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from numpy.typing import NDArray
 
 from gearbench.bench.plan.workers import side_by_side
 from gearbench.diagnosis.effects.effect import BEYOND, Hypothesis, Wide
-from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
 from gearbench.diagnosis.forces.unknowns import Unknowns
-from gearbench.diagnosis.output.beginning import Around, beginning
+from gearbench.diagnosis.output.background import prior_of
+from gearbench.diagnosis.output.beginning import Around
 from gearbench.diagnosis.output.contrast import is_strange
 from gearbench.diagnosis.output.fit import SETTLED, Optimum, Sensitivity, cost_of, fit, sensitivity_of
 from gearbench.diagnosis.output.jacobian import FOLLOWED
 from gearbench.diagnosis.output.reshaped import has_shapes, reshaped
-from gearbench.diagnosis.output.restructured import better, is_close, restructured
+from gearbench.diagnosis.output.restructured import better, restructured
 from gearbench.diagnosis.output.rivals import compared, is_like, rivals_of, usual_of
 from gearbench.diagnosis.output.simulator import Simulator
 
@@ -45,9 +45,9 @@ BY_FORCES = 2  # of them at least, by the force residuals' ranking
 MOST = 3  # effects
 LOOKED_AT = 8  # hypotheses whose quadratic is followed to its minimum
 WORTH = 2.0  # nats promised from which a hypothesis is simulated
-# Renewals of the Jacobian: of the background, of each promising hypothesis, and of what entered in the end, whose
-# structure has been found beside a gap that the effects now close.
-RENEWALS_BASE, RENEWALS, RENEWALS_LAST = 8, 1, 2
+# Renewals of the Jacobian: of each promising hypothesis, and of what entered in the end, whose structure has been found
+# beside a gap that the effects now close.
+RENEWALS, RENEWALS_LAST = 1, 2
 
 
 @dataclass(frozen=True)
@@ -91,28 +91,19 @@ class Start:
 
 def select(
     simulator: Simulator,
+    base: Optimum,
     hypotheses: Sequence[Hypothesis],
-    background: Sequence[Array],
     starts: Mapping[str, Start],
     report: Report = lambda step: None,
     around: Around | None = None,
     *,
     apart: bool = False,
-) -> Selection | None:
-    """The effects of the hypotheses that the records call for; `background`: where to begin without any (size,),
-    `starts`: by a hypothesis' name; `around`: the rig around its mesh, as the records show it; `apart`: a record that
-    has no part in this judges what enters. None where no start is a rig."""
+) -> Selection:
+    """The effects of the hypotheses that the records call for beside the background's optimum `base`; `starts`: by a
+    hypothesis' name; `around`: the rig around its mesh, as the records show it; `apart`: a record that has no part in
+    this judges what enters."""
     unknowns = simulator.layout.unknowns
-    sd = prior_of(simulator, unknowns.prior())
     chosen = np.ones(unknowns.size, dtype=bool)
-    report("simulating: background")
-    base = _fitted(simulator, background, around, sd)
-    if base is None:
-        return None
-    # What the force residuals make of a rig beside a large effect can lead astray: then from the nominal one.
-    if not is_close(simulator, base):
-        base = better(base, _fitted(simulator, background[:1], around, sd))
-    base = restructured(simulator, base, around, report)
     best, weighed = base, None
     entered: list[Weighed] = []
     while len(entered) < MOST:
@@ -136,24 +127,6 @@ def select(
     best = restructured(simulator, best, around, report) if kept else best
     bare = _without(simulator, base, kept, chosen)
     return Selection(base, bare, best, kept, tuple(weighed or ()))
-
-
-def _fitted(
-    simulator: Simulator, background: Sequence[Array], around: Around | None, sd: Array
-) -> Optimum | None:
-    """The background's optimum under the prior `sd` (size,) from the best of these beginnings; None where none is a
-    rig."""
-    begin, chosen = beginning(simulator, background, around, sd), np.ones(len(sd), dtype=bool)
-    first = sensitivity_of(simulator, begin, simulator.layout.unknowns.prior(), chosen)
-    return fit(simulator, begin, sd, first, renewals=RENEWALS_BASE, chosen=chosen) if first else None
-
-
-def prior_of(simulator: Simulator, sd: Array) -> Array:
-    """The prior `sd` (size,) with what no rig of the background has held at zero: cracked teeth."""
-    out = sd.copy()
-    unknowns = simulator.layout.unknowns
-    out[unknowns[CRACK]] = 0.0
-    return out
 
 
 def weigh(

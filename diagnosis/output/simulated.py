@@ -18,7 +18,9 @@ from gearbench.diagnosis.evidence.search import Search
 from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.output.around import around
+from gearbench.diagnosis.output.background import background
 from gearbench.diagnosis.output.layout import Layout, layout_of
+from gearbench.diagnosis.output.likely_teeth import with_likely_teeth
 from gearbench.diagnosis.output.selection import WORTH, Selection, Start, Weighed, entering, select
 from gearbench.diagnosis.output.simulator import Simulate, Simulator
 from gearbench.diagnosis.output.structure import beginnings
@@ -31,7 +33,7 @@ Report = Callable[[str], None]
 # Part of the time without contact from which a record is too rough to follow downhill: small changes make jumps.
 LOSING = 0.01
 SPACING = 0.15  # of the backlash, between the values that are tried
-CRACKED = 4  # teeth that may be cracked: those that the force residuals rank first
+CRACKED = 2  # teeth that may be cracked: those that the force residuals rank first
 
 
 @dataclass(frozen=True)
@@ -73,26 +75,24 @@ def simulated(
         return None
     listed = library(problem.model, without)
     cracks = [one for one in listed if one.wide[0].key == CRACK]
-    ranked = np.argsort(-predicted_factors(found.base, problem.unknowns, cracks))[:CRACKED]
-    likely = [cracks[number] for number in ranked]
-    teeth = tuple(int(one.wide[0].at) for one in likely if one.wide[0].at is not None)
-    layout = layout_of(nominal, problem.model, problem.conditions, teeth)
+    layout = layout_of(nominal, problem.model, problem.conditions, ())
     chosen = [measurements[number] for number in smooth]
-    target = target_of(chosen, [problem.conditions[number] for number in smooth])
-    simulator = Simulator(layout, target, simulate)
-    weighed = [one for one in listed if one.wide[0].key != CRACK or one in likely]
-    starts = _starts(layout, problem.unknowns, found, weighed)
-    selection = select(
-        simulator,
-        weighed,
-        _beginnings(layout, carried_over(layout, problem.unknowns, found.base.p)),
-        starts,
-        report,
-        lambda held: around(layout, [problem.conditions[number] for number in smooth], held),
-        apart=apart,
-    )
-    if selection is None:
+    conditions = [problem.conditions[number] for number in smooth]
+    simulator = Simulator(layout, target_of(chosen, conditions), simulate)
+
+    def seen(held: Array) -> Array | None:
+        return around(layout, conditions, held)
+
+    by_forces = carried_over(layout, problem.unknowns, found.base.p)
+    base = background(simulator, _beginnings(layout, by_forces), seen, report)
+    if base is None:
         return None
+    if cracks:
+        simulator, base = with_likely_teeth(simulator, base, _cracked_by_forces(problem, found, cracks))
+    layout = simulator.layout
+    weighed = [one for one in listed if one.wide[0].key != CRACK or one.wide[0].at in layout.teeth]
+    starts = _starts(layout, problem.unknowns, found, weighed)
+    selection = select(simulator, base, weighed, starts, report, seen, apart=apart)
     std = selection.best.std
     rough = [number for number in range(len(measurements)) if number not in smooth]
     start = starts.get("backlash")
@@ -106,6 +106,12 @@ def simulated(
             selection = opened
             std[layout.unknowns[BACKLASH]] = SPACING * selection.best.p[layout.unknowns[BACKLASH]]
     return Simulated(layout, simulator, selection, std)
+
+
+def _cracked_by_forces(problem: Problem, found: Search, cracks: Sequence[Hypothesis]) -> list[int]:
+    """Teeth that the force residuals rank first."""
+    ranked = np.argsort(-predicted_factors(found.base, problem.unknowns, cracks))[:CRACKED]
+    return [at for at in (cracks[number].wide[0].at for number in ranked) if at is not None]
 
 
 def _opened(simulator: Simulator, selection: Selection, start: Start, apart: bool) -> Selection | None:

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 
+from gearbench.diagnosis.effects.effect import Hypothesis
 from gearbench.diagnosis.forces.unknowns import Unknowns, group, unknowns_of
+from gearbench.diagnosis.output.background import background
+from gearbench.diagnosis.output.beginning import Around
+from gearbench.diagnosis.output.selection import Selection, Start, select
 from gearbench.diagnosis.output.target import Block, Target
 
 LINES, BLOCKS = 60, 6
@@ -42,6 +47,21 @@ def target(lines: np.ndarray, floor: float = 1e-6) -> Target:
         counts=np.full(BLOCKS, 8.0),
         sizes=np.bincount(of_line).astype(float),
     )
+
+
+def chosen(
+    simulator: FakeSimulator,
+    hypotheses: Sequence[Hypothesis],
+    beginnings: Sequence[np.ndarray],
+    starts: Mapping[str, Start],
+    around: Around | None = None,
+    *,
+    apart: bool = False,
+) -> Selection | None:
+    """The selection beside the background's optimum; None without one."""
+    here: Any = simulator
+    base = background(here, beginnings, around)
+    return select(here, base, hypotheses, starts, around=around, apart=apart) if base is not None else None
 
 
 def sensitivities(seed: int = 0) -> np.ndarray:

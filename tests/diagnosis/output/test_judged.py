@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from shared.fake_simulator import LINES, FakeSimulator, sensitivities, target
+from shared.fake_simulator import LINES, FakeSimulator, chosen, sensitivities, target
 
 from gearbench.diagnosis.effects.effect import Hypothesis, Wide
 from gearbench.diagnosis.output import judged as module
 from gearbench.diagnosis.output.judged import GAIN, Judged, Sizes, judged_on, rms_closed
-from gearbench.diagnosis.output.selection import LIMIT, PROVISIONAL, Selection, select
+from gearbench.diagnosis.output.selection import LIMIT, PROVISIONAL, Selection
 from gearbench.diagnosis.output.simulated import Simulated
 from gearbench.diagnosis.output.target import Target
 
@@ -53,7 +53,7 @@ def judged(
         q[number] = value
     simulator = Answering(lambda one: one @ MATRIX, target(noisy(p @ MATRIX, 11)))
     simulator.layout.size = 8
-    selection = select(simulator, (FRICTION, RIPPLE), [np.zeros(8)], {}, apart=apart)
+    selection = chosen(simulator, (FRICTION, RIPPLE), [np.zeros(8)], {}, apart=apart)
     assert isinstance(selection, Selection)
     plain = target(noisy(q @ OTHER, 12))
     held = OfLines(**{one.name: getattr(plain, one.name) for one in fields(plain)})

@@ -7,13 +7,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from shared.fake_simulator import LINES, FakeSimulator, sensitivities, target
+from shared.fake_simulator import LINES, FakeSimulator, chosen, sensitivities, target
 
 from gearbench.diagnosis.effects.effect import Hypothesis, Wide
 from gearbench.diagnosis.forces.unknowns import group, unknowns_of
 from gearbench.diagnosis.output import selection as module
 from gearbench.diagnosis.output.rivals import compared, is_like, usual_of
-from gearbench.diagnosis.output.selection import LIMIT, Selection, Start, Weighed, known_within, select
+from gearbench.diagnosis.output.selection import LIMIT, Selection, Start, Weighed, known_within
 
 MATRIX = sensitivities(3)
 FRICTION = Hypothesis("friction", "mesh", (Wide("friction"),))
@@ -29,7 +29,7 @@ def selected(true: dict[int, float], starts: dict[str, Start] | None = None) -> 
     rng = np.random.default_rng(11)
     lines = p @ MATRIX + 0.02 * (rng.standard_normal(LINES) + 1j * rng.standard_normal(LINES))
     simulator = FakeSimulator(lambda q: q @ MATRIX, target(lines))
-    found = select(simulator, LISTED, [np.zeros(8)], starts or {})
+    found = chosen(simulator, LISTED, [np.zeros(8)], starts or {})
     assert found is not None
     return found
 
@@ -63,7 +63,7 @@ def test_what_explains_the_records_as_well_is_a_rival_and_leaves_with_the_one_th
     alike[7] = alike[6]
     true = np.array([0.08, -0.1, 0.02, 0.0, 0.0, 0.0, 0.3, 0.0])
     simulator = FakeSimulator(lambda q: q @ alike, target(true @ alike))
-    found = select(simulator, LISTED, [np.zeros(8)], {})
+    found = chosen(simulator, LISTED, [np.zeros(8)], {})
     assert found is not None
     (one,) = found.entered
     assert {one.hypothesis.name, *(other.name for other in one.rivals)} == {"tooth-crack 0", "tooth-crack 1"}
@@ -73,7 +73,7 @@ def test_what_explains_the_records_as_well_is_a_rival_and_leaves_with_the_one_th
     for number, other in (0, 1), (1, 0):
         rare = {number: ("crack", 1.0)}
         listed = (FRICTION, RIPPLE, *(replace(CRACKS[one], usual=rare.get(one)) for one in range(2)))
-        named = select(simulator, listed, [np.zeros(8)], {})
+        named = chosen(simulator, listed, [np.zeros(8)], {})
         assert named is not None and names(named) == [f"tooth-crack {other}"]
 
 
@@ -96,7 +96,7 @@ def test_the_usual_one_is_fitted_from_where_the_rare_one_got() -> None:
     alike[7] = 0.5 * alike[6]
     simulator = FakeSimulator(lambda q: q @ alike, target(0.2 * alike[6] + 0.08 * alike[0]))
     simulator.jacobian = lambda p, sd, chosen: alike  # type: ignore[method-assign, assignment]
-    found = select(simulator, (CRACKS[0],), [np.zeros(8)], {})
+    found = chosen(simulator, (CRACKS[0],), [np.zeros(8)], {})
     assert found is not None and names(found) == ["tooth-crack 0"]
     first = Weighed(replace(CRACKS[0], usual=("crack", 2.0)), 1e6, found.best)
     one, other = compared(simulator, found.base, [first, Weighed(CRACKS[1], 2.0, None)])
@@ -140,7 +140,7 @@ def test_a_start_of_the_force_residuals_is_tried_even_if_the_quadratic_does_not_
         np.arange(8)[:, None] == 3, 40 * (p[3] + 1e-3) * MATRIX, np.where(np.arange(8)[:, None] < 3, MATRIX, 0)
     )
     start = Start(FRICTION, np.array([0, 0, 0, 0.35, 0, 0, 0, 0.0]), 30.0)
-    found = select(simulator, (FRICTION,), [np.zeros(8)], {"friction": start})
+    found = chosen(simulator, (FRICTION,), [np.zeros(8)], {"friction": start})
     assert found is not None and names(found) == ["friction"]
     assert found.best.p[3] == pytest.approx(0.4, abs=0.02)
 
@@ -165,7 +165,7 @@ def test_structure_beyond_a_hill_is_found_by_beginning_again() -> None:
     rng = np.random.default_rng(11)
     lines = lines_of(true) + 0.02 * (rng.standard_normal(LINES) + 1j * rng.standard_normal(LINES))
     simulator = FakeSimulator(lines_of, target(lines), layout=SimpleNamespace(unknowns=unknowns))
-    found = select(simulator, (FRICTION,), [np.zeros(8)], {})
+    found = chosen(simulator, (FRICTION,), [np.zeros(8)], {})
     assert found is not None and names(found) == ["friction"]
     assert found.best.p[[3, 4, 5]] == pytest.approx([0.4, 0.23, 0.21], abs=0.01)
 
@@ -200,7 +200,7 @@ def test_structure_that_the_rig_shows_around_its_mesh_is_begun_from() -> None:
         out[[0, 1, 3]] = true[[0, 1, 3]] + 0.01
         return out
 
-    without, found = (select(simulator, (), [np.zeros(11)], {}, around=around) for around in (None, read))
+    without, found = (chosen(simulator, (), [np.zeros(11)], {}, around=around) for around in (None, read))
     assert without is not None and abs(without.base.p[3] + 1.0) > 0.3
     assert found is not None
     assert found.base.p[[0, 1, 2, 3]] == pytest.approx(true[:4], abs=0.01)
@@ -208,7 +208,7 @@ def test_structure_that_the_rig_shows_around_its_mesh_is_begun_from() -> None:
 
 def test_no_rig_at_the_start_is_no_selection() -> None:
     simulator = FakeSimulator(lambda q: q @ MATRIX, target(MATRIX[0]), largest=0.1)
-    assert select(simulator, LISTED, [np.ones(8)], {}) is None
+    assert chosen(simulator, LISTED, [np.ones(8)], {}) is None
 
 
 def test_a_number_known_to_a_third_or_worse_may_be_nothing() -> None:

@@ -1,0 +1,56 @@
+"""The background alone: nuisances and structure of the rig where they come closest to the records without an effect."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
+from gearbench.diagnosis.output.beginning import Around, beginning
+from gearbench.diagnosis.output.fit import Optimum, fit, sensitivity_of
+from gearbench.diagnosis.output.restructured import better, is_close, restructured
+from gearbench.diagnosis.output.simulator import Simulator
+
+Array = NDArray[np.float64]
+Report = Callable[[str], None]
+
+RENEWALS = 8  # of the Jacobian
+
+
+def background(
+    simulator: Simulator,
+    beginnings: Sequence[Array],
+    around: Around | None = None,
+    report: Report = lambda step: None,
+) -> Optimum | None:
+    """The optimum without any effect, from the best of these `beginnings` (size,); `around`: the rig around its mesh,
+    as the records show it. None where no beginning is a rig."""
+    sd = prior_of(simulator, simulator.layout.unknowns.prior())
+    report("simulating: background")
+    base = _fitted(simulator, beginnings, around, sd)
+    if base is None:
+        return None
+    # What the force residuals make of a rig beside a large effect can lead astray: then from the nominal one.
+    if not is_close(simulator, base):
+        base = better(base, _fitted(simulator, beginnings[:1], around, sd))
+    return restructured(simulator, base, around, report)
+
+
+def _fitted(
+    simulator: Simulator, beginnings: Sequence[Array], around: Around | None, sd: Array
+) -> Optimum | None:
+    """The background's optimum under the prior `sd` (size,) from the best of these beginnings; None where none is a
+    rig."""
+    begin, chosen = beginning(simulator, beginnings, around, sd), np.ones(len(sd), dtype=bool)
+    first = sensitivity_of(simulator, begin, simulator.layout.unknowns.prior(), chosen)
+    return fit(simulator, begin, sd, first, renewals=RENEWALS, chosen=chosen) if first else None
+
+
+def prior_of(simulator: Simulator, sd: Array) -> Array:
+    """The prior `sd` (size,) with what no rig of the background has held at zero: cracked teeth."""
+    out = sd.copy()
+    unknowns = simulator.layout.unknowns
+    out[unknowns[CRACK]] = 0.0
+    return out
