@@ -1,4 +1,4 @@
-"""Teeth that may be cracked by what simulation leaves: against dense least squares, and on a rig with a cracked tooth."""
+"""Teeth that may be cracked by what simulation leaves: against dense least squares, and on a cracked rig."""
 
 from __future__ import annotations
 
