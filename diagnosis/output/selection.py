@@ -82,7 +82,8 @@ class Selection:
 
 @dataclass(frozen=True)
 class Start:
-    """Where the force residuals would have the unknowns of a hypothesis, and their log Bayes factor for it."""
+    """Where the force residuals, or an earlier fit, would have the unknowns of a hypothesis, and their log Bayes factor
+    for it."""
 
     hypothesis: Hypothesis
     p: Array
@@ -109,8 +110,9 @@ def select(
     while len(entered) < MOST:
         taken = [one.hypothesis for one in entered]
         rest = [one for one in hypotheses if not any(is_like(one, other) for other in taken)]
-        found = compared(simulator, best, weigh(simulator, best, rest, starts, report))
-        weighed = found if weighed is None else weighed
+        found = compared(simulator, best, weigh(simulator, best, rest, starts, report, reshape=not entered))
+        if weighed is None:
+            weighed, starts = found, {**starts, **_shaped(found)}
         winner = usual_of(found)
         winner = entering(unknowns, winner, apart) if winner else None
         if winner is None or winner.optimum is None:
@@ -135,8 +137,11 @@ def weigh(
     hypotheses: Sequence[Hypothesis],
     starts: Mapping[str, Start],
     report: Report = lambda step: None,
+    *,
+    reshape: bool = True,
 ) -> list[Weighed]:
-    """All hypotheses beside what `base` holds, the best first: the most promising simulated."""
+    """All hypotheses beside what `base` holds, the best first: the most promising simulated, those that have shapes to
+    begin from also from these (`reshape`)."""
     unknowns, quadratic = simulator.layout.unknowns, base.sensitivity.quadratic
     # What moves nothing in these records cannot be weighed by them.
     hypotheses = [one for one in hypotheses if np.isin(one.entries(unknowns), quadratic.active).any()]
@@ -158,7 +163,7 @@ def weigh(
     by_force = sorted((s for s in starts.values() if s.hypothesis.name in ranked), key=lambda s: -s.log_bayes_factor)
     names = [s.hypothesis.name for s in by_force[:BY_FORCES] if s.log_bayes_factor > WORTH]
     names = list(dict.fromkeys([*names, *(one.name for value, one, _ in promised[:TRIED] if value > WORTH)]))[:TRIED]
-    shaped = [one.name for one in hypotheses if has_shapes(one)] if is_strange(unknowns, base.p) else []
+    shaped = [one.name for one in hypotheses if has_shapes(one)] if reshape and is_strange(unknowns, base.p) else []
     names += [name for name in shaped if name not in names]
 
     def weighed(item: tuple[float, Hypothesis, Array]) -> Weighed:
@@ -182,6 +187,15 @@ def weigh(
 
     out = side_by_side(weighed, promised)
     return sorted(out, key=lambda one: -one.log_bayes_factor)
+
+
+def _shaped(weighed: Sequence[Weighed]) -> dict[str, Start]:
+    """Where hypotheses that have shapes to begin from got, to begin from beside an effect."""
+    return {
+        one.hypothesis.name: Start(one.hypothesis, one.optimum.p, one.log_bayes_factor)
+        for one in weighed
+        if one.optimum is not None and has_shapes(one.hypothesis)
+    }
 
 
 def first_look(base: Optimum, hypotheses: Sequence[Hypothesis], unknowns: Unknowns) -> Array:
