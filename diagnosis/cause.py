@@ -133,7 +133,7 @@ def _by_simulation(
     drift = None if TEMPERATURE_DRIFT.name in of.without else drift_of(found)
     decided = decide_simulated(judged, of.result, missing, of.unsteady, changing, known=known, drift=drift)
     signs |= {"lines": float(found.simulator.target.counts.sum()), "unknown": decided.sign, "left": judged.left,
-              "remains": judged.remains, "changing": changing}  # fmt: skip
+              "remains": judged.remains, "searched": judged.searched, "changing": changing}  # fmt: skip
     chances = chances_of(judged, decided, known, signs["lines"], (*entered, *judged.dropped))
     kept = [one.hypothesis for one in decided.named]
     common["indistinguishable"] = with_rivals(common["indistinguishable"], decided.named)

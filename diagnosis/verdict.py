@@ -227,8 +227,9 @@ class Found(_Value):
 class Verdict(_Value):
     """What a diagnosis hands back; the fields are those of verdict.json. `signs`: what its probabilities were read
     from, all without dimension: independent "lines", the largest sign of something "unknown" over its limit, parts of
-    the gap and of a channel's fluctuation that remain ("left", "remains"), what changes between repetitions over the
-    gap ("changing"), and how far places stand out over what the population's sound rigs leave ("over mesh", ...).
+    the gap and of a channel's fluctuation that remain ("left", "remains"; "searched": on the records of the search),
+    what changes between repetitions over the gap ("changing"), and how far places stand out over what the population's
+    sound rigs leave ("over mesh", ...).
     `calibrated_on`: number of rigs behind probabilities and limits."""
 
     schema_: Literal["gearbench-verdict/2"] = Field(SCHEMA, alias="schema")

@@ -97,6 +97,19 @@ class Judged:
         parts = (np.sqrt(max(s.final**2 - s.noise**2, 0.0)) / s.fluctuation for s in self.sizes.values())
         return float(max(parts, default=0.0))
 
+    @cached_property
+    def searched(self) -> float:
+        """The same on the records that the selection was found from, whose channels are taken together."""
+        simulator, lines = self.found.simulator, self.found.selection.best.lines
+        target, left, whole = simulator.target, dict[str, float](), dict[str, float]()
+        rest = target.energies(target.lines - lines) - target.noise
+        for block, energy, level, size in zip(
+            target.blocks, rest, target.energies(target.lines), target.sizes, strict=True
+        ):
+            left[block.channel] = left.get(block.channel, 0.0) + energy * size
+            whole[block.channel] = whole.get(block.channel, 0.0) + level * size
+        return max((float(np.sqrt(max(left[one], 0.0) / whole[one])) for one in left), default=0.0)
+
     def share(self, without: Mapping[str, Array]) -> float:
         """Part of the nominal gap, by energy and all channels in units of their fluctuation, that comes back in a rig
         with those signals."""

@@ -99,7 +99,8 @@ def _decided(
             because = f"a force {at_place(place)} without any given form explains the records clearly better"
             return Decided("unknown", place, (), free.log_bayes_factor / needed, (because,))
     place, over = outstanding(missing)
-    size = judged.remains / known.structure
+    # A record that had no part in the search may be off because the others do not determine the rig.
+    size = min(judged.remains, judged.searched) / known.structure
     seen = min(over, size / VISIBLE)
     sign = max(min(judged.left / GREATER, size), seen)
     if named:
@@ -111,13 +112,23 @@ def _decided(
     if seen > 1.0:
         because = f"a force {at_place(place)} remains that no effect of the library explains"
         return Decided("unknown", place, (), sign, (because,))
+    return Decided("none", "none", (), sign, (_nothing(judged, known), *aside))
+
+
+def _nothing(judged: Judged, known: Calibration) -> str:
+    """Why no effect is needed, and what remains all the same."""
+    because = "no effect brings the simulation closer to the records than a good rig's share of it; "
+    if judged.searched <= known.structure < judged.remains:
+        return because + (
+            f"it explains the records of the search to {percent(judged.searched)} of any channel's fluctuation: that"
+            f" the judged one is off by {percent(judged.remains)} says that they do not determine the rig"
+        )
     sound = f"within the {percent(known.structure)} that sound rigs leave"
-    because = (
-        "no effect brings the simulation closer to the records than a good rig's share of it; what remains, at most"
-        f" {percent(judged.remains)} of any channel's fluctuation, is"
-        f" {sound if size <= 1.0 else 'the smaller part of the gap'}"
+    small = judged.remains <= known.structure
+    return because + (
+        f"what remains, at most {percent(judged.remains)} of any channel's fluctuation, is"
+        f" {sound if small else 'the smaller part of the gap'}"
     )
-    return Decided("none", "none", (), sign, (because, *aside))
 
 
 def _changes(place: Place, changing: float) -> str:

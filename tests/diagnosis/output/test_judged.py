@@ -90,6 +90,16 @@ def test_an_effect_that_leaves_the_judged_record_as_it_was_is_not(monkeypatch: p
     assert not none.found.selection.entered and none.found.selection.best is none.found.selection.base
 
 
+def test_what_is_left_of_the_records_of_the_search_is_that_of_their_lines(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = judged({3: 0.4}, {3: 0.4}, monkeypatch)
+    lines, best = found.found.simulator.target.lines, found.found.selection.best.lines
+    assert found.searched == pytest.approx(np.linalg.norm(lines - best) / np.linalg.norm(lines))
+    target_of_search: Any = found.found.simulator.target
+    object.__setattr__(target_of_search, "noise", target_of_search.energies(lines - best))
+    again = replace(found)
+    assert again.searched == 0.0
+
+
 def test_what_weak_evidence_lacks_is_made_up_for_on_the_judged_record(monkeypatch: pytest.MonkeyPatch) -> None:
     weak = {3: 0.045}  # of a good rig 0.01: widening its prior is worth ten nats and costs four
     assert not judged(weak, weak, monkeypatch).found.selection.entered

@@ -29,6 +29,7 @@ def decided(
     *,
     left: float = 0.05,
     remains: float = 0.05,
+    searched: float | None = None,
     share: float = 0.2,
     free: float = 0.0,
     excess: np.ndarray = QUIET,
@@ -37,7 +38,7 @@ def decided(
     drift: Drift | None = None,
 ) -> Decided:
     """`worth` nats of friction (None: nothing was kept), which closes `share` of the gap; `left` of the nominal gap,
-    `remains` of a channel's fluctuation in the end."""
+    `remains` of a channel's fluctuation in the end, `searched` (None: as much) on the records of the search."""
     entered: tuple[Any, ...] = ()
     if worth is not None:
         entered = (SimpleNamespace(hypothesis=FRICTION, log_bayes_factor=worth),)
@@ -47,6 +48,7 @@ def decided(
         share=lambda signals: share,
         left=left,
         remains=remains,
+        searched=remains if searched is None else searched,
     )
     form = SimpleNamespace(hypothesis=Hypothesis("free drive", "drive", ()), log_bayes_factor=free)
     forces: Any = SimpleNamespace(best_free=form if free else None, tried=())
@@ -73,6 +75,13 @@ def test_the_greater_part_unexplained_is_unknown_unless_any_rig_leaves_as_much()
     assert decided(None, **much, excess=at(3, 2 * OUTSTANDING["driven-support"])).place == "driven-support"
     assert decided(None, **(much | {"left": 0.9 * GREATER})).verdict == "none"
     assert decided(None, **(much | {"remains": 0.9 * STRUCTURE})).verdict == "none"
+
+
+def test_records_that_are_explained_and_predict_no_other_do_not_determine_the_rig() -> None:
+    off = {"left": 1.1 * GREATER, "remains": 1.5 * STRUCTURE}
+    made = decided(None, **off, searched=0.2 * STRUCTURE)
+    assert made.verdict == "none" and "do not determine the rig" in made.because[0]
+    assert decided(None, **off, searched=1.1 * STRUCTURE).verdict == "unknown"
 
 
 def test_a_place_that_stands_out_is_unknown_only_over_a_visible_remainder() -> None:
