@@ -15,7 +15,7 @@ from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
 from gearbench.diagnosis.effects.torque_ripple import KEY as RIPPLE
 from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.output.beginning import Around, levelled, seen_by
-from gearbench.diagnosis.output.fit import SETTLED, Optimum, fit, sensitivity_of
+from gearbench.diagnosis.output.fit import SETTLED, Optimum, cost_of, fit, sensitivity_of
 from gearbench.diagnosis.output.simulator import Simulator
 from gearbench.diagnosis.output.structure import otherwise
 
@@ -26,6 +26,9 @@ Report = Callable[[str], None]
 RENEWALS = 3
 # Nats an independent line that are left, in the median block, below which no other structure is tried.
 CLOSE = 0.2
+# Cost of the nominal rig over that of a fit up to which another fit is begun there: mesh, offsets and flanks trade
+# along long valleys, and a rig without any of that can lie below their floors.
+NEAR = 1.5
 # What moves the rotation's lines alone: it waits until the structure is found.
 ROTATION = (*RUNOUTS.values(), *PITCHES.values(), CRACK, RIPPLE, *ENCODERS.values())
 
@@ -38,6 +41,15 @@ def restructured(simulator: Simulator, found: Optimum, around: Around | None, re
     if not is_close(simulator, found):
         found = better(found, _otherwise(simulator, found, report))
     return found
+
+
+def begun_at_nominal(simulator: Simulator, found: Optimum, kept: Flags) -> Optimum:
+    """The optimum, or the one of more evidence that is found from the nominal rig with only the unknowns `kept` (size,)
+    as they are, where that is nearly as close to the records."""
+    p = np.where(kept, found.p, 0.0)
+    if cost_of(simulator, p, found.sd) > NEAR * found.cost:
+        return found
+    return better(found, _fitted(simulator, p, found.sd))
 
 
 def better(found: Optimum, other: Optimum | None) -> Optimum:

@@ -22,7 +22,7 @@ from gearbench.diagnosis.output.contrast import is_strange
 from gearbench.diagnosis.output.fit import SETTLED, Optimum, Sensitivity, cost_of, fit, sensitivity_of
 from gearbench.diagnosis.output.jacobian import FOLLOWED
 from gearbench.diagnosis.output.reshaped import has_shapes, reshaped
-from gearbench.diagnosis.output.restructured import better, restructured
+from gearbench.diagnosis.output.restructured import begun_at_nominal, better, restructured
 from gearbench.diagnosis.output.rivals import compared, is_like, rivals_of, usual_of
 from gearbench.diagnosis.output.simulator import Simulator
 
@@ -126,7 +126,10 @@ def select(
     if kept and best.left > SETTLED:
         report("simulating: all together")
         best = fit(simulator, best.p, best.sd, best.sensitivity, renewals=RENEWALS_LAST, chosen=chosen) or best
-    best = restructured(simulator, best, around, report) if kept else best
+    if kept:
+        report("simulating: all together, from the nominal rig")
+        best = restructured(simulator, best, around, report)
+        best = begun_at_nominal(simulator, best, _entries(unknowns, kept))
     bare = _without(simulator, base, kept, chosen)
     return Selection(base, bare, best, kept, tuple(weighed or ()))
 
@@ -187,6 +190,14 @@ def weigh(
 
     out = side_by_side(weighed, promised)
     return sorted(out, key=lambda one: -one.log_bayes_factor)
+
+
+def _entries(unknowns: Unknowns, effects: Sequence[Weighed]) -> NDArray[np.bool_]:
+    """Which unknowns (size,) are those of these effects."""
+    out = np.zeros(unknowns.size, dtype=bool)
+    for one in effects:
+        out[one.hypothesis.entries(unknowns)] = True
+    return out
 
 
 def _shaped(weighed: Sequence[Weighed]) -> dict[str, Start]:

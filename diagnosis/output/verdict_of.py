@@ -27,7 +27,8 @@ Array = NDArray[np.float64]
 # Of the nominal gap, rms over rms and all channels in units of their own fluctuation: more than this part left is "the
 # greater part".
 GREATER = 0.5
-# Of what sound rigs leave of a channel's fluctuation at most: from there on a place can stand out.
+# Of what sound rigs leave of a channel's fluctuation at most: from there on a place can stand out, and a form without a
+# name outbid an effect.
 VISIBLE = 0.5
 # Part of the nominal gap that the named effects must close for content that changes, or a form without a name, not to
 # outbid them.
@@ -90,17 +91,17 @@ def _decided(
     if over > 1.0 and changing > known.changing and share < CLOSES:
         because = f"the force missing {at_place(place)} changes from one repetition to the next"
         return Decided("unknown", place, (), changing / known.changing, (because,))
+    # A record that had no part in the search may be off because the others do not determine the rig.
+    size = min(judged.remains, judged.searched) / known.structure
     free = forces.best_free
     worth = max((one.log_bayes_factor for one in named), default=0.0)
-    if named and free and share < CLOSES:
+    if named and free and share < CLOSES and size > VISIBLE:
         needed = limits.competitor_factor * max(worth, _by_force(forces, named)) + limits.competitor_offset
         if free.log_bayes_factor > needed:
             place = free.hypothesis.place
             because = f"a force {at_place(place)} without any given form explains the records clearly better"
             return Decided("unknown", place, (), free.log_bayes_factor / needed, (because,))
     place, over = outstanding(missing)
-    # A record that had no part in the search may be off because the others do not determine the rig.
-    size = min(judged.remains, judged.searched) / known.structure
     seen = min(over, size / VISIBLE)
     sign = max(min(judged.left / GREATER, size), seen)
     if named:

@@ -99,10 +99,13 @@ def test_the_sign_of_something_unknown_follows_the_remainder() -> None:
 
 
 def test_a_form_without_a_name_outbids_only_an_effect_that_leaves_the_gap() -> None:
-    assert decided(40.0, free=90.0).verdict == "unknown"
-    assert decided(40.0, free=70.0).verdict == "effects"
-    assert decided(40.0, share=0.8, free=900.0).verdict == "effects"
-    assert decided(None, free=900.0).verdict == "none"
+    seen = 1.1 * VISIBLE * STRUCTURE
+    assert decided(40.0, free=90.0, remains=seen).verdict == "unknown"
+    assert decided(40.0, free=70.0, remains=seen).verdict == "effects"
+    assert decided(40.0, share=0.8, free=900.0, remains=seen).verdict == "effects"
+    assert decided(None, free=900.0, remains=seen).verdict == "none"
+    # Where nothing that can be seen is left a form without a name has nothing to explain.
+    assert decided(40.0, free=900.0, remains=0.9 * VISIBLE * STRUCTURE).verdict == "effects"
 
 
 def test_what_changes_counts_by_its_part_of_the_gap() -> None:
