@@ -13,20 +13,23 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from gearbench.bench.errors import BenchError
 from gearbench.diagnosis.advice import advice_of
 from gearbench.diagnosis.effects.backlash import BACKLASH, KEY
 from gearbench.diagnosis.effects.effect import Estimate, Hypothesis
 from gearbench.diagnosis.effects.library import hypotheses as library
 from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
+from gearbench.diagnosis.errors import DiagnosisError
 from gearbench.diagnosis.evidence.separable import groups_of
 from gearbench.diagnosis.output.layout import Layout
 from gearbench.diagnosis.output.verdict_of import VISIBLE
+from gearbench.diagnosis.planning.added import larger_plans
 from gearbench.diagnosis.planning.information import Known, Without, known_of
 from gearbench.diagnosis.planning.opened import MOST, smallest_backlash
 from gearbench.diagnosis.planning.planned import Planned, planned
 from gearbench.diagnosis.planning.row import BOTH, LONGER, Cost, Row
 from gearbench.diagnosis.planning.smallest import View, apart_from, direction, largest, rivals_at, smallest
-from gearbench.diagnosis.planning.worth import said_of
+from gearbench.diagnosis.planning.worth import is_poor, said_of, sentence_of_more, words_of_effect
 from gearbench.diagnosis.population import POPULATION
 from gearbench.rig import Case
 from gearbench.rig.contract import rank_of
@@ -71,7 +74,12 @@ def plan_of(case: Case, report: Report = lambda step: None) -> Plan:
     parting = tuple(inputs.measurements[number].name for number in plan.rough)
     ranked = tuple(sorted(rows, key=lambda row: rank_of(row.effect)))
     groups = _groups(view)
-    said = (*advice_of(inputs.measurements, inputs.held_out), *said_of(ranked, groups, parting, inputs.judged.name))
+    more = _what_more_brings(case, plan, view, report) if is_poor(rows) else ()
+    said = (
+        *advice_of(inputs.measurements, inputs.held_out),
+        *said_of(ranked, groups, parting, inputs.judged.name),
+        *more,
+    )
     return Plan(
         case=case.name,
         left=LEFT,
@@ -158,6 +166,37 @@ def _with_costs(plan: Planned, view: View, rows: Sequence[Row]) -> list[Row]:
             if size is not None:
                 costs[number][name] = _cost(view, one, number, size)
     return [replace(row, costs=cost) for row, cost in zip(rows, costs, strict=True)]
+
+
+def _what_more_brings(case: Case, plan: Planned, view: View, report: Report) -> tuple[str, ...]:
+    """What one more record would find that this plan does not, or finds only larger, or mixes up."""
+    held_out, said = plan.inputs.held_out, []
+    for words, larger in larger_plans(case).items() if held_out else ():
+        report(f"what a record {words} would add")
+        try:
+            known = known_of(planned(larger, held_out=held_out.name if held_out else None))
+        except (BenchError, DiagnosisError):
+            continue  # the sampling does not suit that speed, or the like
+        other = View(known, view.hypotheses, left=LEFT)
+        said.append(sentence_of_more(words, *_brought(view, other)))
+    return tuple(one for one in said if one)
+
+
+def _brought(view: View, other: View) -> tuple[dict[str, float], list[tuple[str, str]]]:
+    """By how much smaller sizes the other view finds, by effect in words, and which effects it tells apart."""
+    smaller: dict[str, float] = {}
+    told = []
+    for number, one in enumerate(view.hypotheses):
+        assert one.effect is not None
+        found, better = smallest(view, number), smallest(other, number)
+        if better is None:
+            continue
+        smaller[words_of_effect(one.effect.name, one.name, one.on)] = np.inf if found is None else found / better
+        size = better if found is None else found
+        mixed = set(_effects(view, rivals_at(view, number, size))) if found is not None else set()
+        gone = mixed - set(_effects(other, rivals_at(other, number, size)))
+        told += [(one.effect.name, name) for name in sorted(gone)]
+    return smaller, told
 
 
 def _cost(view: View, other: View, number: int, size: float) -> Cost:

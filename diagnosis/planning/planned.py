@@ -55,13 +55,14 @@ class Planned:
         return one, prepare(one, self.problem.model, self.problem.conditions[0].band)
 
 
-def planned(case: Case, report: Report = lambda step: None) -> Planned:
+def planned(case: Case, report: Report = lambda step: None, held_out: str | None = None) -> Planned:
     """The case's conditions carried out on its nominal rig, by the model that diagnosis replays on, with the noise of
-    its sensors. Raises BenchError or DiagnosisError, a sentence each, for what cannot be simulated or diagnosed."""
+    its sensors; `held_out` as in `take_in`. Raises BenchError or DiagnosisError, a sentence each, for what cannot be
+    simulated or diagnosed."""
     check_timing(case)
     nominal = on_finite_elements(case)
     report("simulating the planned records")
-    inputs = take_in(_records(nominal), nominal)
+    inputs = take_in(_records(nominal), nominal, held_out=held_out)
     report("taking them in")
     problem = problem_of(inputs.measurements, inputs.nominal)
     simulate = replays_of(inputs.nominal, inputs.all)

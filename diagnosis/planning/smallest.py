@@ -171,8 +171,8 @@ class _Judge:
         whole = direction(known, one)[active]
         covariance, _ = view._posterior(sd)
         blocks = known.judged
-        self.target = replace(blocks.target, noise=view.quiet * blocks.target.noise)
-        self.floors = blocks.floors(view.quiet, view.left)
+        self.target = replace(blocks.target, noise=view.quiet / view.sharper * blocks.target.noise)
+        self.floors = blocks.floors(view.quiet, view.left) / view.sharper
         # A record that is left out of the search is judged on all the same; a channel that is not measured is not.
         kept = blocks.kept(Without(channels=view.without.channels))
         self.energies = blocks.energies(whole - covariance @ view.information @ whole) * kept

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from math import isinf
 
 from gearbench.diagnosis.effects.library import LIBRARY
 from gearbench.diagnosis.planning.row import BOTH, LONGER, Cost, Row
@@ -40,7 +41,7 @@ def said_of(
         said.append(f"Records of this plan cannot tell {_listed([NOUNS[name] for name in group], 'and')} apart.")
     names = dict.fromkeys(name for row in rows for name in row.costs)
     said += [one for one in (_of(name, rows) for name in names) if one]
-    poor = [row for row in rows if row.over_best is not None and row.over_best > HARDER]
+    poor = _poor(rows)
     if any(row.found is not None for row in rows) and not poor:
         said.append(
             "Of every effect that is found no other plan would find much less: what a good rig has of it sets the"
@@ -51,15 +52,35 @@ def said_of(
     return tuple(said)
 
 
+def is_poor(rows: Sequence[Row]) -> bool:
+    """Whether other records could find more: smaller sizes, or effects that this plan mixes up."""
+    return bool(_poor(rows)) or any(row.rivals for row in rows)
+
+
+def _poor(rows: Sequence[Row]) -> list[Row]:
+    return [row for row in rows if row.over_best is not None and row.over_best > HARDER]
+
+
+def sentence_of_more(words: str, smaller: Mapping[str, float], told: Sequence[tuple[str, str]]) -> str:
+    """What a record in addition brings: by how many times `smaller` sizes of effects are found, by their words, and
+    which pairs of effects are `told` apart; empty where that is nothing."""
+    better = sorted((one for one in smaller if smaller[one] > HARDER), key=lambda one: -smaller[one])
+    parts = [f"{one} ({'at all' if isinf(smaller[one]) else f'{number(smaller[one], 2)} times'})" for one in better]
+    said = [f"find smaller sizes of {_listed(parts[:TOLD], 'and')}"] if parts else []
+    said += [f"tell {NOUNS[one]} from {NOUNS[other]}" for one, other in dict.fromkeys(told)]
+    return f"A further record {words} would {_listed(said, 'and')}." if said else ""
+
+
 def words_of(row: Row) -> str:
     """`run-out of a gear (driver)`: an effect, and which part it is about."""
-    about = ", ".join(CHANNELS.get(one, one) for one in row.on) or _kind(row)
-    return f"{NOUNS[row.effect]} ({about})" if about else NOUNS[row.effect]
+    return words_of_effect(row.effect, row.name, row.on)
 
 
-def _kind(row: Row) -> str:
-    """What tells it from another one of the same effect and place."""
-    return FORMS.get(row.name.removeprefix(row.effect).strip(), "")
+def words_of_effect(effect: str, name: str, on: Sequence[str]) -> str:
+    """The same of a hypothesis by its name; where it is about no part, the rest of its name tells it from another one
+    of the same effect."""
+    about = ", ".join(CHANNELS.get(one, one) for one in on) or FORMS.get(name.removeprefix(effect).strip(), "")
+    return f"{NOUNS[effect]} ({about})" if about else NOUNS[effect]
 
 
 def _of(name: str, rows: Sequence[Row]) -> str:

@@ -7,11 +7,14 @@ from pathlib import Path
 
 import pytest
 
+from gearbench.cases import case_files
 from gearbench.cli import run_command_line
 from gearbench.diagnosis.planning import plan as job
+from gearbench.diagnosis.planning.added import larger_plans
 from gearbench.diagnosis.planning.plan import Plan
 from gearbench.diagnosis.planning.row import LONGER, Cost, Row
-from gearbench.diagnosis.planning.worth import said_of
+from gearbench.diagnosis.planning.worth import said_of, sentence_of_more
+from gearbench.rig import read_case
 from gearbench.words.plan import plan_data, plan_lines
 
 
@@ -76,3 +79,28 @@ def test_the_command_prints_writes_and_draws(
 def test_a_picture_alone_is_refused(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     assert run_command_line(["check", "gap_demo", "--figure", str(tmp_path / "plan.png")]) == 2
     assert "--diagnosis" in capsys.readouterr().err
+
+
+def test_what_one_more_record_brings_is_said() -> None:
+    said = sentence_of_more("at half", {"friction": float("inf"), "a crack": 1.1}, [("friction", "tooth-crack")])
+    assert said == (
+        "A further record at half would find smaller sizes of friction (at all) and tell friction between the flanks"
+        " from a cracked tooth."
+    )
+    assert sentence_of_more("at half", {"a crack": 1.1}, []) == ""
+
+
+def test_a_larger_plan_has_one_more_record_of_whole_hunting_periods() -> None:
+    case = read_case(case_files()["gap_demo"])
+    plans = larger_plans(case)
+    for larger in plans.values():
+        names = [one.name for one in larger.conditions]
+        assert names[0] == case.conditions[0].name and names[2:] == [one.name for one in case.conditions[1:]]
+        added = larger.conditions[1].experiment
+        assert added.samples_per_period and added.mesh_frequency
+        cycles = added.samples_per_period * added.mesh_frequency / added.sampling_rate
+        assert cycles == pytest.approx(60.0, rel=1e-12)
+    torques = [larger.conditions[1].experiment.torque_mean for larger in plans.values()]
+    assert torques == [50.0, 100.0]
+    assert larger_plans(case.model_copy(update={"experiment": case.experiment.model_copy(update={"multisine": None}),
+                                                "conditions": ()})) == {}  # fmt: skip
