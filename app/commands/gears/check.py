@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -15,6 +16,7 @@ from gearbench.words.combs import comb_data, comb_lines, comb_reports
 from gearbench.words.rig import effect_lines
 
 if TYPE_CHECKING:
+    from gearbench.geometry.pair.datasheet import Datum
     from gearbench.rig import Case
 
 
@@ -64,6 +66,18 @@ def check(
         print_json({"case": loaded.name, "data": data, "effects": effects, "combs": [comb_data(one) for one in combs]})
         return
     typer.echo(f"{loaded.name}\n")
+    _print_sheet(rows)
+    effects_said = effect_lines(loaded.rig)
+    if effects_said:
+        typer.echo("\n  " + "\n  ".join(effects_said))
+    for line in crack_lines(loaded.rig, loaded.simulation.element_size, loaded.simulation.modes):
+        typer.echo(f"\n  {line}")
+    for comb in combs:
+        typer.echo("\n  " + "\n  ".join(comb_lines(comb)))
+
+
+def _print_sheet(rows: Sequence[Datum]) -> None:
+    """Rows of both gears together, then those of either in columns."""
     shared = [row for row in rows if not row.name.startswith(("driver ", "driven "))]
     for row in shared:
         typer.echo(f"  {row.name:<46} {_figure(row.value):>12}  {row.unit}".rstrip())
@@ -74,13 +88,6 @@ def check(
         if name != row.name:
             both = f"{_figure(row.value):>12} {_figure(driven[name]):>12}"
             typer.echo(f"  {name:<46} {both}  {row.unit}".rstrip())
-    effects_said = effect_lines(loaded.rig)
-    if effects_said:
-        typer.echo("\n  " + "\n  ".join(effects_said))
-    for line in crack_lines(loaded.rig, loaded.simulation.element_size, loaded.simulation.modes):
-        typer.echo(f"\n  {line}")
-    for comb in combs:
-        typer.echo("\n  " + "\n  ".join(comb_lines(comb)))
 
 
 def _check_plan(loaded: Case, given: str, figure: Path | None, as_json: bool) -> None:
