@@ -1,7 +1,7 @@
 """The answers of a challenge: what was withheld from each case. They alone hold the seed.
 
 File: `{"ID": {"kind": "effect" | "none" | "foreign", "effects": [names], "place": name, "parameters": {effect: {name:
-{"value", "unit"}}}, "severity": {effect: number}, "family", "seed", "number"}}`.
+{"value", "unit"}}}, "severity": {effect: number}, "family", "seed", "number", "places": [name of each effect]}}`.
 """
 
 from __future__ import annotations
@@ -31,6 +31,12 @@ class Answer:
     family: str = ""
     seed: int = 0
     number: int = 0
+    places: tuple[str, ...] = ()  # of every effect, in their order
+
+    @property
+    def everywhere(self) -> tuple[str, ...]:
+        """Places that a verdict may rightly give: of any of the effects."""
+        return self.places or (self.place,)
 
 
 def write_answers(answers: Mapping[str, Answer], path: Path) -> None:
@@ -78,4 +84,5 @@ def _answer(entry: Any, where: str) -> Answer:
         family=str(entry.get("family", "")),
         seed=int(entry.get("seed", 0)),
         number=int(entry.get("number", 0)),
+        places=tuple(str(one) for one in entry.get("places", ())),
     )

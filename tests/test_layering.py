@@ -43,7 +43,7 @@ ROOMS: dict[str, tuple[str, ...]] = {
         "study",
     ),
     "identification": ("excitation", "spectra", "lpm", "smooth", "truth", "response", "feedback", "nonlinear"),
-    "diagnosis": ("intake", "forces", "effects", "evidence", "replay", "output"),
+    "diagnosis": ("intake", "forces", "effects", "evidence", "replay", "output", "planning"),
     "challenge": ("truth", "making", "scoring"),
     "app": ("shell", "words", "figures", "report", "commands"),
 }

@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from gearbench.bench.nonlinear.law_table import mesh_law
@@ -27,14 +28,15 @@ from gearbench.challenge.making.drawn import drawn_nominal
 from gearbench.challenge.making.nominal import nominal_text
 from gearbench.challenge.making.plan import MOST_CASES, Mix, Plan, make_plan
 from gearbench.challenge.truth.effects import EFFECTS, FOREIGN, Drawn
+from gearbench.challenge.truth.elastic import measure_elastic, within_uncertainty
 from gearbench.challenge.truth.levels import background
 from gearbench.challenge.truth.measure import measure
 from gearbench.challenge.truth.rigs import Bench, check_nominal, conditions_of, make_bench
 from gearbench.challenge.truth.scale import Scale, scale_of
-from gearbench.challenge.truth.structure import FAMILIES, Structure, draw_structure, family_named
+from gearbench.challenge.truth.structure import FAMILIES, Structure, draw_structure, family_named, loosened
 from gearbench.geometry import pair
 from gearbench.records import write_record
-from gearbench.rig import Case
+from gearbench.rig import Case, Condition
 
 STAMP = 946684800  # 2000-01-01: of every file and folder
 Array = NDArray[np.float64]
@@ -47,21 +49,26 @@ Progress = Callable[[float, str], None]
 
 @dataclass(frozen=True)
 class Truth:
-    """One truth rig complete: structure and levels, and the answer that belongs to it."""
+    """One truth rig complete: structure and levels, and the answer that belongs to it; `elastic`: in place of the
+    structure the nominal case within its uncertainty, to be simulated by finite elements."""
 
     structure: Structure
     drawn: Drawn
     answer: Answer
+    elastic: Case | None = None
 
 
 def draw_truth(
-    nominal: Case, family: str, seed: int, number: int, plan: Plan, scale: Scale | None = None
+    nominal: Case, family: str, seed: int, number: int, plan: Plan, scale: Scale | None = None, loose: bool = False
 ) -> tuple[Truth, np.random.Generator]:
     """The truth rig of case `number` of a challenge, and the stream that its noise comes from; `scale`: of a rig that
-    is not of the demonstration's size."""
+    is not of the demonstration's size; `loose`: its housing is as soft as housings are."""
     stream = np.random.SeedSequence([seed, list(FAMILIES).index(family), number])
-    rngs = [np.random.default_rng(child) for child in stream.spawn(4)]
+    rngs = [np.random.default_rng(child) for child in stream.spawn(6)]
     structure = draw_structure(nominal, family, rngs[0])
+    if loose:
+        structure = loosened(structure, rngs[4])
+    elastic = within_uncertainty(nominal, rngs[5]) if plan.elastic else None
     drawn = Drawn(background((nominal.rig.driver.teeth, nominal.rig.driven.teeth), rngs[1]), "none", 0.0, {})
     places, parameters, severity = [], {}, {}
     for name, size in zip(plan.effects, plan.severity, strict=True):
@@ -73,9 +80,17 @@ def draw_truth(
         structure, drawn = scale.structure(structure), replace(drawn, levels=scale.levels(drawn.levels))
         parameters = scale.parameters(parameters)
     answer = Answer(
-        plan.kind, plan.effects, places[0] if places else "none", parameters, severity, family, seed, number
+        plan.kind,
+        plan.effects,
+        places[0] if places else "none",
+        parameters,
+        severity,
+        family,
+        seed,
+        number,
+        tuple(places),
     )
-    return Truth(structure, drawn, answer), rngs[3]
+    return Truth(structure, drawn, answer, elastic), rngs[3]
 
 
 def nominal_stiffness(nominal: Case) -> float:
@@ -118,12 +133,14 @@ def make_challenge(
     """
     family_named(family)
     check_nominal(nominal)
+    if mix.reduced and torques:
+        raise ChallengeError("reduced: finite elements are not run under a measured torque, only under a multisine")
     if not 1 <= mix.cases <= MOST_CASES:
         raise ChallengeError(f"a challenge of {mix.cases} cases cannot be made: at least 1, at most {MOST_CASES}")
     plans = make_plan(mix, np.random.default_rng(np.random.SeedSequence([seed, list(FAMILIES).index(family)])))
     check_apart(out, answers_file)
     rigs = [_rig_of(nominal, family, seed, number, drawn, bool(torques)) for number in range(len(plans))]
-    truths = [draw_truth(rig, family, seed, i, plan, scale)[0].answer for i, (plan, (rig, scale)) in
+    truths = [draw_truth(rig, family, seed, i, plan, scale, drawn)[0].answer for i, (plan, (rig, scale)) in
               enumerate(zip(plans, rigs, strict=True))]  # fmt: skip
     answers = _claim(out, answers_file, truths)
     shared = None
@@ -137,7 +154,7 @@ def make_challenge(
         if not stop.is_set():
             number = answers[name].number
             rig, scale = rigs[number]
-            truth, rng = draw_truth(rig, family, seed, number, plans[number], scale)
+            truth, rng = draw_truth(rig, family, seed, number, plans[number], scale, drawn)
             bench, text = shared or (make_bench(rig, nominal_stiffness(rig), scale), nominal_text(rig))
             _write_case(bench, truth, name, text, out, rng)
 
@@ -155,9 +172,7 @@ def make_challenge(
     return answers
 
 
-def _rig_of(
-    nominal: Case, family: str, seed: int, number: int, drawn: bool, scaled: bool
-) -> tuple[Case, Scale | None]:
+def _rig_of(nominal: Case, family: str, seed: int, number: int, drawn: bool, scaled: bool) -> tuple[Case, Scale | None]:
     """The nominal rig of case `number`, and its scale where effects go with the rig's size."""
     if not drawn:
         return nominal, scale_of(nominal) if scaled else None
@@ -208,9 +223,17 @@ def _write_case(bench: Bench, truth: Truth, name: str, text: str, out: Path, rng
     folder.mkdir()
     (folder / "nominal.toml").write_text(text, encoding="utf-8")
     for condition in conditions_of(bench.nominal):
-        record = measure(bench, truth.structure, truth.drawn.levels, condition, name, rng)
+        record = _record(bench, truth, condition, name, rng)
         write_record(record, folder / f"record-{condition.name}.nc")
     for path in sorted(folder.iterdir()):
         os.utime(path, (STAMP, STAMP))
     os.utime(folder, (STAMP, STAMP))
     os.replace(folder, out / name)
+
+
+def _record(bench: Bench, truth: Truth, condition: Condition, name: str, rng: np.random.Generator) -> xr.Dataset:
+    levels = truth.drawn.levels
+    if truth.elastic is None:
+        return measure(bench, truth.structure, levels, condition, name, rng)
+    soft = "coupling" in truth.answer.effects
+    return measure_elastic(bench, truth.elastic, levels, condition, soft, name, rng)

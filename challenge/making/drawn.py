@@ -15,7 +15,7 @@ import numpy as np
 from gearbench.challenge.truth.scale import STIFFNESS, scale_of
 from gearbench.challenge.truth.structure import FAMILIES
 from gearbench.geometry import pair
-from gearbench.rig import Case, Condition, Gear
+from gearbench.rig import Case, Condition, Experiment, Gear
 
 # Teeth: as many as have a hunting period that a short record holds, and neither undercut nor a ratio above four.
 FEWEST, MOST, LONGEST_HUNT, LARGEST_RATIO = 18, 120, 144, 4.0
@@ -31,6 +31,7 @@ SAMPLES = (2400, 5000)  # of a period
 RATE = (4.6, 6.0)  # sampling over the mesh's resonance
 TOP, BOTTOM = 0.29, 0.002  # ends of the excitation over the sampling rate
 SWING = (0.25, 0.5)  # of the torque over its mean
+FAR, PARTING = (0.5, 1.0), 0.25  # the same up to where flanks part, and the part of the rigs that swing so far
 NOISE = (0.2, 10.0)  # over that of the demonstration's sensors, in terms of its deflection
 SENSORS = {"angle": 1e-6 * 0.0282, "displacement": 0.05e-6}  # [m] noise of the demonstration's
 TORQUE_NOISE = 2e-4  # over the mean
@@ -104,7 +105,21 @@ def drawn_nominal(base: Case, family: str, rng: np.random.Generator) -> Case:
         "noise_displacement": SENSORS["displacement"] * louder,
         "noise_torque": TORQUE_NOISE * torque * louder / scale_of(case).length,
     })  # fmt: skip
-    return case.model_copy(update={"rig": rig.model_copy(update={"sensors": sensors})})
+    case = case.model_copy(update={"rig": rig.model_copy(update={"sensors": sensors})})
+    return _swinging(case, rng) if rng.random() < PARTING else case
+
+
+def _swinging(case: Case, rng: np.random.Generator) -> Case:
+    """The case with torques that swing until flanks part, under all its conditions."""
+    first = case.conditions[0].experiment
+    amplitude = float(f"{rng.uniform(*FAR) * first.torque_mean:.3g}")
+
+    def swung(of: Experiment) -> Experiment:
+        assert of.multisine is not None
+        return of.model_copy(update={"multisine": of.multisine.model_copy(update={"amplitude": amplitude})})
+
+    conditions = tuple(Condition(name=one.name, experiment=swung(one.experiment)) for one in case.conditions)
+    return case.model_copy(update={"experiment": conditions[0].experiment, "conditions": conditions})
 
 
 def _gear(base: Gear, teeth: int, module: float, width: float, density: float, shafted: float) -> Gear:

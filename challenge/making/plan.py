@@ -9,47 +9,59 @@ import numpy as np
 
 from gearbench.challenge.errors import ChallengeError
 from gearbench.challenge.truth.effects import EFFECTS, FOREIGN, SEVERITY
+from gearbench.challenge.truth.elastic import REPRESENTED
 
 # Controls, cases with an effect, foreign ones: as many as a scoring by which the diagnosis is judged has.
 SHARES = (60, 81, 30)
 MOST_CASES = 10_000
+SEVERAL = 0.1  # part of the cases with an effect that have two or three
+KEYS = ("controls", "per-effect", "foreign", "pairs", "triples", "reduced")
 
 
 @dataclass(frozen=True)
 class Mix:
-    """Numbers of cases: without effect, with each effect of the library, with foreign effects, with two effects."""
+    """Numbers of cases: without effect, with each effect of the library, with foreign effects, with two effects, with
+    three, and of rigs by finite elements, without an effect and with one in turn."""
 
     controls: int
     per_effect: tuple[int, ...]  # in the order of EFFECTS
     foreign: int
     pairs: int = 0
+    triples: int = 0
+    reduced: int = 0
 
     @property
     def cases(self) -> int:
         """All cases."""
-        return self.controls + sum(self.per_effect) + self.foreign + self.pairs
+        return self.controls + sum(self.per_effect) + self.foreign + self.pairs + self.triples + self.reduced
 
 
 @dataclass(frozen=True)
 class Plan:
-    """One case to be: its kind, its effects, and the severity of each."""
+    """One case to be: its kind, its effects, the severity of each, and whether the rig is one of finite elements."""
 
     kind: str
     effects: tuple[str, ...] = ()
     severity: tuple[float, ...] = ()
+    elastic: bool = False
 
 
 def default_mix(cases: int) -> Mix:
-    """`cases` cases in SHARES; effects as evenly as that goes."""
+    """`cases` cases in SHARES; a tenth of those with an effect have several, of which every third has three; single
+    effects as evenly as that goes."""
     controls, foreign = (round(cases * share / sum(SHARES)) for share in (SHARES[0], SHARES[2]))
     rest = cases - controls - foreign
-    each, more = divmod(rest, len(EFFECTS))
-    return Mix(controls, tuple(each + (i < more) for i in range(len(EFFECTS))), foreign)
+    several = round(SEVERAL * rest)
+    triples = several // 3
+    each, more = divmod(rest - several, len(EFFECTS))
+    single = tuple(each + (i < more) for i in range(len(EFFECTS)))
+    return Mix(controls, single, foreign, several - triples, triples)
 
 
 def parse_mix(text: str) -> Mix:
-    """The mix in a text such as "controls=12,per-effect=4,foreign=12,pairs=0". Raises ChallengeError."""
-    known = {"controls": 0, "per-effect": 0, "foreign": 0, "pairs": 0}
+    """The mix in a text such as "controls=12,per-effect=4,foreign=12,pairs=2,triples=1,reduced=4". Raises
+    ChallengeError."""
+    known = dict.fromkeys(KEYS, 0)
     for item in text.split(","):
         key, _, number = item.strip().partition("=")
         if key not in known:
@@ -57,7 +69,8 @@ def parse_mix(text: str) -> Mix:
         if not number.isdecimal() or int(number) > MOST_CASES:
             raise ChallengeError(f"--mix {text}: {key} = {number!r} must be a whole number from 0 to {MOST_CASES}")
         known[key] = int(number)
-    return Mix(known["controls"], (known["per-effect"],) * len(EFFECTS), known["foreign"], known["pairs"])
+    controls, single, *rest = (known[key] for key in KEYS)
+    return Mix(controls, (single,) * len(EFFECTS), *rest)
 
 
 def make_plan(mix: Mix, rng: np.random.Generator) -> list[Plan]:
@@ -72,6 +85,14 @@ def make_plan(mix: Mix, rng: np.random.Generator) -> list[Plan]:
     for severities in zip(_severities(mix.pairs, rng), _severities(mix.pairs, rng), strict=True):
         one, two = rng.choice(len(names), 2, replace=False)
         plans.append(Plan("effect", (names[one], names[two]), severities))
+    # What follows draws after all that was there before it.
+    for sizes in zip(*(_severities(mix.triples, rng) for _ in range(3)), strict=True):
+        chosen = rng.choice(len(names), 3, replace=False)
+        plans.append(Plan("effect", tuple(names[one] for one in chosen), sizes))
+    first = int(rng.integers(len(REPRESENTED))) if mix.reduced else 0
+    for number, size in enumerate(_severities(mix.reduced, rng)):
+        turn = REPRESENTED[(first + number // 2) % len(REPRESENTED)]
+        plans.append(Plan("effect", (turn,), (size,), True) if number % 2 else Plan("none", elastic=True))
     return plans
 
 

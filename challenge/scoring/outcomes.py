@@ -1,15 +1,14 @@
 """One case judged: what the verdict is worth beside the answer.
 
-* An effect (or two) was at work. `right`: the verdict names exactly these. `class`: it names another, but reports a
-  class of indistinguishable effects that holds both the named and the true one. `part`: it names one of two.
+* An effect (or several) was at work. `right`: the verdict names exactly these. `class`: it names another, but reports a
+  class of indistinguishable effects that holds both the named and the true one. `part`: it names some of several.
   `wrong`: it names anything else. `missed`: it says none. `refused`: it says unknown.
 * None was. `right`: it says none. `named`: it names an effect (a false alarm). `flagged`: it says unknown.
 * A foreign one was, or one that was taken out of the library. `refused`: it says unknown. `blamed`: it names another
   effect; `right`: it knows that one. `missed`: it says none.
 * `failed`: there is no verdict, because the diagnosis of the case failed.
 
-The place is right when the verdict's equals the answer's, whatever the verdict; the answer of two effects gives the
-place of the first.
+The place is right when the verdict's is that of one of the effects, whatever the verdict.
 """
 
 from __future__ import annotations
@@ -61,7 +60,7 @@ def judge(name: str, answer: Answer, verdict: Verdict | None) -> Outcome:
     """The outcome of one case."""
     if verdict is None:
         return Outcome(name, answer, None, "failed", False)
-    return Outcome(name, answer, verdict, _result(answer, verdict), verdict["place"] == answer.place)
+    return Outcome(name, answer, verdict, _result(answer, verdict), verdict["place"] in answer.everywhere)
 
 
 def _result(answer: Answer, verdict: Verdict) -> str:

@@ -46,6 +46,7 @@ def score(outcomes: Sequence[Outcome]) -> Table:
         "parameters": parameter_errors(effects),
         "shrinkage": shrinkage(effects),
     }
+    table["several"] = _several([o for o in effects if len(o.answer.effects) > 1])
     table["due"] = {
         "found": found_of_due(effects).plain(),
         "true": true_of_named(outcomes).plain(),
@@ -56,11 +57,23 @@ def score(outcomes: Sequence[Outcome]) -> Table:
 
 
 def grouped(outcomes: Sequence[Outcome]) -> dict[str, list[Outcome]]:
-    """Outcomes by what was at work: the library's effects first, in their order."""
+    """Outcomes by what was at work: the library's effects first, in their order; several by their number."""
     groups: dict[str, list[Outcome]] = {}
-    for outcome in sorted(outcomes, key=lambda o: rank_of("+".join(o.answer.effects))):
-        groups.setdefault("+".join(outcome.answer.effects), []).append(outcome)
+    for outcome in sorted(outcomes, key=lambda o: (len(o.answer.effects), rank_of(o.answer.effects[0]))):
+        effects = outcome.answer.effects
+        groups.setdefault(effects[0] if len(effects) == 1 else f"{len(effects)} effects", []).append(outcome)
     return groups
+
+
+def _several(outcomes: Sequence[Outcome]) -> Table:
+    """Of cases with several effects: how many of the effects were named, and how many of the names were true."""
+    true = [(set(o.answer.effects), set(named_effects(o.verdict)) if o.verdict else set()) for o in outcomes]
+    hits = sum(len(at_work & named) for at_work, named in true)
+    return {
+        "cases": len(outcomes),
+        "found": Rate(hits, sum(len(at_work) for at_work, _ in true)).plain(),
+        "true": Rate(hits, sum(len(named) for _, named in true)).plain(),
+    }
 
 
 def _rate(outcomes: Sequence[Outcome], holds: Callable[[Outcome], bool]) -> Rate:
@@ -142,7 +155,7 @@ def parameter_errors(outcomes: Sequence[Outcome]) -> list[Table]:
     stated 90 % interval."""
     found: dict[tuple[str, str, str], list[tuple[float, float, float, float]]] = {}
     for outcome in outcomes:
-        if outcome.result != "right" or outcome.verdict is None:
+        if outcome.result not in ("right", "part") or outcome.verdict is None:
             continue
         for effect in outcome.verdict["effects"]:
             true = outcome.answer.parameters.get(effect["name"], {})

@@ -12,7 +12,7 @@ Table = Mapping[str, Any]
 WORDS = {
     "right": "right",
     "class": "right class",
-    "part": "one of two",
+    "part": "some of several",
     "wrong": "wrong cause",
     "missed": "missed",
     "refused": "refused as unknown",
@@ -27,8 +27,8 @@ WORDS = {
 
 def score_text(score: Table) -> str:
     """All tables of a score, a line each row."""
-    parts = [_kinds(score), _due(score["due"]), _by_effect(score), _by_severity(score), _calibration(score)]
-    parts += [_parameters(score["parameters"]), _shrinkage(score["shrinkage"]), _reach(score)]
+    parts = [_kinds(score), _due(score["due"], score["several"]), _by_effect(score), _by_severity(score)]
+    parts += [_calibration(score), _parameters(score["parameters"]), _shrinkage(score["shrinkage"]), _reach(score)]
     return "\n\n".join(part for part in parts if part)
 
 
@@ -59,10 +59,14 @@ def _kinds(score: Table) -> str:
     return "\n".join(lines)
 
 
-def _due(due: Table) -> str:
+def _due(due: Table, several: Table) -> str:
     lines = ["Of the effects at work, those without which the oracle's held-out gap is a tenth larger are due"]
     for key, words in (("found", "due effects found"), ("true", "named effects true")):
         lines.append(f"  {words:24} {rate_text(due[key])}")
+    if several["cases"]:
+        lines.append(f"Of {several['cases']} cases with several effects")
+        for key, words in (("found", "effects found"), ("true", "named effects true")):
+            lines.append(f"  {words:24} {rate_text(several[key])}")
     return "\n".join(lines)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import ceil, pi
 
@@ -38,7 +39,7 @@ from gearbench.challenge.truth.plant import (
 from gearbench.challenge.truth.rigs import Bench, build_plant
 from gearbench.challenge.truth.structure import Structure
 from gearbench.records import make_record
-from gearbench.rig import Condition
+from gearbench.rig import Condition, Sensors
 
 Array = NDArray[np.float64]
 
@@ -164,13 +165,16 @@ def measure(
     plan = schedule(condition.experiment, bench.nominal.rig)
     run = run_condition(bench, rig, levels, condition)
     channels = _channels(run, plan, levels)
-    sensors = bench.nominal.rig.sensors
+    return make_record(noisy(channels, bench.nominal.rig.sensors, rng), attributes_of(bench, condition, plan, name))
+
+
+def noisy(channels: Mapping[str, Array], sensors: Sensors, rng: np.random.Generator) -> dict[str, Array]:
+    """Channels (1, N) with the noise of their sensors."""
     noise = {"angle": sensors.noise_angle, "y": sensors.noise_displacement, "torque": sensors.noise_torque}
-    noisy = {
+    return {
         key: (values + noise[key.split("_")[0]] * rng.standard_normal(values.size))[None]
         for key, values in channels.items()
     }
-    return make_record(noisy, _attributes(bench, condition, plan, name))
 
 
 def _channels(run: Run, plan: Schedule, levels: Levels) -> dict[str, Array]:
@@ -195,7 +199,8 @@ def sampled(values: Array) -> Array:
     return np.asarray(mean + fftconvolve(values - mean, kernel, mode="valid")[::OVERSAMPLED])
 
 
-def _attributes(bench: Bench, condition: Condition, plan: Schedule, name: str) -> dict[str, object]:
+def attributes_of(bench: Bench, condition: Condition, plan: Schedule, name: str) -> dict[str, object]:
+    """Attributes of a case's record: of the nominal rig, and its name in the challenge."""
     return {
         **rig_attributes(bench.nominal.rig, bench.meshing),
         **experiment_attributes(plan, plan.periods, condition.experiment.torque_mean),

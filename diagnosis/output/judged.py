@@ -172,7 +172,7 @@ def _closings(found: Simulated, target: Target, measured: Measurement) -> Judged
         without = simulator.channels(taken_out(simulator, selection, one).p, measured)
         rest = target.lines - target.gathered([without])
         gain = target.cost(rest) - target.cost(with_all)
-        growth, part = _growth(target, target.energies(rest), target.energies(with_all))
+        growth, part = growth_of(target, target.energies(rest), target.energies(with_all))
         lacking = inf if one.lacking and not apart else one.lacking
         closings[one.hypothesis.name] = Closing(gain, growth, part, without, lacking)
     nothing = np.zeros(simulator.layout.size)
@@ -180,7 +180,7 @@ def _closings(found: Simulated, target: Target, measured: Measurement) -> Judged
     return Judged(measured, found, closings, nominal, plain, signals)
 
 
-def _growth(target: Target, without: Array, with_all: Array) -> tuple[float, tuple[str, str]]:
+def growth_of(target: Target, without: Array, with_all: Array) -> tuple[float, tuple[str, str]]:
     """The largest factor between the rms gaps without and with an effect (blocks,), over the parts of each channel that
     hold a visible part of the gap without it, and which part that is."""
     lost, kept = without * target.sizes, with_all * target.sizes

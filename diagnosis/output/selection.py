@@ -315,7 +315,7 @@ def _without(simulator: Simulator, base: Optimum, effects: Sequence[Weighed], ch
     sd, p, unknowns = base.sd.copy(), base.p.copy(), simulator.layout.unknowns
     for wide in (wide for one in effects for cause in one.causes for wide in cause.wide):
         at = wide.entries(unknowns)
-        low, high = (0.0, 0.0) if _is_own(unknowns, wide) else known_within(unknowns.prior()[at])
+        low, high = (0.0, 0.0) if is_own(unknowns, wide) else known_within(unknowns.prior()[at])
         sd[at], p[at] = 0.0, np.clip(p[at], low, high)
     return (fit(simulator, p, sd, base.sensitivity, renewals=0, chosen=chosen) or base) if effects else base
 
@@ -340,10 +340,10 @@ def limit_of(unknowns: Unknowns, one: Hypothesis) -> float:
     """Nats from which a hypothesis enters where no other record speaks."""
     if any(wide.key == FOLLOWED for wide in one.wide):
         return LIMIT_GIVEN
-    return LIMIT if any(_is_own(unknowns, wide) for wide in one.wide) else LIMIT_NUMBER
+    return LIMIT if any(is_own(unknowns, wide) for wide in one.wide) else LIMIT_NUMBER
 
 
-def _is_own(unknowns: Unknowns, wide: Wide) -> bool:
+def is_own(unknowns: Unknowns, wide: Wide) -> bool:
     """Whether a prior belongs to the effect's own unknowns, and not to a number of the nominal rig."""
     group = unknowns.group(wide.key)
     return bool((group.wide > group.sd).any())

@@ -36,7 +36,9 @@ def make(
     ] = "test",
     mix: Annotated[
         str | None,
-        typer.Option("--mix", help="numbers instead of --cases: controls=12,per-effect=4,foreign=12,pairs=0"),
+        typer.Option(
+            "--mix", help="numbers instead of --cases: controls=12,per-effect=4,foreign=12,pairs=2,triples=1,reduced=4"
+        ),
     ] = None,
     draw_rigs: Annotated[
         bool,

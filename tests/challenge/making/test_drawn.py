@@ -57,6 +57,16 @@ def test_a_drawn_rig_can_be_run_and_says_how_uncertain_it_is(seed: int) -> None:
     assert NOISE[0] <= louder * (1 + 1e-9) and louder <= NOISE[1] * (1 + 1e-9)
 
 
+def test_some_rigs_swing_until_flanks_part() -> None:
+    swings = []
+    for seed in range(60):
+        first, *_ = conditions_of(drawn_nominal(BASE, "calibration", np.random.default_rng(seed)))
+        assert first.experiment.multisine is not None and first.experiment.multisine.amplitude is not None
+        swings.append(first.experiment.multisine.amplitude / first.experiment.torque_mean)
+    far = np.array(swings) > 0.5
+    assert 0.1 < far.mean() < 0.4 and 0.8 < max(swings) <= 1.01 and min(swings) >= 0.249
+
+
 def test_a_drawn_rig_is_written_and_read_again(tmp_path: Path) -> None:
     case = drawn_nominal(BASE, "development", np.random.default_rng(5))
     path = tmp_path / "nominal.toml"

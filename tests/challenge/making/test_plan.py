@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,13 +13,14 @@ from gearbench.challenge.errors import ChallengeError
 from gearbench.challenge.making.cases import draw_truth
 from gearbench.challenge.making.plan import Mix, Plan, default_mix, make_plan, parse_mix
 from gearbench.challenge.truth.effects import EFFECTS, FOREIGN, SEVERITY
+from gearbench.challenge.truth.elastic import REPRESENTED
 from gearbench.challenge.truth.levels import Levels
 from gearbench.challenge.truth.rigs import check_nominal
 from gearbench.challenge.truth.structure import FAMILIES, draw_structure, family_named
 
 
 def test_default_mix_is_that_of_the_reach() -> None:
-    assert default_mix(171) == Mix(60, (9,) * 9, 30)
+    assert default_mix(171) == Mix(60, (9, *(8,) * 8), 30, 6, 2)
     for cases in (1, 7, 60, 100):
         assert default_mix(cases).cases == cases
 
@@ -26,6 +28,7 @@ def test_default_mix_is_that_of_the_reach() -> None:
 def test_mix_is_parsed() -> None:
     assert parse_mix("controls=12, per-effect=4,foreign=12") == Mix(12, (4,) * 9, 12)
     assert parse_mix("pairs=3").cases == 3
+    assert parse_mix("triples=3,reduced=2") == Mix(0, (0,) * 9, 0, 0, 3, 2)
 
 
 @pytest.mark.parametrize("text", ["controls", "effects=3", "controls=-1", "foreign=1e3", "controls=99999"])
@@ -46,6 +49,40 @@ def test_plan_holds_the_mix_with_log_uniform_severities() -> None:
         low, high = np.log(SEVERITY)
         parts = (logs - low) / (high - low)
         assert (np.floor(30 * parts) == np.arange(30)).all()
+
+
+def test_triples_and_rigs_of_finite_elements_come_after_all_else() -> None:
+    """A seed draws the same cases as before, whatever is asked for besides."""
+    before = make_plan(Mix(5, (3,) * 9, 12, 4), np.random.default_rng(3))
+    plans = make_plan(Mix(5, (3,) * 9, 12, 4, 5, 20), np.random.default_rng(3))
+    assert plans[: len(before)] == before and len(plans) == len(before) + 25
+    for plan in plans[len(before) : -20]:
+        assert plan.kind == "effect" and len(set(plan.effects)) == len(plan.severity) == 3
+    elastic = plans[-20:]
+    assert all(plan.elastic for plan in elastic) and not any(plan.elastic for plan in plans[:-20])
+    assert [plan.kind for plan in elastic] == ["none", "effect"] * 10
+    assert {plan.effects[0] for plan in elastic if plan.effects} == set(REPRESENTED) < set(EFFECTS)
+
+
+def test_three_effects_are_in_the_rig_at_once() -> None:
+    plan = Plan("effect", ("bearing-nonlinearity", "friction", "torque-ripple"), (1.0, 0.5, 1.2))
+    truth, _ = draw_truth(short_case(), "test", 7, 3, plan)
+    levels = truth.drawn.levels
+    assert max(levels.exponent) == pytest.approx(0.35) and levels.friction == pytest.approx(0.03)
+    assert levels.ripple == pytest.approx(1.2 * 0.006 * np.ones(4))
+    assert truth.answer.places[1:] == ("mesh", "drive") and truth.answer.place == truth.answer.places[0]
+    assert set(truth.answer.parameters) == set(plan.effects) and truth.answer.everywhere == truth.answer.places
+
+
+def test_a_loose_housing_changes_nothing_else() -> None:
+    nominal, plan = short_case(), Plan("none")
+    parts = []
+    for number in range(40):
+        tight, loose = (draw_truth(nominal, "test", 7, number, plan, None, one)[0].structure for one in (False, True))
+        parts.append(loose.mode_part)
+        assert str(replace(loose, mode_part=tight.mode_part)) == str(tight)
+    assert np.min(parts) >= 0.005 and np.max(parts) <= 0.1
+    assert 0.3 < np.mean(np.array(parts) > 0.0224) < 0.7  # log-uniform
 
 
 SIZES = {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -10,6 +11,8 @@ from shared.fake_verdicts import verdict
 from gearbench.challenge.answers import Answer
 from gearbench.challenge.scoring.due import found_of_due, owed, true_of_named
 from gearbench.challenge.scoring.outcomes import Outcome, judge
+from gearbench.challenge.scoring.score import score
+from gearbench.challenge.scoring.text import score_text
 
 TWO = Answer("effect", ("friction", "coupling"), "mesh", {"friction": {}, "coupling": {}})
 FRICTION = Answer("effect", ("friction",), "mesh", {"friction": {}})
@@ -50,3 +53,24 @@ def test_nothing_is_due_of_foreign_cases_and_nothing_named_there_is_true() -> No
 
 def test_a_failed_case_owes_its_effect() -> None:
     assert owed(judge("x", FRICTION, None)) == ("friction",)
+
+
+def test_of_several_effects_each_that_is_named_counts() -> None:
+    three = Answer("effect", ("friction", "coupling", "backlash"), "mesh", {"friction": {}})
+    some = judged(three, ("coupling", "friction"), {})
+    more = judged(TWO, ("friction", "backlash"), {})
+    table = score([some, more, judged(FRICTION, ("friction",), {})])
+    assert some.result == "part" and more.result == "wrong"
+    assert table["several"]["cases"] == 2
+    assert (table["several"]["found"]["count"], table["several"]["found"]["total"]) == (3, 5)
+    assert (table["several"]["true"]["count"], table["several"]["true"]["total"]) == (3, 4)
+    assert list(table["by_effect"]) == ["friction", "2 effects", "3 effects"]
+    assert "Of 2 cases with several effects" in score_text(table)
+
+
+def test_the_place_of_any_of_the_effects_is_right() -> None:
+    answer = replace(TWO, places=("mesh", "drive"))
+    for place, right in (("mesh", True), ("drive", True), ("load", False)):
+        given = verdict("effect", "coupling") | {"place": place}
+        assert judge("x", answer, given).place_right is right
+        assert judge("x", TWO, given).place_right is (place == "mesh")

@@ -1,0 +1,103 @@
+"""What planned records tell of the unknowns: Fisher's information at the nominal rig, block by block.
+
+A block is a record, a channel, a kind of line and a band (`output.target`). Leaving out a record or a channel leaves
+out its blocks, so that one Jacobian serves every question about the plan.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.diagnosis.errors import DiagnosisError
+from gearbench.diagnosis.forces.unknowns import Unknowns
+from gearbench.diagnosis.output.fit import sensitivity_of
+from gearbench.diagnosis.output.quadratic import Quadratic, quadratic_of
+from gearbench.diagnosis.output.selection import prior_of
+from gearbench.diagnosis.output.simulator import Simulator
+from gearbench.diagnosis.output.target import Target, target_of
+from gearbench.diagnosis.planning.planned import Planned
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Without:
+    """What is left out of a plan: a record of the search, channels of all records."""
+
+    record: str = ""
+    channels: tuple[str, ...] = ()
+
+
+def floors_of(target: Target, quiet: float = 1.0, left: float = 0.0) -> Array:
+    """Mean squares (blocks,) below which nothing is seen: s^2 with `quiet` times the variance of the noise, and what
+    the best rig leaves of a block, the part `left` of its level."""
+    level = np.bincount(target.of_line, np.abs(target.lines) ** 2, len(target.blocks)) / target.sizes
+    return np.asarray(target.floors - (1.0 - quiet) * target.noise + left**2 * level)
+
+
+@dataclass(frozen=True, eq=False)
+class Blocks:
+    """Quadratic of some records about what they hold of the nominal rig itself: noise."""
+
+    quadratic: Quadratic
+
+    @property
+    def target(self) -> Target:
+        """The lines."""
+        return self.quadratic.target
+
+    def kept(self, without: Without) -> NDArray[np.bool_]:
+        """Which blocks are kept."""
+        blocks = self.target.blocks
+        return np.array([one.record != without.record and one.channel not in without.channels for one in blocks])
+
+    def floors(self, quiet: float, left: float) -> Array:
+        """As `floors_of`."""
+        return floors_of(self.target, quiet, left)
+
+    def information(self, without: Without, quiet: float, left: float) -> Array:
+        """Information (q, q) of the blocks kept."""
+        noise = quiet * self.quadratic.energy / self.target.sizes
+        weights = 2 * self.target.counts / ((self.floors(quiet, left) + noise) * self.target.sizes)
+        return np.asarray(np.tensordot(weights * self.kept(without), self.quadratic.squares, axes=1))
+
+    def energies(self, step: Array) -> Array:
+        """Mean squares (blocks,) of the lines that a step (q,) of the unknowns changes."""
+        whole = np.einsum("bij,i,j->b", self.quadratic.squares, step, step, optimize=True)
+        return np.asarray(np.maximum(whole, 0.0) / self.target.sizes)
+
+
+@dataclass(frozen=True)
+class Known:
+    """Blocks of the records of the search and of the judged one, over the unknowns `active` (q,) that they show;
+    `narrow` (size,): priors of the background."""
+
+    unknowns: Unknowns
+    active: NDArray[np.int64]
+    narrow: Array
+    search: Blocks
+    judged: Blocks
+
+
+def known_of(plan: Planned) -> Known:
+    """Derivatives of all planned records at the nominal rig. Raises DiagnosisError where it cannot be simulated."""
+    simulator = Simulator(plan.layout, target_of(plan.fitted, plan.conditions), plan.simulate)
+    unknowns = plan.layout.unknowns
+    nothing, chosen = np.zeros(unknowns.size), np.ones(unknowns.size, dtype=bool)
+    found = sensitivity_of(simulator, nothing, unknowns.prior(), chosen)
+    one, condition = plan.judged
+    # Ripple has unknowns for each condition of the search; the judged record's is like that of the first of them, whose
+    # name it takes.
+    alike = replace(one, name=plan.fitted[0].name)
+    other = Simulator(plan.layout, target_of([alike], [condition]), plan.simulate)
+    here, jacobian = other.lines(nothing), other.jacobian(nothing, unknowns.prior(), chosen)
+    if found is None or here is None or jacobian is None:
+        raise DiagnosisError(
+            "the nominal rig does not settle under the planned conditions: nothing can be told of them"
+        )
+    active = found.quadratic.active
+    judged = quadratic_of(other.target, other.target.lines - here, jacobian, active)
+    return Known(unknowns, active, prior_of(simulator, unknowns.prior()), Blocks(found.quadratic), Blocks(judged))

@@ -1,0 +1,79 @@
+"""The smallest backlash that planned records would show: flanks must part for it, and small changes make jumps there,
+so that it is simulated and not read off a derivative."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.diagnosis.effects.backlash import KEY
+from gearbench.diagnosis.forces.condition import Condition
+from gearbench.diagnosis.intake.measurements import Measurement
+from gearbench.diagnosis.output.judged import DUE, GAIN, growth_of
+from gearbench.diagnosis.output.selection import LIMIT
+from gearbench.diagnosis.output.simulated import SPACING
+from gearbench.diagnosis.output.simulator import Simulator
+from gearbench.diagnosis.output.target import target_of
+from gearbench.diagnosis.planning.information import floors_of
+from gearbench.diagnosis.planning.planned import Planned
+
+Array = NDArray[np.float64]
+
+LEAST, MOST = 0.02, 3.0  # wide standard deviations, between which it is looked for
+HALVINGS = 7
+
+
+def smallest_backlash(plan: Planned, left: float) -> tuple[float, float] | None:
+    """Smallest backlash beyond the nominal one [m] that would be named, and the standard deviation that is stated for
+    it; None where no record's flanks part, or no size would be named."""
+    if not plan.rough:
+        return None
+    rough = _Changed(plan, [_condition(plan, number) for number in plan.rough], left)
+    judged = _Changed(plan, [plan.judged], left)
+    wide = float(plan.layout.unknowns.group(KEY).wide[0])
+
+    def named(size: float) -> bool:
+        occam = max(float(np.log(1.0 / (SPACING * size))), 0.0) + 0.5 * size**2
+        if rough.gain(size * wide) - occam < LIMIT:
+            return False
+        return judged.gain(size * wide) > GAIN and judged.growth(size * wide) > DUE
+
+    low, high = LEAST, MOST
+    if not named(high):
+        return None
+    for _ in range(HALVINGS):
+        middle = float(np.sqrt(low * high))
+        low, high = (low, middle) if named(middle) else (middle, high)
+    return high * wide, SPACING * high * wide
+
+
+def _condition(plan: Planned, number: int) -> tuple[Measurement, Condition]:
+    return plan.inputs.measurements[number], plan.problem.conditions[number]
+
+
+class _Changed:
+    """How far some records change with the backlash."""
+
+    def __init__(self, plan: Planned, of: list[tuple[Measurement, Condition]], left: float) -> None:
+        self.target = target_of([one for one, _ in of], [condition for _, condition in of])
+        self.floors = floors_of(self.target, left=left)
+        self.simulator = Simulator(plan.layout, self.target, plan.simulate)
+        self.at = plan.layout.unknowns[KEY].start
+        self.nothing = np.zeros(plan.layout.size)
+
+    def energies(self, more: float) -> Array:
+        """Mean squares (blocks,) of the change of the lines; none where it does not settle."""
+        p = self.nothing.copy()
+        p[self.at] = more
+        here, there = self.simulator.lines(self.nothing), self.simulator.lines(p)
+        if here is None or there is None:
+            return np.zeros(len(self.floors))
+        return self.target.energies(there - here)
+
+    def gain(self, more: float) -> float:
+        """Nats that it costs to leave the backlash out."""
+        return float(np.sum(self.target.counts * np.log1p(self.energies(more) / self.floors)))
+
+    def growth(self, more: float) -> float:
+        """By how much the gap of some part grows without it."""
+        return growth_of(self.target, self.floors + self.energies(more), self.floors)[0]

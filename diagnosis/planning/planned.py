@@ -1,0 +1,86 @@
+"""The records that a planned experiment would leave on the nominal rig, taken in as measured ones are."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import xarray as xr
+
+from gearbench.bench.conditions import simulate_all
+from gearbench.bench.readiness import check_timing
+from gearbench.diagnosis.diagnosis import Inputs, on_finite_elements, take_in
+from gearbench.diagnosis.evidence.problem import Problem, problem_of
+from gearbench.diagnosis.forces.condition import Condition, prepare
+from gearbench.diagnosis.intake.measurements import Measurement
+from gearbench.diagnosis.output.layout import Layout, layout_of
+from gearbench.diagnosis.output.simulated import smooth_records
+from gearbench.diagnosis.output.simulator import Simulate
+from gearbench.diagnosis.replay.replays import replays_of
+from gearbench.rig import Case
+
+Report = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Planned:
+    """Records of the nominal rig, what a diagnosis would make of them before its search, and which of the
+    measurements are `smooth`: flanks stay together."""
+
+    inputs: Inputs
+    problem: Problem
+    layout: Layout
+    simulate: Simulate
+    smooth: tuple[int, ...]
+
+    @property
+    def fitted(self) -> tuple[Measurement, ...]:
+        """The measurements that the unknowns are fitted on."""
+        return tuple(self.inputs.measurements[number] for number in self.smooth)
+
+    @property
+    def conditions(self) -> tuple[Condition, ...]:
+        """Theirs."""
+        return tuple(self.problem.conditions[number] for number in self.smooth)
+
+    @property
+    def rough(self) -> tuple[int, ...]:
+        """The other measurements."""
+        return tuple(number for number in range(len(self.inputs.measurements)) if number not in self.smooth)
+
+    @property
+    def judged(self) -> tuple[Measurement, Condition]:
+        """The measurement that the verdict would be judged on, and its condition."""
+        one = self.inputs.judged
+        return one, prepare(one, self.problem.model, self.problem.conditions[0].band)
+
+
+def planned(case: Case, report: Report = lambda step: None, held_out: str | None = None) -> Planned:
+    """The case's conditions carried out on its nominal rig, by the model that diagnosis replays on, with the noise of
+    its sensors; `held_out` as in `take_in`. Raises BenchError or DiagnosisError, a sentence each, for what cannot be
+    simulated or diagnosed."""
+    check_timing(case)
+    nominal = on_finite_elements(case)
+    report("simulating the planned records")
+    inputs = take_in(_records(nominal), nominal, held_out=held_out)
+    report("taking them in")
+    problem = problem_of(inputs.measurements, inputs.nominal)
+    simulate = replays_of(inputs.nominal, inputs.all)
+    smooth = smooth_records(inputs.nominal, inputs.measurements, simulate)
+    # One tooth of each gear for all of them.
+    layout = layout_of(inputs.nominal, problem.model, problem.conditions, (0, problem.model.teeth[0]))
+    return Planned(inputs, problem, layout, simulate, tuple(smooth))
+
+
+def _records(nominal: Case) -> list[xr.Dataset]:
+    """A record of each condition, one realisation, the only one that diagnosis uses."""
+    named = nominal.experiments()
+    single = [replace_experiment(case, realisations=1) for _, case in named]
+    records: dict[int, xr.Dataset] = {}
+    simulate_all(single, records.__setitem__, "lumped")
+    return [records[number].assign_attrs(condition=name or "base") for number, (name, _) in enumerate(named)]
+
+
+def replace_experiment(case: Case, **update: object) -> Case:
+    """The case with fields of its experiment replaced."""
+    return case.model_copy(update={"experiment": case.experiment.model_copy(update=update)})

@@ -1,0 +1,97 @@
+"""Smallest sizes read off the information: against the quadratic's own optimum, and what leaving out does."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+from shared.fake_simulator import LINES, sensitivities, target, unknowns
+
+from gearbench.diagnosis.effects.effect import Hypothesis, Wide
+from gearbench.diagnosis.effects.friction import FRICTION
+from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
+from gearbench.diagnosis.effects.tooth_crack import TOOTH_CRACK
+from gearbench.diagnosis.effects.torque_ripple import TORQUE_RIPPLE
+from gearbench.diagnosis.output.quadratic import quadratic_of
+from gearbench.diagnosis.output.selection import LIMIT
+from gearbench.diagnosis.planning.information import Blocks, Known, Without
+from gearbench.diagnosis.planning.smallest import View, apart_from, direction, largest, rivals_at, smallest, wide_prior
+
+NO_MODEL = cast(Any, None)
+HYPOTHESES = (*FRICTION.hypotheses(NO_MODEL), *TORQUE_RIPPLE.hypotheses(NO_MODEL))
+
+
+def known(matrix: np.ndarray, floor: float = 1e-2) -> Known:
+    """Six blocks, two of them of record `fast`; the judged record has the same derivatives."""
+    where = target(np.zeros(LINES, dtype=complex), floor)
+    named = tuple(replace(one, record="fast") if n > 3 else one for n, one in enumerate(where.blocks))
+    where = replace(where, blocks=named)
+    blocks = Blocks(quadratic_of(where, where.lines, matrix, np.arange(8)))
+    narrow = unknowns().prior()
+    narrow[unknowns()[CRACK]] = 0.0
+    return Known(unknowns(), np.arange(8), narrow, blocks, blocks)
+
+
+def test_evidence_is_that_of_the_two_optima() -> None:
+    """Near nothing the cost is a square: there the log Bayes factor is the one of the fits themselves."""
+    one = known(sensitivities(), floor=1e4)
+    view, bounds = View(one, HYPOTHESES), unknowns().bounds()
+    base = one.search.quadratic
+    for number, hypothesis in enumerate(HYPOTHESES):
+        size = 0.02
+        lines = size * direction(one, hypothesis) @ sensitivities()
+        quadratic = base.moved(lines, sensitivities())
+        evidence = []
+        for prior in (one.narrow, wide_prior(one, hypothesis)):
+            _, cost, information = quadratic.best(np.zeros(8), prior, bounds)
+            evidence.append(quadratic.evidence(cost, information, prior))
+        noise = view.evidence(number, 0.0)[number] + 0.5 * np.linalg.slogdet(
+            np.eye(8) + one.search.information(Without(), 1.0, 0.0) * np.outer(*[wide_prior(one, hypothesis)] * 2)
+        )[1] - 0.5 * np.linalg.slogdet(
+            np.eye(8) + one.search.information(Without(), 1.0, 0.0) * np.outer(one.narrow, one.narrow)
+        )[1]  # fmt: skip
+        assert view.evidence(number, size)[number] - noise == pytest.approx(evidence[1] - evidence[0], rel=1e-3)
+
+
+def test_what_is_named_is_named_at_any_larger_size() -> None:
+    view = View(known(sensitivities()), HYPOTHESES)
+    for number in range(len(HYPOTHESES)):
+        found = smallest(view, number)
+        assert found is not None and found < largest(view.known, HYPOTHESES[number])
+        assert view.evidence(number, found)[number] >= LIMIT
+        assert apart_from(view, number, found) == pytest.approx(found)
+        assert rivals_at(view, number, found) == ()
+
+
+def test_fewer_records_and_more_noise_find_less() -> None:
+    one = known(0.02 * sensitivities())
+    whole = View(one, HYPOTHESES)
+    less = replace(whole, without=Without(record="fast"))
+    assert np.all(np.linalg.eigvalsh(whole.information - less.information) > -1e-9)
+    kept = sum(one.search.information(Without(record=name), 1.0, 0.0) for name in ("base", "fast"))
+    assert kept == pytest.approx(whole.information)
+    for number in range(len(HYPOTHESES)):
+        sizes = [smallest(view, number) for view in (replace(whole, sharper=100.0), whole, less)]
+        assert None not in sizes and sizes == sorted(sizes, key=lambda size: size or np.inf)
+        assert less.std(number)[3] > whole.std(number)[3]
+
+
+def test_records_that_do_not_show_it_find_nothing() -> None:
+    blind = sensitivities()
+    blind[3] = 0.0
+    assert smallest(View(known(blind), HYPOTHESES), 0) is None
+
+
+def test_effects_with_the_same_trace_are_rivals() -> None:
+    """A crack that does what friction does, but for a trace of its own a hundred times smaller."""
+    alike, tooth = sensitivities(), unknowns()[CRACK].start
+    alike[tooth] = alike[3] + 1e-2 * alike[tooth]
+    crack = Hypothesis("tooth-crack 0", "mesh", (Wide(CRACK, 0),), effect=TOOTH_CRACK)
+    view = View(known(alike), (HYPOTHESES[0], crack))
+    found = smallest(view, 0)
+    assert found is not None and rivals_at(view, 0, found) == (1,)
+    apart = apart_from(view, 0, found)
+    assert apart is not None and apart > found and rivals_at(view, 0, apart) == ()
+    assert apart_from(View(known(sensitivities()), (HYPOTHESES[0], crack)), 0, found) == pytest.approx(found)
