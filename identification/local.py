@@ -15,9 +15,10 @@ import xarray as xr
 
 from gearbench.identification.lpm.accuracy import MISSING, Accuracy, RecordRule, expected_accuracy, record_rule
 from gearbench.identification.lpm.at_varying import polynomials_at_varying_speed
-from gearbench.identification.lpm.estimate import LpmResult, local_polynomial
+from gearbench.identification.lpm.estimate import LpmResult, local_polynomial, require_lines
 from gearbench.identification.lpm.limits import Limits, limits_of
 from gearbench.identification.lpm.local_solve import LpmError
+from gearbench.identification.lpm.regression import Window
 from gearbench.identification.lpm.selection import choose_window
 from gearbench.identification.response.frf import make_frf
 from gearbench.identification.response.mode_spread import natural_frequency_deviation
@@ -61,6 +62,9 @@ def by_local_method(task: Task) -> xr.Dataset:
     settings, spectra = task.settings, task.spectra
     transient = settings.transient == "estimate" or (settings.transient == "auto" and not spectra.steady)
     prescribed = (settings.harmonics, settings.order, settings.window) != (None, None, None)
+    if settings.harmonics is not None:
+        # Before anything is built for branches that no line holds.
+        require_lines(spectra, task.lines, Window(settings.harmonics, 0, settings.window or 0, transient))
     if settings.branches == "smooth":
         found = _by_smooth_branches(task, transient)
     elif settings.branches == "polynomials" or prescribed:
