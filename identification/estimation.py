@@ -12,7 +12,7 @@ import xarray as xr
 from gearbench.identification.feedback.estimate import mesh_feedback
 from gearbench.identification.feedback.frf import feedback_frf
 from gearbench.identification.feedback.varying_frf import signals_of, varying_frf
-from gearbench.identification.local import by_local_method, by_polynomials_at_varying_speed
+from gearbench.identification.local import by_local_method, by_local_method_at_varying_speed
 from gearbench.identification.lpm.local_solve import LpmError
 from gearbench.identification.lpm.selection import LADDER
 from gearbench.identification.spectra.course import LOST, SIDEBANDS, VARIES, course_spectra, speed_varies
@@ -60,7 +60,7 @@ def identify(
     if settings.method == "mesh-feedback" and speed_varies(records):
         return _feedback_at_varying_speed(records, settings, report)
     if _not_averaged(records):
-        return _polynomials_at_varying_speed(records, settings, report)
+        return _local_at_varying_speed(records, settings, report)
     sidebands = settings.harmonics if settings.harmonics is not None else LADDER[-1]
     try:
         spectra, excited, notes = record_spectra(
@@ -161,17 +161,17 @@ def _not_averaged(records: Sequence[xr.Dataset]) -> bool:
     return speed_varies(records, LOST if repeated else VARIES)
 
 
-def _polynomials_at_varying_speed(
+def _local_at_varying_speed(
     records: Sequence[xr.Dataset], settings: IdentificationSettings, report: Progress
 ) -> xr.Dataset:
-    """The local polynomial method with the measured phase."""
+    """The local method with the measured phase."""
     doubts, cost = _doubts(records)
     spectra, course = course_spectra(records, SIDEBANDS if settings.harmonics is None else settings.harmonics)
     excited = (course.lowest * spectra.spacing, course.excited * spectra.spacing)
     lines = output_lines(spectra, settings.band or excited, excited, settings.step)
     simulated = all("model" in record.attrs for record in records)
     task = Task(spectra, lines, settings, excited, tuple(doubts), cost, report, simulated)
-    frf = by_polynomials_at_varying_speed(task, course)
+    frf = by_local_method_at_varying_speed(task, course)
     report(1.0, "identified")
     return frf
 
