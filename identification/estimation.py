@@ -25,6 +25,8 @@ from gearbench.records.record import require_finite
 
 # Expected error of mesh-feedback beyond which the local polynomial method is tried as well.
 SECOND_OPINION = 0.05
+# Sidebands below the excited band's end that a prediction at another mesh frequency follows.
+MOST_SIDEBANDS = 5000
 # Equations of mesh-feedback beyond which further realisations are left out.
 ENOUGH = 20_000
 
@@ -58,6 +60,11 @@ def identify(
         for name in record.data_vars:
             require_finite(record[name])
     if settings.method == "mesh-feedback" and speed_varies(records):
+        if settings.mesh_frequency is not None:
+            raise LpmError(
+                f"mesh_frequency = {settings.mesh_frequency:g} Hz is predicted from records of constant speed only; the"
+                " speed of this record varies"
+            )
         return _feedback_at_varying_speed(records, settings, report)
     if _not_averaged(records):
         return _local_at_varying_speed(records, settings, report)
@@ -100,7 +107,8 @@ def identify_spectra(
     task = Task(spectra, lines, settings, excited, tuple(notes), record_error, report, simulated)
     if settings.method == "mesh-feedback":
         frf = by_feedback(task)
-        if frf.attrs["expected_error"] > SECOND_OPINION:
+        # Another method knows no other mesh frequency than the record's.
+        if frf.attrs["expected_error"] > SECOND_OPINION and settings.mesh_frequency is None:
             alone = replace(task, settings=_as_polynomials(settings))
             frf = _second_opinion(frf, partial(by_local_method, alone))
     else:
@@ -112,6 +120,12 @@ def identify_spectra(
 def by_feedback(task: Task) -> xr.Dataset:
     """Dataset of kind "identified" by mesh feedback alone. Raises LpmError for what the record does not support."""
     highest, realisations = round(task.excited[1] / task.spectra.spacing), task.spectra.realisations
+    least, wanted = task.excited[1] / MOST_SIDEBANDS, task.settings.mesh_frequency
+    if wanted is not None and wanted < least:
+        raise LpmError(
+            f"mesh_frequency = {wanted:g} Hz must be at least {least:.3g} Hz: {MOST_SIDEBANDS} sidebands to the end of"
+            f" the excited band, {task.excited[1]:g} Hz, are followed"
+        )
     kept = min(realisations, max(1, -(-ENOUGH // highest)))
     if kept < realisations:
         said = f"mesh-feedback uses the first {kept} of {realisations} realisations: they are enough"
@@ -127,6 +141,7 @@ def by_feedback(task: Task) -> xr.Dataset:
         notes=list(task.notes),
         record=task.record_error,
         attributes=task.attributes(),
+        mesh_frequency=task.settings.mesh_frequency,
     )
 
 
