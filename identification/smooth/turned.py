@@ -5,9 +5,9 @@ A branch is a sum of delays, turned half before and half after each (Weyl's orde
     y(t) = sum_l sum_p sum_q h_lpq sigma^p exp(j l (theta(t) + theta(t - tau_q)) / 2) F(t - tau_q)
 
 sigma is the departure of the mesh frequency over its largest one, at the middle of the delay: p = 0 is the branch at
-the mean speed, p = 1 what the speed changes of it. No product is taken to commute; at a constant speed it is the smooth
-branch of `posterior.py`. The operating response of order o is the same of a constant force, the transient of each
-record the same of an impulse at its beginning.
+the mean speed, p = 1, 2 what the speed changes of it. No product is taken to commute; at a constant speed it is the
+smooth branch of `posterior.py`. The operating response of order o is the same of a constant force, the transient of
+each record the same of an impulse at its beginning.
 
 The delays are nodes of Gauss and Legendre's quadrature for the lags 0..LAST of the variance exp(-u), so that
 
@@ -28,8 +28,8 @@ from gearbench.identification.spectra.joint import Complexes, Floats, Spectra
 # Lags [1 / 2a, a the decay of amplitudes] that are kept; nodes at least, and more of them for each bandwidth that the
 # lines of a window span.
 LAST, FEWEST, PER_BANDWIDTH = 9.5, 7, 2.15
-# Powers of the departure of the speed that a branch has: itself, and its change in proportion.
-POWERS = 2
+# Powers of the departure of the speed that a branch has: itself, its change in proportion, and with the square.
+POWERS = 3
 
 
 @dataclass(frozen=True)
