@@ -12,7 +12,7 @@ import xarray as xr
 from gearbench.identification.feedback.estimate import mesh_feedback
 from gearbench.identification.feedback.frf import feedback_frf
 from gearbench.identification.feedback.varying_frf import signals_of, varying_frf
-from gearbench.identification.local import by_local_method, by_polynomials_at_varying_speed
+from gearbench.identification.local import by_local_method, by_local_method_at_varying_speed
 from gearbench.identification.lpm.local_solve import LpmError
 from gearbench.identification.lpm.selection import LADDER
 from gearbench.identification.spectra.course import LOST, SIDEBANDS, VARIES, course_spectra, speed_varies
@@ -25,6 +25,8 @@ from gearbench.records.record import require_finite
 
 # Expected error of mesh-feedback beyond which the local polynomial method is tried as well.
 SECOND_OPINION = 0.05
+# Sidebands below the excited band's end that a prediction at another mesh frequency follows.
+MOST_SIDEBANDS = 5000
 # Equations of mesh-feedback beyond which further realisations are left out.
 ENOUGH = 20_000
 
@@ -58,9 +60,14 @@ def identify(
         for name in record.data_vars:
             require_finite(record[name])
     if settings.method == "mesh-feedback" and speed_varies(records):
+        if settings.mesh_frequency is not None:
+            raise LpmError(
+                f"mesh_frequency = {settings.mesh_frequency:g} Hz is predicted from records of constant speed only; the"
+                " speed of this record varies"
+            )
         return _feedback_at_varying_speed(records, settings, report)
     if _not_averaged(records):
-        return _polynomials_at_varying_speed(records, settings, report)
+        return _local_at_varying_speed(records, settings, report)
     sidebands = settings.harmonics if settings.harmonics is not None else LADDER[-1]
     try:
         spectra, excited, notes = record_spectra(
@@ -100,7 +107,8 @@ def identify_spectra(
     task = Task(spectra, lines, settings, excited, tuple(notes), record_error, report, simulated)
     if settings.method == "mesh-feedback":
         frf = by_feedback(task)
-        if frf.attrs["expected_error"] > SECOND_OPINION:
+        # Another method knows no other mesh frequency than the record's.
+        if frf.attrs["expected_error"] > SECOND_OPINION and settings.mesh_frequency is None:
             alone = replace(task, settings=_as_polynomials(settings))
             frf = _second_opinion(frf, partial(by_local_method, alone))
     else:
@@ -112,6 +120,12 @@ def identify_spectra(
 def by_feedback(task: Task) -> xr.Dataset:
     """Dataset of kind "identified" by mesh feedback alone. Raises LpmError for what the record does not support."""
     highest, realisations = round(task.excited[1] / task.spectra.spacing), task.spectra.realisations
+    least, wanted = task.excited[1] / MOST_SIDEBANDS, task.settings.mesh_frequency
+    if wanted is not None and wanted < least:
+        raise LpmError(
+            f"mesh_frequency = {wanted:g} Hz must be at least {least:.3g} Hz: {MOST_SIDEBANDS} sidebands to the end of"
+            f" the excited band, {task.excited[1]:g} Hz, are followed"
+        )
     kept = min(realisations, max(1, -(-ENOUGH // highest)))
     if kept < realisations:
         said = f"mesh-feedback uses the first {kept} of {realisations} realisations: they are enough"
@@ -127,6 +141,7 @@ def by_feedback(task: Task) -> xr.Dataset:
         notes=list(task.notes),
         record=task.record_error,
         attributes=task.attributes(),
+        mesh_frequency=task.settings.mesh_frequency,
     )
 
 
@@ -161,17 +176,17 @@ def _not_averaged(records: Sequence[xr.Dataset]) -> bool:
     return speed_varies(records, LOST if repeated else VARIES)
 
 
-def _polynomials_at_varying_speed(
+def _local_at_varying_speed(
     records: Sequence[xr.Dataset], settings: IdentificationSettings, report: Progress
 ) -> xr.Dataset:
-    """The local polynomial method with the measured phase."""
+    """The local method with the measured phase."""
     doubts, cost = _doubts(records)
     spectra, course = course_spectra(records, SIDEBANDS if settings.harmonics is None else settings.harmonics)
     excited = (course.lowest * spectra.spacing, course.excited * spectra.spacing)
     lines = output_lines(spectra, settings.band or excited, excited, settings.step)
     simulated = all("model" in record.attrs for record in records)
     task = Task(spectra, lines, settings, excited, tuple(doubts), cost, report, simulated)
-    frf = by_polynomials_at_varying_speed(task, course)
+    frf = by_local_method_at_varying_speed(task, course)
     report(1.0, "identified")
     return frf
 

@@ -15,13 +15,15 @@ import xarray as xr
 
 from gearbench.identification.lpm.accuracy import MISSING, Accuracy, RecordRule, expected_accuracy, record_rule
 from gearbench.identification.lpm.at_varying import polynomials_at_varying_speed
-from gearbench.identification.lpm.estimate import LpmResult, local_polynomial
+from gearbench.identification.lpm.estimate import LpmResult, local_polynomial, require_lines
 from gearbench.identification.lpm.limits import Limits, limits_of
 from gearbench.identification.lpm.local_solve import LpmError
+from gearbench.identification.lpm.regression import Window
 from gearbench.identification.lpm.selection import choose_window
 from gearbench.identification.response.frf import make_frf
 from gearbench.identification.response.mode_spread import natural_frequency_deviation
 from gearbench.identification.response.modes import itf_modes
+from gearbench.identification.smooth.at_varying import smooth_at_varying_speed
 from gearbench.identification.smooth.choice import choose_smooth
 from gearbench.identification.smooth.estimate import smooth_branches
 from gearbench.identification.spectra.course import Course
@@ -61,6 +63,9 @@ def by_local_method(task: Task) -> xr.Dataset:
     settings, spectra = task.settings, task.spectra
     transient = settings.transient == "estimate" or (settings.transient == "auto" and not spectra.steady)
     prescribed = (settings.harmonics, settings.order, settings.window) != (None, None, None)
+    if settings.harmonics is not None:
+        # Before anything is built for branches that no line holds.
+        require_lines(spectra, task.lines, Window(settings.harmonics, 0, settings.window or 0, transient))
     if settings.branches == "smooth":
         found = _by_smooth_branches(task, transient)
     elif settings.branches == "polynomials" or prescribed:
@@ -116,32 +121,66 @@ def _by_smooth_branches(task: Task, transient: bool) -> tuple[Fitted, LpmResult]
     return Fitted(model.harmonics, None, model.half_width, model.bandwidth, transient), result
 
 
-def by_polynomials_at_varying_speed(task: Task, course: Course) -> xr.Dataset:
+def by_local_method_at_varying_speed(task: Task, course: Course) -> xr.Dataset:
     """The same of records whose speed varies, at the mean mesh frequency. Raises LpmError likewise."""
     settings = task.settings
     if settings.transient == "none":
         raise LpmError("transient = 'none' belongs to a constant speed; at one that varies it is always estimated")
-    if settings.branches == "smooth":
-        raise LpmError("branches = 'smooth' belongs to a constant speed; at one that varies they are polynomials")
+    prescribed = (settings.harmonics, settings.order, settings.window) != (None, None, None)
+    said: dict[str, str] = {}
+    found, refused = [], ""
+    if settings.branches != "smooth":
+        try:
+            fitted, result, operating = _polynomials_with(task, course)
+            found.append((fitted, result))
+            said["operating_response"] = operating
+        except LpmError as error:
+            refused = str(error)
+    if settings.branches == "smooth" or (
+        settings.branches == "auto" and not prescribed and (not found or _expects(found[0]) > ENOUGH)
+    ):
+        try:
+            found.append(_smooth_with(task, course))
+        except LpmError as error:
+            refused = refused or str(error)
+    if not found:
+        raise LpmError(refused)
+    best = min(found, key=_expects)
+    if best[0].bandwidth is not None:
+        said["operating_response"] = "free"
+    task.report(0.9, "modes")
+    speeds = (task.spectra.mesh_lines + np.array([course.shift.min(), course.shift.max()])) * task.spectra.spacing
+    return _dataset(task, *best).assign_attrs(
+        speed="varying",
+        mesh_frequency_lowest=float(speeds[0]),
+        mesh_frequency_highest=float(speeds[1]),
+        **said,
+    )
+
+
+def _polynomials_with(task: Task, course: Course) -> tuple[Fitted, LpmResult, str]:
+    """Polynomials at a speed that varies, and what became of the operating response. Raises LpmError."""
     task.report(0.1, "choosing branches, order and window at a speed that varies")
     result, window, free = polynomials_at_varying_speed(
         task.spectra,
         course,
         task.lines,
-        harmonics=settings.harmonics,
-        order=settings.order,
-        half_width=settings.window,
-        progress=task.part(0.2, 0.7),
+        harmonics=task.settings.harmonics,
+        order=task.settings.order,
+        half_width=task.settings.window,
+        progress=task.part(0.2, 0.2),
     )
-    task.report(0.9, "modes")
-    speeds = (task.spectra.mesh_lines + np.array([course.shift.min(), course.shift.max()])) * task.spectra.spacing
     fitted = Fitted(window.harmonics, window.order, window.half_width, None, True)
-    return _dataset(task, fitted, result).assign_attrs(
-        speed="varying",
-        mesh_frequency_lowest=float(speeds[0]),
-        mesh_frequency_highest=float(speeds[1]),
-        operating_response="free" if free else "as noise",
+    return fitted, result, "free" if free else "as noise"
+
+
+def _smooth_with(task: Task, course: Course) -> tuple[Fitted, LpmResult]:
+    """Smooth branches at a speed that varies. Raises LpmError."""
+    task.report(0.4, "choosing bandwidth and number of smooth branches at a speed that varies")
+    result, model = smooth_at_varying_speed(
+        task.spectra, course, task.lines, harmonics=task.settings.harmonics, progress=task.part(0.4, 0.5)
     )
+    return Fitted(model.harmonics, None, model.half_width, model.bandwidth, True), result
 
 
 def _dataset(task: Task, fitted: Fitted, result: LpmResult) -> xr.Dataset:

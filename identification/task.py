@@ -31,7 +31,7 @@ class IdentificationSettings:
     `transient`: "estimate" polynomials for it, "none", or "auto": only where the record does not prove its
     steady state; `modes`: at most that many; `branches` of the local method "lpm": "polynomials" in each window,
     "smooth" random functions, or "auto": whichever predicts the lesser error (polynomials where any of L, R, n is
-    given).
+    given); `mesh_frequency` [Hz] of "mesh-feedback": predict the response there (default: at the record's).
     """
 
     method: Literal["lpm", "mesh-feedback"] = "lpm"
@@ -44,6 +44,7 @@ class IdentificationSettings:
     transient: Literal["auto", "estimate", "none"] = "auto"
     modes: int | None = None
     branches: Literal["auto", "polynomials", "smooth"] = "auto"
+    mesh_frequency: float | None = None
 
     def __post_init__(self) -> None:
         if self.method not in METHODS:
@@ -55,6 +56,13 @@ class IdentificationSettings:
             raise LpmError(f"branches = {self.branches!r} must be 'auto', 'polynomials' or 'smooth'")
         if self.branches != "auto" and self.method != "lpm":
             raise LpmError(f"branches = {self.branches!r} belongs to method 'lpm', not to {self.method!r}")
+        if self.mesh_frequency is not None and self.method != "mesh-feedback":
+            raise LpmError(
+                f"mesh_frequency = {self.mesh_frequency:g} belongs to method 'mesh-feedback': branches of"
+                f" {self.method!r} hold at the record's own only"
+            )
+        if self.mesh_frequency is not None and not 0 < self.mesh_frequency < np.inf:
+            raise LpmError(f"mesh_frequency = {self.mesh_frequency:g} Hz must be positive and finite")
         for name in ("order", "window"):
             if self.branches == "smooth" and getattr(self, name) is not None:
                 raise LpmError(f"{name} = {getattr(self, name)} belongs to branches = 'polynomials', not to 'smooth'")

@@ -22,12 +22,14 @@ NEGLIGIBLE = 2e-4
 ROOM = 6_000_000
 
 
-def enough_branches(model: Model, data: ClassData, lines: NDArray[np.int64]) -> tuple[int, Floats]:
+def enough_branches(
+    model: Model, data: ClassData, lines: NDArray[np.int64], ratio: float = 1.0
+) -> tuple[int, Floats]:
     """Branches on each side that hold all but NEGLIGIBLE of the response, within ROOM, and the power [m^2/N^2] (F,)
-    beyond them on the output `lines`."""
-    most = 2 * data.furthest // data.mesh_lines
+    beyond them on the output `lines`; `ratio` as in `htf_on`."""
+    most = int(2 * data.furthest / (data.mesh_lines * ratio))
     chosen = followed(lines)
-    power = np.abs(htf_on(model, data, chosen, most)) ** 2
+    power = np.abs(htf_on(model, data, chosen, most, ratio)) ** 2
     order = np.abs(np.arange(-most, most + 1))
     of_order = np.bincount(order, weights=power.sum(axis=1))
     beyond = of_order.sum() - np.cumsum(of_order)

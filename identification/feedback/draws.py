@@ -16,12 +16,19 @@ from gearbench.identification.truth.periodic import itf_from_htf
 
 
 def response_variances(
-    model: Model, draws: Sequence[Model], data: ClassData, lines: NDArray[np.int64], branches: int, phases: int
+    model: Model,
+    draws: Sequence[Model],
+    data: ClassData,
+    lines: NDArray[np.int64],
+    branches: int,
+    phases: int,
+    ratio: float = 1.0,
 ) -> tuple[Floats, Floats]:
-    """Variances of HTF (2L+1, F) and ITF (F, phases), from the drawn models on some of the lines."""
+    """Variances of HTF (2L+1, F) and ITF (F, phases), from the drawn models on some of the lines; `ratio` as in
+    `htf_on`."""
     chosen = followed(lines)
-    centre = htf_on(model, data, chosen, branches)
-    errors = [(htf_on(drawn, data, chosen, branches) - centre) / STEP for drawn in draws]
+    centre = htf_on(model, data, chosen, branches, ratio)
+    errors = [(htf_on(drawn, data, chosen, branches, ratio) - centre) / STEP for drawn in draws]
     of_htf = np.mean([np.abs(error) ** 2 for error in errors], axis=0)
     of_itf = np.mean([np.abs(itf_from_htf(error, phases)) ** 2 for error in errors], axis=0)
     return (

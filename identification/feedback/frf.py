@@ -41,19 +41,22 @@ def feedback_frf(
     notes: list[str],
     record: float,
     attributes: Mapping[str, Any],
+    mesh_frequency: float | None = None,
 ) -> xr.Dataset:
     """Dataset of kind "identified" on the output `lines`, with `mesh_stiffness`, `mesh_damping` (phase) and their
-    variances. `record`: what doubtful channels may cost."""
+    variances. `record`: what doubtful channels may cost; `mesh_frequency` [Hz]: the one that the response is wanted at,
+    as D, N, k and c do not depend on it; absent: the record's."""
     data, model = found.data, found.model
     frequency = np.asarray(lines * spectra.spacing, dtype=float)
-    branches, beyond = enough_branches(model, data, lines)
-    response = htf_on(model, data, lines, branches)
+    ratio = 1.0 if mesh_frequency is None else mesh_frequency / (data.mesh_lines * spectra.spacing)
+    branches, beyond = enough_branches(model, data, lines, ratio)
+    response = htf_on(model, data, lines, branches, ratio)
     itf = itf_from_htf(response, phases)
     draws = drawn_models(found)
-    htf_variance, itf_variance = response_variances(model, draws, data, lines, branches, phases)
+    htf_variance, itf_variance = response_variances(model, draws, data, lines, branches, phases, ratio)
     # Sidebands beyond the record's lines are extrapolated: those that it holds tell how well.
     order = np.arange(-branches, branches + 1)[:, None]
-    extrapolated = np.where(np.abs(lines + order * data.mesh_lines) > data.top, np.abs(response) ** 2, 0.0)
+    extrapolated = np.where(np.abs(lines + order * data.mesh_lines * ratio) > data.top, np.abs(response) ** 2, 0.0)
     extrapolated *= doubt_beyond(found)
     htf_variance += extrapolated
     itf_variance += extrapolated.sum(axis=0)[:, None]
@@ -76,23 +79,25 @@ def feedback_frf(
         natural_frequency_sd=natural_frequency_deviation(frequency, itf, itf_variance, natural, float(lines.size)),
         attributes={
             **attributes,
-            **_about_fit(found),
+            **_about_fit(found, spectra, ratio),
             "harmonics": branches,
             "variance_error": variance,
             "truncation_error": truncation,
             "unexplained_error": apart,
             "record_error": record,
             "expected_error": hypot(variance, truncation, apart, record),
-            "warnings": "\n".join([*notes, *_doubts(found, spectra, natural[0], variance, apart)]),
+            "warnings": "\n".join([*notes, *_doubts(found, spectra, natural[0], variance, apart, ratio)]),
         },
     )
     add_mesh_curves(frf, model, draws, data)
     return frf
 
 
-def _about_fit(found: Feedback) -> dict[str, Any]:
-    """Attributes that say what was fitted, and how well."""
-    return {
+def _about_fit(found: Feedback, spectra: Spectra, ratio: float) -> dict[str, Any]:
+    """Attributes that say what was fitted, how well, and of a prediction for which mesh frequency."""
+    own = found.data.mesh_lines * spectra.spacing
+    predicted = {} if ratio == 1.0 else {"mesh_frequency": own * ratio, "identified_at_mesh_frequency": own}
+    return predicted | {
         "mesh_harmonics": found.model.harmonics,
         "pole_pairs": found.model.basis.pairs.shape[0],
         "unknowns": found.model.vector().size,
@@ -101,8 +106,20 @@ def _about_fit(found: Feedback) -> dict[str, Any]:
     }
 
 
-def _doubts(found: Feedback, spectra: Spectra, natural: Floats, variance: float, apart: float) -> list[str]:
-    notes = doubt_of(apart, variance)
+def _predicted(own: float, ratio: float) -> list[str]:
+    """The warning of a response at another mesh frequency than the record's `own` [Hz]."""
+    if ratio == 1.0:
+        return []
+    return [
+        f"predicted at {own * ratio:g} Hz mesh from a record at {own:g} Hz: the expected error counts what this"
+        " record's noise and residual tell, not errors of the model that matter at the other speed only"
+    ]
+
+
+def _doubts(
+    found: Feedback, spectra: Spectra, natural: Floats, variance: float, apart: float, ratio: float
+) -> list[str]:
+    notes = [*_predicted(found.data.mesh_lines * spectra.spacing, ratio), *doubt_of(apart, variance)]
     if not spectra.steady:
         notes.append("the steady state is not verified, and mesh-feedback assumes it")
     lowest = found.data.lowest * spectra.spacing

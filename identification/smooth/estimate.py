@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Generic, TypeVar
 
 import numpy as np
 
@@ -28,12 +29,15 @@ from gearbench.identification.smooth.posterior import (
     first_sizes,
     refined,
 )
+from gearbench.identification.smooth.turned_posterior import TurnedPosterior
 from gearbench.identification.spectra.joint import Complexes, Floats, Spectra
 
 # Rounds for the sizes: of a first window, and of one beside a window whose sizes are known.
 FIRST_ROUNDS, ROUNDS = 5, 2
 # Equations of a window below which nothing is made of it.
 FEWEST = 8
+
+Found = TypeVar("Found", Posterior, TurnedPosterior)
 
 
 @dataclass(frozen=True)
@@ -92,14 +96,30 @@ def smooth_branches(
     plan = plan_centres(rows, model.window, regression.last_row(model.harmonics))
     # Rows below 0 mirror those above and say nothing new.
     centres = [(max(centre, model.half_width), own) for centre, own in plan]
-    return _Pass(regression, lines, model, spectra.noise).run(centres, progress)
+
+    def solve(centre: int, before: Posterior | None) -> Posterior | None:
+        equations = window_equations(regression, centre, model)
+        if equations is None or equations.power == 0.0:
+            return None
+        return posterior_beside(equations, before.sizes if before else None, model.bandwidth)
+
+    return Pass[Posterior](regression, lines, model, spectra.noise, solve).run(centres, progress)
 
 
-class _Pass:
-    """One pass over all windows."""
+class Pass(Generic[Found]):
+    """One pass over all windows; `solve(centre, before)` makes the posterior of one from that of the window before it,
+    or None where there is nothing to solve."""
 
-    def __init__(self, regression: Regression, lines: Lines, model: SmoothModel, noise: Floats | None) -> None:
+    def __init__(
+        self,
+        regression: Regression,
+        lines: Lines,
+        model: SmoothModel,
+        noise: Floats | None,
+        solve: Callable[[int, Found | None], Found | None],
+    ) -> None:
         self.regression, self.model, self.noise = regression, model, noise
+        self.solve: Callable[[int, Found | None], Found | None] = solve
         self.missing = MissingPower(regression, lines, model.harmonics)
         self.determined: list[tuple[float, int]] = []
         self.residual = self.power = 0.0
@@ -109,15 +129,15 @@ class _Pass:
         self, centres: list[tuple[int, Lines]], progress: Callable[[float, str], None] | None
     ) -> LpmResult:
         """Condition every window on its data."""
-        model, before = self.model, None
+        model = self.model
+        before: Found | None = None
         last = int(centres[-1][1][-1])
         output = OutputLines(self.missing.lines, model.harmonics, self.regression.mesh_lines, last)
         for done, (centre, own) in enumerate(centres, start=1):
-            equations = window_equations(self.regression, centre, model)
-            if equations is None or equations.power == 0.0:
+            found = self.solve(centre, before)
+            if found is None:
                 continue
-            found = posterior_beside(equations, before, model.bandwidth)
-            before = found.sizes
+            before = found
             self._read(found, output, centre, own)
             if progress is not None:
                 progress(done / len(centres), f"window {done} of {len(centres)}")
@@ -125,7 +145,7 @@ class _Pass:
             raise LpmError("no window holds equations: the excitation does not reach the output lines")
         return self._result(output, len(centres))
 
-    def _read(self, found: Posterior, output: OutputLines, centre: int, own: Lines) -> None:
+    def _read(self, found: Found, output: OutputLines, centre: int, own: Lines) -> None:
         offset = (own - centre).astype(float)
         branches = 2 * self.model.harmonics + 1
         # The variance is least in the middle and rises to both ends: three rows tell it.

@@ -118,15 +118,21 @@ def conditioned(equations: Equations, sizes: Sizes, bandwidth: float) -> Posteri
     total = near * ((equations.columns * sizes.functions) @ equations.columns.conj().T)
     noise = max(sizes.noise, LEAST_NOISE * max(float(np.trace(total).real) / count, equations.power))
     total[np.diag_indices(count)] += noise
+    inverse, weights, evidence = factored(total, equations.data)
+    return Posterior(equations, Sizes(sizes.functions, noise), bandwidth, inverse, weights, evidence)
+
+
+def factored(total: Complexes, data: Complexes) -> tuple[Complexes, Complexes, float]:
+    """K^-1 (N, N), K^-1 Y (N,) and the log likelihood but for a constant, of a covariance K = `total` (N, N) and `data`
+    (N,). Raises numpy.linalg.LinAlgError where K is singular."""
     triangle, failed = lapack.zpotrf(total, lower=1, clean=1)
     if failed:
         raise np.linalg.LinAlgError("the covariance of the rows is singular")
     evidence = -2.0 * float(np.log(np.diagonal(triangle).real).sum())
     half, _ = lapack.zpotri(triangle, lower=1)
     inverse = np.tril(half) + np.tril(half, -1).conj().T
-    weights = inverse @ equations.data
-    evidence -= float(np.vdot(equations.data, weights).real)
-    return Posterior(equations, Sizes(sizes.functions, noise), bandwidth, inverse, weights, evidence)
+    weights = inverse @ data
+    return inverse, weights, evidence - float(np.vdot(data, weights).real)
 
 
 def refined(equations: Equations, start: Sizes, bandwidth: float, rounds: int) -> Posterior:
@@ -147,21 +153,32 @@ def _next_sizes(found: Posterior, ties: Floats) -> Sizes:
     held = size**2 * np.einsum("nc,nc->c", turned.conj(), near @ turned).real
     determined = size * np.einsum("nc,nc->c", columns, (found.inverse.T * near) @ columns.conj()).real
     held, determined = ties @ np.maximum(held, 0.0), ties @ np.maximum(determined, 0.0)
-    sizes = np.where(determined > 0, held / np.where(determined > 0, determined, 1.0), 0.0)
-    least, most = size / LARGEST_CHANGE, size * LARGEST_CHANGE
-    change = float(np.vdot(found.weights, found.weights).real / np.trace(found.inverse).real)
+    return next_sizes(found.sizes, held, determined, found.weights, found.inverse)
+
+
+def next_sizes(sizes: Sizes, held: Floats, determined: Floats, weights: Complexes, inverse: Complexes) -> Sizes:
+    """Sizes of functions that hold so much power `held` (C,) over numbers that the data have `determined` (C,); the
+    noise likewise, from K^-1 Y and K^-1. No size changes by more than LARGEST_CHANGE."""
+    found = np.where(determined > 0, held / np.where(determined > 0, determined, 1.0), 0.0)
+    least, most = sizes.functions / LARGEST_CHANGE, sizes.functions * LARGEST_CHANGE
+    change = float(np.vdot(weights, weights).real / np.trace(inverse).real)
     change = min(max(change, 1.0 / LARGEST_CHANGE), LARGEST_CHANGE)
-    return Sizes(np.clip(sizes, least, most), found.sizes.noise * change)
+    return Sizes(np.clip(found, least, most), sizes.noise * change)
 
 
 def _ties(equations: Equations) -> Floats:
     """Which columns (C, C) share a size: branches of nearly the same order, and all transients."""
     count, branches = equations.columns.shape[1], 2 * equations.harmonics + 1
-    order = np.arange(branches) - equations.harmonics
     ties = np.ones((count, count))
     ties[:branches, branches:] = ties[branches:, :branches] = 0.0
-    ties[:branches, :branches] = np.abs(order[:, None] - order) <= np.round(SHARED * np.abs(order))[:, None]
+    ties[:branches, :branches] = tied_orders(equations.harmonics)
     return ties
+
+
+def tied_orders(harmonics: int) -> Floats:
+    """Which of the branches -L..L (2L+1, 2L+1) share a size."""
+    order = np.arange(-harmonics, harmonics + 1)
+    return np.asarray(np.abs(order[:, None] - order) <= np.round(SHARED * np.abs(order))[:, None], dtype=float)
 
 
 def continued(equations: Equations, before: Sizes) -> Sizes:

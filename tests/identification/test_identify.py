@@ -289,6 +289,7 @@ def test_result_that_says_nothing_says_so() -> None:
         ({"band": (700.0, 3500.0)}, "leaves the excited band 2-2600 Hz"),
         ({"band": (1000.0, 1001.0)}, "at least 3"),
         ({"harmonics": 250}, "under-determined|sidebands"),
+        ({"harmonics": 100_000}, "harmonics = 100000 puts sidebands of .* at most [0-9]+ fit"),
     ],
 )
 def test_requests_beyond_the_record_are_refused(record: xr.Dataset, changes: dict, words: str) -> None:

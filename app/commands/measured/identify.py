@@ -37,6 +37,10 @@ def identify(
         Literal["auto", "polynomials", "smooth"],
         typer.Option("--branches", help="of lpm: polynomials in windows, smooth random functions, or the better"),
     ] = "auto",
+    at_mesh_hz: Annotated[
+        float | None,
+        typer.Option("--at-mesh-hz", help="of mesh-feedback: predict the response at this mesh frequency"),
+    ] = None,
     export: Annotated[
         list[Path] | None, typer.Option("--export", metavar="FILE", help="write it as .uff or .mat too; repeatable")
     ] = None,
@@ -51,8 +55,9 @@ def identify(
 
     _check_files(records, out, export or [], pictures)
     settings = gb.IdentificationSettings(
-        method=method, harmonics=harmonics, order=order, window=window, band=band_hz, branches=branches
-    )
+        method=method, harmonics=harmonics, order=order, window=window, band=band_hz, branches=branches,
+        mesh_frequency=at_mesh_hz,
+    )  # fmt: skip
     with Progress("identify") as progress:
         progress.step("reading")
         loaded = [gb.read_record(path) for path in records]

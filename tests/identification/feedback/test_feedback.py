@@ -1,6 +1,7 @@
 """Mesh feedback: its response against the exact ITF, its estimates against the rig that made the record."""
 
 import re
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -45,6 +46,37 @@ def record() -> xr.Dataset:
 def identified() -> xr.Dataset:
     settings = IdentificationSettings(method="mesh-feedback", harmonics=30, band=BAND, phases=64, step=4)
     return identify([noisy_record(0.01, 0.5)], settings)
+
+
+def test_the_response_at_another_mesh_frequency_is_predicted() -> None:
+    """Identified at 64 Hz, against the exact ITF at 150 Hz, from which the one at 64 Hz differs by most of itself."""
+    record = noisy_record(0.01, 0.5)
+    settings = IdentificationSettings(
+        method="mesh-feedback", harmonics=30, band=BAND, phases=64, step=10, mesh_frequency=150.0
+    )
+    found = identify([record], settings)
+    fast = replace(RIG, mesh_frequency=150.0)
+    exact, before = (exact_itf(rig.system(512), found.frequency.values, found.phase.values) for rig in (fast, RIG))
+    error = relative(itf(found).values, exact)
+    assert error < 0.02 and relative(before, exact) > 0.3
+    assert 0.5 < found.attrs["expected_error"] / error < 2.0
+    assert found.attrs["mesh_frequency"] == 150.0 and found.attrs["identified_at_mesh_frequency"] == 64.0
+    assert "predicted at 150 Hz mesh from a record at 64 Hz" in found.attrs["warnings"]
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"method": "lpm", "mesh_frequency": 100.0}, "mesh_frequency = 100 belongs to method 'mesh-feedback'"),
+        ({"mesh_frequency": -1.0}, "mesh_frequency = -1 Hz must be positive and finite"),
+        ({"mesh_frequency": float("nan")}, "mesh_frequency = nan Hz must be positive and finite"),
+        ({"mesh_frequency": 0.01}, "mesh_frequency = 0.01 Hz must be at least 0.5"),
+    ],
+)
+def test_mesh_frequencies_that_cannot_be_predicted_are_refused(changes: dict, words: str) -> None:
+    record = noisy_record(0.01, 0.125)
+    with pytest.raises(LpmError, match=words):
+        identify([record], IdentificationSettings(**{"method": "mesh-feedback", **changes}))
 
 
 def stiffness_and_damping(phases: int) -> tuple[np.ndarray, np.ndarray]:
