@@ -19,6 +19,7 @@ from gearbench.diagnosis.evidence.problem import Problem
 from gearbench.diagnosis.forces.condition import prepare
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.intake.signals import measured_channels, noise_of_mean
+from gearbench.diagnosis.output.fit import Optimum
 from gearbench.diagnosis.output.selection import Weighed, only, taken_out
 from gearbench.diagnosis.output.simulated import Simulated
 from gearbench.diagnosis.output.target import FITTED, Target, target_of
@@ -36,12 +37,14 @@ SEEN = 0.05
 @dataclass(frozen=True)
 class Closing:
     """What an effect closes of the judged record: nats gained, the largest factor by which the gap of some part grows
-    without it, that part in words (channel, kind of line or band), and the signals (channel -> (N,)) without it."""
+    without it, that part in words (channel, kind of line or band), the signals (channel -> (N,)) without it, and the
+    optimum that makes them."""
 
     gain: float
     growth: float
     part: tuple[str, str]
     without: Mapping[str, Array]
+    optimum: Optimum | None = None
 
     @property
     def due(self) -> bool:
@@ -53,7 +56,7 @@ class Closing:
 class Judged:
     """A selection on the judged record `measured`: `found` with the effects that are kept, what each closes by its
     hypothesis' name, the signals (channel -> (N,)) of the nominal rig, of the one without any of them and with all of
-    them, and what was entered but closes nothing."""
+    them, what was entered but closes nothing, and the lines of that record."""
 
     measured: Measurement
     found: Simulated
@@ -62,6 +65,7 @@ class Judged:
     plain: Mapping[str, Array]
     signals: Mapping[str, Array]
     dropped: tuple[Weighed, ...] = ()
+    target: Target | None = None
 
     @cached_property
     def sizes(self) -> dict[str, Sizes]:
@@ -148,17 +152,21 @@ def itself(problem: Problem, found: Simulated) -> Judged:
 def _closings(found: Simulated, target: Target, measured: Measurement) -> Judged:
     simulator, selection = found.simulator, found.selection
     signals = simulator.channels(selection.best.p, measured)
-    with_all = target.lines - target.gathered([signals])
     closings = {}
     for one in selection.entered:
-        without = simulator.channels(taken_out(simulator, selection, one).p, measured)
-        rest = target.lines - target.gathered([without])
-        gain = target.cost(rest) - target.cost(with_all)
-        growth, part = _growth(target, target.energies(rest), target.energies(with_all))
-        closings[one.hypothesis.name] = Closing(gain, growth, part, without)
+        optimum = taken_out(simulator, selection, one)
+        closing = closing_of(target, simulator.channels(optimum.p, measured), signals)
+        closings[one.hypothesis.name] = replace(closing, optimum=optimum)
     nothing = np.zeros(simulator.layout.size)
     nominal, plain = (simulator.channels(p, measured) for p in (nothing, selection.bare.p))
-    return Judged(measured, found, closings, nominal, plain, signals)
+    return Judged(measured, found, closings, nominal, plain, signals, target=target)
+
+
+def closing_of(target: Target, without: Mapping[str, Array], with_all: Mapping[str, Array]) -> Closing:
+    """What an effect closes of a record, from the signals (channel -> (N,)) of the rigs without and with it."""
+    rest, final = (target.lines - target.gathered([signals]) for signals in (without, with_all))
+    growth, part = _growth(target, target.energies(rest), target.energies(final))
+    return Closing(target.cost(rest) - target.cost(final), growth, part, without)
 
 
 def _growth(target: Target, without: Array, with_all: Array) -> tuple[float, tuple[str, str]]:
