@@ -12,7 +12,6 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from gearbench.bench.elastic.model import Reduced
-from gearbench.bench.elastic.rig import machine_for
 from gearbench.bench.elastic.run import Elastic, State, prepare_unseen, rest_of
 from gearbench.bench.elastic.together import under_ripple
 from gearbench.bench.errors import BenchError
@@ -22,20 +21,11 @@ from gearbench.bench.plan.workers import READY
 from gearbench.bench.protocol import Drive
 from gearbench.bench.record.remarks import beyond_model
 from gearbench.bench.record.sensors import repeated
-from gearbench.fem.motion.machine import Machine
+from gearbench.fem.motion.machine import STEADY, Course, Machine, make_machine
 from gearbench.fem.motion.transient import CHANNELS
 from gearbench.rig import Case
 
 Array = NDArray[np.float64]
-
-
-class Course(NamedTuple):
-    """A rotation as the equations of motion take it: instants (n,) [s], the driver's speed [rad/s] and its rotation
-    [rad] there."""
-
-    time: Array
-    speed: Array
-    angle: Array
 
 
 class Start(NamedTuple):
@@ -100,7 +90,8 @@ def _start(prepared: Elastic, given: Given) -> Start:
     phase = float(given.turning.cycles(np.array([-early / plan.sampling_rate]))[0])
     # At rest there is no course yet: it begins where the nominal rotation has that phase.
     step = rest_of(machine, mean, phase / plan.mesh_frequency)._replace(t=begin)
-    following = machine_for(prepared.elastic, plan.mesh_frequency, mean, 1.0, course)
+    e = prepared.elastic
+    following = make_machine(e.rig, e.pair, e.law, e.gears, e.bodies, plan.mesh_frequency, mean, course=course)
     return Start(following, State(-early, under_ripple(following, step), np.zeros(CHANNELS), begins=True), early)
 
 
@@ -117,7 +108,8 @@ def _course(given: Given, turning: Followed, early: int, substeps: int) -> tuple
     time = -early / plan.sampling_rate + half * np.arange(-2.0, 2 * substeps * samples)
     cycles, frequency = turning.cycles(time)[1::2], turning.frequency(time)[1::2]
     clock = half * np.arange(1.0, 2 * len(cycles), 2)
-    return Course(clock, 2 * pi / teeth * frequency, 2 * pi / teeth * cycles), 2 * half
+    turning_at = {"speed": 2 * pi / teeth * frequency, "angle": 2 * pi / teeth * cycles}
+    return STEADY._replace(time=clock, **turning_at), 2 * half
 
 
 def _settled(prepared: Elastic, drive: Drive, given: Given, start: Start) -> tuple[Array, float]:

@@ -62,15 +62,15 @@ def by_elements(judged: Judged, effects: bool, report: Report) -> ByElements:
         case = found.layout.case(p, judged.measured.name)
         return case, simulated_channels(judged.measured, elements.simulate(case, judged.measured.record))
 
-    def refitted(optimum: Optimum, words: str) -> Optimum:
+    def again(optimum: Optimum, words: str) -> Optimum:
         report(f"by finite elements: {words}")
-        return _refitted(elements, optimum, open_teeth)
+        return refitted(elements, optimum, open_teeth)
 
     report("by finite elements: the nominal rig")
     vectors = {"nominal": np.zeros(found.layout.size)}
     plain = selection.bare if named else selection.base
-    vectors["recalibrated"] = refitted(plain, "the recalibrated rig").p
-    best = refitted(selection.best, "with what was found") if named else None
+    vectors["recalibrated"] = again(plain, "the recalibrated rig").p
+    best = again(selection.best, "with what was found") if named else None
     if best is not None:
         vectors["with_effect"] = best.p
     answers = {stage: answered(p) for stage, p in vectors.items()}
@@ -78,7 +78,7 @@ def by_elements(judged: Judged, effects: bool, report: Report) -> ByElements:
     for name in named:
         optimum = judged.closings[name].optimum
         assert optimum is not None and judged.target is not None
-        without = answered(refitted(optimum, f"without {name}").p)[1]
+        without = answered(again(optimum, f"without {name}").p)[1]
         closings[name] = closing_of(judged.target, without, answers["with_effect"][1])
     lacks = tuple(dict.fromkeys(key for one in carried.values() for key in one.lacks))
     said = tuple(dict.fromkeys(word for one in carried.values() for word in one.said))
@@ -99,7 +99,7 @@ def _simulate(resonance: float, carried: dict[str, Carried]) -> Callable[[Case, 
     return simulate
 
 
-def _refitted(elements: Simulator, optimum: Optimum, open_teeth: bool) -> Optimum:
+def refitted(elements: Simulator, optimum: Optimum, open_teeth: bool) -> Optimum:
     """The optimum by finite elements near that of the lumped model; where none of its steps comes closer, itself."""
     unknowns, target = elements.layout.unknowns, elements.target
     p, sd = optimum.p.copy(), optimum.sd.copy()
@@ -112,8 +112,7 @@ def _refitted(elements: Simulator, optimum: Optimum, open_teeth: bool) -> Optimu
     lines = elements.lines(p)
     if lines is None:
         raise ValueError("finite elements cannot answer the records of the search with what the lumped model found")
-    jacobian = optimum.sensitivity.jacobian.copy()
-    jacobian[sd <= 0.0] = 0.0
+    jacobian = optimum.sensitivity.jacobian
     active = np.flatnonzero(np.abs(jacobian).max(axis=1) > 0.0)
     near = Sensitivity(jacobian, quadratic_of(target, target.lines - lines, jacobian, active))
     chosen = np.ones(p.size, dtype=bool)
