@@ -108,8 +108,7 @@ def _course(given: Given, turning: Followed, early: int, substeps: int) -> tuple
     time = -early / plan.sampling_rate + half * np.arange(-2.0, 2 * substeps * samples)
     cycles, frequency = turning.cycles(time)[1::2], turning.frequency(time)[1::2]
     clock = half * np.arange(1.0, 2 * len(cycles), 2)
-    turning_at = {"speed": 2 * pi / teeth * frequency, "angle": 2 * pi / teeth * cycles}
-    return STEADY._replace(time=clock, **turning_at), 2 * half
+    return STEADY._replace(time=clock, speed=2 * pi / teeth * frequency, angle=2 * pi / teeth * cycles), 2 * half
 
 
 def _settled(prepared: Elastic, drive: Drive, given: Given, start: Start) -> tuple[Array, float]:
