@@ -3,10 +3,10 @@
 `models`: the list of models; `protocol`: what a model is; `experiment`: one experiment, whatever the model;
 `realisations`, `finish`: its realisations and their record. `plan`:
 schedule, torque, settling and workers. `record`: what a record says of its rig, sensors. `refusals`: what cannot be
-asked for, found before work begins. `linear`, `nonlinear`, `elastic`, `full`: the models. `stress`: fields and root
-stress. `results`: frequency responses of cases, single numbers, comparisons. `export`: models for other programs.
-`study`: many members of one case, on processes or a cluster, and which factor decides.
-`conversion`: measured files become records.
+asked for, found before work begins. `linear`, `nonlinear`, `elastic`, `full`: the models. `replays`: records on the
+reduced one. `stress`: fields and root stress. `results`: frequency responses of cases, single numbers, comparisons.
+`export`: models for other programs. `study`: many members of one case, on processes or a cluster, and which factor
+decides. `conversion`: measured files become records.
 """
 
 from __future__ import annotations

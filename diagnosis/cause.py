@@ -46,7 +46,8 @@ Report = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Finding:
-    """What was found: fields of the verdict, the nominal case recalibrated and with the effects added."""
+    """What was found: fields of the verdict, the nominal case recalibrated and with the effects added; `judged`: what
+    simulation makes of the judged record, None where records cannot be simulated."""
 
     verdict: Outcome
     probability: dict[str, float]
@@ -65,6 +66,7 @@ class Finding:
     advice: tuple[str, ...] = ()
     evidence: dict[str, float] = field(default_factory=dict)
     audits: dict[str, tuple[float, ...]] = field(default_factory=dict)
+    judged: Judged | None = None
 
 
 def find_cause(
@@ -158,6 +160,7 @@ def _by_simulation(
             "changing": (changing,),
             "left": (judged.left, judged.remains),
         },
+        judged=judged,
         **common,
     )
 

@@ -10,11 +10,14 @@ import xarray as xr
 
 from gearbench.bench.refusals.effects import refuse_unknown
 from gearbench.bench.refusals.stated import check_springs, check_stated
+from gearbench.bench.replays.carried import damped_alike, mesh_damped_alike
 from gearbench.diagnosis.account import parts_of, sentences_of_gap
 from gearbench.diagnosis.advice import advice_of
 from gearbench.diagnosis.cause import Finding, find_cause
+from gearbench.diagnosis.confirmed import advice_on, confirmed_by_elements
 from gearbench.diagnosis.effects.library import CHANGING, LIBRARY
 from gearbench.diagnosis.errors import DiagnosisError
+from gearbench.diagnosis.forces.nominal import resonance_of
 from gearbench.diagnosis.intake.measurements import Measurement, held_out_of, intake
 from gearbench.diagnosis.intake.signals import simulated_channels
 from gearbench.diagnosis.odds import Calibration
@@ -23,8 +26,8 @@ from gearbench.diagnosis.replay.adjustable import Simulate, uncertain, variants
 from gearbench.diagnosis.replay.budget import budget
 from gearbench.diagnosis.replay.gap import gaps
 from gearbench.diagnosis.replay.replays import replays_of
-from gearbench.diagnosis.verdict import Gap, Probabilities, Share, Verdict
-from gearbench.rig import Case
+from gearbench.diagnosis.verdict import Confirmed, Gap, Probabilities, Share, Verdict
+from gearbench.rig import Case, Damping
 from gearbench.rig.contract import rank_of
 
 # What the next step is called.
@@ -34,18 +37,23 @@ Progress = Callable[[str], None]
 @dataclass(frozen=True)
 class Inputs:
     """Records taken in: those to diagnose from, the one that is held out, what is asked, and what the decision rests
-    on."""
+    on; of a nominal rig of finite elements the resonance [Hz] of what turns on the mesh, at which its damping holds."""
 
     nominal: Case
     measurements: tuple[Measurement, ...]
     held_out: Measurement | None
     without: tuple[str, ...] = ()
     known: Calibration = POPULATION
+    resonance: float | None = None
 
     @property
     def all(self) -> tuple[Measurement, ...]:
         """All measurements, the held-out one last."""
         return (*self.measurements, *([self.held_out] if self.held_out else []))
+
+    def damped(self, case: Case) -> Case:
+        """A case found, with the damping of the mesh said for the nominal rig's own model as well."""
+        return case if self.resonance is None else with_damping(case, damped_alike(case.rig.damping, self.resonance))
 
     @property
     def judged(self) -> Measurement:
@@ -82,13 +90,14 @@ def diagnose(
     without: Sequence[str] = (),
     progress: Progress | None = None,
     quick: bool = False,
+    confirm: bool = False,
 ) -> Diagnosis:
     """Where measured records and the nominal rig differ, what causes it, and how far the gap shrinks with it.
 
     `records`: one of each condition, files or datasets. `held_out` names the record that the result is judged by and
     not found from (absent: the one named "held-out", or of four or more the last); `without` leaves effects out of the
     library; `progress` is told the name of every step as it begins. `quick` leaves out the division of the gap by
-    channel, band and so on.
+    channel, band and so on. `confirm` asks the reduced finite-element model too, which takes one to some minutes.
 
     Raises DiagnosisError or RecordError, one sentence each, for records that cannot be diagnosed.
 
@@ -97,7 +106,8 @@ def diagnose(
     Traceback (most recent call last):
     gearbench.records.errors.RecordError: record none.nc does not exist
     """
-    return diagnosed(take_in(records, nominal, held_out=held_out, without=without), progress, quick=quick)
+    inputs = take_in(records, nominal, held_out=held_out, without=without)
+    return diagnosed(inputs, progress, quick=quick, confirm=confirm)
 
 
 def take_in(
@@ -117,7 +127,17 @@ def take_in(
         if name not in names:
             raise DiagnosisError(f"without = {name} is no effect of the library: {', '.join(names)}")
     rest, out = held_out_of(intake(records, nominal), held_out)
-    return Inputs(nominal, rest, out, tuple(dict.fromkeys(without)))
+    left = tuple(dict.fromkeys(without))
+    if nominal.simulation.model == "lumped":
+        return Inputs(nominal, rest, out, left)
+    resonance = resonance_of(nominal, rest)
+    nominal = with_damping(nominal, mesh_damped_alike(nominal.rig.damping, resonance))
+    return Inputs(nominal, rest, out, left, resonance=resonance)
+
+
+def with_damping(case: Case, damping: Damping) -> Case:
+    """The case with another damping."""
+    return case.model_copy(update={"rig": case.rig.model_copy(update={"damping": damping})})
 
 
 def on_finite_elements(nominal: Case) -> Case:
@@ -129,7 +149,9 @@ def on_finite_elements(nominal: Case) -> Case:
     return nominal.model_copy(update={"simulation": simulation})
 
 
-def diagnosed(inputs: Inputs, progress: Progress | None = None, *, quick: bool = False) -> Diagnosis:
+def diagnosed(
+    inputs: Inputs, progress: Progress | None = None, *, quick: bool = False, confirm: bool = False
+) -> Diagnosis:
     """The diagnosis of records that were taken in; arguments as in `diagnose`."""
     said = progress or (lambda step: None)
     simulate = replays_of(inputs.nominal, inputs.all)
@@ -137,13 +159,15 @@ def diagnosed(inputs: Inputs, progress: Progress | None = None, *, quick: bool =
     finding = find_cause(inputs.measurements, inputs.nominal, held_out=inputs.held_out, without=inputs.without,
                          known=inputs.known)  # fmt: skip
     said("how far the gap shrinks")
-    plain, improved = finding.recalibrated, finding.with_effect
+    plain = inputs.damped(finding.recalibrated)
+    improved = inputs.damped(finding.with_effect) if finding.with_effect is not None else None
     shrunk = gaps(inputs.nominal, plain, improved, inputs.judged, simulate=simulate)
     where = finding.where
     if not quick:
         said("where the gap is")
         where += _budget(inputs, simulate)
-    return Diagnosis(inputs, _verdict(inputs, finding, where, shrunk), plain, improved)
+    confirmed = confirmed_by_elements(finding.judged, finding.effects, said) if confirm else None
+    return Diagnosis(inputs, _verdict(inputs, finding, where, shrunk, confirmed), plain, improved)
 
 
 def _budget(inputs: Inputs, simulate: Simulate) -> tuple[Share, ...]:
@@ -153,8 +177,10 @@ def _budget(inputs: Inputs, simulate: Simulate) -> tuple[Share, ...]:
     return budget(measurements, simulated, nominal, moved)
 
 
-def _verdict(inputs: Inputs, finding: Finding, where: tuple[Share, ...], shrunk: tuple[Gap, ...]) -> Verdict:
-    advice = (*finding.advice, *advice_of(inputs.measurements, inputs.held_out))
+def _verdict(
+    inputs: Inputs, finding: Finding, where: tuple[Share, ...], shrunk: tuple[Gap, ...], confirmed: Confirmed | None
+) -> Verdict:
+    advice = (*finding.advice, *advice_of(inputs.measurements, inputs.held_out), *advice_on(confirmed))
     explained, remaining = parts_of(shrunk, finding.missing, finding.places)
     return Verdict(
         verdict=finding.verdict,
@@ -162,7 +188,7 @@ def _verdict(inputs: Inputs, finding: Finding, where: tuple[Share, ...], shrunk:
         effects=finding.effects,
         candidates=finding.candidates,
         place=finding.place,
-        because=(*finding.because, *sentences_of_gap(shrunk, remaining)),
+        because=(*finding.because, *sentences_of_gap(shrunk, remaining), *(confirmed.because if confirmed else ())),
         explained=explained,
         remainder=remaining,
         structure=finding.structure,
@@ -174,4 +200,5 @@ def _verdict(inputs: Inputs, finding: Finding, where: tuple[Share, ...], shrunk:
         held_out=inputs.held_out.name if inputs.held_out else None,
         indistinguishable=finding.indistinguishable,
         advice=tuple(dict.fromkeys(advice)),
+        confirmed=confirmed,
     )

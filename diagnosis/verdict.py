@@ -224,13 +224,37 @@ class Found(_Value):
     unit: str
 
 
+class Confirmation(_Value):
+    """How a named effect stands by finite elements: whether it is due there by the same rule, the largest factor by
+    which the gap of some part grows without it, nats that the judged record is more likely with it, and its parameters
+    as they are fitted there."""
+
+    name: Name
+    confirmed: bool
+    growth: NotNegative
+    gain: float
+    parameters: dict[Name, Parameter] = {}
+
+
+class Confirmed(_Value):
+    """What the reduced finite-element model says: the gap as in `gap`, the rigs fitted again by it, what it says of
+    each named effect, keys of the rig that it leaves out (`lacks`), and why in sentences. No gap: it could not
+    answer."""
+
+    model: Literal["reduced"] = "reduced"
+    gap: tuple[Gap, ...] = ()
+    effects: tuple[Confirmation, ...] = ()
+    lacks: tuple[Name, ...] = ()
+    because: tuple[str, ...] = ()
+
+
 class Verdict(_Value):
     """What a diagnosis hands back; the fields are those of verdict.json. `signs`: what its probabilities were read
     from, all without dimension: independent "lines", the largest sign of something "unknown" over its limit, parts of
     the gap and of a channel's fluctuation that remain ("left", "remains"; "searched": on the records of the search),
     what changes between repetitions over the gap ("changing"), and how far places stand out over what the population's
     sound rigs leave ("over mesh", ...).
-    `calibrated_on`: number of rigs behind probabilities and limits."""
+    `calibrated_on`: number of rigs behind probabilities and limits. `confirmed`: by finite elements, where asked."""
 
     schema_: Literal["gearbench-verdict/2"] = Field(SCHEMA, alias="schema")
     verdict: Outcome
@@ -250,6 +274,7 @@ class Verdict(_Value):
     advice: tuple[str, ...] = ()
     signs: dict[Name, float] = {}
     calibrated_on: Annotated[int, Field(ge=0)] | None = None
+    confirmed: Confirmed | None = None
 
     @model_validator(mode="after")
     def _agrees_with_itself(self) -> Verdict:
@@ -267,7 +292,7 @@ class Verdict(_Value):
 def verdict_json(verdict: Verdict) -> str:
     """The text of verdict.json: indented, keys in the order of the fields, ranges as lists."""
     tree = verdict.model_dump(mode="json", by_alias=True)
-    for gap in tree["gap"]:
+    for gap in (*tree["gap"], *(tree["confirmed"] or {}).get("gap", ())):
         for name in ("nominal", "recalibrated", "with_effect", "floor"):
             if gap[name] is not None:
                 gap[name] = list(gap[name].values())
@@ -363,6 +388,7 @@ _BELOW: dict[str, type[_Value]] = {
     "explained": Part,
     "remainder": Part,
     "structure": Found,
+    "confirmed": Confirmed,
 }
 
 

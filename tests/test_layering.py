@@ -39,8 +39,8 @@ ROOMS: dict[str, tuple[str, ...]] = {
     "fem": ("gear", "contact", "motion", "full", "stress"),
     "lumped": ("stiffness", "linear", "nonlinear"),
     "bench": (
-        *("plan", "record", "refusals", "linear", "elastic", "full", "nonlinear", "stress", "export", "results"),
-        "study",
+        *("plan", "record", "refusals", "linear", "elastic", "full", "nonlinear", "replays", "stress", "export"),
+        *("results", "study"),
     ),
     "identification": ("excitation", "spectra", "lpm", "smooth", "truth", "response", "feedback", "nonlinear"),
     "diagnosis": ("intake", "forces", "effects", "evidence", "replay", "output", "planning"),

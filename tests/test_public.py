@@ -26,7 +26,7 @@ FUNCTIONS: dict[str, tuple[str, ...]] = {
     ),
     "compare": ("a", "b"),
     "convert": ("files", "channel_map", "case", "condition", "progress"),
-    "diagnose": ("records", "nominal", "held_out", "without", "progress", "quick"),
+    "diagnose": ("records", "nominal", "held_out", "without", "progress", "quick", "confirm"),
     "dte": ("record",),
     "dump_case": ("case",),
     "force": ("record",),

@@ -67,6 +67,7 @@ def report_page(report: Report) -> str:
         *_because(verdict),
         *_parameters(verdict),
         *_how_far(report),
+        *_by_elements(verdict),
         *_candidates(verdict),
         *_where(report),
         *_limits(report),
@@ -127,6 +128,33 @@ def _how_far(report: Report) -> list[str]:
         *_pictures(report, ("waterfall", "gap", "traces")),
         _gap_table(main),
         folded("All channels and bands", _gap_table(gaps)) if rest else "",
+    ]
+
+
+def _by_elements(verdict: Verdict) -> list[str]:
+    told = verdict.confirmed
+    if told is None:
+        return []
+    rows = [
+        (
+            effects_in_words([one.name]),
+            "confirmed" if one.confirmed else "not confirmed",
+            f"{number(one.growth, 2)} times",
+            ", ".join(f"{parameter_in_words(one.name, name)} {' '.join(value_in_words(parameter)).strip()}"
+                      for name, parameter in one.parameters.items()) or "–",
+        )
+        for one in told.effects
+    ]  # fmt: skip
+    head = ("effect", "by finite elements", "gap without it, where most", "as fitted there")
+    return [
+        text("What finite elements say", "h2"),
+        text(
+            "The same rigs on the reduced finite-element model, each fitted again by it on the records of the search;"
+            " rms of measured minus simulated on the judged record."
+        ),
+        _gap_table([gap for gap in told.gap if gap in whole_band(told.gap)]) if told.gap else "",
+        table(head, rows) if rows else "",
+        items([]) if told.gap else items([f"{one[:1].upper()}{one[1:]}." for one in told.because]),
     ]
 
 

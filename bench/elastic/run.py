@@ -189,12 +189,22 @@ def rest_of(machine: Machine, torque: float, t: float) -> Step:
 
 
 def prepare(case: Case, plan: Schedule, note: Note) -> Elastic:
-    """Gears condensed, contact tabulated, step chosen. Raises GeometryError, ContactError or BenchError."""
+    """Gears condensed, contact tabulated, step chosen, and a look at rest. Raises GeometryError, ContactError or
+    BenchError."""
+    prepared = prepare_unseen(case, plan, note)
+    note("looking at rest")
+    check_rest(prepared.machine, prepared.dte, case.experiment.torque_mean, plan)
+    return prepared
+
+
+def prepare_unseen(case: Case, plan: Schedule, note: Note) -> Elastic:
+    """The same without the look at rest, which takes longer than all else once gears are condensed: for a rig close to
+    one that has been looked at."""
     elastic = elastic_rig(case.rig, case.simulation, note)
     duration = (plan.record_samples - 1) / plan.sampling_rate
     machine = machine_for(elastic, plan.mesh_frequency, case.experiment.torque_mean, duration, plan.rotation)
     substeps = choose_substeps(machine, case, plan)
-    prepared = Elastic(
+    return Elastic(
         elastic=elastic,
         machine=machine,
         scheme=make_scheme(1.0 / (plan.sampling_rate * substeps), case.simulation.spectral_radius),
@@ -205,6 +215,3 @@ def prepare(case: Case, plan: Schedule, note: Note) -> Elastic:
         teeth=case.simulation.outputs == "teeth",
         changes=plan.rotation is not None,
     )
-    note("looking at rest")
-    check_rest(machine, prepared.dte, case.experiment.torque_mean, plan)
-    return prepared

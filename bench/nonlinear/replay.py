@@ -11,12 +11,12 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from gearbench.bench.errors import BenchError
-from gearbench.bench.nonlinear.followed import followed, follows
+from gearbench.bench.nonlinear.followed import Followed, followed, follows
 from gearbench.bench.nonlinear.law_table import mesh_law
 from gearbench.bench.nonlinear.run import HEADROOM, Setup, make_setup
 from gearbench.bench.plan.schedule import Schedule, schedule
 from gearbench.bench.plan.settling import change
-from gearbench.bench.protocol import Drive
+from gearbench.bench.protocol import Channels, Drive
 from gearbench.bench.record.attributes import experiment_attributes, rig_attributes, shown_mean, turning_inertias
 from gearbench.bench.record.channels import mesh_phases, sensed, with_rotation
 from gearbench.bench.record.remarks import joined, lost_contact
@@ -34,24 +34,34 @@ TOLERANCE = 1e-4  # change of the DTE over its standard deviation from period to
 PERIODS_MAX = 6
 
 
+class Given(NamedTuple):
+    """What a record imposes on a rig: the case, its experiment being the record's; the schedule; mean torque on the rig
+    over one excitation period (samples,) [N m]; mesh frequency [Hz] and mesh phase [cycles] of the first sample; how
+    the driven gear turns, None where steadily; whether that phase is the nominal rotation's, else the driven gear's."""
+
+    case: Case
+    plan: Schedule
+    torque: Array
+    frequency: float
+    phase: float
+    turning: Followed | None
+    nominal: bool
+
+
 class Steady(NamedTuple):
-    """A rig in the steady motion of a record: its setup, what drives it, one repetition of outputs (samples, n), and
-    how steady that is; the record's mean torque on the rig over one excitation period, mesh frequency [Hz] and mesh
-    phase [cycles] of the first sample."""
+    """A rig in the steady motion of a record: its setup, what drives it, one repetition of outputs (samples, n), how
+    steady that is, and what the record imposes."""
 
     setup: Setup
     drive: Drive
     outputs: Array
     residual: float
-    plan: Schedule
-    torque: Array
-    frequency: float
-    phase: float
+    given: Given
 
 
-def steady_motion(case: Case, record: xr.Dataset, law: MeshLaw | None = None, realisation: int = 0) -> Steady:
-    """The steady motion of the case's rig under the record's torque, as its sensors would not show it; arguments and
-    refusals as those of `replay`."""
+def given_by(case: Case, record: xr.Dataset, realisation: int = 0) -> Given:
+    """What one realisation of a record imposes on the case's rig. Raises BenchError for a rig that does not let it act,
+    and for a record that says too little."""
     if case.rig.drive.boundary != "torque":
         raise BenchError(
             f'a replay imposes the recorded driver torque, which rig.drive.boundary = "{case.rig.drive.boundary}" does'
@@ -64,17 +74,24 @@ def steady_motion(case: Case, record: xr.Dataset, law: MeshLaw | None = None, re
     frequency, phase = _rotation(case, record, realisation)
     experiment = _experiment(case.experiment, torque, frequency, rate, samples, periods)
     case = case.model_copy(update={"experiment": experiment})
-    meshing = pair(case.rig)
-    law = law or mesh_law(case.rig, case.simulation, HEADROOM * float(np.abs(torque).max()))
     plan = schedule(experiment, case.rig)
     check_delays(case.rig, plan.wraps, plan.repeat_time)
     turning = None
     if follows(case.rig, record) and plan.repeat_periods == 1:
         turning = followed(case.rig, record, realisation, plan.cycles_per_sample, phase)
-    setup = make_setup(case, plan, law, phase, turning, nominal="mesh_phase" in record and turning is None)
-    drive = Drive(torque, resampled(torque, 2 * setup.substeps * samples) / meshing.driver.base_radius)
+    return Given(case, plan, torque, frequency, phase, turning, "mesh_phase" in record and turning is None)
+
+
+def steady_motion(case: Case, record: xr.Dataset, law: MeshLaw | None = None, realisation: int = 0) -> Steady:
+    """The steady motion of the case's rig under the record's torque, as its sensors would not show it; arguments and
+    refusals as those of `replay`."""
+    given = given_by(case, record, realisation)
+    case, torque = given.case, given.torque
+    law = law or mesh_law(case.rig, case.simulation, HEADROOM * float(np.abs(torque).max()))
+    setup = make_setup(case, given.plan, law, given.phase, given.turning, nominal=given.nominal)
+    drive = Drive(torque, resampled(torque, 2 * setup.substeps * torque.size) / setup.meshing.driver.base_radius)
     outputs, residual = _settled(setup, drive)
-    return Steady(setup, drive, outputs, residual, plan, torque, frequency, phase)
+    return Steady(setup, drive, outputs, residual, given)
 
 
 def replay(case: Case, record: xr.Dataset, law: MeshLaw | None = None, realisation: int = 0) -> xr.Dataset:
@@ -91,34 +108,47 @@ def replay(case: Case, record: xr.Dataset, law: MeshLaw | None = None, realisati
     returned with a warning. Raises BenchError for a record that says too little.
     """
     steady = steady_motion(case, record, law, realisation)
-    setup, outputs, residual, plan, phase = steady.setup, steady.outputs, steady.residual, steady.plan, steady.phase
-    meshing, samples = setup.meshing, plan.samples_per_period
-    applied = repeated(steady.torque, len(outputs))
-    swings = {**setup.channels(outputs, applied)._asdict(), "torque_driver": applied}
+    setup, outputs = steady.setup, steady.outputs
+    applied = repeated(steady.given.torque, len(outputs))
+    channels = setup.channels(outputs, applied)
     turned = 2 * np.pi * setup.departures(len(outputs))
-    swings["angle_driver"] = swings["angle_driver"] + turned / case.rig.driver.teeth
-    swings["angle_driven"] = swings["angle_driven"] + turned / case.rig.driven.teeth
+    channels = channels._replace(
+        torque_driver=applied,
+        angle_driver=channels.angle_driver + turned / case.rig.driver.teeth,
+        angle_driven=channels.angle_driven + turned / case.rig.driven.teeth,
+    )
+    about = {"model": "lumped", "mesh": "non-linear", "substeps": setup.substeps}
+    lost = int(setup.apart(outputs).sum())
+    return answer(steady.given, channels, steady.residual, lost, about)
+
+
+def answer(
+    given: Given, channels: Channels, residual: float, lost: int, about: dict[str, Any]
+) -> xr.Dataset:
+    """The record of a replay: `channels` (samples,) of the rig without its steady rotation, which still changed by
+    `residual` and lost contact in so many samples, as the rig's sensors show them without noise; `about` the model."""
+    case, plan, phase = given.case, given.plan, given.phase
+    meshing, samples = pair(case.rig), len(channels.dte)
+    swings = {name: values for name, values in channels._asdict().items() if name != "tooth_force"}
     rows = {name: values[None] for name, values in swings.items() if values is not None}
     quiet = case.rig.model_copy(update={"sensors": _quiet(case.rig.sensors)})
-    shown = sensed(rows, quiet, meshing, plan, samples=len(outputs), seed=0, first=phase)
+    shown = sensed(rows, quiet, meshing, plan, samples=samples, seed=0, first=phase)
     seen = with_rotation(shown, plan, phase)
-    seen["mesh_phase"] = mesh_phases(plan, len(outputs), phase)[None] + case.rig.sensors.mesh_phase_zero
+    seen["mesh_phase"] = mesh_phases(plan, samples, phase)[None] + case.rig.sensors.mesh_phase_zero
     unsettled = None if residual <= TOLERANCE else f"the DTE still changes by {residual:.3g} from period to period"
-    lost = int(setup.apart(outputs).sum())
     inertias = turning_inertias(case.rig, meshing)
     attributes = {
         **rig_attributes(case.rig, meshing),
-        **experiment_attributes(plan, len(outputs) // samples, shown_mean(case.rig, float(steady.torque.mean()))),
+        **experiment_attributes(plan, samples // plan.samples_per_period,
+                                shown_mean(case.rig, float(given.torque.mean()))),
         "inertia_driver": inertias[0],
         "inertia_driven": inertias[1],
-        "mesh_period": 1.0 / steady.frequency,
+        "mesh_period": 1.0 / given.frequency,
         "settling_residual": residual,
         "contact_lost_samples": lost,
-        "warnings": joined(lost_contact(lost, len(outputs)), unsettled),
-        "model": "lumped",
-        "mesh": "non-linear",
-        "substeps": setup.substeps,
-    }
+        "warnings": joined(lost_contact(lost, samples), unsettled),
+        **about,
+    }  # fmt: skip
     return make_record(seen, attributes)
 
 

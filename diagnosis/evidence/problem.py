@@ -13,7 +13,7 @@ from gearbench.diagnosis.forces.condition import Condition, prepare
 from gearbench.diagnosis.forces.covariance import EXCITED, Blocks, cut
 from gearbench.diagnosis.forces.equations import MESH, PLACES
 from gearbench.diagnosis.forces.mesh import corrected, mesh
-from gearbench.diagnosis.forces.nominal import NominalModel, nominal_model, table_load
+from gearbench.diagnosis.forces.nominal import NominalModel, model_for
 from gearbench.diagnosis.forces.residuals import assemble, carried_force
 from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.intake.measurements import Measurement
@@ -42,8 +42,7 @@ class Problem:
 
 def problem_of(measurements: Sequence[Measurement], nominal: Case) -> Problem:
     """The problem that the measurements pose to the nominal case."""
-    mean = float(np.mean([measured.mean("torque_driver").mean() for measured in measurements]))
-    model = nominal_model(nominal, table_load(measurements), mean)
+    model = model_for(nominal, measurements)
     band = max(excited_band(measured) for measured in measurements)
     conditions = tuple(prepare(measured, model, band) for measured in measurements)
     unknowns = all_unknowns(model, conditions)

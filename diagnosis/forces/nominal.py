@@ -173,6 +173,17 @@ def table_load(measurements: Sequence[Measurement]) -> float:
     return LOAD_MARGIN * max(float(np.abs(measured.mean("torque_driver")).max()) for measured in measurements)
 
 
+def model_for(nominal: Case, measurements: Sequence[Measurement]) -> NominalModel:
+    """The model of a nominal case that these measurements are of."""
+    mean = float(np.mean([measured.mean("torque_driver").mean() for measured in measurements]))
+    return nominal_model(nominal, table_load(measurements), mean)
+
+
+def resonance_of(nominal: Case, measurements: Sequence[Measurement]) -> float:
+    """Resonance [Hz] of the turning parts on the mesh, of a nominal case that these measurements are of."""
+    return model_for(nominal, measurements).resonance
+
+
 def _references(supports: tuple[Support, Support], force: float) -> tuple[float, float]:
     """Deflections [m] at which the secant stiffness is the stated one; under `force` [N] if the case says linear."""
     first, second = (s.reference_deflection if s.exponent else force / s.holding(1.0).stiffness for s in supports)

@@ -20,6 +20,7 @@ from gearbench.diagnosis.evidence.problem import Problem
 from gearbench.diagnosis.forces.condition import prepare
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.intake.signals import measured_channels, noise_of_mean
+from gearbench.diagnosis.output.fit import Optimum
 from gearbench.diagnosis.output.selection import Weighed, only, taken_out
 from gearbench.diagnosis.output.simulated import Simulated
 from gearbench.diagnosis.output.target import FITTED, Target, target_of
@@ -38,13 +39,14 @@ SEEN = 0.05
 class Closing:
     """What an effect closes of the judged record: nats gained, the largest factor by which the gap of some part grows
     without it, that part in words (channel, kind of line or band), the signals (channel -> (N,)) without it, and the
-    nats that the search lacked up to its limit, which are to be gained here besides."""
+    nats that the search lacked up to its limit, which are to be gained here besides, and the optimum without it."""
 
     gain: float
     growth: float
     part: tuple[str, str]
     without: Mapping[str, Array]
     lacking: float = 0.0
+    optimum: Optimum | None = None
 
     @property
     def due(self) -> bool:
@@ -56,7 +58,7 @@ class Closing:
 class Judged:
     """A selection on the judged record `measured`: `found` with the effects that are kept, what each closes by its
     hypothesis' name, the signals (channel -> (N,)) of the nominal rig, of the one without any of them and with all of
-    them, and what was entered but closes nothing."""
+    them, what was entered but closes nothing, and the lines of that record."""
 
     measured: Measurement
     found: Simulated
@@ -65,6 +67,7 @@ class Judged:
     plain: Mapping[str, Array]
     signals: Mapping[str, Array]
     dropped: tuple[Weighed, ...] = ()
+    target: Target | None = None
 
     @cached_property
     def sizes(self) -> dict[str, Sizes]:
@@ -164,20 +167,24 @@ def itself(problem: Problem, found: Simulated) -> Judged:
 def _closings(found: Simulated, target: Target, measured: Measurement) -> Judged:
     simulator, selection = found.simulator, found.selection
     signals = simulator.channels(selection.best.p, measured)
-    with_all = target.lines - target.gathered([signals])
     closings = {}
     # A record that had part in the search cannot make up for what it lacked.
     apart = not any(measured is searched for searched in simulator.target.measurements)
     for one in selection.entered:
-        without = simulator.channels(taken_out(simulator, selection, one).p, measured)
-        rest = target.lines - target.gathered([without])
-        gain = target.cost(rest) - target.cost(with_all)
-        growth, part = growth_of(target, target.energies(rest), target.energies(with_all))
+        optimum = taken_out(simulator, selection, one)
+        closing = closing_of(target, simulator.channels(optimum.p, measured), signals)
         lacking = inf if one.lacking and not apart else one.lacking
-        closings[one.hypothesis.name] = Closing(gain, growth, part, without, lacking)
+        closings[one.hypothesis.name] = replace(closing, optimum=optimum, lacking=lacking)
     nothing = np.zeros(simulator.layout.size)
     nominal, plain = (simulator.channels(p, measured) for p in (nothing, selection.bare.p))
-    return Judged(measured, found, closings, nominal, plain, signals)
+    return Judged(measured, found, closings, nominal, plain, signals, target=target)
+
+
+def closing_of(target: Target, without: Mapping[str, Array], with_all: Mapping[str, Array]) -> Closing:
+    """What an effect closes of a record, from the signals (channel -> (N,)) of the rigs without and with it."""
+    rest, final = (target.lines - target.gathered([signals]) for signals in (without, with_all))
+    growth, part = growth_of(target, target.energies(rest), target.energies(final))
+    return Closing(target.cost(rest) - target.cost(final), growth, part, without)
 
 
 def growth_of(target: Target, without: Array, with_all: Array) -> tuple[float, tuple[str, str]]:

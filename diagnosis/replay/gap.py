@@ -20,7 +20,7 @@ displacements and torque always. Elsewhere the mean is left out on both sides.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -75,13 +75,19 @@ def gaps(
         from gearbench.bench.nonlinear.replay import replay
 
         simulate = replay
-    repetitions = measured_channels(held_out)
     cases = [nominal, recalibrated, *([] if with_effect is None else [with_effect])]
     simulated = [simulated_channels(held_out, simulate(case, held_out.record)) for case in cases]
-    parts = bands(held_out)
+    return gaps_of(held_out, simulated, "angle_driven" if follows(nominal.rig, held_out.record) else None)
+
+
+def gaps_of(
+    held_out: Measurement, simulated: Sequence[Mapping[str, Array]], given: str | None = None
+) -> tuple[Gap, ...]:
+    """The same from channels (channel -> (N,)) that are simulated already: of the nominal rig, of the recalibrated one
+    and, where there is any, of the one with effects; `given`: the channel that replays take from the record."""
+    repetitions, parts = measured_channels(held_out), bands(held_out)
     shown = ((0.0, parts[-1][1]), *parts) if len(parts) > 1 else parts
     found = []
-    given = "angle_driven" if follows(nominal.rig, held_out.record) else None
     for channel in CHANNELS:
         if channel == given or channel not in repetitions or any(channel not in values for values in simulated):
             continue

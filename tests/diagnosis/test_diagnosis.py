@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 import xarray as xr
 from shared.fake_diagnosis import at_rest, friction_found
@@ -14,6 +15,7 @@ from gearbench.cases import case_files
 from gearbench.diagnosis import Diagnosis, DiagnosisError, diagnose
 from gearbench.diagnosis import diagnosis as module
 from gearbench.diagnosis.diagnosis import take_in
+from gearbench.diagnosis.forces.nominal import model_for
 from gearbench.rig import Case, read_case
 
 
@@ -81,6 +83,19 @@ def test_a_rig_of_finite_elements_is_replayed_on_their_law_and_what_no_replay_ha
     worn = demonstration(f"rig.driver.profile_slope_tooth_um={[1.0] * 19 + [0.0]}")
     with pytest.raises(BenchError, match=r"lumped model does not represent rig\.driver\.profile_slope_tooth_um"):
         take_in(sets(), worn)
+
+
+def test_replays_of_a_rig_of_finite_elements_have_the_damping_of_its_material() -> None:
+    """At the mesh's own resonance 2 zeta sqrt(k m) over k is the material's beta."""
+    damped = ("rig.damping.material_ratio=0.03", "rig.damping.material_frequency_hz=1000", "rig.damping.mesh_ratio=0.2")
+    inputs = take_in(sets(), demonstration('simulation.model="reduced"', *damped))
+    model = model_for(inputs.nominal, inputs.measurements)
+    beta = 0.03 / (np.pi * 1000.0)
+    wanted = 0.5 * beta * np.sqrt(model.mesh_stiffness / model.mesh_mass)
+    assert inputs.nominal.rig.damping.mesh_ratio == pytest.approx(wanted, rel=1e-6) != 0.2
+    assert inputs.damped(inputs.nominal).rig.damping.beta == pytest.approx(beta, rel=1e-9)
+    plain = take_in(sets(), demonstration(*damped))
+    assert plain.resonance is None and plain.damped(plain.nominal).rig.damping.mesh_ratio == 0.2
 
 
 def test_two_datasets_without_a_condition_get_names_of_their_own() -> None:

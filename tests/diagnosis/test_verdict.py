@@ -141,6 +141,7 @@ def test_what_is_written_is_the_specified_file(tmp_path: Path) -> None:
     tree = json.loads(path.read_text(encoding="utf-8"))
     # Two further keys tell the floors apart.
     assert tree["where"][0].pop("floor_noise") is None and tree["where"][0].pop("floor_nominal") is None
+    assert tree.pop("confirmed") is None  # finite elements were not asked
     # And two what probabilities were read from.
     assert tree.pop("signs") == {"lines": 400.0} and tree.pop("calibrated_on") == 12
     assert tree == TREE

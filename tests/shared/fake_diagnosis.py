@@ -32,6 +32,7 @@ class Finding:
     because: tuple[str, ...] = ("it was made by hand",)
     structure: tuple = ()
     missing: None = None
+    judged: None = None
     places: tuple[str, ...] = ()
     signs: dict[str, float] = field(default_factory=dict)
 

@@ -57,6 +57,14 @@ def diagnose(
             " dozen: some minutes, once for a rig and experiment); 0: from the population's",
         ),
     ] = 0,
+    confirm: Annotated[
+        bool,
+        typer.Option(
+            "--confirm/--no-confirm",
+            help="ask the reduced finite-element model too: the rigs are fitted again by it and answer the judged"
+            " record (one to some minutes)",
+        ),
+    ] = False,
     force: Annotated[
         bool, typer.Option("--force", help="replace what another diagnosis left in the folder")
     ] = False,
@@ -76,8 +84,8 @@ def diagnose(
         if calibrate:
             progress.step("calibrating on truth rigs around this one")
             inputs = replace(inputs, known=limits_of(inputs, calibrate, diagnose_case, progress))
-        with claimed(out, "diagnose", _identity(inputs), force) as output:
-            diagnosis = diagnosis_in(output, inputs, progress.step)
+        with claimed(out, "diagnose", _identity(inputs, confirm), force) as output:
+            diagnosis = diagnosis_in(output, inputs, progress.step, confirm)
             progress.step("report")
             write_report(diagnosis, output)
     if as_json:
@@ -90,7 +98,9 @@ def diagnose(
     typer.echo(f"{out}: report.html, verdict.json, updated.toml")
 
 
-def diagnosis_in(output: Output, inputs: Inputs, progress: Callable[[str], None]) -> Diagnosis:
+def diagnosis_in(
+    output: Output, inputs: Inputs, progress: Callable[[str], None], confirm: bool = False
+) -> Diagnosis:
     """The diagnosis that an earlier run left in the folder; else made, and written to it."""
     from gearbench.diagnosis.diagnosis import Diagnosis, diagnosed
     from gearbench.diagnosis.verdict import read_verdict, verdict_json
@@ -100,7 +110,7 @@ def diagnosis_in(output: Output, inputs: Inputs, progress: Callable[[str], None]
         verdict = read_verdict(output.path("verdict.json"))
         updated = read_case(output.path("updated.toml")) if verdict.verdict == "effects" else None
         return Diagnosis(inputs, verdict, read_case(output.path("recalibrated.toml")), updated)
-    made = diagnosed(inputs, progress)
+    made = diagnosed(inputs, progress, confirm=confirm)
     output.write("recalibrated.toml", partial(_write_case, made.recalibrated))
     output.write("updated.toml", partial(_write_case, made.updated))
     output.write_text("verdict.json", verdict_json(made.verdict))
@@ -174,13 +184,13 @@ def _about(inputs: Inputs) -> tuple[tuple[str, str], ...]:
     )
 
 
-def _identity(inputs: Inputs) -> str:
+def _identity(inputs: Inputs, confirm: bool = False) -> str:
     from gearbench.records.provenance import source_digest
     from gearbench.rig import dump_case
 
     held_out = inputs.held_out.name if inputs.held_out else ""
     parts = [dump_case(inputs.nominal), source_digest(), held_out, ",".join(sorted(inputs.without))]
-    parts.append(repr(inputs.known))
+    parts += [repr(inputs.known), *(["confirm"] if confirm else [])]
     return fingerprint(*parts, *(f"{one.path.name} {digest_of(one.path)}" for one in inputs.all if one.path))
 
 

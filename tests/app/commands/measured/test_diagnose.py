@@ -19,7 +19,7 @@ from gearbench.bench.results.compare_records import differences
 from gearbench.cli import run_command_line
 from gearbench.diagnosis import diagnosis as job
 from gearbench.diagnosis.diagnosis import take_in
-from gearbench.diagnosis.verdict import read_verdict
+from gearbench.diagnosis.verdict import Confirmation, Confirmed, read_verdict
 from gearbench.records import read_record
 from gearbench.report.html import bar, items, page, table, text
 from gearbench.rig import Case, read_case
@@ -221,6 +221,27 @@ def test_a_second_run_resumes_and_another_one_is_refused(
 
 
 @pytest.mark.validation
+def test_finite_elements_are_asked_on_demand_and_stand_in_verdict_and_report(
+    records: list[Path], tmp_path: Path, asked: dict, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    said = "Finite elements do not confirm friction"
+    told = Confirmed(effects=(Confirmation(name="friction", confirmed=False, growth=1.04, gain=0.5),), because=(said,))
+    monkeypatch.setattr(job, "confirmed_by_elements", lambda judged, effects, report: told)
+    out = tmp_path / "out"
+    assert run(records, out) == 0 and read_verdict(out / "verdict.json").confirmed is None
+    assert said not in capsys.readouterr().out
+    # Another question is another diagnosis.
+    assert run(records, out, "--confirm") == 2
+    assert run(records, out, "--confirm", "--force") == 0
+    verdict = read_verdict(out / "verdict.json")
+    assert verdict.confirmed == told and verdict.because[-1] == said
+    assert [effect.name for effect in verdict.effects] == ["friction"]
+    assert any(one.startswith("Do not act on friction between the flanks yet") for one in verdict.advice)
+    words = " ".join(page_of(out)[1].words)
+    assert "What finite elements say" in words and "not confirmed" in words and "1.0 times" in words
+    assert said in capsys.readouterr().out
+
+
 def test_a_lost_report_is_made_again_and_force_searches_anew(
     records: list[Path], done: tuple[Path, dict, str, str], tmp_path: Path, asked: dict
 ) -> None:

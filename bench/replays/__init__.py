@@ -1,0 +1,1 @@
+"""Replays of records on the reduced finite-element model."""

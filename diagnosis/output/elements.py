@@ -1,0 +1,120 @@
+"""What was found, answered by the reduced finite-element model: fitted again there, and judged by the same rule.
+
+The optimum of the lumped model has taken in what that model lacks of elements: bodies that shear, contact off the line
+of action. So the rig without effects and the one with them each go on from their optimum, on the records of the search,
+simulated by finite elements. Steps come from the lumped model's Jacobian: it only has to point downhill, as each step
+is simulated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from gearbench.bench.replays.carried import Carried, on_elements
+from gearbench.diagnosis.effects.backlash import KEY as BACKLASH
+from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
+from gearbench.diagnosis.intake.signals import simulated_channels
+from gearbench.diagnosis.output.fit import Optimum, Sensitivity, fit
+from gearbench.diagnosis.output.judged import Closing, Judged, closing_of
+from gearbench.diagnosis.output.quadratic import quadratic_of
+from gearbench.diagnosis.output.simulator import Simulator
+from gearbench.diagnosis.output.viscous import LOADED
+from gearbench.rig import Case
+
+Array = NDArray[np.float64]
+Report = Callable[[str], None]
+
+# Unknowns that stay as they are: the elements lack the first; the others change teeth, which would be meshed anew at
+# every step.
+HELD = (LOADED, BACKLASH, CRACK)
+
+
+@dataclass(frozen=True)
+class ByElements:
+    """What finite elements answer on the judged record: the rigs of the stages "nominal", "recalibrated" and, where an
+    effect is named, "with_effect", with their channels (channel -> (N,)); what each named effect closes, by its
+    hypothesis' name; the optimum with all of them, None where none is named; keys that the elements lack, and sentences
+    on what they have in another form."""
+
+    stages: Mapping[str, Case]
+    signals: Mapping[str, Mapping[str, Array]]
+    closings: Mapping[str, Closing] = field(default_factory=dict)
+    optimum: Optimum | None = None
+    lacks: tuple[str, ...] = ()
+    said: tuple[str, ...] = ()
+
+
+def by_elements(judged: Judged, effects: bool, report: Report) -> ByElements:
+    """The judged record answered by finite elements; `effects`: whether the verdict names any. Raises ValueError, one
+    sentence, for a rig that they cannot answer."""
+    found, selection = judged.found, judged.found.selection
+    named = [one.hypothesis.name for one in selection.entered] if effects else []
+    carried: dict[str, Carried] = {}
+    elements = Simulator(found.layout, found.simulator.target, _simulate(found.layout.model.resonance, carried))
+    open_teeth = any(one.hypothesis.wide[0].key == BACKLASH for one in selection.entered)
+
+    def answered(p: Array) -> tuple[Case, Mapping[str, Array]]:
+        case = found.layout.case(p, judged.measured.name)
+        return case, simulated_channels(judged.measured, elements.simulate(case, judged.measured.record))
+
+    def again(optimum: Optimum, words: str) -> Optimum:
+        report(f"by finite elements: {words}")
+        return refitted(elements, optimum, open_teeth)
+
+    report("by finite elements: the nominal rig")
+    vectors = {"nominal": np.zeros(found.layout.size)}
+    plain = selection.bare if named else selection.base
+    vectors["recalibrated"] = again(plain, "the recalibrated rig").p
+    best = again(selection.best, "with what was found") if named else None
+    if best is not None:
+        vectors["with_effect"] = best.p
+    answers = {stage: answered(p) for stage, p in vectors.items()}
+    closings = {}
+    for name in named:
+        optimum = judged.closings[name].optimum
+        assert optimum is not None and judged.target is not None
+        without = answered(again(optimum, f"without {name}").p)[1]
+        closings[name] = closing_of(judged.target, without, answers["with_effect"][1])
+    lacks = tuple(dict.fromkeys(key for one in carried.values() for key in one.lacks))
+    said = tuple(dict.fromkeys(word for one in carried.values() for word in one.said))
+    signals = {stage: shown for stage, (_, shown) in answers.items()}
+    return ByElements({stage: case for stage, (case, _) in answers.items()}, signals, closings, best, lacks, said)
+
+
+def _simulate(resonance: float, carried: dict[str, Carried]) -> Callable[[Case, xr.Dataset], xr.Dataset]:
+    """`simulate(case, record)` by finite elements; what it carried over is put into `carried`."""
+    # Its time loop is compiled on import, which not every user of this module wants.
+    from gearbench.bench.replays.reduced import replay
+
+    def simulate(case: Case, record: xr.Dataset) -> xr.Dataset:
+        one = on_elements(case, resonance)
+        carried["; ".join((*one.lacks, *one.said))] = one
+        return replay(one.case, record)
+
+    return simulate
+
+
+def refitted(elements: Simulator, optimum: Optimum, open_teeth: bool) -> Optimum:
+    """The optimum by finite elements near that of the lumped model; where none of its steps comes closer, itself."""
+    unknowns, target = elements.layout.unknowns, elements.target
+    p, sd = optimum.p.copy(), optimum.sd.copy()
+    for key in HELD:
+        if key in unknowns.slices:
+            sd[unknowns[key]] = 0.0
+            # What flanks that stay together never show is left at the nominal teeth.
+            if key == LOADED or (key == BACKLASH and not open_teeth):
+                p[unknowns[key]] = 0.0
+    lines = elements.lines(p)
+    if lines is None:
+        raise ValueError("finite elements cannot answer the records of the search with what the lumped model found")
+    jacobian = optimum.sensitivity.jacobian
+    active = np.flatnonzero(np.abs(jacobian).max(axis=1) > 0.0)
+    near = Sensitivity(jacobian, quadratic_of(target, target.lines - lines, jacobian, active))
+    chosen = np.ones(p.size, dtype=bool)
+    better = fit(elements, p, sd, near, renewals=0, chosen=chosen)
+    return better if better is not None else replace(optimum, p=p, sd=sd)
