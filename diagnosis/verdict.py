@@ -253,8 +253,7 @@ class Verdict(_Value):
     from, all without dimension: independent "lines", the largest sign of something "unknown" over its limit, parts of
     the gap and of a channel's fluctuation that remain ("left", "remains"; "searched": on the records of the search),
     what changes between repetitions over the gap ("changing"), and how far places stand out over what the population's
-    sound rigs leave ("over mesh", ...). `calibrated_on`: rigs behind probabilities and limits. `confirmed`: by finite
-    elements, where asked."""
+    sound rigs leave ("over mesh", ...). `calibrated_on`: rigs behind all that. `confirmed`: by finite elements."""
 
     schema_: Literal["gearbench-verdict/2"] = Field(SCHEMA, alias="schema")
     verdict: Outcome
