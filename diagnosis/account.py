@@ -127,6 +127,11 @@ def sentence_of_effect(noun: str, closing: Closing, share: float) -> str:
     channel, part = closing.part
     where = CHANNELS.get(channel, channel)
     lines = LINES.get(part, f"at {part} Hz")
+    if closing.record:
+        return (
+            f"Without {noun} the gap of the {where} {lines} is {number(closing.growth, 2)} times as large on record"
+            f" {closing.record}, whose flanks part; the judged record does not feel it"
+        )
     return (
         f"Without {noun} the gap of the {where} {lines} is {number(closing.growth, 2)} times as large; that is"
         f" {percent(share)} of the nominal rig's whole gap"

@@ -126,7 +126,7 @@ def _by_simulation(
 ) -> Finding:
     """The finding that simulation justifies."""
     entered = found.selection.entered
-    judged = judgement(of.problem, sized(seconded(found, of.result)), held_out)
+    judged = judgement(of.problem, sized(seconded(found, of.result)), held_out, of.measurements)
     found = judged.found
     missing = _missing(of, found)
     signs = {f"over {place}": float(over) for place, over in zip(PLACES, missing.over, strict=True)}
@@ -213,11 +213,13 @@ def with_rivals(groups: Sequence[tuple[str, ...]], named: Sequence[Weighed]) -> 
     return tuple(joined)
 
 
-def judgement(problem: Problem, found: Simulated, held_out: Measurement | None) -> Judged:
+def judgement(
+    problem: Problem, found: Simulated, held_out: Measurement | None, searched: Sequence[Measurement]
+) -> Judged:
     """What was found on the held-out record; without one that can be simulated, on the first record of the search."""
     judged = None
     if held_out is not None and held_out.phase_known:
-        judged = judged_on(problem, found, held_out)
+        judged = judged_on(problem, found, held_out, searched)
     return judged or itself(problem, found)
 
 

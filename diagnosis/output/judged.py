@@ -8,7 +8,7 @@ band, or in one kind of line.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf
@@ -23,6 +23,7 @@ from gearbench.diagnosis.intake.signals import measured_channels, noise_of_mean
 from gearbench.diagnosis.output.fit import Optimum
 from gearbench.diagnosis.output.selection import Weighed, only, taken_out
 from gearbench.diagnosis.output.simulated import Simulated
+from gearbench.diagnosis.output.simulator import Simulator
 from gearbench.diagnosis.output.target import FITTED, Target, target_of
 
 Array = NDArray[np.float64]
@@ -31,6 +32,8 @@ Array = NDArray[np.float64]
 DUE = 1.1
 # Nats by which the judged record must be more likely with it: odds of 20.
 GAIN = 3.0
+# Energy of what an effect changes over that of what is left, below which a record does not feel it.
+FELT = 0.1
 # Part of a channel's whole gap below which a part of it counts for nothing.
 SEEN = 0.05
 
@@ -39,7 +42,8 @@ SEEN = 0.05
 class Closing:
     """What an effect closes of the judged record: nats gained, the largest factor by which the gap of some part grows
     without it, that part in words (channel, kind of line or band), the signals (channel -> (N,)) without it, and the
-    nats that the search lacked up to its limit, which are to be gained here besides, and the optimum without it."""
+    nats that the search lacked up to its limit, which are to be gained here besides, the optimum without it, and the
+    `record` that tells where the judged one does not feel the effect."""
 
     gain: float
     growth: float
@@ -47,6 +51,7 @@ class Closing:
     without: Mapping[str, Array]
     lacking: float = 0.0
     optimum: Optimum | None = None
+    record: str = ""
 
     @property
     def due(self) -> bool:
@@ -136,14 +141,21 @@ class Sizes:
     noise: float
 
 
-def judged_on(problem: Problem, found: Simulated, measured: Measurement) -> Judged | None:
+def judged_on(
+    problem: Problem, found: Simulated, measured: Measurement, searched: Sequence[Measurement] = ()
+) -> Judged | None:
     """The selection with only those effects that close a part of the gap of `measured`; None where the rig found cannot
-    answer that record."""
-    target = target_of([measured], [prepare(measured, problem.model, problem.conditions[0].band)])
+    answer that record. Those of the records `searched` whose flanks part, which the fit leaves out, judge what
+    `measured` does not feel."""
+    band = problem.conditions[0].band
+    target = target_of([measured], [prepare(measured, problem.model, band)])
+    smooth = found.simulator.target.measurements
+    rough = [one for one in searched if not any(one is own for own in smooth)]
+    parted = [target_of([one], [prepare(one, problem.model, band)]) for one in rough]
     dropped: list[Weighed] = []
     while True:
         try:
-            judged = _closings(found, target, measured)
+            judged = _closings(found, target, measured, parted)
         except ValueError:
             return None
         poor = [one for one in found.selection.entered if not judged.closings[one.hypothesis.name].due]
@@ -164,7 +176,7 @@ def itself(problem: Problem, found: Simulated) -> Judged:
     return judged
 
 
-def _closings(found: Simulated, target: Target, measured: Measurement) -> Judged:
+def _closings(found: Simulated, target: Target, measured: Measurement, parted: Sequence[Target]) -> Judged:
     simulator, selection = found.simulator, found.selection
     signals = simulator.channels(selection.best.p, measured)
     closings = {}
@@ -174,10 +186,27 @@ def _closings(found: Simulated, target: Target, measured: Measurement) -> Judged
         optimum = taken_out(simulator, selection, one)
         closing = closing_of(target, simulator.channels(optimum.p, measured), signals)
         lacking = inf if one.lacking and not apart else one.lacking
+        if parted and not one.lacking and not feels(target, closing.without, signals):
+            told = [_closing_there(simulator, there, optimum.p, selection.best.p) for there in parted]
+            closing = replace(max(told, key=lambda there: there.gain), without=closing.without)
         closings[one.hypothesis.name] = replace(closing, optimum=optimum, lacking=lacking)
     nothing = np.zeros(simulator.layout.size)
     nominal, plain = (simulator.channels(p, measured) for p in (nothing, selection.bare.p))
     return Judged(measured, found, closings, nominal, plain, signals, target=target)
+
+
+def _closing_there(simulator: Simulator, target: Target, without: Array, with_all: Array) -> Closing:
+    """What unknowns `with_all` (size,) close beside those `without` (size,) of the one record of a target."""
+    (measured,) = target.measurements
+    signals = [simulator.channels(p, measured) for p in (without, with_all)]
+    return replace(closing_of(target, *signals), record=measured.name)
+
+
+def feels(target: Target, without: Mapping[str, Array], with_all: Mapping[str, Array]) -> bool:
+    """Whether a record can speak for or against an effect: some block's gap could grow by 5 % without it."""
+    one, other = (target.gathered([signals]) for signals in (without, with_all))
+    left = target.energies(target.lines - other) + target.noise
+    return bool((target.energies(one - other) > FELT * left).any())
 
 
 def closing_of(target: Target, without: Mapping[str, Array], with_all: Mapping[str, Array]) -> Closing:

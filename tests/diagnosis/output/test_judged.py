@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from shared.fake_simulator import LINES, FakeSimulator, chosen, sensitivities, target
 
+from gearbench.diagnosis.account import sentence_of_effect
 from gearbench.diagnosis.effects.effect import Hypothesis, Wide
 from gearbench.diagnosis.output import judged as module
 from gearbench.diagnosis.output.judged import GAIN, Judged, Sizes, judged_on, rms_closed
@@ -146,3 +147,45 @@ def test_parts_of_the_gap_are_energies_beyond_noise_in_units_of_each_channel(mon
     assert made.share(final) == 0.0
     value, low, high = rms_closed(None, "dte", half["dte"], final["dte"])  # type: ignore[arg-type]
     assert low < value < high < 1.1 * value and value == pytest.approx(np.sqrt(0.15) * gap["dte"].std(), rel=1e-6)
+
+
+class Blind(Answering):
+    """A judged record that does not feel friction, and one whose flanks part, which the fit leaves out."""
+
+    def channels(self, p: np.ndarray, measured: Any) -> dict[str, np.ndarray]:
+        return {"lines": p @ SEEN_BY[measured.name], "dte": np.zeros(8)}
+
+
+SEEN_BY = {"held-out": np.where(np.arange(8)[:, None] == 3, 0.0, OTHER), "light": sensitivities(9)}
+HELD, LIGHT = (SimpleNamespace(name=name) for name in SEEN_BY)
+
+
+@pytest.mark.parametrize(("light", "named"), [(0.4, ["friction"]), (0.0, [])])
+def test_what_the_judged_record_does_not_feel_is_told_by_one_whose_flanks_part(
+    light: float, named: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    p, q = BACKGROUND.copy(), BACKGROUND.copy()
+    p[3], q[3] = 0.4, light
+    simulator = Blind(lambda one: one @ MATRIX, target(noisy(p @ MATRIX, 11)))
+    simulator.layout.size = 8
+    selection = chosen(simulator, (FRICTION, RIPPLE), [np.zeros(8)], {}, apart=True)
+    assert selection is not None and names(selection.entered) == ["friction"]
+
+    def of_record(measurements: Sequence[Any], conditions: Sequence[Any]) -> OfLines:
+        plain = target(noisy(q @ SEEN_BY[measurements[0].name], 12))
+        given = {one.name: getattr(plain, one.name) for one in fields(plain)}
+        return OfLines(**(given | {"measurements": tuple(measurements)}))
+
+    monkeypatch.setattr(module, "target_of", of_record)
+    monkeypatch.setattr(module, "prepare", lambda measured, model, band: None)
+    problem: Any = SimpleNamespace(model=None, conditions=[SimpleNamespace(band=1.0)])
+    layout: Any = simulator.layout
+    whole: Any = Simulated(layout, simulator, selection, selection.best.std)  # type: ignore[arg-type]
+    held, rough = HELD, LIGHT
+    assert names(judged_on(problem, whole, held).found.selection.entered) == []  # type: ignore[arg-type, union-attr]
+    found = judged_on(problem, whole, held, (rough,))  # type: ignore[arg-type]
+    assert found is not None and names(found.found.selection.entered) == named
+    if named:
+        closing = found.closings["friction"]
+        assert closing.record == "light" and closing.growth > 0.4 / 0.02
+        assert "on record light" in sentence_of_effect("friction", closing, 0.0)
