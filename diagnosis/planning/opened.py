@@ -6,10 +6,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.diagnosis.effects.backlash import KEY
+from gearbench.diagnosis.effects.backlash import BACKLASH, KEY
+from gearbench.diagnosis.evidence.calibration import LIMITS
 from gearbench.diagnosis.forces.condition import Condition
 from gearbench.diagnosis.intake.measurements import Measurement
-from gearbench.diagnosis.output.judged import DUE, GAIN, growth_of
+from gearbench.diagnosis.output.judged import DUE, FELT, GAIN, growth_of
 from gearbench.diagnosis.output.selection import LIMIT
 from gearbench.diagnosis.output.simulated import SPACING
 from gearbench.diagnosis.output.simulator import Simulator
@@ -30,17 +31,23 @@ def smallest_backlash(plan: Planned, left: float) -> tuple[float, float] | None:
         return None
     rough = _Changed(plan, [_condition(plan, number) for number in plan.rough], left)
     judged = _Changed(plan, [plan.judged], left)
-    wide = float(plan.layout.unknowns.group(KEY).wide[0])
+    group = plan.layout.unknowns.group(KEY)
+    wide, good = float(group.wide[0]), float(group.sd[0])
 
     def named(size: float) -> bool:
         occam = max(float(np.log(1.0 / (SPACING * size))), 0.0) + 0.5 * size**2
         if rough.gain(size * wide) - occam < LIMIT:
             return False
-        return judged.gain(size * wide) > GAIN and judged.growth(size * wide) > DUE
+        # What the judged record does not feel is judged by those whose flanks part.
+        telling = judged if judged.feels(size * wide) else rough
+        return telling.gain(size * wide) > GAIN and telling.growth(size * wide) > DUE
 
-    low, high = LEAST, MOST
+    # As much as a good rig has is not named, however well it shows.
+    low, high = max(LEAST, LIMITS.size_of(BACKLASH) * good / wide), MOST
     if not named(high):
         return None
+    if named(low):
+        return low * wide, SPACING * low * wide
     for _ in range(HALVINGS):
         middle = float(np.sqrt(low * high))
         low, high = (low, middle) if named(middle) else (middle, high)
@@ -73,6 +80,10 @@ class _Changed:
     def gain(self, more: float) -> float:
         """Nats that it costs to leave the backlash out."""
         return float(np.sum(self.target.counts * np.log1p(self.energies(more) / self.floors)))
+
+    def feels(self, more: float) -> bool:
+        """Whether the records would change beside what is left of them."""
+        return bool((self.energies(more) > FELT * self.floors).any())
 
     def growth(self, more: float) -> float:
         """By how much the gap of some part grows without it."""
