@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
 from gearbench.diagnosis.output.beginning import Around, beginning
 from gearbench.diagnosis.output.fit import Optimum, fit, sensitivity_of
-from gearbench.diagnosis.output.restructured import begun_at_nominal, better, is_close, restructured
+from gearbench.diagnosis.output.restructured import better, is_close, restructured
 from gearbench.diagnosis.output.simulator import Simulator
 
 Array = NDArray[np.float64]
@@ -35,8 +35,7 @@ def background(
     # What the force residuals make of a rig beside a large effect can lead astray: then from the nominal one.
     if not is_close(simulator, base):
         base = better(base, _fitted(simulator, beginnings[:1], around, sd))
-    base = restructured(simulator, base, around, report)
-    return begun_at_nominal(simulator, base, np.zeros(len(sd), dtype=bool))
+    return restructured(simulator, base, around, report)
 
 
 def _fitted(
