@@ -9,6 +9,12 @@ from gearbench.diagnosis.intake.measurements import Measurement
 # Mean torques or speeds further apart than this ratio are two.
 APART = 1.1
 
+PARTED = (
+    "Add a record whose flanks stay together, under a heavier load or a smaller swing of the torque: they part in every"
+    " record to search from, or the nominal rig does not settle there, so that no simulation can follow these and the"
+    " force residuals decide alone."
+)
+
 
 def advice_of(measurements: Sequence[Measurement], held_out: Measurement | None) -> tuple[str, ...]:
     """Sentences about what these records lack; none if they hold all that diagnosis can use."""

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.diagnosis.account import places_of, sentence_of_effect, sentence_of_rivals
+from gearbench.diagnosis.advice import PARTED
 from gearbench.diagnosis.chances import chances_of
 from gearbench.diagnosis.effects.effect import Fitted, Hypothesis, added
 from gearbench.diagnosis.effects.recalibrated import recalibrated
@@ -101,6 +102,8 @@ def find_cause(
         silent = missing_by_equation(problem, fit)
         common["where"] = _places(problem, result.base)
         common["audits"] = {"silent": tuple(silent), "unsteady": tuple(unsteady)}
+        if all(one.phase_known for one in measurements):
+            common["advice"] = (PARTED,)
         return _by_forces_alone(problem, nominal, result, decide(result, silent, unsteady), known, common)
     report("judging")
     searched = Searched(problem, nominal, tuple(measurements), result, fit, unsteady, tuple(without))

@@ -68,8 +68,8 @@ def simulated(
     *,
     apart: bool = False,
 ) -> Simulated | None:
-    """Which effects the records call for, by simulation; None where the nominal rig cannot be simulated at all, or
-    records do not tell the mesh phase. `apart`: another record judges what enters."""
+    """Which effects the records call for, by simulation; None where the nominal rig cannot be simulated at all, records
+    do not tell the mesh phase, or flanks part in all of them. `apart`: another record judges what enters."""
     smooth = smooth_records(nominal, measurements, simulate)
     if not smooth:
         return None
@@ -145,7 +145,15 @@ def _opened(simulator: Simulator, selection: Selection, start: Start, apart: boo
 
 
 def smooth_records(nominal: Case, measurements: Sequence[Measurement], simulate: Simulate) -> list[int]:
-    """Numbers of the records whose flanks stay together on the nominal rig; if all part, of the one that does least."""
+    """Numbers of the records whose flanks stay together on the nominal rig: elsewhere small changes make jumps, so that
+    no fit can follow them."""
+    lost = lost_contact(nominal, measurements, simulate)
+    return [number for number, part in enumerate(lost) if part < LOSING]
+
+
+def lost_contact(nominal: Case, measurements: Sequence[Measurement], simulate: Simulate) -> list[float]:
+    """Part of the time that the flanks of the nominal rig are apart in each record; empty where it cannot be simulated
+    in one of them, or one does not tell the mesh phase."""
     if not all(one.phase_known for one in measurements):
         return []
     lost = []
@@ -156,8 +164,7 @@ def smooth_records(nominal: Case, measurements: Sequence[Measurement], simulate:
             return []
         samples = max(int(np.prod(steady["time"].shape)), 1)
         lost.append(float(steady.attrs.get("contact_lost_samples", 0)) / samples)
-    smooth = [number for number, part in enumerate(lost) if part < LOSING]
-    return smooth or [int(np.argmin(lost))]
+    return lost
 
 
 def carried_over(layout: Layout, unknowns: Unknowns, p: Array) -> Array:

@@ -10,6 +10,7 @@ import xarray as xr
 from gearbench.bench.conditions import simulate_all
 from gearbench.bench.readiness import check_timing
 from gearbench.diagnosis.diagnosis import Inputs, on_finite_elements, take_in
+from gearbench.diagnosis.errors import DiagnosisError
 from gearbench.diagnosis.evidence.problem import Problem, problem_of
 from gearbench.diagnosis.forces.condition import Condition, prepare
 from gearbench.diagnosis.intake.measurements import Measurement
@@ -67,6 +68,11 @@ def planned(case: Case, report: Report = lambda step: None, held_out: str | None
     problem = problem_of(inputs.measurements, inputs.nominal)
     simulate = replays_of(inputs.nominal, inputs.all)
     smooth = smooth_records(inputs.nominal, inputs.measurements, simulate)
+    if not smooth:
+        raise DiagnosisError(
+            f"{nominal.name}: flanks part in all {len(inputs.measurements)} records to search from, where nothing can"
+            " be read off a derivative: plan one under a heavier torque_mean_nm or a smaller multisine"
+        )
     # One tooth of each gear for all of them.
     layout = layout_of(inputs.nominal, problem.model, problem.conditions, (0, problem.model.teeth[0]))
     return Planned(inputs, problem, layout, simulate, tuple(smooth))

@@ -1,0 +1,37 @@
+"""Which records a fit can follow: those whose flanks stay together on the nominal rig."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from gearbench.diagnosis.output.simulated import LOSING, lost_contact, smooth_records
+
+
+def answer(case: Any, record: int | None) -> xr.Dataset:
+    """A replay of 1000 samples, in so many of which flanks are apart; none for None."""
+    if record is None:
+        raise ValueError("it does not settle")
+    return xr.Dataset(coords={"time": np.arange(1000.0)}, attrs={"contact_lost_samples": record})
+
+
+@pytest.mark.parametrize(
+    ("lost", "smooth"),
+    [([0, 300, 5], [0, 2]), ([300, 40, 200], []), ([0, None], []), ([], [])],
+)
+def test_records_whose_flanks_stay_together_are_followed(lost: list[int | None], smooth: list[int]) -> None:
+    records: Any = [SimpleNamespace(phase_known=True, record=one) for one in lost]
+    nominal: Any = None
+    assert smooth_records(nominal, records, answer) == smooth  # type: ignore[arg-type]
+    parts = lost_contact(nominal, records, answer)  # type: ignore[arg-type]
+    assert parts == ([] if None in lost else [one / 1000 for one in lost if one is not None])
+    assert all(parts[number] < LOSING for number in smooth)
+
+
+def test_records_without_a_mesh_phase_are_not_simulated() -> None:
+    records: Any = [SimpleNamespace(phase_known=False, record=None)]
+    assert lost_contact(None, records, answer) == []  # type: ignore[arg-type]
