@@ -32,6 +32,9 @@ Array = NDArray[np.float64]
 DUE = 1.1
 # Nats by which the judged record must be more likely with it: odds of 20.
 GAIN = 3.0
+# Of the nominal gap, rms over rms and all channels in units of their own fluctuation: more than this part left is "the
+# greater part".
+GREATER = 0.5
 # Energy of what an effect changes over that of what is left, below which a record does not feel it.
 FELT = 0.1
 # Part of a channel's whole gap below which a part of it counts for nothing.
@@ -158,7 +161,7 @@ def judged_on(
             judged = _closings(found, target, measured, parted)
         except ValueError:
             return None
-        poor = [one for one in found.selection.entered if not judged.closings[one.hypothesis.name].due]
+        poor = [one for one in found.selection.entered if not _stays(judged, one)]
         if not poor:
             return replace(judged, dropped=tuple(dropped))
         worst = min(poor, key=lambda one: judged.closings[one.hypothesis.name].gain)
@@ -166,6 +169,12 @@ def judged_on(
         dropped.append(worst)
         selection = only(found.simulator, found.selection, kept)
         found = replace(found, selection=selection, std=selection.best.std)
+
+
+def _stays(judged: Judged, one: Weighed) -> bool:
+    """Whether an effect is due; weak evidence is nothing to go by where the greater part is not explained."""
+    closing = judged.closings[one.hypothesis.name]
+    return closing.due and not (closing.lacking and judged.left > GREATER)
 
 
 def itself(problem: Problem, found: Simulated) -> Judged:

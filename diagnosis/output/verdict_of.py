@@ -13,7 +13,7 @@ from gearbench.diagnosis.evidence.search import Search
 from gearbench.diagnosis.forces.equations import PLACES
 from gearbench.diagnosis.odds import Calibration
 from gearbench.diagnosis.output.drift import Drift
-from gearbench.diagnosis.output.judged import Judged
+from gearbench.diagnosis.output.judged import GREATER, Judged
 from gearbench.diagnosis.output.missing import Missing
 from gearbench.diagnosis.output.selection import Weighed
 from gearbench.diagnosis.output.simulated import Simulated
@@ -24,9 +24,6 @@ from gearbench.rig.contract import Place
 
 Array = NDArray[np.float64]
 
-# Of the nominal gap, rms over rms and all channels in units of their own fluctuation: more than this part left is "the
-# greater part".
-GREATER = 0.5
 # Of what sound rigs leave of a channel's fluctuation at most: from there on a place can stand out, and a form without a
 # name outbid an effect.
 VISIBLE = 0.5

@@ -14,7 +14,7 @@ from shared.fake_simulator import LINES, FakeSimulator, chosen, sensitivities, t
 from gearbench.diagnosis.account import sentence_of_effect
 from gearbench.diagnosis.effects.effect import Hypothesis, Wide
 from gearbench.diagnosis.output import judged as module
-from gearbench.diagnosis.output.judged import GAIN, Judged, Sizes, judged_on, rms_closed
+from gearbench.diagnosis.output.judged import GAIN, GREATER, Judged, Sizes, judged_on, rms_closed
 from gearbench.diagnosis.output.selection import LIMIT, PROVISIONAL, Selection
 from gearbench.diagnosis.output.simulated import Simulated
 from gearbench.diagnosis.output.target import Target
@@ -44,9 +44,16 @@ def noisy(lines: np.ndarray, seed: int) -> np.ndarray:
 
 
 def judged(
-    searched: dict[int, float], there: dict[int, float], monkeypatch: pytest.MonkeyPatch, *, apart: bool = False
+    searched: dict[int, float],
+    there: dict[int, float],
+    monkeypatch: pytest.MonkeyPatch,
+    *,
+    apart: bool = False,
+    left: float = 0.05,
 ) -> Judged:
-    """Effects of these sizes in the records of the search, and in the judged one, which is waited for (`apart`)."""
+    """Effects of these sizes in the records of the search, and in the judged one, which is waited for (`apart`); so
+    much of the nominal gap is `left`."""
+    monkeypatch.setattr(Judged, "left", left)
     p, q = BACKGROUND.copy(), BACKGROUND.copy()
     for number, value in searched.items():
         p[number] = value
@@ -111,6 +118,9 @@ def test_what_weak_evidence_lacks_is_made_up_for_on_the_judged_record(monkeypatc
     assert closing.due and not replace(closing, gain=GAIN + 0.5 * one.lacking).due
     none = judged(weak, {}, monkeypatch, apart=True)
     assert names(none.dropped) == ["friction"] and not none.found.selection.entered
+    # In a rig of which the greater part is not explained it is nothing to go by.
+    assert names(judged(weak, weak, monkeypatch, apart=True, left=1.1 * GREATER).dropped) == ["friction"]
+    assert not judged({3: 0.4}, {3: 0.4}, monkeypatch, apart=True, left=1.1 * GREATER).dropped
 
 
 def test_a_record_of_the_search_makes_up_for_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
