@@ -98,6 +98,7 @@ def _about_fit(found: Feedback, spectra: Spectra, ratio: float) -> dict[str, Any
     own = found.data.mesh_lines * spectra.spacing
     predicted = {} if ratio == 1.0 else {"mesh_frequency": own * ratio, "identified_at_mesh_frequency": own}
     return predicted | {
+        "form": "centres from angles" if found.model.torsional else "dte",
         "mesh_harmonics": found.model.harmonics,
         "pole_pairs": found.model.basis.pairs.shape[0],
         "unknowns": found.model.vector().size,
