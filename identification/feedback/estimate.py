@@ -79,41 +79,53 @@ def mesh_feedback(
     part = fewer_classes(data, SEARCHED)
     first = first_model(part, Splines(intervals), count)
     splines = refined(first, part, ROUGH_SETTLED)
-    best = _with_poles(first, splines, part, report)
+    tried = _with_poles(first, splines, part, report)
+    best = _least(tried, part)
     if spectra.angle_only:
-        other = with_centres(splines, part, report)
+        other = with_centres(tried, part, report)
         best = min((best, other), key=lambda fit: criterion(fit, part))
     report(1.0, "mesh feedback: last rounds")
     return Feedback(data, settled_covariance(refined(best.model, data), data))
 
 
-def _with_poles(first: Model, splines: Refined, part: ClassData, report: Progress) -> Refined:
-    """The fit of least criterion among the `splines` and partial fractions of ever more poles."""
-    best = splines
+def _least(tried: list[Refined], part: ClassData) -> Refined:
+    """The fit of least criterion; further ones must improve it by GAIN."""
+    best = tried[0]
+    for fit in tried[1:]:
+        if criterion(fit, part) < criterion(best, part) - GAIN:
+            best = fit
+    return best
+
+
+def _with_poles(first: Model, splines: Refined, part: ClassData, report: Progress) -> list[Refined]:
+    """The `splines`, and partial fractions of ever more poles as long as the criterion falls."""
+    best, tried = splines, [splines]
     for pairs in range(1, PAIRS + 1):
         report(pairs / (PAIRS + 1), f"mesh feedback: {pairs} pair(s) of poles")
         found = isinstance(best.model.basis, Fractions)
         trial = refined(further(best.model, part) if found else begin(first, splines, part, pairs), part, COMPARED)
+        tried.append(trial)
         if criterion(trial, part) < criterion(best, part) - GAIN:
             best = trial
         elif found:
             break
-    return best
+    return tried
 
 
-def with_centres(splines: Refined, part: ClassData, report: Progress) -> Refined:
-    """The fit of least criterion that shows N Y + E U, as angles do of a rig whose centres move, from the `splines` of
-    the form without E: splines again, then partial fractions of ever more poles.
+def with_centres(tried: list[Refined], part: ClassData, report: Progress) -> Refined:
+    """The fit of least criterion that shows N Y + E U, as angles do of a rig whose centres move, from the fits `tried`
+    of the form without E: splines again, then partial fractions of ever more poles.
 
-    Poles that are added one at a time end in poor minima here, as E takes what the first pair does not explain; those
-    of the splines do not. Both are refined.
+    Poles that are added one at a time may end in poor minima, as E takes what the first pair does not explain. Hence
+    those of the splines, and of the fits without E, are refined beside them.
     """
-    model = splines.model
+    model = tried[0].model
     none = np.zeros_like(model.n)
     rough = best = refined(Model(model.basis, model.d, model.n, model.k, model.c, none), part, CENTRES_SETTLED)
     for pairs in range(1, PAIRS + 1):
         report(pairs / (PAIRS + 1), f"mesh feedback from angles: {pairs} pair(s) of poles")
         begun = [rational(rough, part, pairs)]
+        begun += [_halfway(fit.model) for fit in tried if fit.model.basis.pairs.shape[0] == pairs]
         found = isinstance(best.model.basis, Fractions)
         if found:
             begun.append(min(extended(best.model, part), key=lambda model: output_error(model, part)))
@@ -123,6 +135,13 @@ def with_centres(splines: Refined, part: ClassData, report: Progress) -> Refined
         elif found:
             break
     return best
+
+
+def _halfway(model: Model) -> Model:
+    """With N midway between 1 and that of a form without E, in partial fractions: about its root, as N comes twice."""
+    n = 0.5 * model.n
+    n[0] += 0.5
+    return Model(model.basis, model.d, n, model.k, model.c, np.zeros_like(n))
 
 
 def _too_short(spectra: Spectra, excited: int, unknowns: int, equations: float) -> str:

@@ -123,6 +123,11 @@ def _doubts(
     notes = [*_predicted(found.data.mesh_lines * spectra.spacing, ratio), *doubt_of(apart, variance)]
     if not spectra.steady:
         notes.append("the steady state is not verified, and mesh-feedback assumes it")
+    if found.model.torsional:
+        notes.append(
+            "dte of angles alone: the centres' motion is identified as a part of its own, and the response is that of"
+            " the angles; mesh stiffness and damping have a factor that is uncertain beyond their variance"
+        )
     lowest = found.data.lowest * spectra.spacing
     if natural.size and np.isfinite(natural[0]).any() and lowest > GAUGED * float(np.nanmin(natural[0])):
         notes.append(
