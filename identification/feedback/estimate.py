@@ -27,6 +27,8 @@ INTERVALS = 160
 SUPPORT = 18
 FEWEST_INTERVALS = 20
 ROUGH_SETTLED = 0.2
+# The same where the splines of E join them, which are further from the start.
+CENTRES_SETTLED = 0.1
 # Splines are trusted to no better than this part of D and N.
 ROUGH = 0.01
 PAIRS = 6
@@ -63,7 +65,8 @@ def mesh_feedback(
 ) -> Feedback:
     """Identify the mesh-feedback model from all lines up to the highest `excited` one.
 
-    `harmonics` L of the mesh. Raises LpmError where the record holds fewer equations than unknowns.
+    `harmonics` L of the mesh. Of dte from angles alone the form that also tells the centres' motion is found besides,
+    and the one of least criterion returned. Raises LpmError where the record holds fewer equations than unknowns.
     """
     report = progress or (lambda part, message: None)
     data = class_data(spectra, excited)
@@ -75,17 +78,70 @@ def mesh_feedback(
     report(0.0, "mesh feedback: first model")
     part = fewer_classes(data, SEARCHED)
     first = first_model(part, Splines(intervals), count)
-    best = splines = refined(first, part, ROUGH_SETTLED)
+    splines = refined(first, part, ROUGH_SETTLED)
+    tried = _with_poles(first, splines, part, report)
+    best = _least(tried, part)
+    if spectra.angle_only:
+        other = with_centres(tried, part, report)
+        best = min((best, other), key=lambda fit: criterion(fit, part))
+    report(1.0, "mesh feedback: last rounds")
+    return Feedback(data, settled_covariance(refined(best.model, data), data))
+
+
+def _least(tried: list[Refined], part: ClassData) -> Refined:
+    """The fit of least criterion; further ones must improve it by GAIN."""
+    best = tried[0]
+    for fit in tried[1:]:
+        if criterion(fit, part) < criterion(best, part) - GAIN:
+            best = fit
+    return best
+
+
+def _with_poles(first: Model, splines: Refined, part: ClassData, report: Progress) -> list[Refined]:
+    """The `splines`, and partial fractions of ever more poles as long as the criterion falls."""
+    best, tried = splines, [splines]
     for pairs in range(1, PAIRS + 1):
         report(pairs / (PAIRS + 1), f"mesh feedback: {pairs} pair(s) of poles")
         found = isinstance(best.model.basis, Fractions)
         trial = refined(further(best.model, part) if found else begin(first, splines, part, pairs), part, COMPARED)
+        tried.append(trial)
         if criterion(trial, part) < criterion(best, part) - GAIN:
             best = trial
         elif found:
             break
-    report(1.0, "mesh feedback: last rounds")
-    return Feedback(data, settled_covariance(refined(best.model, data), data))
+    return tried
+
+
+def with_centres(tried: list[Refined], part: ClassData, report: Progress) -> Refined:
+    """The fit of least criterion that shows N Y + E U, as angles do of a rig whose centres move, from the fits `tried`
+    of the form without E: splines again, then partial fractions of ever more poles.
+
+    Poles that are added one at a time may end in poor minima, as E takes what the first pair does not explain. Hence
+    those of the splines, and of the fits without E, are refined beside them.
+    """
+    model = tried[0].model
+    none = np.zeros_like(model.n)
+    rough = best = refined(Model(model.basis, model.d, model.n, model.k, model.c, none), part, CENTRES_SETTLED)
+    for pairs in range(1, PAIRS + 1):
+        report(pairs / (PAIRS + 1), f"mesh feedback from angles: {pairs} pair(s) of poles")
+        begun = [rational(rough, part, pairs)]
+        begun += [_halfway(fit.model) for fit in tried if fit.model.basis.pairs.shape[0] == pairs]
+        found = isinstance(best.model.basis, Fractions)
+        if found:
+            begun.append(min(extended(best.model, part), key=lambda model: output_error(model, part)))
+        trial = min((refined(one, part, COMPARED) for one in begun), key=lambda fit: criterion(fit, part))
+        if criterion(trial, part) < criterion(best, part) - GAIN:
+            best = trial
+        elif found:
+            break
+    return best
+
+
+def _halfway(model: Model) -> Model:
+    """With N midway between 1 and that of a form without E, in partial fractions: about its root, as N comes twice."""
+    n = 0.5 * model.n
+    n[0] += 0.5
+    return Model(model.basis, model.d, n, model.k, model.c, np.zeros_like(n))
 
 
 def _too_short(spectra: Spectra, excited: int, unknowns: int, equations: float) -> str:
@@ -130,21 +186,22 @@ def criterion(fit: Refined, data: ClassData) -> float:
 
 
 def rational(fit: Refined, data: ClassData, pairs: int) -> Model:
-    """The model with partial fractions of `pairs` common poles fitted to the D and N of another one, where it knows
+    """The model with partial fractions of `pairs` common poles fitted to D, N (and E) of another one, where it knows
     them."""
     model = fit.model
     position: NDArray[np.float64] = np.linspace(max(data.lowest, 1), data.excited, FITTED_POINTS) / data.top
     values = model.basis.at(position)
+    parts = [model.d, model.n, *([model.e] if model.torsional else [])]
     weights = []
-    for first, coefficients in ((0, model.d), (model.d.size, model.n)):
-        own = slice(first, first + coefficients.size)
+    for number, coefficients in enumerate(parts):
+        own = slice(number * model.d.size, (number + 1) * model.d.size)
         variance = np.einsum("fi,ij,fj->f", values, fit.covariance[own, own], values.conj(), optimize=True).real
         weights.append(1.0 / np.sqrt(np.maximum(variance, 0.0) + (ROUGH * np.abs(values @ coefficients)) ** 2))
-    d, n = model.functions(position)
-    basis = Fractions.limited(common_pairs(position, [d, n], weights, pairs), data.least)
+    wanted = [np.asarray(values @ coefficients) for coefficients in parts]
+    basis = Fractions.limited(common_pairs(position, wanted, weights, pairs), data.least)
     fractions = basis.at(position)
-    of_d, of_n = (_fitted(fractions, f, weight) for f, weight in zip((d, n), weights, strict=True))
-    return Model(basis, of_d, of_n, model.k, model.c)
+    d, n, *e = (_fitted(fractions, f, weight) for f, weight in zip(wanted, weights, strict=True))
+    return Model(basis, d, n, model.k, model.c, *e)
 
 
 def extended(model: Model, data: ClassData) -> list[Model]:
@@ -154,15 +211,15 @@ def extended(model: Model, data: ClassData) -> list[Model]:
     kept, size_of = known.shape[0], np.array(PLACES) * data.excited / data.top
     placed = np.stack([2 * np.array(PLACED_DAMPING) * size_of, size_of**2], axis=1)
     basis = Fractions.limited(np.concatenate([known, placed]), least)
-    wide_d, wide_n = (_spread(x, kept, count) for x in (model.d, model.n))
-    start = Model(basis, wide_d, wide_n, model.k, model.c)
+    start = _widened(model, basis, kept, count)
     gram, right = linearised(start, data)
     size, pairs = start.d.size, kept + count
     new = np.array([[3 + kept + place, 3 + pairs + kept + place] for place in range(count)])
-    new = np.concatenate([new, size + new], axis=1)  # (places, 4): residues of D and N
-    poles = 2 * size + np.arange(2 * pairs).reshape(2, pairs)[:, kept:]
+    functions = 3 if model.torsional else 2
+    new = np.concatenate([first * size + new for first in range(functions)], axis=1)  # residues of D, N (and E)
+    poles = functions * size + np.arange(2 * pairs).reshape(2, pairs)[:, kept:]
     others = np.setdiff1d(np.arange(right.size), np.concatenate([new.ravel(), poles.ravel()]))
-    best, chosen, residues = 0.0, 0, np.zeros(4)
+    best, chosen, residues = 0.0, 0, np.zeros(2 * functions)
     for place in range(count):
         own = np.concatenate([others, new[place]])
         part = gram[np.ix_(own, own)]
@@ -172,14 +229,21 @@ def extended(model: Model, data: ClassData) -> list[Model]:
         step = np.linalg.solve(part, right[own] / scale)
         gain = float(step @ (right[own] / scale))
         if gain > best:
-            best, chosen, residues = gain, place, (step / scale)[-4:]
+            best, chosen, residues = gain, place, (step / scale)[-2 * functions :]
     one, models = Fractions.limited(np.concatenate([known, placed[chosen : chosen + 1]]), least), []
     for part in (1.0, 0.0):
-        d, n = (_spread(x, kept, 1) for x in (model.d, model.n))
-        for coefficients, (constant, slope) in ((d, part * residues[:2]), (n, part * residues[2:])):
+        wide = _widened(model, one, kept, 1)
+        found = zip((wide.d, wide.n, wide.e), (part * residues).reshape(functions, 2), strict=False)
+        for coefficients, (constant, slope) in found:
             coefficients[3 + kept], coefficients[4 + 2 * kept] = constant, slope
-        models.append(Model(one, d, n, model.k, model.c))
+        models.append(wide)
     return models
+
+
+def _widened(model: Model, basis: Fractions, kept: int, more: int) -> Model:
+    """The same model on a basis of `more` pairs of poles beyond its `kept` ones."""
+    d, n = (_spread(x, kept, more) for x in (model.d, model.n))
+    return Model(basis, d, n, model.k, model.c, _spread(model.e, kept, more) if model.torsional else model.e)
 
 
 def _spread(coefficients: NDArray[np.float64], kept: int, more: int) -> NDArray[np.float64]:

@@ -98,6 +98,7 @@ def _about_fit(found: Feedback, spectra: Spectra, ratio: float) -> dict[str, Any
     own = found.data.mesh_lines * spectra.spacing
     predicted = {} if ratio == 1.0 else {"mesh_frequency": own * ratio, "identified_at_mesh_frequency": own}
     return predicted | {
+        "form": "centres from angles" if found.model.torsional else "dte",
         "mesh_harmonics": found.model.harmonics,
         "pole_pairs": found.model.basis.pairs.shape[0],
         "unknowns": found.model.vector().size,
@@ -122,6 +123,11 @@ def _doubts(
     notes = [*_predicted(found.data.mesh_lines * spectra.spacing, ratio), *doubt_of(apart, variance)]
     if not spectra.steady:
         notes.append("the steady state is not verified, and mesh-feedback assumes it")
+    if found.model.torsional:
+        notes.append(
+            "dte of angles alone: the centres' motion is identified as a part of its own, and the response is that of"
+            " the angles; mesh stiffness and damping have a factor that is uncertain beyond their variance"
+        )
     lowest = found.data.lowest * spectra.spacing
     if natural.size and np.isfinite(natural[0]).any() and lowest > GAUGED * float(np.nanmin(natural[0])):
         notes.append(

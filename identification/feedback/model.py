@@ -4,11 +4,19 @@
 
 for a machine Y = P1 U - P2 F_m with F_m = k(t) dte + c(t) dte'. D and N are functions of frequency, k_l and
 c_l Fourier coefficients of the mesh. Everything is in the units of `ClassData`.
+
+Angles alone show X = P1 (U - F_m), without the motion S F_m of the gear centres, while F_m follows the whole deflection
+Y = X - S F_m (P2 = P1 + S). With F_m = (P1 U - Y) / P2,
+
+    X = Y + S F_m = (1 - S/P2) Y + (S P1/P2) U = N Y + E U,    E = S N,
+
+where Y obeys the equation above: N is the same function twice, by reciprocity, and E has the poles of D and N. (As an
+equation for X: with F_m = U - X/P1, [k*](P2/P1 X + (P1 - P2) U) + X/P1 = U.)
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -20,13 +28,19 @@ from gearbench.identification.spectra.joint import Complexes, Floats
 @dataclass(frozen=True)
 class Model:
     """`d`, `n` (M,) real coefficients of D and N on `basis`, `k` and `c` (L,) Fourier coefficients l = 1..L of the
-    mesh."""
+    mesh; `e` (M,) those of E where records show N Y + E U, else (0,)."""
 
     basis: Basis
     d: Floats
     n: Floats
     k: Complexes
     c: Complexes
+    e: Floats = field(default_factory=lambda: np.empty(0))
+
+    @property
+    def torsional(self) -> bool:
+        """Whether the records show the torsional part of the deflection only."""
+        return self.e.size > 0
 
     @property
     def harmonics(self) -> int:
@@ -35,32 +49,40 @@ class Model:
 
     @property
     def free(self) -> int:
-        """Real parameters of D and N, poles included."""
-        return self.d.size + self.n.size + self.basis.pairs.size
+        """Real parameters of D, N and E, poles included."""
+        return self.d.size + self.n.size + self.e.size + self.basis.pairs.size
 
     def vector(self) -> Floats:
-        """All parameters as real numbers: d, n, those of the pairs, k, c, of complex ones real parts first."""
+        """All parameters as real numbers: d, n, e, those of the pairs, k, c, of complex ones real parts first."""
         mesh = [part for x in (self.k, self.c) for part in (x.real, x.imag)]
-        return np.concatenate([self.d, self.n, self.basis.parameters, *mesh])
+        return np.concatenate([self.d, self.n, self.e, self.basis.parameters, *mesh])
 
     def scaled(self, factor: float) -> Model:
-        """D, N, k, c times a real number: the same response."""
-        return Model(self.basis, factor * self.d, factor * self.n, factor * self.k, factor * self.c)
+        """N times a real number, and D, k, c times what leaves the same response."""
+        other = factor**self.gauge
+        return Model(self.basis, other * self.d, factor * self.n, other * self.k, other * self.c, self.e)
+
+    @property
+    def gauge(self) -> int:
+        """Power of N's factor that D, k and c have: with N in the output, too, the deflection has 1 over the factor."""
+        return 2 if self.torsional else 1
 
     def scale_direction(self) -> Floats:
         """Derivative of `vector` with respect to that number."""
-        direction = self.vector()
-        direction[self.d.size + self.n.size : self.free] = 0.0
+        direction = self.gauge * self.vector()
+        first = self.d.size + self.n.size
+        direction[self.d.size : first] = self.n
+        direction[first : self.free] = 0.0
         return direction
 
     def moved(self, vector: Floats) -> Model:
         """The model with these parameters; poles are kept stable."""
-        sizes = [self.d.size, self.n.size, self.basis.pairs.size, *(4 * [self.harmonics])]
-        d, n, pairs, k, kj, c, cj = np.split(vector, np.cumsum(sizes)[:-1])
+        sizes = [self.d.size, self.n.size, self.e.size, self.basis.pairs.size, *(4 * [self.harmonics])]
+        d, n, e, pairs, k, kj, c, cj = np.split(vector, np.cumsum(sizes)[:-1])
         basis = self.basis
         if isinstance(basis, Fractions):
             basis = basis.with_parameters(pairs)
-        return Model(basis, d, n, k + 1j * kj, c + 1j * cj)
+        return Model(basis, d, n, k + 1j * kj, c + 1j * cj, e)
 
     def functions(self, position: Floats) -> tuple[Complexes, Complexes]:
         """D and N at signed positions line / top."""
@@ -69,11 +91,34 @@ class Model:
 
     def columns(self, values: Complexes, omega: Floats, dte: Complexes, force: Complexes) -> Complexes:
         """Derivatives (S, P) of A Y - N U of one class for Y = `dte` and U = `force` (S,); `values`: of the basis."""
-        parts = [values * dte[:, None], -values * force[:, None]]
+        parts = [values * dte[:, None], -values * force[:, None], np.zeros((dte.size, self.e.size), dtype=complex)]
         if isinstance(self.basis, Fractions):
             of_d, of_n = self.basis.slopes(omega, self.d), self.basis.slopes(omega, self.n)
             parts.append(of_d * dte[:, None] - of_n * force[:, None])
         return np.concatenate([*parts, mesh_columns(dte, omega, self.harmonics)], axis=1)
+
+    def shown(self, position: Floats, dte: Complexes, force: Complexes) -> Complexes:
+        """What the records show (...) of a deflection `dte` under `force`: itself, or N Y + E U."""
+        if not self.torsional:
+            return dte
+        values = self.basis.at(position)
+        return np.asarray((values @ self.n) * dte + (values @ self.e) * force)
+
+    def shown_columns(
+        self, values: Complexes, omega: Floats, inner: Complexes, dte: Complexes, force: Complexes
+    ) -> Complexes:
+        """Derivatives (S, P) of `shown` from those of the deflection, `inner`; else as in `columns`."""
+        if not self.torsional:
+            return inner
+        columns = (values @ self.n)[:, None] * inner
+        first, second = self.d.size, self.d.size + self.n.size
+        third = second + self.e.size
+        columns[:, first:second] += values * dte[:, None]
+        columns[:, second:third] += values * force[:, None]
+        if isinstance(self.basis, Fractions):
+            slopes = self.basis.slopes(omega, self.n) * dte[:, None] + self.basis.slopes(omega, self.e) * force[:, None]
+            columns[:, third : self.free] += slopes
+        return columns
 
 
 class Operator:

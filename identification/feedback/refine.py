@@ -49,18 +49,29 @@ class Refined:
         return np.asarray(self.root @ self.root.T)
 
 
-def response(model: Model, data: ClassData, operator: Operator | None = None) -> Complexes:
+def response(model: Model, data: ClassData) -> Complexes:
+    """What the records would show of the model (C, S, E): Y^ = A^-1 N U or N Y^ + E U."""
+    return _shown(model, data, _deflection(Operator(model, data.omega, data.modelled), data))
+
+
+def _deflection(operator: Operator, data: ClassData) -> Complexes:
     """Y^ = A^-1 N U (C, S, E)."""
-    operator = operator or Operator(model, data.omega, data.modelled)
     source = operator.n[:, :, None] * data.force
     return np.stack([operator.solve(index, source[index]) for index in range(source.shape[0])])
+
+
+def _shown(model: Model, data: ClassData, deflection: Complexes) -> Complexes:
+    """What the records would show (C, S, E) of a deflection."""
+    if not model.torsional:
+        return deflection
+    return model.shown(data.omega[:, :, None], deflection, data.force) * data.modelled[:, :, None]
 
 
 def refined(model: Model, data: ClassData, settled: float = SETTLED) -> Refined:
     """The model of least output error, from a first one; rounds end at a relative decrease of the cost by `settled`."""
     operator = Operator(model, data.omega, data.modelled)
-    predicted = response(model, data, operator)
-    cost = _cost(data, predicted)
+    predicted = _deflection(operator, data)
+    cost = _cost(data, _shown(model, data, predicted))
     prior = _prior(model, None)
     damping = 0.0
     for _ in range(ROUNDS):
@@ -76,7 +87,7 @@ def refined(model: Model, data: ClassData, settled: float = SETTLED) -> Refined:
         model, operator, predicted, prior = trial, operator_of, of_trial, _prior(trial, root)
         if before - cost < settled * before:
             break
-    left = np.where(data.dte != 0, data.dte - predicted, 0.0)
+    left = np.where(data.dte != 0, data.dte - _shown(model, data, predicted), 0.0)
     return Refined(model, left, cost / _freedom(data, model), root, _freedom(data, model))
 
 
@@ -96,7 +107,7 @@ def output_error(model: Model, data: ClassData) -> float:
 def linearised(model: Model, data: ClassData) -> tuple[Floats, Floats]:
     """J^T J and J^T r of the output error of a model."""
     operator = Operator(model, data.omega, data.modelled)
-    return _normal(model, data, operator, response(model, data, operator))
+    return _normal(model, data, operator, _deflection(operator, data))
 
 
 def _damped(
@@ -107,8 +118,8 @@ def _damped(
     for _ in range(TRIALS):
         trial = gauged(model.moved(model.vector() + system.step(damping)), data)
         operator = Operator(trial, data.omega, data.modelled)
-        predicted = response(trial, data, operator)
-        found = _cost(data, predicted)
+        predicted = _deflection(operator, data)
+        found = _cost(data, _shown(trial, data, predicted))
         if found < cost * (1 + SETTLED):
             break
         damping = max(GROWTH * damping, DAMPING)
@@ -143,8 +154,8 @@ def _prior(model: Model, root: Floats | None) -> Floats:
     return precision
 
 
-def _normal(model: Model, data: ClassData, operator: Operator, predicted: Complexes) -> tuple[Floats, Floats]:
-    """J^T J and J^T r of the stacked real equations."""
+def _normal(model: Model, data: ClassData, operator: Operator, deflection: Complexes) -> tuple[Floats, Floats]:
+    """J^T J and J^T r of the stacked real equations, at the model's own `deflection` (C, S, E)."""
     count = model.vector().size
     gram, right = np.zeros((count, count)), np.zeros(count)
     for index in range(data.lines.shape[0]):
@@ -154,12 +165,13 @@ def _normal(model: Model, data: ClassData, operator: Operator, predicted: Comple
             measured = data.dte[index, :, experiment]
             if not measured.any():
                 continue
-            y = predicted[index, :, experiment] * modelled
+            y = deflection[index, :, experiment] * modelled
             u = data.force[index, :, experiment]
             columns = -model.columns(values, omega, y, u)
-            columns = operator.solve(index, columns * modelled[:, None]) * data.weight[index]
+            columns = operator.solve(index, columns * modelled[:, None])
+            columns = model.shown_columns(values, omega, columns, y, u) * data.weight[index]
             own = valid & (omega >= 0) if 2 * data.weight[index] ** 2 <= 1.01 else valid
-            columns, left = columns[own], ((measured - predicted[index, :, experiment]) * data.weight[index])[own]
+            columns, left = columns[own], ((measured - model.shown(omega, y, u)) * data.weight[index])[own]
             if own is not valid:
                 columns, left = columns * np.sqrt(2.0), left * np.sqrt(2.0)
             stacked = np.concatenate([columns.real, columns.imag])

@@ -42,9 +42,10 @@ def htf_on(model: Model, data: ClassData, lines: NDArray[np.int64], harmonics: i
         omega = (residue + step * np.arange(first, last + 1))[None] / data.top
         operator = Operator(model, omega, np.ones(omega.shape, dtype=bool))
         place = np.round((lines[chosen] - residue) / step).astype(int) - first
-        right = np.zeros((omega.size, chosen.size), dtype=complex)
-        right[place, np.arange(chosen.size)] = operator.n[0, place]
-        solved = operator.solve(0, right) / data.stiffness_unit
+        force = np.zeros((omega.size, chosen.size), dtype=complex)
+        force[place, np.arange(chosen.size)] = 1.0
+        solved = operator.solve(0, operator.n[0][:, None] * force)
+        solved = model.shown(omega[0][:, None], solved, force) / data.stiffness_unit
         for branch in range(-harmonics, harmonics + 1):
             row = place + branch
             inside = (row >= 0) & (row < omega.size)

@@ -32,7 +32,8 @@ class Spectra:
     `start_phase` (realisations,) the mesh phase [cycles] of the first sample, `steady` whether the steady
     state was verified, `periods` how many joint periods were averaged, `repeats` how many excitation
     periods make a joint period (only every `repeats`-th line can be excited), `noise` (lines,) the variance
-    of a line's dte from the scatter of the periods, or None, and `duration` [s] the joint period.
+    of a line's dte from the scatter of the periods, or None, `angle_only` whether dte lacks the motion of the
+    gear centres, and `duration` [s] the joint period.
     """
 
     force: Complexes
@@ -44,6 +45,7 @@ class Spectra:
     periods: int = 1
     repeats: int = 1
     noise: Floats | None = None
+    angle_only: bool = False
 
     @property
     def realisations(self) -> int:

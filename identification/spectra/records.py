@@ -58,10 +58,12 @@ def record_spectra(
     spacing = sampling.rate / sampling.joint
     lines = np.arange(max(1, int(band[0] / spacing)), min(highest, int(band[1] / spacing)) + 1)
     forces, responses, phases, noises, steady = [], [], [], [], []
+    angles = False
     for record in records:
         phases.append(_start_phases(record, 1.0 / (sampling.mesh_lines * spacing), notes))
         settled = _declared_steady(record)
-        for driving, error in _signals(record, notes):
+        for driving, error, alone in _signals(record, notes):
+            angles |= alone
             forces.append(period_spectra(driving, sampling.joint, highest)[0])
             response, blocks, noise = period_spectra(error, sampling.joint, highest)
             responses.append(response)
@@ -78,20 +80,22 @@ def record_spectra(
         records[0].sizes["time"] // sampling.joint,
         sampling.repeats,
         np.mean(noises, axis=0) if noises else _declared_noise(records[0], sampling, highest),
+        angles,
     )
     return spectra, band, list(dict.fromkeys(notes))
 
 
-def _signals(record: xr.Dataset, notes: list[str]) -> Iterator[tuple[Floats, Floats]]:
-    """Force and DTE of each realisation, one at a time: long records stay lean."""
+def _signals(record: xr.Dataset, notes: list[str]) -> Iterator[tuple[Floats, Floats, bool]]:
+    """Force and DTE of each realisation, and whether that is of angles only; one at a time: long records stay lean."""
     for realisation in range(record.sizes["realisation"]):
         one = record.isel(realisation=[realisation])
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", AngleOnlyWarning)
             error = dte(one)
-        if error.attrs.get("angle_only"):
+        alone = bool(error.attrs.get("angle_only"))
+        if alone:
             notes.append("dte holds the angles only (no y channels): what is identified from it is biased")
-        yield force(one).values[0], error.values[0]
+        yield force(one).values[0], error.values[0], alone
 
 
 def _excited_band(records: Sequence[xr.Dataset], sampling: Sampling) -> tuple[float, float]:

@@ -27,6 +27,7 @@ from gearbench.identification.truth.periodic import Floats, PeriodicSystem
 from gearbench.records.record import make_record
 
 DIRECTION = np.array([1.0, 1.0, -1.0])  # dte = DIRECTION @ (x, y1, y2)
+ANGLES = np.array([1.0, 0.0, 0.0])  # what angles alone show of it
 DECAY = 20.0  # the initial state has decayed by exp(-DECAY) when the record begins
 
 
@@ -76,9 +77,10 @@ class ReferenceRig:
         b[3] = 1.0 / self.mass
         return a, b, np.concatenate([DIRECTION, np.zeros(3)])
 
-    def system(self, phases: int = 2048) -> PeriodicSystem:
-        """The periodic system sampled on `phases` phases; trigonometric in between."""
-        a, b, c = self.matrices(np.arange(phases) / phases)
+    def system(self, phases: int = 2048, output: Floats = DIRECTION) -> PeriodicSystem:
+        """The periodic system sampled on `phases` phases; trigonometric in between; `output` (3,) of (x, y1, y2)."""
+        a, b, _ = self.matrices(np.arange(phases) / phases)
+        c = np.concatenate([output, np.zeros(3)])
         return PeriodicSystem(1.0 / self.mesh_frequency, a, b, c, interpolation="trigonometric")
 
 
@@ -95,20 +97,22 @@ def reference_record(
     start_phase: float = 0.0,
     substeps: int = 4,
     seed: int = 0,
+    output: Floats = DIRECTION,
 ) -> xr.Dataset:
     """A record with `dte`, `force` and `mesh_phase` of the reference rig in steady state, one excitation period each.
 
     `duration` [s] must be a whole number of mesh periods; `amplitude` [N] is the peak of the multisine,
     `mean` [N] the mean force, `noise` the standard deviation of white noise on dte relative to the standard
     deviation of its multisine-induced part, `start_phase` the mesh phase [cycles] of the first sample. The
-    record starts after the initial state has decayed by exp(-DECAY).
+    record starts after the initial state has decayed by exp(-DECAY). With `output` = ANGLES the dte is that of the
+    angles, and marked so.
     """
     samples = round(duration * sampling_rate)
     rng = np.random.default_rng(seed)
     signals = [
         random_phase_multisine(samples, sampling_rate, band, amplitude=amplitude, rng=rng) for _ in range(realisations)
     ]
-    dte = integrate(rig, signals, mean=mean, start_phase=start_phase, substeps=substeps)
+    dte = integrate(rig, signals, mean=mean, start_phase=start_phase, substeps=substeps, output=output)
     force = np.stack([signal.sample(samples) for signal in signals]) + mean
     if noise:
         induced = dte - dte.mean(axis=0) if realisations > 1 else dte - dte.mean()
@@ -123,7 +127,9 @@ def reference_record(
         "mesh_phase_origin": "geometry",
         "settling_residual": float(np.exp(-DECAY)),
     }
-    return make_record({"dte": dte, "force": force, "mesh_phase": np.array(phase)}, attributes)
+    record = make_record({"dte": dte, "force": force, "mesh_phase": np.array(phase)}, attributes)
+    record.dte.attrs["angle_only"] = int(output is ANGLES)
+    return record
 
 
 def integrate(
@@ -133,6 +139,7 @@ def integrate(
     mean: float = 0.0,
     start_phase: float = 0.0,
     substeps: int = 4,
+    output: Floats = DIRECTION,
 ) -> Floats:
     """Steady-state dte (realisations, samples) [m] of one period of the multisine forces plus `mean` [N].
 
@@ -156,7 +163,7 @@ def integrate(
     dte = np.empty((len(signals), first.samples))
     for index in range(-settling, steps):
         if index >= 0 and index % substeps == 0:
-            dte[:, index // substeps] = DIRECTION @ state[:3]
+            dte[:, index // substeps] = output @ state[:3]
         state = transition[index % cycle] @ state + weights[index % cycle] @ forces[index % steps]
     return dte
 
