@@ -139,8 +139,11 @@ class NonLinear:
     def twisted_on(self, force: float) -> float:
         """How far [cycles] the driven gear at rest under the mesh force [N] stands beyond its steady rotation, where
         the speed of either end is held: by the twist of a shaft behind it, and what lies between the driver and it."""
-        if self.structure is None or not (self.structure.held or self.rig.drive.boundary == "speed"):
+        structure = self.structure
+        if structure is None or not (structure.held or self.rig.drive.boundary == "speed"):
             return 0.0
+        if self.rig.drive.boundary != "speed":  # the shaft's twist is the same at every phase of the mesh
+            return structure.held * self._load_twist(force) / self.teeth.base_pitch
         gain = np.array([self.rig.mesh.stiffness_scale])
         phases = (alike(np.array([n / REST_PHASES]), np.zeros(1), gain) for n in range(REST_PHASES))
         rest = [Coordinates(*self.equilibrium(force, at)[: len(Coordinates._fields)]).u2 for at in phases]
@@ -285,11 +288,16 @@ class NonLinear:
         if structure is None:
             return np.array([*Coordinates(apart, y1, y2, 0.0, apart + twist), *(0.0 for _ in Coordinates._fields)])
         apart -= self.slide * (x1 - x2)
-        out = force / structure.load_stiffness if self.rig.load.twists else 0.0
+        out = self._load_twist(force)
         # The end whose speed is prescribed is where it would be in steady rotation.
         u2 = -twist - apart if self.rig.drive.boundary == "speed" else structure.held * out
         place = Coordinates(u2 + apart, y1, y2, u2, u2 + apart + twist), Further(u2 - out, *housed, x1, x2)
         return np.array([*place[0], *place[1], *np.zeros(self.size)])
+
+    def _load_twist(self, force: float) -> float:
+        """How far [m] the load's shaft twists under the mesh force [N]."""
+        structure = self.structure
+        return force / structure.load_stiffness if structure is not None and self.rig.load.twists else 0.0
 
     @cached_property
     def support_springs(self) -> tuple[SupportSpring, SupportSpring]:
