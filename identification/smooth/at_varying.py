@@ -18,6 +18,7 @@ from gearbench.identification.lpm.local_solve import LpmError
 from gearbench.identification.lpm.moving import MovingRegression, prepare_moving
 from gearbench.identification.lpm.rows import Lines
 from gearbench.identification.lpm.selection import LADDER, Search, search_of
+from gearbench.identification.smooth.choice import likeliest_step
 from gearbench.identification.smooth.estimate import FIRST_ROUNDS, ROUNDS, Pass, SmoothModel
 from gearbench.identification.smooth.turned import POWERS, Delays, Turned, delays_for, room_of, span_of, turned
 from gearbench.identification.smooth.turned_posterior import TurnedPosterior, turned_equations, turned_posterior
@@ -127,13 +128,7 @@ class _Trials:
             tried = replace(model, bandwidth=self.half_width * STEP**step)
             return sum(found.evidence for found in self._posteriors(search, tried).values())
 
-        best = 0
-        for direction in (-1, 1):
-            while FEWEST_STEPS <= best + direction <= MOST_STEPS and evidence(best + direction) > evidence(best):
-                best += direction
-            if best:
-                break
-        return float(self.half_width * STEP**best)
+        return float(self.half_width * STEP ** likeliest_step(evidence, FEWEST_STEPS, MOST_STEPS))
 
     def _search(self, model: SmoothModel) -> Search:
         regression = _rows_of(self.spectra, self.course, model.harmonics, self.narrow)

@@ -11,6 +11,7 @@ falls: `lpm/selection.py` predicts the same of polynomials.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 
@@ -100,13 +101,18 @@ def _bandwidth(regression: Regression, search: Search, model: SmoothModel, width
         tried = replace(model, bandwidth=width * STEP**step)
         return sum(found.evidence for found in _posteriors(regression, search, tried).values())
 
+    return width * STEP ** likeliest_step(evidence, FEWEST_STEPS, MOST_STEPS)
+
+
+def likeliest_step(evidence: Callable[[int], float], fewest: int, most: int) -> int:
+    """The step of a ladder from `fewest` to `most` at which the log `evidence` of a step is largest, climbed from 0."""
     best = 0
     for direction in (-1, 1):
-        while FEWEST_STEPS <= best + direction <= MOST_STEPS and evidence(best + direction) > evidence(best):
+        while fewest <= best + direction <= most and evidence(best + direction) > evidence(best):
             best += direction
         if best:
             break
-    return width * STEP**best
+    return best
 
 
 def _branches(regression: Regression, search: Search, model: SmoothModel, ladder: list[int]) -> int:

@@ -76,7 +76,6 @@ def diagnose(
     from gearbench.commands.measured.challenge import diagnose_case
     from gearbench.diagnosis.diagnosis import take_in
     from gearbench.rig_limits import limits_of
-    from gearbench.words.diagnosis import confidence, headline, parameters_in_words, sentences
 
     with Progress(f"diagnose {nominal.name}") as progress:
         progress.step("reading")
@@ -91,6 +90,13 @@ def diagnose(
     if as_json:
         print_json(json.loads(output.path("verdict.json").read_text(encoding="utf-8")))
         return
+    _tell(diagnosis, out)
+
+
+def _tell(diagnosis: Diagnosis, out: Path) -> None:
+    """Print what was found, and where it lies."""
+    from gearbench.words.diagnosis import confidence, headline, parameters_in_words, sentences
+
     typer.echo(headline(diagnosis.verdict))
     typer.echo(confidence(diagnosis.verdict))
     for sentence in (*parameters_in_words(diagnosis.verdict), *sentences(diagnosis.verdict)):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -76,13 +77,18 @@ def identify(
     if as_json:
         print_json(summary)
         return
+    _tell(summary, out)
+
+
+def _tell(summary: Mapping[str, Any], out: Path) -> None:
+    """Print what was identified, and where it lies."""
     low, high = summary["first_mode_hz"]
     mode = f"first mode {low:.4g}-{high:.4g} Hz" if isfinite(low) else "no mode in the identified band"
     typer.echo(
         f"{out}: {mode}; {summary['unknowns']} unknowns, {summary['equations']} equations"
         f" a window; expected error of the ITF {summary['expected_error']:.1%}"
     )
-    for line in distortion_lines(summary["distortion"]) if split is not None else []:
+    for line in distortion_lines(summary["distortion"]) if "distortion" in summary else []:
         typer.echo(line)
     for warning in summary["warnings"]:
         typer.echo(f"warning: {warning}")
