@@ -49,7 +49,8 @@ def begun_at_nominal(simulator: Simulator, found: Optimum, kept: Flags) -> Optim
     p = np.where(kept, found.p, 0.0)
     if cost_of(simulator, p, found.sd) > NEAR * found.cost:
         return found
-    return better(found, _fitted(simulator, p, found.sd))
+    chosen = np.ones(p.size, dtype=bool)
+    return better(found, fit(simulator, p, found.sd, found.sensitivity, renewals=1, chosen=chosen))
 
 
 def better(found: Optimum, other: Optimum | None) -> Optimum:
