@@ -127,8 +127,8 @@ def select(
         report("simulating: all together")
         best = fit(simulator, best.p, best.sd, best.sensitivity, renewals=RENEWALS_LAST, chosen=chosen) or best
     if kept:
-        report("simulating: all together, from the nominal rig")
         best = restructured(simulator, best, around, report)
+        report("simulating: all together, from the nominal rig")
         best = begun_at_nominal(simulator, best, _entries(unknowns, kept))
     bare = _without(simulator, base, kept, chosen)
     return Selection(base, bare, best, kept, tuple(weighed or ()))

@@ -87,11 +87,15 @@ class Posterior:
         """E|error|^2 (C,) of the functions at one `offset`, and the part of it that is noise."""
         row = correlation(offset - self.equations.offset, self.bandwidth)
         shared = row.conj()[:, None] * self.equations.columns
-        seen = self.inverse @ shared
-        size = self.sizes.functions
-        known = size**2 * np.einsum("nc,nc->c", shared.conj(), seen).real
-        noise = size**2 * self.sizes.noise * np.einsum("nc,nc->c", seen.conj(), seen).real
-        return np.maximum(size - known, 0.0), noise
+        return spread(self.sizes.functions, self.sizes.noise, shared, self.inverse @ shared)
+
+
+def spread(size: Floats, noise: float, shared: Complexes, seen: Complexes) -> tuple[Floats, Floats]:
+    """E|error|^2 (C,) of functions of prior variance `size` (C,) that share `shared` (N, C) with the rows, of which the
+    data show `seen` (N, C) = K^-1 shared, and the part of it that is `noise`."""
+    known = size**2 * np.einsum("nc,nc->c", shared.conj(), seen).real
+    noisy = size**2 * noise * np.einsum("nc,nc->c", seen.conj(), seen).real
+    return np.maximum(size - known, 0.0), noisy
 
 
 def correlation(lines: Floats, bandwidth: float) -> Complexes:

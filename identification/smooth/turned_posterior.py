@@ -22,6 +22,7 @@ from gearbench.identification.smooth.posterior import (
     Sizes,
     factored,
     next_sizes,
+    spread,
     tied_orders,
 )
 from gearbench.identification.smooth.turned import POWERS, Turned
@@ -91,11 +92,7 @@ class TurnedPosterior:
         count = 2 * equations.harmonics + 1
         turn = self._turn(np.array([offset]))[0].conj() * np.sqrt(equations.turned.delays.weights)
         shared = np.einsum("ngq,gq->ng", equations.columns[:, :count], turn)
-        seen = self.inverse @ shared
-        size = self.sizes.functions[:count]
-        known = size**2 * np.einsum("nc,nc->c", shared.conj(), seen).real
-        noise = size**2 * self.sizes.noise * np.einsum("nc,nc->c", seen.conj(), seen).real
-        return np.maximum(size - known, 0.0), noise
+        return spread(self.sizes.functions[:count], self.sizes.noise, shared, self.inverse @ shared)
 
     def _turn(self, offset: Floats) -> Complexes:
         """exp(-j w tau) (M, 2J+1, Q) at the middle between input and output line."""
