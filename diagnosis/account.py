@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from gearbench.diagnosis.effects.effect import Hypothesis
 from gearbench.diagnosis.forces.equations import PLACES
-from gearbench.diagnosis.output.judged import Closing, Judged
-from gearbench.diagnosis.output.missing import Missing
+from gearbench.diagnosis.judging.judged import Closing, Judged
+from gearbench.diagnosis.judging.missing import Missing
 from gearbench.diagnosis.verdict import Gap, Part, Range, Share
 from gearbench.diagnosis.words import CHANNELS, SHOWN_UNITS, band_in_words, length, number, percent
 from gearbench.diagnosis.words import PLACES as IN_WORDS

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from gearbench.diagnosis.account import places_of, sentence_of_effect, sentence_of_rivals
 from gearbench.diagnosis.advice import PARTED
-from gearbench.diagnosis.chances import chances_of
 from gearbench.diagnosis.effects.effect import Fitted, Hypothesis, added
 from gearbench.diagnosis.effects.recalibrated import recalibrated
 from gearbench.diagnosis.effects.temperature_drift import TEMPERATURE_DRIFT
@@ -25,16 +24,17 @@ from gearbench.diagnosis.forces.equations import PLACES
 from gearbench.diagnosis.forces.steadiness import changing_parts, unsteadiness
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.intake.signals import measured_channels
-from gearbench.diagnosis.naming import drifts_of, effects_of, parameters_of
+from gearbench.diagnosis.judging.chances import chances_of
+from gearbench.diagnosis.judging.decided import decide_simulated, relative_size, size_needed
+from gearbench.diagnosis.judging.drift import drift_of
+from gearbench.diagnosis.judging.judged import Judged, itself, judged_on
+from gearbench.diagnosis.judging.missing import Missing, missing_forces, nothing_missing
+from gearbench.diagnosis.judging.naming import drifts_of, effects_of, parameters_of
 from gearbench.diagnosis.odds import Calibration, effect_signs
 from gearbench.diagnosis.output.contrast import other_flanks
-from gearbench.diagnosis.output.drift import drift_of
-from gearbench.diagnosis.output.judged import Judged, itself, judged_on
-from gearbench.diagnosis.output.missing import Missing, missing_forces, nothing_missing
 from gearbench.diagnosis.output.selection import WORTH, Weighed, only, with_entered
 from gearbench.diagnosis.output.simulated import Simulated, simulated
 from gearbench.diagnosis.output.structure import structure_found
-from gearbench.diagnosis.output.verdict_of import decide_simulated, relative_size, size_needed
 from gearbench.diagnosis.population import POPULATION
 from gearbench.diagnosis.replay.replays import replays
 from gearbench.diagnosis.verdict import Candidate, Effect, Found, Outcome, Share

@@ -8,9 +8,9 @@ from gearbench.bench.nonlinear.followed import follows
 from gearbench.diagnosis.account import LINES
 from gearbench.diagnosis.effects.effect import Hypothesis
 from gearbench.diagnosis.effects.library import LIBRARY
-from gearbench.diagnosis.naming import parameters_of
-from gearbench.diagnosis.output.elements import HELD, ByElements, by_elements
-from gearbench.diagnosis.output.judged import Closing, Judged
+from gearbench.diagnosis.judging.elements import HELD, ByElements, by_elements
+from gearbench.diagnosis.judging.judged import Closing, Judged
+from gearbench.diagnosis.judging.naming import parameters_of
 from gearbench.diagnosis.replay.gap import gaps_of
 from gearbench.diagnosis.verdict import Confirmation, Confirmed, Effect, Gap, Parameter
 from gearbench.diagnosis.words import CHANNELS, SHOWN_UNITS, length, number

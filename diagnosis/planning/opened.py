@@ -10,7 +10,7 @@ from gearbench.diagnosis.effects.backlash import BACKLASH, KEY
 from gearbench.diagnosis.evidence.calibration import LIMITS
 from gearbench.diagnosis.forces.condition import Condition
 from gearbench.diagnosis.intake.measurements import Measurement
-from gearbench.diagnosis.output.judged import DUE, FELT, GAIN, growth_of
+from gearbench.diagnosis.judging.judged import DUE, FELT, GAIN, growth_of
 from gearbench.diagnosis.output.selection import LIMIT
 from gearbench.diagnosis.output.simulated import SPACING
 from gearbench.diagnosis.output.simulator import Simulator

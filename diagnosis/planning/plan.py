@@ -21,8 +21,8 @@ from gearbench.diagnosis.effects.library import hypotheses as library
 from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
 from gearbench.diagnosis.errors import DiagnosisError
 from gearbench.diagnosis.evidence.separable import groups_of
+from gearbench.diagnosis.judging.decided import VISIBLE
 from gearbench.diagnosis.output.layout import Layout
-from gearbench.diagnosis.output.verdict_of import VISIBLE
 from gearbench.diagnosis.planning.added import larger_plans
 from gearbench.diagnosis.planning.information import Known, Without, known_of
 from gearbench.diagnosis.planning.opened import MOST, smallest_backlash

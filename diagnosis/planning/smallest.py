@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from gearbench.diagnosis.effects.effect import Hypothesis
 from gearbench.diagnosis.evidence.calibration import LIMITS
 from gearbench.diagnosis.evidence.separable import APART
-from gearbench.diagnosis.output.judged import DUE, GAIN, growth_of
+from gearbench.diagnosis.judging.judged import DUE, GAIN, growth_of
 from gearbench.diagnosis.output.rivals import NEARLY
 from gearbench.diagnosis.output.selection import is_own, known_within, limit_of
 from gearbench.diagnosis.planning.information import Known, Without

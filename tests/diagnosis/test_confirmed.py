@@ -15,8 +15,8 @@ from gearbench.diagnosis.diagnosis import take_in
 from gearbench.diagnosis.effects.effect import Hypothesis, Wide
 from gearbench.diagnosis.effects.friction import FRICTION
 from gearbench.diagnosis.intake.signals import measured_channels
-from gearbench.diagnosis.output.elements import ByElements
-from gearbench.diagnosis.output.judged import Closing
+from gearbench.diagnosis.judging.elements import ByElements
+from gearbench.diagnosis.judging.judged import Closing
 from gearbench.diagnosis.verdict import Confirmed, Effect, Probabilities, Verdict, parse_verdict, verdict_json
 from gearbench.diagnosis.words import length
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from gearbench.diagnosis.forces.unknowns import group, unknowns_of
-from gearbench.diagnosis.output import drift as module
-from gearbench.diagnosis.output.drift import Drift, drift_of
+from gearbench.diagnosis.judging import drift as module
+from gearbench.diagnosis.judging.drift import Drift, drift_of
 
 SAMPLES, REPETITIONS, NOISE = 4096, 4, 1e-3
 BINS = np.arange(1, 900)
@@ -33,9 +33,7 @@ def derivatives() -> np.ndarray:
     return lines.reshape(3, -1)
 
 
-def found(
-    changes: np.ndarray, monkeypatch: pytest.MonkeyPatch, columns: np.ndarray | None = None
-) -> Drift | None:
+def found(changes: np.ndarray, monkeypatch: pytest.MonkeyPatch, columns: np.ndarray | None = None) -> Drift | None:
     """`changes` (repetitions, lines of two channels): what each repetition has beside the others and noise; `columns`
     (3, lines): what the rig is said to do, if not what it does."""
     rng, channels = np.random.default_rng(7), {}

@@ -11,10 +11,10 @@ from gearbench.diagnosis.evidence.calibration import LIMITS, Limits
 from gearbench.diagnosis.evidence.decision import at_place, worst
 from gearbench.diagnosis.evidence.search import Search
 from gearbench.diagnosis.forces.equations import PLACES
+from gearbench.diagnosis.judging.drift import Drift
+from gearbench.diagnosis.judging.judged import GREATER, Judged
+from gearbench.diagnosis.judging.missing import Missing
 from gearbench.diagnosis.odds import Calibration
-from gearbench.diagnosis.output.drift import Drift
-from gearbench.diagnosis.output.judged import GREATER, Judged
-from gearbench.diagnosis.output.missing import Missing
 from gearbench.diagnosis.output.selection import Weighed
 from gearbench.diagnosis.output.simulated import Simulated
 from gearbench.diagnosis.population import POPULATION

@@ -13,8 +13,8 @@ from shared.fake_simulator import LINES, FakeSimulator, chosen, sensitivities, t
 
 from gearbench.diagnosis.account import sentence_of_effect
 from gearbench.diagnosis.effects.effect import Hypothesis, Wide
-from gearbench.diagnosis.output import judged as module
-from gearbench.diagnosis.output.judged import GAIN, GREATER, Judged, Sizes, judged_on, rms_closed
+from gearbench.diagnosis.judging import judged as module
+from gearbench.diagnosis.judging.judged import GAIN, GREATER, Judged, Sizes, judged_on, rms_closed
 from gearbench.diagnosis.output.selection import LIMIT, PROVISIONAL, Selection
 from gearbench.diagnosis.output.simulated import Simulated
 from gearbench.diagnosis.output.target import Target

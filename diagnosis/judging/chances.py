@@ -7,10 +7,10 @@ from math import inf
 from typing import NamedTuple
 
 from gearbench.diagnosis.effects.temperature_drift import TEMPERATURE_DRIFT
+from gearbench.diagnosis.judging.decided import Decided
+from gearbench.diagnosis.judging.judged import Judged
 from gearbench.diagnosis.odds import Calibration, effect_signs
-from gearbench.diagnosis.output.judged import Judged
 from gearbench.diagnosis.output.selection import Weighed
-from gearbench.diagnosis.output.verdict_of import Decided
 
 
 class Chances(NamedTuple):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from shared.fake_simulator import FakeSimulator, sensitivities, target
 
-from gearbench.diagnosis.output.elements import refitted
+from gearbench.diagnosis.judging.elements import refitted
 from gearbench.diagnosis.output.fit import fit, sensitivity_of
 
 LUMPED = sensitivities(3)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Any
 
-from gearbench.diagnosis.chances import chances_of
+from gearbench.diagnosis.judging.chances import chances_of
 from gearbench.diagnosis.odds import effect_signs
 from gearbench.diagnosis.population import POPULATION
 

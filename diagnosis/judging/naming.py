@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from gearbench.diagnosis.chances import Chances
 from gearbench.diagnosis.effects.effect import Effect as Library
 from gearbench.diagnosis.effects.effect import Estimate
 from gearbench.diagnosis.effects.temperature_drift import TEMPERATURE_DRIFT
 from gearbench.diagnosis.intake.signals import UNITS
-from gearbench.diagnosis.output.judged import Closing, Judged, rms_closed
-from gearbench.diagnosis.output.verdict_of import Decided
+from gearbench.diagnosis.judging.chances import Chances
+from gearbench.diagnosis.judging.decided import Decided
+from gearbench.diagnosis.judging.judged import Closing, Judged, rms_closed
 from gearbench.diagnosis.verdict import NINE_OF_TEN, Effect, Parameter, Range
 from gearbench.diagnosis.words import SHOWN_UNITS
 

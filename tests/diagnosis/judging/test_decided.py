@@ -12,9 +12,9 @@ import pytest
 from gearbench.diagnosis.effects.effect import Hypothesis, Wide
 from gearbench.diagnosis.effects.library import LIBRARY
 from gearbench.diagnosis.evidence.calibration import LIMITS
-from gearbench.diagnosis.output.drift import Drift
-from gearbench.diagnosis.output.missing import OUTSTANDING, Missing
-from gearbench.diagnosis.output.verdict_of import GREATER, VISIBLE, Decided, decide_simulated
+from gearbench.diagnosis.judging.decided import GREATER, VISIBLE, Decided, decide_simulated
+from gearbench.diagnosis.judging.drift import Drift
+from gearbench.diagnosis.judging.missing import OUTSTANDING, Missing
 from gearbench.diagnosis.population import POPULATION
 
 EFFECT = next(one for one in LIBRARY if one.name == "friction")
