@@ -30,7 +30,8 @@ def force_feeds_the_rig(look: Look) -> list[Finding]:
     cosine = 0.0 if error is None else _cosine(look, force, error)
     if error is None or cosine >= LIMIT or clocks_agree(look):
         return []
-    whole = look.stored_or_own_dte
+    # Gears that yield across their supports leave a dte without that motion, whose mean may have any sign.
+    whole = rolled if rolled is not None else look.stored_or_own_dte
     opposed = whole is not None and look.zero_known and -float(whole.mean()) * np.sign(force.mean()) > whole.std()
     certain = opposed or accounts_agree(look)
     if not certain and (look.zero_known or name == "angles"):
