@@ -9,7 +9,7 @@ band, or in one kind of line.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf
 
@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 from gearbench.diagnosis.evidence.problem import Problem
 from gearbench.diagnosis.forces.condition import prepare
 from gearbench.diagnosis.intake.measurements import Measurement
-from gearbench.diagnosis.intake.signals import measured_channels, noise_of_mean
+from gearbench.diagnosis.intake.signals import measured_channels
 from gearbench.diagnosis.output.fit import Optimum
+from gearbench.diagnosis.output.passed_noise import noise_left, noise_rms
 from gearbench.diagnosis.output.selection import Weighed, only, taken_out
 from gearbench.diagnosis.output.simulated import Simulated
 from gearbench.diagnosis.output.simulator import Simulator
@@ -66,7 +67,7 @@ class Closing:
 class Judged:
     """A selection on the judged record `measured`: `found` with the effects that are kept, what each closes by its
     hypothesis' name, the signals (channel -> (N,)) of the nominal rig, of the one without any of them and with all of
-    them, what was entered but closes nothing, and the lines of that record."""
+    them, what was entered but closes nothing, the lines of that record, and by channel the parts of its noise."""
 
     measured: Measurement
     found: Simulated
@@ -76,6 +77,7 @@ class Judged:
     signals: Mapping[str, Array]
     dropped: tuple[Weighed, ...] = ()
     target: Target | None = None
+    noise: Mapping[str, Array] = field(default_factory=dict)
 
     @cached_property
     def sizes(self) -> dict[str, Sizes]:
@@ -85,9 +87,7 @@ class Judged:
             if channel not in FITTED or channel not in self.signals:
                 continue
             mean = repetitions.mean(axis=0)
-            noise = 0.0
-            if len(repetitions) > 1:
-                noise = float(np.sqrt((noise_of_mean(repetitions) ** 2).sum(axis=0).mean()))
+            noise = noise_rms(self.noise[channel]) if channel in self.noise else 0.0
             nominal, plain, final = (_rms(mean - one[channel]) for one in (self.nominal, self.plain, self.signals))
             out[channel] = Sizes(_rms(mean), nominal, plain, final, noise)
         return out
@@ -151,14 +151,15 @@ def judged_on(
     answer that record. Those of the records `searched` whose flanks part, which the fit leaves out, judge what
     `measured` does not feel."""
     band = problem.conditions[0].band
-    target = target_of([measured], [prepare(measured, problem.model, band)])
+    noise = noise_left(found.layout.nominal, measured, found.simulator.simulate)
+    target = target_of([measured], [prepare(measured, problem.model, band)], [noise])
     smooth = found.simulator.target.measurements
     rough = [one for one in searched if not any(one is own for own in smooth)]
     parted = [target_of([one], [prepare(one, problem.model, band)]) for one in rough]
     dropped: list[Weighed] = []
     while True:
         try:
-            judged = _closings(found, target, measured, parted)
+            judged = replace(_closings(found, target, measured, parted), noise=noise)
         except ValueError:
             return None
         poor = [one for one in found.selection.entered if not _stays(judged, one)]

@@ -29,21 +29,20 @@ def background(
     as the records show it. None where no beginning is a rig."""
     sd = prior_of(simulator, simulator.layout.unknowns.prior())
     report("simulating: background")
-    base = _fitted(simulator, beginnings, around, sd)
+    begin = beginning(simulator, beginnings, around, sd)
+    base = _fitted(simulator, begin, sd)
     if base is None:
         return None
     # What the force residuals make of a rig beside a large effect can lead astray: then from the nominal one.
     if not is_close(simulator, base):
-        base = better(base, _fitted(simulator, beginnings[:1], around, sd))
+        other = beginning(simulator, beginnings[:1], around, sd)
+        base = base if np.array_equal(begin, other) else better(base, _fitted(simulator, other, sd))
     return restructured(simulator, base, around, report)
 
 
-def _fitted(
-    simulator: Simulator, beginnings: Sequence[Array], around: Around | None, sd: Array
-) -> Optimum | None:
-    """The background's optimum under the prior `sd` (size,) from the best of these beginnings; None where none is a
-    rig."""
-    begin, chosen = beginning(simulator, beginnings, around, sd), np.ones(len(sd), dtype=bool)
+def _fitted(simulator: Simulator, begin: Array, sd: Array) -> Optimum | None:
+    """The background's optimum under the prior `sd` (size,) from `begin` (size,); None where that is no rig."""
+    chosen = np.ones(len(sd), dtype=bool)
     first = sensitivity_of(simulator, begin, simulator.layout.unknowns.prior(), chosen)
     return fit(simulator, begin, sd, first, renewals=RENEWALS, chosen=chosen) if first else None
 

@@ -21,6 +21,7 @@ from gearbench.diagnosis.output.around import around
 from gearbench.diagnosis.output.background import background
 from gearbench.diagnosis.output.layout import Layout, layout_of
 from gearbench.diagnosis.output.likely_teeth import with_likely_teeth
+from gearbench.diagnosis.output.passed_noise import noise_left
 from gearbench.diagnosis.output.selection import WORTH, Selection, Start, Weighed, entering, select
 from gearbench.diagnosis.output.simulator import Simulate, Simulator
 from gearbench.diagnosis.output.structure import beginnings
@@ -32,6 +33,8 @@ Report = Callable[[str], None]
 
 # Part of the time without contact from which a record is too rough to follow downhill: small changes make jumps.
 LOSING = 0.01
+# The same where no record is smoother: impacts that are few and repeat bend a fit without breaking it.
+LOSING_MORE = 0.1
 SPACING = 0.15  # of the backlash, between the values that are tried
 CRACKED = 2  # teeth that may be cracked: those that the force residuals rank first
 
@@ -78,7 +81,8 @@ def simulated(
     layout = layout_of(nominal, problem.model, problem.conditions, ())
     chosen = [measurements[number] for number in smooth]
     conditions = [problem.conditions[number] for number in smooth]
-    simulator = Simulator(layout, target_of(chosen, conditions), simulate)
+    noises = [noise_left(layout.case(np.zeros(layout.size), one.name), one, simulate) for one in chosen]
+    simulator = Simulator(layout, target_of(chosen, conditions, noises), simulate)
 
     def seen(held: Array) -> Array | None:
         return around(layout, conditions, held)
@@ -145,10 +149,14 @@ def _opened(simulator: Simulator, selection: Selection, start: Start, apart: boo
 
 
 def smooth_records(nominal: Case, measurements: Sequence[Measurement], simulate: Simulate) -> list[int]:
-    """Numbers of the records whose flanks stay together on the nominal rig: elsewhere small changes make jumps, so that
-    no fit can follow them."""
+    """Numbers of the records whose flanks stay together on the nominal rig, and where there is none, of those that part
+    for little of their time: elsewhere small changes make jumps, so that no fit can follow them."""
     lost = lost_contact(nominal, measurements, simulate)
-    return [number for number, part in enumerate(lost) if part < LOSING]
+    for limit in (LOSING, LOSING_MORE):
+        smooth = [number for number, part in enumerate(lost) if part < limit]
+        if smooth:
+            return smooth
+    return []
 
 
 def lost_contact(nominal: Case, measurements: Sequence[Measurement], simulate: Simulate) -> list[float]:

@@ -1,9 +1,10 @@
 """What a simulation is held against: the lines of all channels, in blocks whose misfit has a size of its own.
 
 A block is one record, channel, kind of line (operating, excited, sideband of either shaft, other) and band. With s^2
-the noise of the repetitions' mean and the square of a hundredth of the level, below which no model is right, and C the
-mean square of measured minus simulated, the block costs n log((s^2 + C) / s^2) nats: what the discrepancy between rig
-and model is there is not known and has been maximised out. Neighbouring lines err alike: n is at most 8.
+the noise of measured minus simulated (`passed_noise`) and the square of a hundredth of the level, below which no model
+is right, and C the mean square of measured minus simulated, the block costs n log((s^2 + C) / s^2) nats: what the
+discrepancy between rig and model is there is not known and has been maximised out. Neighbouring lines err alike: n is
+at most 8, and of a shaft with many teeth half of these.
 """
 
 from __future__ import annotations
@@ -27,9 +28,13 @@ Flags = NDArray[np.bool_]
 
 FITTED = ("dte", "y_driver", "y_driven", "torque_driven")
 INDEPENDENT = 8  # lines that a block counts as, at most
+# Over the number of teeth: those that a block of a shaft's lines counts as, where that is more. Errors of teeth have as
+# many numbers as there are teeth, and show in lines that are as independent as these.
+BY_TEETH = 0.5
 LEVEL = 1e-2  # part of the measured level below which no model is right
 REACH = 1e-4  # part of the channel's whole fluctuation that leaks into any line
 TINY = 1e-60
+SHAFTS = ("driver-shaft", "driven-shaft")  # kinds of lines: sidebands of the gears
 
 
 @dataclass(frozen=True)
@@ -120,8 +125,13 @@ class Target:
         return float(np.sum(counts * self.nats(self.energies(residual))))
 
 
-def target_of(measurements: Sequence[Measurement], conditions: Sequence[Condition]) -> Target:
-    """The lines of measurements, which have those conditions, up to the end of the excitation."""
+def target_of(
+    measurements: Sequence[Measurement],
+    conditions: Sequence[Condition],
+    residual: Sequence[Mapping[str, Array]] | None = None,
+) -> Target:
+    """The lines of measurements, which have those conditions, up to the end of the excitation; `residual`: for each the
+    parts (parts, N) of the noise that the channels' residuals have, that of their repetitions where not given."""
     plan: list[tuple[int, str, Integers]] = []
     lines: list[Complex] = []
     labels: list[Integers] = []
@@ -131,13 +141,15 @@ def target_of(measurements: Sequence[Measurement], conditions: Sequence[Conditio
     counts: list[int] = []
     for number, (one, condition) in enumerate(zip(measurements, conditions, strict=True)):
         kinds, frequency = kinds_of(condition), frequencies(one)[: condition.bins]
+        parts = residual[number] if residual is not None else {}
         for channel, repetitions in measured_channels(one).items():
             if channel not in FITTED:
                 continue
             spectrum = _spectrum(repetitions.mean(axis=0))[: condition.bins]
             noise = np.zeros(spectrum.size)
             if len(repetitions) > 1:
-                noise = (np.abs(_spectrum(noise_of_mean(repetitions))) ** 2).sum(axis=0)[: condition.bins]
+                rows = parts[channel] if channel in parts else noise_of_mean(repetitions)
+                noise = (np.abs(_spectrum(rows)) ** 2).sum(axis=0)[: condition.bins]
             leak = REACH**2 * float(np.abs(spectrum[1:]).max() ** 2)
             label = np.full(spectrum.size, -1)
             for kind, band, inside in _parts(kinds, frequency, one):
@@ -146,7 +158,7 @@ def target_of(measurements: Sequence[Measurement], conditions: Sequence[Conditio
                 blocks.append(Block(one.name, channel, kind, band))
                 noises.append(float(noise[inside].mean()))
                 floors.append(noises[-1] + LEVEL**2 * level + leak + TINY)
-                counts.append(min(INDEPENDENT, int(inside.sum())))
+                counts.append(min(_independent(kind, condition.teeth), int(inside.sum())))
             kept = np.flatnonzero(label >= 0)
             plan.append((number, channel, kept))
             lines.append(spectrum[kept])
@@ -163,6 +175,13 @@ def target_of(measurements: Sequence[Measurement], conditions: Sequence[Conditio
         np.array(counts, dtype=float),
         np.bincount(of_line, minlength=len(blocks)).astype(float),
     )
+
+
+def _independent(kind: str, teeth: Sequence[int]) -> int:
+    """How many lines of a kind a block counts as at most."""
+    if kind not in SHAFTS:
+        return INDEPENDENT
+    return max(INDEPENDENT, round(BY_TEETH * teeth[SHAFTS.index(kind)]))
 
 
 def _parts(

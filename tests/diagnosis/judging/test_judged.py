@@ -34,6 +34,8 @@ class OfLines(Target):
 
 @dataclass
 class Answering(FakeSimulator):
+    simulate: Any = None
+
     def channels(self, p: np.ndarray, measured: Any) -> dict[str, np.ndarray]:
         return {"lines": p @ OTHER, "dte": np.zeros(8)}
 
@@ -60,12 +62,13 @@ def judged(
     for number, value in there.items():
         q[number] = value
     simulator = Answering(lambda one: one @ MATRIX, target(noisy(p @ MATRIX, 11)))
-    simulator.layout.size = 8
+    simulator.layout.size, simulator.layout.nominal = 8, None
     selection = chosen(simulator, (FRICTION, RIPPLE), [np.zeros(8)], {}, apart=apart)
     assert isinstance(selection, Selection)
     plain = target(noisy(q @ OTHER, 12))
     held = OfLines(**{one.name: getattr(plain, one.name) for one in fields(plain)})
-    monkeypatch.setattr(module, "target_of", lambda measurements, conditions: held)
+    monkeypatch.setattr(module, "target_of", lambda measurements, conditions, residual=None: held)
+    monkeypatch.setattr(module, "noise_left", lambda case, measured, simulate: {})
     monkeypatch.setattr(module, "prepare", lambda measured, model, band: None)
     problem: Any = SimpleNamespace(model=None, conditions=[SimpleNamespace(band=1.0)])
     layout: Any = simulator.layout
@@ -177,16 +180,17 @@ def test_what_the_judged_record_does_not_feel_is_told_by_one_whose_flanks_part(
     p, q = BACKGROUND.copy(), BACKGROUND.copy()
     p[3], q[3] = 0.4, light
     simulator = Blind(lambda one: one @ MATRIX, target(noisy(p @ MATRIX, 11)))
-    simulator.layout.size = 8
+    simulator.layout.size, simulator.layout.nominal = 8, None
     selection = chosen(simulator, (FRICTION, RIPPLE), [np.zeros(8)], {}, apart=True)
     assert selection is not None and names(selection.entered) == ["friction"]
 
-    def of_record(measurements: Sequence[Any], conditions: Sequence[Any]) -> OfLines:
+    def of_record(measurements: Sequence[Any], conditions: Sequence[Any], residual: Any = None) -> OfLines:
         plain = target(noisy(q @ SEEN_BY[measurements[0].name], 12))
         given = {one.name: getattr(plain, one.name) for one in fields(plain)}
         return OfLines(**(given | {"measurements": tuple(measurements)}))
 
     monkeypatch.setattr(module, "target_of", of_record)
+    monkeypatch.setattr(module, "noise_left", lambda case, measured, simulate: {})
     monkeypatch.setattr(module, "prepare", lambda measured, model, band: None)
     problem: Any = SimpleNamespace(model=None, conditions=[SimpleNamespace(band=1.0)])
     layout: Any = simulator.layout

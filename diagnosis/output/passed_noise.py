@@ -1,0 +1,80 @@
+"""What noise leaves of measured minus simulated channels: that of each channel, less what the replay makes of the noise
+in what it is given.
+
+A replay turns the driven gear as it was measured, so that the noise of that angle shakes the simulated gear: through
+its inertia alone a reaction of J omega^2 times it, which at a few kHz is far above the noise of a torque sensor.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from gearbench.diagnosis.intake.measurements import Measurement
+from gearbench.diagnosis.intake.signals import measured_channels, noise_of_mean, simulated_channels
+from gearbench.diagnosis.output.simulator import Simulate
+from gearbench.rig import Case
+
+Array = NDArray[np.float64]
+
+GIVEN = ("torque_driver", "angle_driven")
+MOST = 4  # groups that repetitions are taken in: one replay less
+
+
+def noise_left(case: Case, measured: Measurement, simulate: Simulate) -> dict[str, Array]:
+    """Channel -> (parts, N): independent parts of the noise of the mean measured minus the simulated channel, whose
+    squares add up to its variance; none for a record of one repetition, and that of the channels alone where the case
+    cannot be simulated."""
+    groups = min(measured.repetitions, MOST)
+    if groups < 2:
+        return {}
+    parts = {name: noise_of_mean(_grouped(values, groups)) for name, values in measured_channels(measured).items()}
+    given = {
+        name: noise_of_mean(_grouped(measured.periods[name], groups)) for name in GIVEN if name in measured.periods
+    }
+    try:
+        passed = _passed(case, measured, given, simulate)
+    except ValueError:
+        return parts
+    return {name: values - passed[name] if name in passed else values for name, values in parts.items()}
+
+
+def noise_rms(parts: Array) -> float:
+    """Rms of a noise of which these are the parts (parts, N)."""
+    return float(np.sqrt((parts**2).sum(axis=0).mean()))
+
+
+def _passed(case: Case, measured: Measurement, given: Mapping[str, Array], simulate: Simulate) -> dict[str, Array]:
+    """Channel -> (parts, N): what the simulated channels become for the noise in what is given."""
+
+    def channels(record: xr.Dataset) -> dict[str, Array]:
+        return simulated_channels(measured, simulate(case, record))
+
+    quiet = channels(measured.record)
+    count = len(next(iter(given.values())))
+    rows = []
+    for part in range(count - 1):
+        noisy = channels(_shaken(measured.record, {name: values[part] for name, values in given.items()}))
+        rows.append({name: noisy[name] - quiet[name] for name in quiet})
+    found = {name: np.array([row[name] for row in rows]) for name in quiet}
+    # Parts add up to nothing, as departures from a mean do.
+    return {name: np.concatenate([values, -values.sum(axis=0, keepdims=True)]) for name, values in found.items()}
+
+
+def _shaken(record: xr.Dataset, noise: Mapping[str, Array]) -> xr.Dataset:
+    """The record with the same noise (N,) added to each repetition of channels."""
+    changed = {}
+    for name, values in noise.items():
+        samples = record[name].sizes["time"]
+        changed[name] = record[name] + np.tile(values, samples // values.size)
+    return record.assign({name: values.assign_attrs(record[name].attrs) for name, values in changed.items()})
+
+
+def _grouped(repetitions: Array, groups: int) -> Array:
+    """Means (groups, N) of equally many repetitions (P, N); what does not fill a group is left out."""
+    each = len(repetitions) // groups
+    kept = repetitions[: groups * each].reshape(groups, each, -1)
+    return np.asarray(kept.mean(axis=1), dtype=np.float64)
