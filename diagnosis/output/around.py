@@ -49,7 +49,7 @@ SMOOTHED = 12  # parts of the band over which the level is taken
 EVALUATIONS = 25
 # Where a motion of the housing is looked for: compliances over the supports', logarithms of its frequency over theirs.
 HOUSING_FROM = (0.004, 0.012, 0.04)
-HOUSING_AT = tuple(np.linspace(-1.2, 0.8, 21))
+HOUSING_AT = tuple(np.linspace(-2.0, 0.8, 29))
 # Where a gear's resonance across its support is looked for, which its cross-coupling shows.
 ACROSS_AT = tuple(np.geomspace(0.08, 0.6, 19))
 CROSS_AT = (-0.15, -0.06, 0.06, 0.15)

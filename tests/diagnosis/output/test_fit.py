@@ -97,3 +97,20 @@ def test_what_is_not_felt_yet_does_not_stand_in_the_way(monkeypatch: pytest.Monk
     best = fit(simulator, np.zeros(8), sd, first, renewals=2, chosen=ALL)
     assert best is not None and best.left < 0.5
     assert best.p[0] == pytest.approx(0.12, abs=2e-3)
+
+
+def test_a_valley_that_bends_is_followed_to_its_end() -> None:
+    """Renewed derivatives give a small part of what they promise where a valley bends, and do so again from there."""
+
+    def bent(p: np.ndarray) -> np.ndarray:
+        return p @ MATRIX + 2.0 * p[0] ** 2 * MATRIX[1]
+
+    true = np.array([0.5, 0.0, 0.05, 0.3, 0.0, 0.0, 0.0, 0.0])
+    begin = np.array([-0.5, -0.5, 0.05, 0.3, 0.0, 0.0, 0.0, 0.0])
+    wide = np.where(SD > 0.0, 10.0, 0.0)
+    simulator = FakeSimulator(bent, target(bent(true) + noise(1e-3)))
+    first = sensitivity_of(simulator, begin, wide, ALL)
+    assert first is not None
+    best = fit(simulator, begin, wide, first, renewals=20, chosen=ALL)
+    assert best is not None and best.left < 0.5
+    assert best.p == pytest.approx(true, abs=5e-3)
