@@ -59,14 +59,14 @@ class Truth:
 
 
 def draw_truth(
-    nominal: Case, family: str, seed: int, number: int, plan: Plan, scale: Scale | None = None, loose: bool = False
+    nominal: Case, family: str, seed: int, number: int, plan: Plan, scale: Scale | None = None
 ) -> tuple[Truth, np.random.Generator]:
     """The truth rig of case `number` of a challenge, and the stream that its noise comes from; `scale`: of a rig that
-    is not of the demonstration's size; `loose`: its housing is as soft as housings are."""
+    is not of the demonstration's size, whose housing then is as soft as housings are."""
     stream = np.random.SeedSequence([seed, list(FAMILIES).index(family), number])
     rngs = [np.random.default_rng(child) for child in stream.spawn(6)]
     structure = draw_structure(nominal, family, rngs[0])
-    if loose:
+    if scale is not None:
         structure = loosened(structure, rngs[4])
     elastic = within_uncertainty(nominal, rngs[5]) if plan.elastic else None
     drawn = Drawn(background((nominal.rig.driver.teeth, nominal.rig.driven.teeth), rngs[1]), "none", 0.0, {})
@@ -140,7 +140,7 @@ def make_challenge(
     plans = make_plan(mix, np.random.default_rng(np.random.SeedSequence([seed, list(FAMILIES).index(family)])))
     check_apart(out, answers_file)
     rigs = [_rig_of(nominal, family, seed, number, drawn, bool(torques)) for number in range(len(plans))]
-    truths = [draw_truth(rig, family, seed, i, plan, scale, drawn)[0].answer for i, (plan, (rig, scale)) in
+    truths = [draw_truth(rig, family, seed, i, plan, scale)[0].answer for i, (plan, (rig, scale)) in
               enumerate(zip(plans, rigs, strict=True))]  # fmt: skip
     answers = _claim(out, answers_file, truths)
     shared = None
@@ -154,7 +154,7 @@ def make_challenge(
         if not stop.is_set():
             number = answers[name].number
             rig, scale = rigs[number]
-            truth, rng = draw_truth(rig, family, seed, number, plans[number], scale, drawn)
+            truth, rng = draw_truth(rig, family, seed, number, plans[number], scale)
             bench, text = shared or (make_bench(rig, nominal_stiffness(rig), scale), nominal_text(rig))
             _write_case(bench, truth, name, text, out, rng)
 

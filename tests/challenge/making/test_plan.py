@@ -16,7 +16,8 @@ from gearbench.challenge.truth.effects import EFFECTS, FOREIGN, SEVERITY
 from gearbench.challenge.truth.elastic import REPRESENTED
 from gearbench.challenge.truth.levels import Levels
 from gearbench.challenge.truth.rigs import check_nominal
-from gearbench.challenge.truth.structure import FAMILIES, draw_structure, family_named
+from gearbench.challenge.truth.scale import scale_of
+from gearbench.challenge.truth.structure import FAMILIES, draw_structure, family_named, loosened
 
 
 def test_default_mix_is_that_of_the_reach() -> None:
@@ -75,14 +76,23 @@ def test_three_effects_are_in_the_rig_at_once() -> None:
 
 
 def test_a_loose_housing_changes_nothing_else() -> None:
-    nominal, plan = short_case(), Plan("none")
-    parts = []
+    nominal, parts = short_case(), []
     for number in range(40):
-        tight, loose = (draw_truth(nominal, "test", 7, number, plan, None, one)[0].structure for one in (False, True))
+        tight = draw_structure(nominal, "test", np.random.default_rng(number))
+        loose = loosened(tight, np.random.default_rng([number, 1]))
         parts.append(loose.mode_part)
         assert str(replace(loose, mode_part=tight.mode_part)) == str(tight)
     assert np.min(parts) >= 0.005 and np.max(parts) <= 0.1
     assert 0.3 < np.mean(np.array(parts) > 0.0224) < 0.7  # log-uniform
+
+
+def test_rigs_of_another_size_and_those_around_a_users_have_loose_housings() -> None:
+    nominal = short_case()
+    found, tame = (
+        [draw_truth(nominal, "test", 7, number, Plan("none"), scale)[0].structure.mode_part for number in range(20)]
+        for scale in (scale_of(nominal), None)
+    )
+    assert np.max(found) > 0.05 and np.max(tame) < 0.011
 
 
 SIZES = {
