@@ -17,6 +17,7 @@ from gearbench.diagnosis.judging.missing import Missing
 from gearbench.diagnosis.odds import Calibration
 from gearbench.diagnosis.output.selection import Weighed
 from gearbench.diagnosis.output.simulated import Simulated
+from gearbench.diagnosis.output.structure import lag_of_drive
 from gearbench.diagnosis.population import POPULATION
 from gearbench.diagnosis.verdict import Outcome
 from gearbench.diagnosis.words import percent
@@ -30,6 +31,8 @@ VISIBLE = 0.5
 # Part of the nominal gap that the named effects must close for content that changes, or a form without a name, not to
 # outbid them.
 CLOSES = 0.5
+# Over what sound rigs have: a lag of the drive's torque from which something is between its sensor and the rotor.
+LATE_LIMIT = 3.0
 
 
 @dataclass(frozen=True)
@@ -110,6 +113,9 @@ def _decided(
     if seen > 1.0:
         because = f"a force {at_place(place)} remains that no effect of the library explains"
         return Decided("unknown", place, (), sign, (because,))
+    late, sound = lag_of_drive(judged.found.layout.unknowns, selection.best.p)
+    if abs(late) > LATE_LIMIT * sound > 0.0:
+        return Decided("unknown", "drive", (), max(sign, abs(late) / (LATE_LIMIT * sound)), (_late(late),))
     return Decided("none", "none", (), sign, (_nothing(judged, known), *aside))
 
 
@@ -126,6 +132,15 @@ def _nothing(judged: Judged, known: Calibration) -> str:
     return because + (
         f"what remains, at most {percent(judged.remains)} of any channel's fluctuation, is"
         f" {sound if small else 'the smaller part of the gap'}"
+    )
+
+
+def _late(late: float) -> str:
+    """That the drive's torque does not act when it is measured."""
+    return (
+        f"the torque of the drive acts {abs(late) * 1e6:.3g} us {'after' if late > 0.0 else 'before'} its channel shows"
+        " it, more than channels of one clock differ: a filter, or something that yields between its sensor and the"
+        " rotor"
     )
 
 

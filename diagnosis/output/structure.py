@@ -43,6 +43,9 @@ GAIN, GAIN_SD = "gain", 0.01
 # Mesh phase [cycles] that the encoders show at that of the gears: zeros are set by a tooth that touches, not better
 # than this.
 PHASE, PHASE_SD, PHASE_LARGEST = "phase", 0.01, 0.05
+# Time [s] by which the torque reaches the rotor after its channel shows it, in periods of the mesh's resonance: filters
+# and shafts are between both, a little more than between channels of one clock.
+LATE, LATE_SD = "drive-late", 0.015
 # Softer than the former part a rig has it, and then at least the latter: steps stay long.
 FELT, STIFFEST = 0.01, 0.03
 # Moved from nothing by the least that a rig feels: a smaller step would show no derivative, and a fit that begins
@@ -58,6 +61,7 @@ NAMES = (
     (HOUSING, "housing compliance over the supports'", "1"),
     (GAIN, "gain of the reaction torque (logarithm)", "1"),
     (PHASE, "zero of the mesh phase in cycles", "1"),
+    (LATE, "lag of the drive's torque behind its channel", "s"),
     (LOADED, LOADED_NAME, "1"),
     (CONTRAST, CONTRAST_NAME, "1"),
 )
@@ -72,6 +76,7 @@ def structure_groups(rig: Rig, model: NominalModel) -> list[Group]:
         group(CROSS, "1", SIDES, CROSS_SD, slot="structure", first=4, low=-CROSS_LARGEST, high=CROSS_LARGEST),
         group(GAIN, "1", ("torque_driven",), GAIN_SD, slot="structure", first=2),
         group(PHASE, "1", ("mesh",), PHASE_SD, slot="structure", first=18, low=-PHASE_LARGEST, high=PHASE_LARGEST),
+        group(LATE, "s", ("torque_driver",), LATE_SD / model.resonance, slot="structure", first=19),
     ]
     if rig.housing is None:
         groups.append(group(HOUSING, "1", MOTIONS, HOUSING_SD, slot="structure", first=10, low=0.0,
@@ -172,8 +177,17 @@ def sensed(rig: Rig, model: NominalModel, unknowns: Unknowns, p: Array, delays: 
         field = f"delay_{channel}"
         update[field] = getattr(sensors, field) + float(p[unknowns[key]][0])
     update["gain_torque_driven"] = sensors.gain_torque_driven * exp(float(p[unknowns[GAIN]][0]))
+    update["delay_torque_driver"] = sensors.delay_torque_driver - float(p[unknowns[LATE]][0])
     update["mesh_phase_zero"] = sensors.mesh_phase_zero + float(p[unknowns[PHASE]][0])
     return changed(rig, "sensors", **update)
+
+
+def lag_of_drive(unknowns: Unknowns, p: Array) -> tuple[float, float]:
+    """Time [s] by which the torque reaches the rotor after its channel shows it, and its standard deviation on sound
+    rigs."""
+    if LATE not in unknowns.slices:
+        return 0.0, 0.0
+    return float(p[unknowns[LATE]][0]), float(unknowns.group(LATE).sd[0])
 
 
 def structure_found(unknowns: Unknowns, p: Array, std: Array) -> tuple[Found, ...]:

@@ -12,15 +12,18 @@ import pytest
 from gearbench.diagnosis.effects.effect import Hypothesis, Wide
 from gearbench.diagnosis.effects.library import LIBRARY
 from gearbench.diagnosis.evidence.calibration import LIMITS
+from gearbench.diagnosis.forces.unknowns import group, unknowns_of
 from gearbench.diagnosis.judging.decided import GREATER, VISIBLE, Decided, decide_simulated
 from gearbench.diagnosis.judging.drift import Drift
 from gearbench.diagnosis.judging.missing import OUTSTANDING, Missing
+from gearbench.diagnosis.output.structure import LATE
 from gearbench.diagnosis.population import POPULATION
 
 EFFECT = next(one for one in LIBRARY if one.name == "friction")
 FRICTION = Hypothesis("friction", "mesh", (Wide("friction"),), effect=EFFECT)
 QUIET = np.zeros(5)
 STRUCTURE = POPULATION.structure
+CLOCK = unknowns_of([group(LATE, "s", ("torque_driver",), 1e-5, slot="structure")], 0)
 HAND = replace(LIMITS, competitor_factor=1.5, competitor_offset=20.0, free=10.0)
 
 
@@ -36,14 +39,19 @@ def decided(
     unsteady: np.ndarray = QUIET,
     changing: float = 0.0,
     drift: Drift | None = None,
+    late: float = 0.0,
 ) -> Decided:
     """`worth` nats of friction (None: nothing was kept), which closes `share` of the gap; `left` of the nominal gap,
-    `remains` of a channel's fluctuation in the end, `searched` (None: as much) on the records of the search."""
+    `remains` of a channel's fluctuation in the end, `searched` (None: as much) on the records of the search; the drive
+    acts `late` s, of sound rigs 1e-5."""
     entered: tuple[Any, ...] = ()
     if worth is not None:
         entered = (SimpleNamespace(hypothesis=FRICTION, log_bayes_factor=worth),)
     judged: Any = SimpleNamespace(
-        found=SimpleNamespace(selection=SimpleNamespace(entered=entered, weighed=entered)),
+        found=SimpleNamespace(
+            selection=SimpleNamespace(entered=entered, weighed=entered, best=SimpleNamespace(p=np.array([late]))),
+            layout=SimpleNamespace(unknowns=CLOCK),
+        ),
         closings={"friction": SimpleNamespace(without={})},
         share=lambda signals: share,
         left=left,
@@ -90,6 +98,14 @@ def test_a_place_that_stands_out_is_unknown_only_over_a_visible_remainder() -> N
     assert (made.verdict, made.place) == ("unknown", "drive")
     assert decided(None, remains=0.9 * VISIBLE * STRUCTURE, excess=out).verdict == "none"
     assert decided(None, remains=1.1 * STRUCTURE, excess=at(0, 0.9 * OUTSTANDING["drive"])).verdict == "none"
+
+
+def test_a_drive_that_acts_long_after_its_torque_is_measured_is_something_unknown_at_the_drive() -> None:
+    made = decided(None, late=4e-5)
+    assert (made.verdict, made.place) == ("unknown", "drive") and made.sign == pytest.approx(4 / 3)
+    assert "40 us after its channel" in made.because[0] and "before" in decided(None, late=-4e-5).because[0]
+    assert decided(None, late=2e-5).verdict == "none"
+    assert decided(40.0, late=4e-5).verdict == "effects"
 
 
 def test_the_sign_of_something_unknown_follows_the_remainder() -> None:
