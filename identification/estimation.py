@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from math import sqrt
+from math import hypot, sqrt
 
 import xarray as xr
 
@@ -62,18 +62,15 @@ def identify(
 
 
 def _require_response(frf: xr.Dataset) -> None:
-    """Raise LpmError for a result that is expected to err by all of itself. Of simulated records, whose attributes and
-    channels are not in doubt, a warning says so: they are too short or too noisy."""
-    expected = float(frf.attrs["expected_error"])
+    """Raise LpmError for a result that is expected to err by all of itself, apart from doubtful channels, which may be
+    right and are warned of. Of simulated records, whose attributes are not in doubt, a warning says so."""
+    parts = (float(frf.attrs.get(name, 0.0)) for name in ("variance_error", "truncation_error", "unexplained_error"))
+    expected = hypot(*parts)
     if expected < NOTHING:
         return
-    doubtful = float(frf.attrs["record_error"])
-    cause = "its mesh period, channels and their units may be wrong, or it is too short or noisy"
-    if doubtful >= 0.7 * expected:
-        cause = str(frf.attrs["warnings"]).splitlines()[0]
     raise LpmError(
-        f"the response of this record is expected to err by {expected:.0%} of itself (limit {NOTHING:.0%}), which"
-        f" says nothing: {cause}"
+        f"the response of this record is expected to err by {expected:.0%} of itself (limit {NOTHING:.0%}), which says"
+        " nothing: its mesh period, channels or units are wrong, or it is too short or too noisy"
     )
 
 

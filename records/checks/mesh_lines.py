@@ -35,9 +35,11 @@ PARTS = (2, 3)
 
 def mesh_lines_stand_out(look: Look) -> list[Finding]:
     """Harmonics of the declared mesh frequency stand out of the dte, if those of any frequency do; lines midway between
-    them do not, unless something else repeats as slowly."""
+    them do not, unless something else repeats as slowly. For records without angles, which would tell the speed."""
     error, force, period = look.stored_or_own_dte, look.force, look.mesh_period
-    if error is None or force is None or period is None or not look.steady or not np.ptp(error) > 0:
+    if error is None or force is None or period is None or not look.steady or "angle_driver" in look.record:
+        return []
+    if not np.ptp(error) > 0:
         return []
     spacing = look.rate / look.samples
     declared = 1.0 / (period * spacing)
