@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from math import sqrt
+from math import hypot, sqrt
 
 import xarray as xr
 
@@ -27,6 +27,8 @@ from gearbench.records.record import require_finite
 SECOND_OPINION = 0.05
 # Sidebands below the excited band's end that a prediction at another mesh frequency follows.
 MOST_SIDEBANDS = 5000
+# Expected error from which on a result says nothing.
+NOTHING = 1.0
 # Equations of mesh-feedback beyond which further realisations are left out.
 ENOUGH = 20_000
 
@@ -53,8 +55,31 @@ def identify(
     >>> f"{frf.attrs['expected_error']:.0%}"
     '12%'
     """
-    settings = settings or IdentificationSettings()
-    report = progress or (lambda fraction, message: None)
+    frf = _identified(records, settings or IdentificationSettings(), progress or (lambda fraction, message: None))
+    if not _simulated(records):
+        _require_response(frf)
+    return frf
+
+
+def _require_response(frf: xr.Dataset) -> None:
+    """Raise LpmError for a result that is expected to err by all of itself, apart from doubtful channels, which may be
+    right and are warned of. Of simulated records, whose attributes are not in doubt, a warning says so."""
+    parts = (float(frf.attrs.get(name, 0.0)) for name in ("variance_error", "truncation_error", "unexplained_error"))
+    expected = hypot(*parts)
+    if expected < NOTHING:
+        return
+    raise LpmError(
+        f"the response of this record is expected to err by {expected:.0%} of itself (limit {NOTHING:.0%}), which says"
+        " nothing: its mesh period, channels or units are wrong, or it is too short or too noisy"
+    )
+
+
+def _simulated(records: Sequence[xr.Dataset]) -> bool:
+    return all("model" in record.attrs for record in records)
+
+
+def _identified(records: Sequence[xr.Dataset], settings: IdentificationSettings, report: Progress) -> xr.Dataset:
+    """As `identify`, whatever is to be expected of the result."""
     report(0.0, "spectra")
     for record in records:
         for name in record.data_vars:
@@ -81,7 +106,7 @@ def identify(
     require_mesh_periods(spectra)
     report(0.05, "what the records say about themselves")
     doubts, cost = _doubts(records)
-    simulated = all("model" in record.attrs for record in records)
+    simulated = _simulated(records)
     said = [*doubts, *notes]
     return identify_spectra(
         spectra, excited, settings, notes=said, record_error=cost, progress=report, simulated=simulated
@@ -165,7 +190,7 @@ def _feedback_at_varying_speed(
         progress=lambda part, message: report(0.1 + 0.6 * part, message),
     )
     if frf.attrs["expected_error"] > SECOND_OPINION:
-        frf = _second_opinion(frf, lambda: identify(records, _as_polynomials(settings)))
+        frf = _second_opinion(frf, lambda: _identified(records, _as_polynomials(settings), lambda part, message: None))
     report(1.0, "identified")
     return frf
 
@@ -184,7 +209,7 @@ def _local_at_varying_speed(
     spectra, course = course_spectra(records, SIDEBANDS if settings.harmonics is None else settings.harmonics)
     excited = (course.lowest * spectra.spacing, course.excited * spectra.spacing)
     lines = output_lines(spectra, settings.band or excited, excited, settings.step)
-    simulated = all("model" in record.attrs for record in records)
+    simulated = _simulated(records)
     task = Task(spectra, lines, settings, excited, tuple(doubts), cost, report, simulated)
     frf = by_local_method_at_varying_speed(task, course)
     report(1.0, "identified")

@@ -35,6 +35,9 @@ from gearbench.identification.truth.periodic import itf_from_htf
 DOUBTFUL = 0.1
 # Expected error of polynomials beyond which smooth branches are tried as well.
 ENOUGH = 0.01
+# Part of the band's lines below which an excitation leaves classes of lines empty, and of the strongest line's force
+# below which a line is.
+SPARSE, EXCITED = 0.4, 1e-3
 
 
 @dataclass(frozen=True)
@@ -77,8 +80,15 @@ def by_local_method(task: Task) -> xr.Dataset:
 
 
 def _by_the_better(task: Task, transient: bool) -> tuple[Fitted, LpmResult]:
-    """Polynomials, and where they expect to err by more than ENOUGH the better of them and of smooth branches."""
+    """Polynomials, and where they expect to err by more than ENOUGH the better of them and of smooth branches. Where
+    the force leaves most lines out no residual shows what polynomials miss between them: smooth branches alone, if
+    they can be had."""
     found, refused = [], ""
+    if _sparse(task):
+        try:
+            return _by_smooth_branches(task, transient)
+        except LpmError as error:
+            refused = str(error)
     try:
         found.append(_by_polynomials(task, transient))
     except LpmError as error:
@@ -90,6 +100,15 @@ def _by_the_better(task: Task, transient: bool) -> tuple[Fitted, LpmResult]:
             if not found:
                 raise LpmError(refused) from None
     return min(found, key=_expects)
+
+
+def _sparse(task: Task) -> bool:
+    """Whether the force excites less than SPARSE of the lines of its band, as a coset multisine does."""
+    spectra = task.spectra
+    low, high = (round(end / spectra.spacing) for end in task.excited)
+    size = np.abs(spectra.force[:, max(low, 1) : high + 1]).max(axis=0)
+    excited = np.count_nonzero(size > EXCITED * size.max(initial=0.0))
+    return excited * spectra.repeats < SPARSE * size.size
 
 
 def _expects(found: tuple[Fitted, LpmResult]) -> float:
@@ -203,7 +222,7 @@ def _dataset(task: Task, fitted: Fitted, result: LpmResult) -> xr.Dataset:
             "bandwidth": rule.bandwidth,
             "harmonics_needed": rule.harmonics_needed,
         }
-    attributes["warnings"] = "\n".join([*task.notes, *_warnings(accuracy, limits, rule, task)])
+    attributes["warnings"] = "\n".join([*task.notes, *_warnings(fitted, accuracy, limits, rule, task)])
     return make_frf(
         "identified",
         frequency=frequency,
@@ -248,8 +267,13 @@ def _about_fit(
     }
 
 
-def _warnings(accuracy: Accuracy, limits: Limits, rule: RecordRule | None, task: Task) -> list[str]:
+def _warnings(fitted: Fitted, accuracy: Accuracy, limits: Limits, rule: RecordRule | None, task: Task) -> list[str]:
     notes, spectra = [], task.spectra
+    if fitted.bandwidth is None and _sparse(task):
+        notes.append(
+            "the force leaves most lines of its band out: what polynomials miss between those that it excites is in no"
+            " residual, and not in the expected error; smooth branches count it"
+        )
     if accuracy.expected >= 1.0:
         period = 1.0 / (spectra.mesh_lines * spectra.spacing)
         help_ = "more realisations help" if task.simulated else f"is the mesh period of {period:g} s right?"

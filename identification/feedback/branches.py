@@ -27,7 +27,7 @@ def enough_branches(
 ) -> tuple[int, Floats]:
     """Branches on each side that hold all but NEGLIGIBLE of the response, within ROOM, and the power [m^2/N^2] (F,)
     beyond them on the output `lines`; `ratio` as in `htf_on`."""
-    most = int(2 * data.furthest / (data.mesh_lines * ratio))
+    most = int(2 * data.furthest_at(ratio) / (data.mesh_lines * ratio))
     chosen = followed(lines)
     power = np.abs(htf_on(model, data, chosen, most, ratio)) ** 2
     order = np.abs(np.arange(-most, most + 1))

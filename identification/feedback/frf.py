@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from gearbench.identification.feedback.branches import enough_branches
 from gearbench.identification.feedback.draws import add_mesh_curves, response_variances
-from gearbench.identification.feedback.estimate import Feedback
+from gearbench.identification.feedback.estimate import Feedback, rational
+from gearbench.identification.feedback.functions import Splines
 from gearbench.identification.feedback.result import (
     coherence,
     doubt_beyond,
@@ -24,11 +25,13 @@ from gearbench.identification.feedback.result import (
 from gearbench.identification.response.frf import make_frf
 from gearbench.identification.response.mode_spread import natural_frequency_deviation
 from gearbench.identification.response.modes import itf_modes
-from gearbench.identification.spectra.joint import Floats, Spectra
+from gearbench.identification.spectra.joint import Complexes, Floats, Spectra
 from gearbench.identification.truth.periodic import itf_from_htf
 
 # N is 1 only far below the first mode: beyond this part of its frequency k(theta) has a free factor.
 GAUGED = 0.2
+# Pairs of poles of a machine on two supports.
+SUPPORTS = 2
 
 
 def feedback_frf(
@@ -54,10 +57,7 @@ def feedback_frf(
     itf = itf_from_htf(response, phases)
     draws = drawn_models(found)
     htf_variance, itf_variance = response_variances(model, draws, data, lines, branches, phases, ratio)
-    # Sidebands beyond the record's lines are extrapolated: those that it holds tell how well.
-    order = np.arange(-branches, branches + 1)[:, None]
-    extrapolated = np.where(np.abs(lines + order * data.mesh_lines * ratio) > data.top, np.abs(response) ** 2, 0.0)
-    extrapolated *= doubt_beyond(found)
+    extrapolated = doubtful_sidebands(found, lines, response, ratio)
     htf_variance += extrapolated
     itf_variance += extrapolated.sum(axis=0)[:, None]
     itf_variance += beyond[:, None]
@@ -93,6 +93,22 @@ def feedback_frf(
     return frf
 
 
+def doubtful_sidebands(found: Feedback, lines: NDArray[np.int64], response: Complexes, ratio: float) -> Floats:
+    """Power (2L+1, F) of the `response` in sidebands beyond the record's lines that may be wrong: they are
+    extrapolated, and those that the record holds tell how well.
+
+    Of splines they tell nothing of what is carried further by a faster mesh: all of it may be wrong. How much that is
+    follows from partial fractions fitted to them, as what splines are beyond their lines is made of the last of these,
+    which noise may make anything.
+    """
+    data, doubt = found.data, doubt_beyond(found)
+    branches = response.shape[0] // 2
+    order = np.arange(-branches, branches + 1)[:, None]
+    if ratio > 1.0 and isinstance(found.model.basis, Splines):
+        response, doubt = htf_on(rational(found.refined, data, SUPPORTS), data, lines, branches, ratio), 1.0
+    return np.where(np.abs(lines + order * data.mesh_lines * ratio) > data.top, doubt * np.abs(response) ** 2, 0.0)
+
+
 def _about_fit(found: Feedback, spectra: Spectra, ratio: float) -> dict[str, Any]:
     """Attributes that say what was fitted, how well, and of a prediction for which mesh frequency."""
     own = found.data.mesh_lines * spectra.spacing
@@ -112,8 +128,9 @@ def _predicted(own: float, ratio: float) -> list[str]:
     if ratio == 1.0:
         return []
     return [
-        f"predicted at {own * ratio:g} Hz mesh from a record at {own:g} Hz: the expected error counts what this"
-        " record's noise and residual tell, not errors of the model that matter at the other speed only"
+        f"predicted at {own * ratio:g} Hz mesh from a record at {own:g} Hz: the expected error counts this"
+        " record's noise and residual, and sidebands beyond its lines as far as its own highest lines tell; a resonance"
+        " of the supports there would not be known"
     ]
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import norm
 
 from gearbench.identification.feedback.data import ClassData
 from gearbench.identification.feedback.estimate import Feedback
@@ -18,8 +19,8 @@ DRAWS = 16
 # have deviations of many times their size, along which a thousandth of it is not linear yet.
 STEP = 1e-6
 FOLLOWED = 40
-# Lines beyond those of the fit that suffice to tell how well it goes on.
-FEWEST_HELD = 100
+# Deviation of the part that a model leaves of lines beyond its fit from which on too few of them stand out of noise.
+HIDDEN = 0.002
 # Equations of a window in which residuals are compared with the inputs.
 COMPARED = 80
 # Quiet windows, and the deviations above these from which on residuals are more than even noise leaves.
@@ -29,12 +30,13 @@ UNEXPLAINED = 0.03
 
 
 def htf_on(model: Model, data: ClassData, lines: NDArray[np.int64], harmonics: int, ratio: float = 1.0) -> Complexes:
-    """HTF (2H+1, F) [m/N], l = -H..H, on lines of the record by harmonic balance; 0 beyond `data.furthest`.
+    """HTF (2H+1, F) [m/N], l = -H..H, on lines of the record by harmonic balance; 0 beyond
+    `data.furthest_at(ratio)`.
 
     `ratio`: mesh frequency over that of the record, which D, N, k and c do not depend on.
     """
     result = np.zeros((2 * harmonics + 1, lines.size), dtype=complex)
-    step, furthest = data.mesh_lines * ratio, data.furthest
+    step, furthest = data.mesh_lines * ratio, data.furthest_at(ratio)
     for residue in np.unique(np.round(lines % step, 9)):
         chosen = np.flatnonzero(np.abs(np.round(lines % step, 9) - residue) < 1e-8)
         first = int(np.ceil((-furthest - residue) / step))
@@ -56,20 +58,32 @@ def htf_on(model: Model, data: ClassData, lines: NDArray[np.int64], harmonics: i
 def doubt_beyond(found: Feedback) -> float:
     """Part of the power of sidebands beyond the lines of the fit that may be wrong, apart from noise's part in it.
 
-    What the model leaves of the lines that the record has beyond those (if they are too few: of the lines above the
-    excited band, which hold sidebands only, too), less what noise of the level of the fit does and plus one deviation
-    of that, over their power less that of noise. 1 where the record has no such lines.
+    What the model leaves of the lines that the record has beyond those, less noise of the level of the fit, over their
+    power (where noise hides it: of all lines above the excited band, which hold sidebands only, too). Lines count by
+    the power that the model sees in them. The part is positive: of what noise makes of it (normal, since many lines add
+    up) its mean above 0. 1 where the model sees nothing there.
     """
     data = found.data
     has = np.abs(data.dte) > 0
-    counted = has & ~data.valid[:, :, None]
-    if np.count_nonzero(counted) < FEWEST_HELD:
-        counted = has & (np.abs(data.lines) > data.excited)[:, :, None]
-    number, level = np.count_nonzero(counted), found.refined.noise
-    power = float(np.sum(np.abs(data.dte[counted]) ** 2)) - number * level
-    left = float(np.sum(np.abs(found.refined.left[counted]) ** 2)) - number * level
-    deviation = float(np.sqrt(number)) * level
-    return min((max(left, 0.0) + deviation) / power, 1.0) if power > deviation else 1.0
+    part, deviation = _left_over_seen(found, has & ~data.valid[:, :, None])
+    if deviation > HIDDEN:
+        part, deviation = _left_over_seen(found, has & (np.abs(data.lines) > data.excited)[:, :, None])
+    if not np.isfinite(deviation):
+        return 1.0
+    if deviation > 0.0:
+        above = part / deviation
+        part += deviation * float(np.exp(norm.logpdf(above) - norm.logcdf(above)))
+    return min(max(part, 0.0), 1.0)
+
+
+def _left_over_seen(found: Feedback, counted: NDArray[np.bool_]) -> tuple[float, float]:
+    """What the model leaves of the power of counted lines (C, S, E), and its deviation by noise; infinite for none."""
+    left, level = found.refined.left[counted], found.refined.noise
+    seen = np.abs(found.data.dte[counted] - left) ** 2
+    power = float(np.sum(seen**2))
+    if power == 0.0:
+        return 0.0, np.inf
+    return float(np.sum(seen * (np.abs(left) ** 2 - level))) / power, level / float(np.sqrt(power))
 
 
 def followed(lines: NDArray[np.int64]) -> NDArray[np.int64]:

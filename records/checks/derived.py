@@ -142,6 +142,14 @@ def swings_fit_the_teeth(look: Look) -> list[Finding]:
     ):
         if values is not None and float(np.ptp(values)) > most:
             found.append(Finding(f"{name} swings by {np.ptp(values):.4g} m (limit {most:.3g} m, {limit}): {hint}"))
+    stored = look.channel("dte")
+    if not found and stored is not None and "angle_driver" not in look.record and abs(float(stored.mean())) > most:
+        found.append(
+            Finding(
+                f"dte has a mean of {stored.mean():.4g} m (limit {most:.3g} m, {limit}): {length} Where its zero is"
+                " arbitrary, take the mean off"
+            )
+        )
     return found[:1]
 
 

@@ -29,6 +29,7 @@ from gearbench.records.checks.drift import clocks_keep_pace
 from gearbench.records.checks.finding import Finding
 from gearbench.records.checks.lag import force_and_dte_in_step
 from gearbench.records.checks.look import Look
+from gearbench.records.checks.mesh_lines import mesh_lines_stand_out
 from gearbench.records.checks.passive import force_feeds_the_rig
 from gearbench.records.checks.periods import periods_repeat
 from gearbench.records.checks.torques import load_balances, torque_as_declared
@@ -43,6 +44,7 @@ CHECKS: tuple[Check, ...] = (
     angles_unwrapped,
     angles_roll,
     angles_keep_mesh_period,
+    mesh_lines_stand_out,
     torque_as_declared,
     load_balances,
     dte_alive,

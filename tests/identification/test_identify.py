@@ -271,14 +271,26 @@ def test_lost_contact_is_told_with_the_response(record: xr.Dataset) -> None:
     assert "contact" not in identify([record], NARROW).attrs["warnings"]
 
 
-def test_result_that_says_nothing_says_so() -> None:
-    """A mesh period that is 1/7 too long: the expected error exceeds the response."""
-    record = reference_record(RIG, realisations=1, duration=0.25, band=(4.0, 2600.0)).drop_vars("mesh_phase")
-    wrong = record.assign_attrs(mesh_period=0.25 / 7)
+def test_result_that_says_nothing_is_refused() -> None:
+    """A dte of noise alone; of a simulated record, whose channels are not in doubt, a warning says so."""
+    record = reference_record(RIG, realisations=1, duration=0.25, band=(4.0, 2600.0))
+    noise = record.dte.std().item() * np.random.default_rng(1).standard_normal(record.dte.shape)
+    wrong = record.assign(dte=(record.dte.dims, noise, {"units": "m"}))
     settings = IdentificationSettings(harmonics=2, order=1, window=10, band=(900.0, 1300.0), phases=16, modes=0)
-    frf = identify([wrong], settings)
+    with pytest.raises(LpmError, match=r"expected to err by [0-9]{3,}% of itself \(limit 100%\)"):
+        identify([wrong], settings)
+    frf = identify([wrong.assign_attrs(model="lumped")], settings)
     assert frf.attrs["expected_error"] > 1.0
     assert "exceeds the response: this result says nothing" in frf.attrs["warnings"]
+
+
+@pytest.mark.parametrize("cycles", [7, 9])
+def test_a_mesh_period_that_the_dte_contradicts_is_refused(cycles: int) -> None:
+    """A record without angles that holds 8 mesh periods, by its attribute one less or more."""
+    record = reference_record(RIG, realisations=1, duration=0.25, band=(4.0, 2600.0)).drop_vars("mesh_phase")
+    wrong = record.assign_attrs(mesh_period=0.25 / cycles)
+    with pytest.raises(RecordError, match=f"mesh frequency of about 3.* Hz.*declared {cycles / 0.25:g} Hz do not"):
+        identify([wrong], IdentificationSettings(band=(900.0, 1300.0), phases=16, modes=0))
 
 
 @pytest.mark.parametrize(

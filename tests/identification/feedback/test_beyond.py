@@ -7,13 +7,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 from shared.reference_rig import ReferenceRig, reference_record
 
 from gearbench.identification import IdentificationSettings, exact_itf, identify, itf
 from gearbench.identification.feedback.functions import Splines
-from gearbench.identification.feedback.result import FEWEST_HELD, doubt_beyond
+from gearbench.identification.feedback.result import HIDDEN, doubt_beyond
 
-HELD = 2 * FEWEST_HELD
+HELD = 200
 
 
 def found(left: float, noise: float, valid: int, excited: int = 5) -> Any:
@@ -27,18 +28,35 @@ def found(left: float, noise: float, valid: int, excited: int = 5) -> Any:
 
 
 def test_what_is_left_of_lines_that_were_not_fitted_is_the_doubt() -> None:
-    assert doubt_beyond(found(0.1, 0.0, 10)) == pytest.approx(0.01)
+    assert doubt_beyond(found(0.1, 0.0, 10)) == pytest.approx(0.01 / 0.9**2)
     assert doubt_beyond(found(3.0, 0.0, 10)) == 1.0
-    # What noise leaves there is in the parameters' variance; one deviation of its power is not known.
-    assert doubt_beyond(found(0.1, 0.01, 10)) == pytest.approx(0.01 / np.sqrt(HELD) / 0.99)
-    assert doubt_beyond(found(1.0, 0.99, 10)) == 1.0
 
 
-def test_too_few_such_lines_are_joined_by_those_above_the_excited_band() -> None:
-    few = found(0.1, 0.0, 10)
-    few.data.valid[0, :-FEWEST_HELD + 1] = True
-    # Excited to line 5: of the lines 6 to 10 0.3 is left.
-    assert doubt_beyond(few) == pytest.approx((0.01 * HELD + 0.09 * 5) / (HELD + 5))
+def test_what_noise_alone_leaves_counts_by_the_mean_of_its_positive_half() -> None:
+    """200 lines of size 1 - 0.1: the deviation of the power left, over what is seen, and sqrt(2 / pi) of it."""
+    assert doubt_beyond(found(0.1, 0.01, 10)) == pytest.approx(np.sqrt(2 / np.pi) * 0.01 / 0.81 / np.sqrt(HELD))
+
+
+def test_lines_count_by_the_power_that_the_model_sees_in_them() -> None:
+    """Half of the lines hold a hundredth, of which the model sees half: they hardly matter."""
+    uneven = found(0.1, 0.0, 10)
+    weak = uneven.data.lines[0] > 10 + HELD // 2
+    uneven.data.dte[0, weak] *= 0.01
+    uneven.refined.left[0, weak] = 0.5 * uneven.data.dte[0, weak]
+    assert doubt_beyond(uneven) == pytest.approx(0.01 / 0.9**2, rel=1e-3)
+
+
+def test_lines_in_noise_are_joined_by_those_above_the_excited_band() -> None:
+    """Excited to line 5: of lines 6 to 10, larger than those beyond by ten, 0.3 is left."""
+    hidden = found(0.1, 1.0, 10)
+    hidden.data.dte[0, :10] *= 10.0
+    hidden.refined.left[0, :10] *= 10.0
+    assert 1.0 / 0.81 / np.sqrt(HELD) > HIDDEN
+    power = 5 * 49.0**2 + HELD * 0.81**2
+    part = (5 * 49.0 * (9.0 - 1.0) + HELD * 0.81 * (0.01 - 1.0)) / power
+    above = part * np.sqrt(power)
+    positive = 1.0 / np.sqrt(power) * norm.pdf(above) / norm.cdf(above)
+    assert doubt_beyond(hidden) == pytest.approx(part + positive)
 
 
 def test_without_lines_above_the_excited_band_nothing_is_trusted() -> None:
