@@ -18,6 +18,7 @@ from gearbench.diagnosis.effects.effect import BEYOND, Hypothesis, Wide
 from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.output.background import prior_of
 from gearbench.diagnosis.output.beginning import Around
+from gearbench.diagnosis.output.by_forces import Start, begun_by_forces
 from gearbench.diagnosis.output.contrast import is_strange
 from gearbench.diagnosis.output.fit import SETTLED, Optimum, Sensitivity, cost_of, fit, sensitivity_of
 from gearbench.diagnosis.output.jacobian import FOLLOWED
@@ -80,16 +81,6 @@ class Selection:
     weighed: tuple[Weighed, ...]
 
 
-@dataclass(frozen=True)
-class Start:
-    """Where the force residuals, or an earlier fit, would have the unknowns of a hypothesis, and their log Bayes factor
-    for it."""
-
-    hypothesis: Hypothesis
-    p: Array
-    log_bayes_factor: float
-
-
 def select(
     simulator: Simulator,
     base: Optimum,
@@ -105,6 +96,8 @@ def select(
     this judges what enters."""
     unknowns = simulator.layout.unknowns
     chosen = np.ones(unknowns.size, dtype=bool)
+    base, begun = begun_by_forces(simulator, base, hypotheses, starts, report)
+    starts = {**starts, begun.hypothesis.name: begun} if begun else starts
     best, weighed = base, None
     entered: list[Weighed] = []
     while len(entered) < MOST:

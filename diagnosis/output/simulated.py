@@ -19,10 +19,11 @@ from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.output.around import around
 from gearbench.diagnosis.output.background import background
+from gearbench.diagnosis.output.by_forces import Start
 from gearbench.diagnosis.output.layout import Layout, layout_of
 from gearbench.diagnosis.output.likely_teeth import with_likely_teeth
 from gearbench.diagnosis.output.passed_noise import noise_left
-from gearbench.diagnosis.output.selection import WORTH, Selection, Start, Weighed, entering, select
+from gearbench.diagnosis.output.selection import WORTH, Selection, Weighed, entering, select
 from gearbench.diagnosis.output.simulator import Simulate, Simulator
 from gearbench.diagnosis.output.structure import beginnings
 from gearbench.diagnosis.output.target import target_of

@@ -13,7 +13,8 @@ from gearbench.diagnosis.effects.effect import Hypothesis
 from gearbench.diagnosis.forces.unknowns import Unknowns, group, unknowns_of
 from gearbench.diagnosis.output.background import background
 from gearbench.diagnosis.output.beginning import Around
-from gearbench.diagnosis.output.selection import Selection, Start, select
+from gearbench.diagnosis.output.by_forces import Start
+from gearbench.diagnosis.output.selection import Selection, select
 from gearbench.diagnosis.output.target import Block, Target
 
 LINES, BLOCKS = 60, 6

@@ -12,8 +12,9 @@ from shared.fake_simulator import LINES, FakeSimulator, chosen, sensitivities, t
 from gearbench.diagnosis.effects.effect import Hypothesis, Wide
 from gearbench.diagnosis.forces.unknowns import group, unknowns_of
 from gearbench.diagnosis.output import selection as module
+from gearbench.diagnosis.output.by_forces import Start
 from gearbench.diagnosis.output.rivals import compared, is_like, usual_of
-from gearbench.diagnosis.output.selection import LIMIT, Selection, Start, Weighed, known_within
+from gearbench.diagnosis.output.selection import LIMIT, Selection, Weighed, known_within
 
 MATRIX = sensitivities(3)
 FRICTION = Hypothesis("friction", "mesh", (Wide("friction"),))
