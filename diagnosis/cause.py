@@ -24,7 +24,7 @@ from gearbench.diagnosis.forces.equations import PLACES
 from gearbench.diagnosis.forces.steadiness import changing_parts, unsteadiness
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.intake.signals import measured_channels
-from gearbench.diagnosis.judging.chances import chances_of
+from gearbench.diagnosis.judging.chances import chances_of, sentence_of_doubt, unlikely
 from gearbench.diagnosis.judging.decided import decide_simulated, relative_size, size_needed
 from gearbench.diagnosis.judging.drift import drift_of
 from gearbench.diagnosis.judging.judged import Judged, itself, judged_on
@@ -130,16 +130,23 @@ def _by_simulation(
     """The finding that simulation justifies."""
     entered = found.selection.entered
     judged = judgement(of.problem, sized(seconded(found, of.result)), held_out, of.measurements)
-    found = judged.found
-    missing = _missing(of, found)
-    signs = {f"over {place}": float(over) for place, over in zip(PLACES, missing.over, strict=True)}
-    missing = replace(missing, factors=np.array([known.outstanding.get(place, 1.0) for place in PLACES]))
     changing = changing_of(judged, changing_parts(of.measurements, of.problem.conditions[0].band))
-    drift = None if TEMPERATURE_DRIFT.name in of.without else drift_of(found)
-    decided = decide_simulated(judged, of.result, missing, of.unsteady, changing, known=known, drift=drift)
-    signs |= {"lines": float(found.simulator.target.counts.sum()), "unknown": decided.sign, "left": judged.left,
-              "remains": judged.remains, "searched": judged.searched, "changing": changing}  # fmt: skip
-    chances = chances_of(judged, decided, known, signs["lines"], (*entered, *judged.dropped))
+    doubts: tuple[str, ...] = ()
+    while True:
+        found = judged.found
+        missing = _missing(of, found)
+        signs = {f"over {place}": float(over) for place, over in zip(PLACES, missing.over, strict=True)}
+        missing = replace(missing, factors=np.array([known.outstanding.get(place, 1.0) for place in PLACES]))
+        drift = None if TEMPERATURE_DRIFT.name in of.without else drift_of(found)
+        decided = decide_simulated(judged, of.result, missing, of.unsteady, changing, known=known, drift=drift)
+        signs |= {"lines": float(found.simulator.target.counts.sum()), "unknown": decided.sign, "left": judged.left,
+                  "remains": judged.remains, "searched": judged.searched, "changing": changing}  # fmt: skip
+        chances = chances_of(judged, decided, known, signs["lines"], (*entered, *judged.dropped))
+        doubtful = unlikely(decided, chances)
+        if doubtful is None:
+            break
+        doubts = (*doubts, sentence_of_doubt(doubtful, chances))
+        judged = judgement(of.problem, left_out(found, (doubtful,)), held_out, of.measurements)
     kept = [one.hypothesis for one in decided.named]
     common["indistinguishable"] = with_rivals(common["indistinguishable"], decided.named)
     return Finding(
@@ -152,7 +159,8 @@ def _by_simulation(
         where=places_of(judged, kept, missing),
         recalibrated=found.recalibrated if kept else found.layout.case(found.selection.base.p),
         with_effect=found.with_effects if decided.named else None,
-        because=(*decided.because, *_why(judged, kept), *other_flanks(found.layout.unknowns, found.selection.best.p)),
+        because=(*decided.because, *_why(judged, kept), *doubts,
+                 *other_flanks(found.layout.unknowns, found.selection.best.p)),  # fmt: skip
         structure=structure_found(found.layout.unknowns, found.selection.best.p, found.std),
         missing=missing,
         places=tuple(one.place for one in kept),
@@ -187,9 +195,14 @@ def _missing(of: Searched, found: Simulated) -> Missing:
 def sized(found: Simulated, limits: Limits = LIMITS) -> Simulated:
     """What simulation found without those effects of which a sound rig has as much."""
     entered = found.selection.entered
-    kept = [one for one in entered if relative_size(found, one) > size_needed(one, limits)]
-    if len(kept) == len(entered):
+    return left_out(found, [one for one in entered if relative_size(found, one) <= size_needed(one, limits)])
+
+
+def left_out(found: Simulated, out: Sequence[Weighed]) -> Simulated:
+    """What simulation found without these of the effects that entered."""
+    if not out:
         return found
+    kept = [one for one in found.selection.entered if not any(one is other for other in out)]
     selection = only(found.simulator, found.selection, kept)
     return replace(found, selection=selection, std=selection.best.std)
 

@@ -11,6 +11,9 @@ from gearbench.diagnosis.judging.decided import Decided
 from gearbench.diagnosis.judging.judged import Judged
 from gearbench.diagnosis.odds import Calibration, effect_signs
 from gearbench.diagnosis.output.selection import Weighed
+from gearbench.diagnosis.words import percent
+
+LIKELY = 0.5  # an effect is named that is more likely at work than not
 
 
 class Chances(NamedTuple):
@@ -45,3 +48,18 @@ def chances_of(
         named[TEMPERATURE_DRIFT.name] = known.effect.of(all_signs[-1]).value
     best = max(all_signs[1:] or all_signs, key=lambda signs: known.effect.of(signs).value)
     return Chances(named, best)
+
+
+def unlikely(decided: Decided, chances: Chances) -> Weighed | None:
+    """The least likely of the named effects that are not more likely at work than not; None without any."""
+    doubtful = [one for one in decided.named if chances.named[one.hypothesis.name] < LIKELY]
+    return min(doubtful, key=lambda one: chances.named[one.hypothesis.name], default=None)
+
+
+def sentence_of_doubt(one: Weighed, chances: Chances) -> str:
+    """Why an effect that closes a part of the gap is not named."""
+    assert one.hypothesis.effect is not None
+    return (
+        f"{one.hypothesis.effect.noun[0].upper()}{one.hypothesis.effect.noun[1:]} would close a part of the gap, but is"
+        f" less likely at work than not ({percent(chances.named[one.hypothesis.name])})"
+    )

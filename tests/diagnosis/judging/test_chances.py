@@ -5,7 +5,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Any
 
-from gearbench.diagnosis.judging.chances import chances_of
+from gearbench.diagnosis.judging.chances import LIKELY, Chances, chances_of, sentence_of_doubt, unlikely
 from gearbench.diagnosis.odds import effect_signs
 from gearbench.diagnosis.population import POPULATION
 
@@ -43,3 +43,16 @@ def test_what_shows_only_beside_another_effect_is_as_likely_as_it_is_worth_there
     named = chances_of(judged, decided, POPULATION, LINES, ()).named
     assert named["pitch-error"] == POPULATION.effect.of(effect_signs(90.0, LINES, True, 0.4)).value
     assert named["coupling"] == POPULATION.effect.of(effect_signs(300.0, LINES, True, 0.4)).value
+
+
+def test_what_is_less_likely_at_work_than_not_is_not_named() -> None:
+    """The least likely goes first: what it leaves may speak for the others."""
+    one, other, sure = weighed("friction", 9.0), weighed("sensor-delay", 8.0), weighed("coupling", 99.0)
+    decided: Any = SimpleNamespace(named=(one, other, sure))
+    chances = Chances({"friction": 0.45, "sensor-delay": 0.41, "coupling": 0.98}, ())
+    assert unlikely(decided, chances) is other
+    assert unlikely(SimpleNamespace(named=(sure,)), chances) is None  # type: ignore[arg-type]
+    assert unlikely(SimpleNamespace(named=(one,)), Chances({"friction": LIKELY}, ())) is None  # type: ignore[arg-type]
+    other.hypothesis.effect.noun = "a delay of one sensor"
+    said = sentence_of_doubt(other, chances)
+    assert said.startswith("A delay of one sensor would close") and said.endswith("(41 %)")
