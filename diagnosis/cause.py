@@ -148,6 +148,7 @@ def _by_simulation(
         doubts = (*doubts, sentence_of_doubt(doubtful, chances))
         judged = judgement(of.problem, left_out(found, (doubtful,)), held_out, of.measurements)
     kept = [one.hypothesis for one in decided.named]
+    flanks = other_flanks(found.layout.unknowns, found.selection.best.p)
     common["indistinguishable"] = with_rivals(common["indistinguishable"], decided.named)
     return Finding(
         verdict=decided.verdict,
@@ -159,8 +160,7 @@ def _by_simulation(
         where=places_of(judged, kept, missing),
         recalibrated=found.recalibrated if kept else found.layout.case(found.selection.base.p),
         with_effect=found.with_effects if decided.named else None,
-        because=(*decided.because, *_why(judged, kept), *doubts,
-                 *other_flanks(found.layout.unknowns, found.selection.best.p)),  # fmt: skip
+        because=(*decided.because, *_why(judged, kept), *doubts, *flanks),
         structure=structure_found(found.layout.unknowns, found.selection.best.p, found.std),
         missing=missing,
         places=tuple(one.place for one in kept),
