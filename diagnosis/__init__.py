@@ -3,8 +3,8 @@
 `intake`: records become measurements, checked against the nominal rig. `forces`: the force missing from each equation
 of motion, and how it depends on the unknowns. `effects`: the library, an effect a file. `evidence`: hypotheses, their
 evidence, the search among them. `replay`: rigs simulated under the records' own torque: gap, gap budget. `output`: rigs
-fitted to the records as they are simulated, which decides. `planning`: what planned records would tell, before anything
-is measured.
+fitted to the records as they are simulated. `judging`: what was found held against a record that had no part in it,
+which decides. `planning`: what planned records would tell, before anything is measured.
 """
 
 from gearbench.diagnosis.diagnosis import Diagnosis, diagnose
