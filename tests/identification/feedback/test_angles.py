@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 import xarray as xr
 from shared.reference_rig import ANGLES, DIRECTION, ReferenceRig, reference_record
+from shared.rig_model import rig_model
 
 from gearbench.identification import IdentificationSettings, exact_itf, itf
 from gearbench.identification.estimation import by_feedback
 from gearbench.identification.feedback.data import ClassData, class_data
-from gearbench.identification.feedback.functions import Fractions, common_pairs
 from gearbench.identification.feedback.model import Model
 from gearbench.identification.feedback.refine import linearised, output_error, response
 from gearbench.identification.feedback.result import htf_on
@@ -39,30 +39,7 @@ def data() -> ClassData:
 
 @pytest.fixture(scope="module")
 def model(data: ClassData) -> Model:
-    """The rig's own functions in closed form: torsion P1, supports S, D = 1/(P1+S) + k_0 + s c_0, N = P1/(P1+S) and
-    E = S N."""
-    position = np.linspace(1, data.top, 1500) / data.top
-    s = 1j * position * data.omega_unit
-    torsion = 1.0 / (RIG.mass * s**2)
-    supports = sum(
-        1.0 / (m * s**2 + 2 * RIG.support_ratio * np.sqrt(k * m) * s + k)
-        for m, k in zip(RIG.centre_mass, RIG.support_stiffness, strict=True)
-    )
-    stiffness = RIG.stiffness(np.arange(4096) / 4096)
-    k, c = (np.fft.fft(x) / 4096 for x in (stiffness, 2 * RIG.mesh_ratio * np.sqrt(stiffness * RIG.mass)))
-    unit = data.stiffness_unit
-    n = torsion / (torsion + supports)
-    wanted = [(1.0 / (torsion + supports) + k[0].real + s * c[0].real) / unit, n, supports * n * unit]
-    weights = [1.0 / np.abs(f) for f in wanted]
-    basis = Fractions(common_pairs(position, wanted, weights, 2))
-    values, found = basis.at(position), []
-    for f, weight in zip(wanted, weights, strict=True):
-        matrix, target = values * weight[:, None], f * weight
-        stacked = np.concatenate([matrix.real, matrix.imag])
-        found.append(np.linalg.lstsq(stacked, np.concatenate([target.real, target.imag]), rcond=None)[0])
-        assert relative(values @ found[-1], f) < 1e-8
-    d, of_n, e = found
-    return Model(basis, d, of_n, k[1:41] / unit, c[1:41] * data.omega_unit / unit, e)
+    return rig_model(RIG, data, centres=True)
 
 
 def test_the_rigs_own_functions_give_the_exact_response_of_its_angles(data: ClassData, model: Model) -> None:

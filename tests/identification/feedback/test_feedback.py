@@ -9,11 +9,12 @@ import pytest
 import xarray as xr
 from shared.ptv import periodic_filter
 from shared.reference_rig import ReferenceRig, reference_record
+from shared.rig_model import rig_model, stiffness_and_damping
 
 from gearbench.identification import IdentificationSettings, LpmError, SpectraError, htf, identify, itf
 from gearbench.identification.feedback import branches
 from gearbench.identification.feedback import frf as frf_of_feedback
-from gearbench.identification.feedback.data import ClassData, class_data
+from gearbench.identification.feedback.data import class_data
 from gearbench.identification.feedback.estimate import FEWEST_INTERVALS, Feedback
 from gearbench.identification.feedback.functions import Basis, Fractions, Splines, common_pairs, pairs_of
 from gearbench.identification.feedback.model import Model
@@ -80,49 +81,17 @@ def test_mesh_frequencies_that_cannot_be_predicted_are_refused(changes: dict, wo
         identify([record], IdentificationSettings(**{"method": "mesh-feedback", **changes}))
 
 
-def stiffness_and_damping(phases: int) -> tuple[np.ndarray, np.ndarray]:
-    k = RIG.stiffness(np.arange(phases) / phases)
-    return k, 2 * RIG.mesh_ratio * np.sqrt(k * RIG.mass)
-
-
-def rig_model(data: ClassData) -> Model:
-    """The reference rig's own D = 1/P2 + k_0 + s c_0 and N = P1/P2 in partial fractions, k and c by FFT."""
-    position = np.linspace(1, data.top, 1500) / data.top
-    s = 1j * position * data.omega_unit
-    torsion = 1.0 / (RIG.mass * s**2)
-    supports = sum(
-        1.0 / (m * s**2 + 2 * RIG.support_ratio * np.sqrt(k * m) * s + k)
-        for m, k in zip(RIG.centre_mass, RIG.support_stiffness, strict=True)
-    )
-    k, c = (np.fft.fft(x) / 4096 for x in stiffness_and_damping(4096))
-    d = (1.0 / (torsion + supports) + k[0].real + s * c[0].real) / data.stiffness_unit
-    n = torsion / (torsion + supports)
-    weight = 1.0 / np.abs(d)
-    basis = Fractions(common_pairs(position, [d, n], [weight, weight], 2))
-    values = basis.at(position)
-
-    def fitted(f: np.ndarray) -> np.ndarray:
-        stacked = np.concatenate([(values * weight[:, None]).real, (values * weight[:, None]).imag])
-        target = np.concatenate([(f * weight).real, (f * weight).imag])
-        found = np.linalg.lstsq(stacked, target, rcond=None)[0]
-        assert relative(values @ found, f) < 1e-8
-        return found
-
-    unit = data.stiffness_unit
-    return Model(basis, fitted(d), fitted(n), k[1:41] / unit, c[1:41] * data.omega_unit / unit)
-
-
 def test_partial_fractions_of_the_rig_give_its_exact_response(record: xr.Dataset) -> None:
     """D and N in closed form: harmonic balance on the lines of a record against the monodromy, k and c back again."""
     spectra, excited, _ = record_spectra([record], sidebands=40)
     data = class_data(spectra, round(excited[1]))
-    model = rig_model(data)
+    model = rig_model(RIG, data)
     lines = np.arange(900, 1300, 57)
     found = itf_from_htf(htf_on(model, data, lines, 60), 64)
     wanted = exact_itf(RIG.system(512), lines.astype(float), np.arange(64) / 64)
     assert relative(found, wanted) < 1e-3
     k, c = along_phase(model, data, 64)
-    exact_k, exact_c = stiffness_and_damping(64)
+    exact_k, exact_c = stiffness_and_damping(RIG, 64)
     assert relative(k, exact_k) < 2e-3
     assert relative(c, exact_c) < 2e-2  # the supports damp a little at low frequency, too
     # The response to the record's own force is the record without its noise.
@@ -137,7 +106,7 @@ def test_a_faster_mesh_carries_sidebands_beyond_the_lines_of_the_record(record: 
     data = class_data(spectra, round(excited[1]))
     lines = np.arange(900, 2500, 157)
     exact = exact_itf(replace(RIG, mesh_frequency=512.0).system(512), lines.astype(float), np.arange(64) / 64)
-    assert relative(itf_from_htf(htf_on(rig_model(data), data, lines, 20, 8.0), 64), exact) < 1.5e-3
+    assert relative(itf_from_htf(htf_on(rig_model(RIG, data), data, lines, 20, 8.0), 64), exact) < 1.5e-3
 
 
 def test_splines_do_not_tell_sidebands_beyond_their_lines(
@@ -148,7 +117,7 @@ def test_splines_do_not_tell_sidebands_beyond_their_lines(
     monkeypatch.setattr(frf_of_feedback, "doubt_beyond", lambda found: 0.0)
     spectra, excited, _ = record_spectra([record], sidebands=40)
     data = class_data(spectra, round(excited[1]))
-    fractions = rig_model(data)
+    fractions = rig_model(RIG, data)
     position = np.linspace(0, 1, 2000)
     splines = Splines(80)
     values = splines.at(position)
@@ -172,7 +141,7 @@ def test_sidebands_beyond_the_lines_act_back() -> None:
     sidebands beyond, the latter are off by 2 %."""
     spectra, excited, _ = record_spectra([noisy_record(0.0, 0.25)], sidebands=40)
     data = class_data(spectra, round(excited[1] / spectra.spacing))
-    left = np.abs(data.dte - response(rig_model(data), data))[1:]
+    left = np.abs(data.dte - response(rig_model(RIG, data), data))[1:]
     for lowest, part in ((0, 1e-3), (data.excited, 8e-3)):
         there = (data.valid & (np.abs(data.lines) > lowest))[1:]
         assert np.linalg.norm(left[there]) < part * np.linalg.norm(data.dte[1:][there])
@@ -182,7 +151,7 @@ def test_derivatives_of_the_equations(record: xr.Dataset) -> None:
     """Columns against differences of A Y - N U, term by term written down."""
     spectra, excited, _ = record_spectra([record], sidebands=40)
     data = class_data(spectra, round(excited[1]))
-    model = rig_model(data)
+    model = rig_model(RIG, data)
     index = 5
     omega, y, u = data.omega[index], data.dte[index, :, 0], data.force[index, :, 0]
 
@@ -234,7 +203,7 @@ def test_reference_rig_at_40_db(identified: xr.Dataset) -> None:
     assert identified.attrs["method"] == "mesh-feedback"
     assert error < 0.02
     assert 0.6 < identified.attrs["expected_error"] / error < 1.6
-    k, _ = stiffness_and_damping(64)
+    k, _ = stiffness_and_damping(RIG, 64)
     assert relative(identified.mesh_stiffness.values, k) < 0.02
     actual = np.sqrt(np.mean((identified.mesh_stiffness.values - k) ** 2))
     assert actual < 2.5 * np.sqrt(identified.mesh_stiffness_var.values.mean())
@@ -319,12 +288,12 @@ def test_as_many_branches_as_the_response_holds(
     data = class_data(spectra, round(excited[1]))
     lines = np.arange(800, 1600, 25)
     exact = exact_itf(RIG.system(512), lines.astype(float), np.arange(128) / 128)
-    kept, beyond = branches.enough_branches(rig_model(data), data, lines)
+    kept, beyond = branches.enough_branches(rig_model(RIG, data), data, lines)
     assert truncation_error(exact, kept) < 1.02 * negligible < truncation_error(exact, kept - 1) * 1.05
     power = np.sum(np.abs(exact) ** 2) / 128
     assert np.sqrt(beyond.sum() / power) == pytest.approx(truncation_error(exact, kept), rel=0.1)
     monkeypatch.setattr(branches, "ROOM", 5 * lines.size)
-    assert branches.enough_branches(rig_model(data), data, lines)[0] == 2
+    assert branches.enough_branches(rig_model(RIG, data), data, lines)[0] == 2
 
 
 @pytest.mark.validation
