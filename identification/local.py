@@ -28,6 +28,7 @@ from gearbench.identification.smooth.choice import choose_smooth
 from gearbench.identification.smooth.estimate import smooth_branches
 from gearbench.identification.spectra.course import Course
 from gearbench.identification.spectra.joint import Spectra
+from gearbench.identification.spectra.records import EXCITED
 from gearbench.identification.task import Task
 from gearbench.identification.truth.periodic import itf_from_htf
 
@@ -35,9 +36,8 @@ from gearbench.identification.truth.periodic import itf_from_htf
 DOUBTFUL = 0.1
 # Expected error of polynomials beyond which smooth branches are tried as well.
 ENOUGH = 0.01
-# Part of the band's lines below which an excitation leaves classes of lines empty, and of the strongest line's force
-# below which a line is.
-SPARSE, EXCITED = 0.4, 1e-3
+# Part of the band's lines below which an excitation leaves classes of lines empty.
+SPARSE = 0.4
 
 
 @dataclass(frozen=True)

@@ -76,15 +76,19 @@ class Hypothesis:
 
     def prior(self, unknowns: Unknowns) -> Array:
         """Prior standard deviations (size,) under this hypothesis."""
-        return widened(unknowns, self.wide)
+        return self.widened(unknowns, unknowns.prior())
+
+    def widened(self, unknowns: Unknowns, sd: Array) -> Array:
+        """The prior `sd` (size,) with that of this hypothesis made wide."""
+        return widened(unknowns, self.wide, sd)
 
 
-def widened(unknowns: Unknowns, wide: Sequence[Wide]) -> Array:
-    """Prior standard deviations (size,) of the background with some made wide."""
-    sd = unknowns.prior()
+def widened(unknowns: Unknowns, wide: Sequence[Wide], sd: Array) -> Array:
+    """Prior standard deviations `sd` (size,) with some made wide."""
+    out = sd.copy()
     for one in wide:
-        one.into(unknowns, sd)
-    return sd
+        one.into(unknowns, out)
+    return out
 
 
 @dataclass(frozen=True)

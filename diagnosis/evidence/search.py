@@ -60,7 +60,7 @@ def search(problem: Problem, without: Sequence[str] = (), report: Report = lambd
     begin = begin_of(problem)
     effects = hypotheses(problem.model, without)
     # Groups that are wide as a whole; single entries are alternatives to one another, or numbers of the background.
-    sd = widened(unknowns, [wide for one in effects for wide in one.wide if wide.at is None])
+    sd = widened(unknowns, [wide for one in effects for wide in one.wide if wide.at is None], unknowns.prior())
     alone, everything = (unknowns.prior(), STEPS_BASE), (sd, STEPS)
     base, free = side_by_side(
         lambda one: refit(problem, one[0], begin, most=one[1], coarse=COARSE), [alone, everything]

@@ -21,7 +21,8 @@ from gearbench.diagnosis.forces.residuals import Residuals
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-KINDS = ("operating", "excited", "driver-shaft", "driven-shaft", "other")
+SHAFTS = ("driver-shaft", "driven-shaft")  # sidebands of the gears
+KINDS = ("operating", "excited", *SHAFTS, "other")
 BLOCK = 8  # bins
 OPERATING_BLOCK = 3  # as mesh orders fall off steeply
 SHRINK = 1.5  # exponent of the prior on lambda
@@ -54,7 +55,7 @@ def kinds_of(condition: Condition) -> NDArray[np.int64]:
     number = np.arange(condition.bins)
     torque = np.abs(condition.spectra["torque_driver"][: condition.bins])
     kind = np.full(condition.bins, KINDS.index("other"))
-    for side, name in ((1, "driven-shaft"), (0, "driver-shaft")):
+    for side, name in reversed(list(enumerate(SHAFTS))):
         kind[number % (condition.cycles // condition.teeth[side]) == 0] = KINDS.index(name)
     kind[torque > EXCITED * torque[1:].max()] = KINDS.index("excited")
     kind[number % condition.cycles == 0] = KINDS.index("operating")

@@ -114,7 +114,7 @@ def _decided(
         because = f"a force {at_place(place)} remains that no effect of the library explains"
         return Decided("unknown", place, (), sign, (because,))
     late, sound = lag_of_drive(judged.found.layout.unknowns, selection.best.p)
-    if abs(late) > LATE_LIMIT * sound > 0.0:
+    if abs(late) > LATE_LIMIT * sound:
         return Decided("unknown", "drive", (), max(sign, abs(late) / (LATE_LIMIT * sound)), (_late(late),))
     return Decided("none", "none", (), sign, (_nothing(judged, known), *aside))
 

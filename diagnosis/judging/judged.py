@@ -159,7 +159,7 @@ def judged_on(
     dropped: list[Weighed] = []
     while True:
         try:
-            judged = replace(_closings(found, target, measured, parted), noise=noise)
+            judged = _closings(found, target, measured, parted, noise)
         except ValueError:
             return None
         poor = [one for one in found.selection.entered if not _stays(judged, one)]
@@ -186,7 +186,13 @@ def itself(problem: Problem, found: Simulated) -> Judged:
     return judged
 
 
-def _closings(found: Simulated, target: Target, measured: Measurement, parted: Sequence[Target]) -> Judged:
+def _closings(
+    found: Simulated,
+    target: Target,
+    measured: Measurement,
+    parted: Sequence[Target],
+    noise: Mapping[str, Array],
+) -> Judged:
     simulator, selection = found.simulator, found.selection
     signals = simulator.channels(selection.best.p, measured)
     closings = {}
@@ -202,7 +208,7 @@ def _closings(found: Simulated, target: Target, measured: Measurement, parted: S
         closings[one.hypothesis.name] = replace(closing, optimum=optimum, lacking=lacking)
     nothing = np.zeros(simulator.layout.size)
     nominal, plain = (simulator.channels(p, measured) for p in (nothing, selection.bare.p))
-    return Judged(measured, found, closings, nominal, plain, signals, target=target)
+    return Judged(measured, found, closings, nominal, plain, signals, target=target, noise=noise)
 
 
 def _closing_there(simulator: Simulator, target: Target, without: Array, with_all: Array) -> Closing:

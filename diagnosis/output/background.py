@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
 from gearbench.diagnosis.output.beginning import Around, beginning
-from gearbench.diagnosis.output.fit import Optimum, fit, sensitivity_of
+from gearbench.diagnosis.output.fit import Optimum, fit_afresh
 from gearbench.diagnosis.output.restructured import better, is_close, restructured
 from gearbench.diagnosis.output.simulator import Simulator
 
@@ -30,21 +30,15 @@ def background(
     sd = prior_of(simulator, simulator.layout.unknowns.prior())
     report("simulating: background")
     begin = beginning(simulator, beginnings, around, sd)
-    base = _fitted(simulator, begin, sd)
+    base = fit_afresh(simulator, begin, sd, renewals=RENEWALS)
     if base is None:
         return None
     # What the force residuals make of a rig beside a large effect can lead astray: then from the nominal one.
     if not is_close(simulator, base):
         other = beginning(simulator, beginnings[:1], around, sd)
-        base = base if np.array_equal(begin, other) else better(base, _fitted(simulator, other, sd))
+        if not np.array_equal(begin, other):
+            base = better(base, fit_afresh(simulator, other, sd, renewals=RENEWALS))
     return restructured(simulator, base, around, report)
-
-
-def _fitted(simulator: Simulator, begin: Array, sd: Array) -> Optimum | None:
-    """The background's optimum under the prior `sd` (size,) from `begin` (size,); None where that is no rig."""
-    chosen = np.ones(len(sd), dtype=bool)
-    first = sensitivity_of(simulator, begin, simulator.layout.unknowns.prior(), chosen)
-    return fit(simulator, begin, sd, first, renewals=RENEWALS, chosen=chosen) if first else None
 
 
 def prior_of(simulator: Simulator, sd: Array) -> Array:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.diagnosis.effects.effect import Hypothesis
-from gearbench.diagnosis.output.fit import Optimum, fit, sensitivity_of
+from gearbench.diagnosis.output.fit import Optimum, fit, fit_afresh
 from gearbench.diagnosis.output.restructured import better, is_close
 from gearbench.diagnosis.output.simulator import Simulator
 
@@ -45,20 +45,12 @@ def begun_by_forces(
     if start is None or start.log_bayes_factor < SPEAKS or is_close(simulator, base):
         return base, None
     report(f"simulating: {start.hypothesis.name}, as the force residuals have it")
-    unknowns, sd = simulator.layout.unknowns, base.sd.copy()
-    for wide in start.hypothesis.wide:
-        wide.into(unknowns, sd)
-    found = _fitted(simulator, np.where(sd > 0.0, start.p, 0.0), sd)
+    unknowns = simulator.layout.unknowns
+    sd = start.hypothesis.widened(unknowns, base.sd)
+    found = fit_afresh(simulator, np.where(sd > 0.0, start.p, 0.0), sd, renewals=RENEWALS)
     if found is None:
         return base, None
     p = found.p.copy()
     p[start.hypothesis.entries(unknowns)] = 0.0
     again = fit(simulator, p, base.sd, found.sensitivity, renewals=RENEWALS, chosen=np.ones(p.size, dtype=bool))
     return better(base, again), Start(start.hypothesis, found.p, start.log_bayes_factor)
-
-
-def _fitted(simulator: Simulator, p: Array, sd: Array) -> Optimum | None:
-    """The optimum under the prior `sd` (size,) from `p` (size,); None where that is no rig."""
-    chosen = np.ones(p.size, dtype=bool)
-    first = sensitivity_of(simulator, p, simulator.layout.unknowns.prior(), chosen)
-    return fit(simulator, p, sd, first, renewals=RENEWALS, chosen=chosen) if first else None

@@ -135,6 +135,15 @@ def _unseen(unknowns: Unknowns, sensitivity: Sensitivity) -> Flags:
     return out
 
 
+def fit_afresh(
+    simulator: Simulator, p: Array, sd: Array, *, renewals: int, chosen: Flags | None = None
+) -> Optimum | None:
+    """As `fit`, with derivatives by the chosen unknowns (None: all) taken at `p` (size,)."""
+    chosen = np.ones(p.size, dtype=bool) if chosen is None else chosen
+    first = sensitivity_of(simulator, p, simulator.layout.unknowns.prior(), chosen)
+    return fit(simulator, p, sd, first, renewals=renewals, chosen=chosen) if first else None
+
+
 def fit(
     simulator: Simulator, p: Array, sd: Array, sensitivity: Sensitivity, *, renewals: int, chosen: Flags
 ) -> Optimum | None:

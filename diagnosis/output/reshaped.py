@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.diagnosis.effects.effect import Hypothesis
-from gearbench.diagnosis.output.fit import Optimum, cost_of, fit, sensitivity_of
+from gearbench.diagnosis.output.fit import Optimum, cost_of, fit_afresh
 from gearbench.diagnosis.output.simulator import Simulator
 
 Array = NDArray[np.float64]
@@ -38,6 +38,4 @@ def reshaped(simulator: Simulator, one: Hypothesis, sd: Array) -> Optimum | None
             begin, least = p, cost
     if begin is None:
         return None
-    chosen = np.ones(layout.size, dtype=bool)
-    sensitivity = sensitivity_of(simulator, begin, layout.unknowns.prior(), chosen)
-    return fit(simulator, begin, sd, sensitivity, renewals=RENEWALS, chosen=chosen) if sensitivity else None
+    return fit_afresh(simulator, begin, sd, renewals=RENEWALS)

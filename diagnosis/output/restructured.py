@@ -15,7 +15,7 @@ from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
 from gearbench.diagnosis.effects.torque_ripple import KEY as RIPPLE
 from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.output.beginning import Around, levelled, seen_by
-from gearbench.diagnosis.output.fit import SETTLED, Optimum, cost_of, fit, sensitivity_of
+from gearbench.diagnosis.output.fit import SETTLED, Optimum, cost_of, fit, fit_afresh
 from gearbench.diagnosis.output.simulator import Simulator
 from gearbench.diagnosis.output.structure import otherwise
 
@@ -77,13 +77,10 @@ def _from_around(simulator: Simulator, found: Optimum, around: Around | None, re
         return None
     report("simulating: the rig around its mesh")
     begin = levelled(simulator, seen, held, found.sd)
-    sensitivity = sensitivity_of(simulator, begin, unknowns.prior(), chosen)
-    if sensitivity is None:
-        return None
-    best = fit(simulator, begin, found.sd, sensitivity, renewals=RENEWALS, chosen=chosen)
+    best = fit_afresh(simulator, begin, found.sd, renewals=RENEWALS, chosen=chosen)
     if best is None or best.cost > found.cost:
         return None
-    return _fitted(simulator, best.p, found.sd)
+    return fit_afresh(simulator, best.p, found.sd, renewals=RENEWALS)
 
 
 def _otherwise(simulator: Simulator, found: Optimum, report: Report) -> Optimum | None:
@@ -95,7 +92,7 @@ def _otherwise(simulator: Simulator, found: Optimum, report: Report) -> Optimum 
     if p is None:
         return None
     report("simulating: another structure")
-    again = _fitted(simulator, p, found.sd)
+    again = fit_afresh(simulator, p, found.sd, renewals=RENEWALS)
     if again is None or again.evidence <= found.evidence:
         return again
     if again.left > SETTLED:
@@ -103,12 +100,6 @@ def _otherwise(simulator: Simulator, found: Optimum, report: Report) -> Optimum 
         chosen = np.ones(found.p.size, dtype=bool)
         again = fit(simulator, again.p, found.sd, again.sensitivity, renewals=RENEWALS, chosen=chosen) or again
     return again
-
-
-def _fitted(simulator: Simulator, p: Array, sd: Array) -> Optimum | None:
-    chosen = np.ones(p.size, dtype=bool)
-    sensitivity = sensitivity_of(simulator, p, simulator.layout.unknowns.prior(), chosen)
-    return fit(simulator, p, sd, sensitivity, renewals=RENEWALS, chosen=chosen) if sensitivity else None
 
 
 def _of(unknowns: Unknowns, keys: Sequence[str]) -> Flags:

@@ -43,12 +43,11 @@ def compared(simulator: Simulator, base: Optimum, weighed: Sequence[Weighed]) ->
     usual = _counterpart(best, weighed) if best else None
     if best is None or best.optimum is None or best.hypothesis.usual is None or usual is None:
         return list(weighed)
-    unknowns, p, sd = simulator.layout.unknowns, best.optimum.p.copy(), base.sd.copy()
+    unknowns, p = simulator.layout.unknowns, best.optimum.p.copy()
     own = best.hypothesis.entries(unknowns)
     p[usual.hypothesis.entries(unknowns)] += best.hypothesis.usual[1] * p[own]
     p[own] = 0.0
-    for wide in usual.hypothesis.wide:
-        wide.into(unknowns, sd)
+    sd = usual.hypothesis.widened(unknowns, base.sd)
     chosen = np.ones(unknowns.size, dtype=bool)
     found = fit(simulator, p, sd, best.optimum.sensitivity, renewals=RENEWALS, chosen=chosen)
     if found is None:

@@ -148,7 +148,7 @@ def weigh(
         if number not in likely and one.name not in starts:
             promised.append((min(float(first[number]), 0.0), one, np.zeros(len(quadratic.active))))
             continue
-        sd = widened_prior(unknowns, base.sd, one)
+        sd = one.widened(unknowns, base.sd)
         step, cost, information = quadratic.best(base.p, sd, unknowns.bounds())
         evidence = quadratic.evidence(cost, information, sd) - base.evidence - np.log(one.choices)
         there = base.p.copy()
@@ -172,7 +172,7 @@ def weigh(
         try:
             optimum = _refit(simulator, base, one, step, starts.get(one.name), renewals)
             if one.name in shaped:
-                other = reshaped(simulator, one, widened_prior(unknowns, base.sd, one))
+                other = reshaped(simulator, one, one.widened(unknowns, base.sd))
                 optimum = other if optimum is None else better(optimum, other)
         except ValueError:  # a fit that leads nowhere costs its hypothesis, not the verdict
             optimum = None
@@ -219,7 +219,7 @@ def first_look(base: Optimum, hypotheses: Sequence[Hypothesis], unknowns: Unknow
         return 0.5 * float(half @ half) - float(np.log(np.diag(root)).sum())
 
     plain = evidence(base.sd)
-    found = [evidence(widened_prior(unknowns, base.sd, one)) - plain - np.log(one.choices) for one in hypotheses]
+    found = [evidence(one.widened(unknowns, base.sd)) - plain - np.log(one.choices) for one in hypotheses]
     return np.array(found)
 
 
@@ -227,7 +227,7 @@ def _refit(
     simulator: Simulator, base: Optimum, one: Hypothesis, step: Array, start: Start | None, renewals: int
 ) -> Optimum | None:
     unknowns, active = simulator.layout.unknowns, base.sensitivity.quadratic.active
-    sd = widened_prior(unknowns, base.sd, one)
+    sd = one.widened(unknowns, base.sd)
     linear, alone = base.p.copy(), base.p.copy()
     linear[active] += step
     entries = one.entries(unknowns)
@@ -243,14 +243,6 @@ def _refit(
     chosen = np.ones(unknowns.size, dtype=bool)
     near: Sensitivity = base.sensitivity
     return fit(simulator, begin, sd, near, renewals=renewals, chosen=chosen)
-
-
-def widened_prior(unknowns: Unknowns, sd: Array, hypothesis: Hypothesis) -> Array:
-    """The prior `sd` (size,) with that of the hypothesis made wide."""
-    out = sd.copy()
-    for wide in hypothesis.wide:
-        wide.into(unknowns, out)
-    return out
 
 
 def relief(unknowns: Unknowns, narrow: Array, hypothesis: Hypothesis, p: Array, sd: Array) -> float:
@@ -278,7 +270,7 @@ def only(simulator: Simulator, selection: Selection, kept: Sequence[Weighed]) ->
         return replace(selection, bare=base, best=base, entered=())
     sd = base.sd
     for one in kept:
-        sd = widened_prior(unknowns, sd, one.hypothesis)
+        sd = one.hypothesis.widened(unknowns, sd)
     p, near = selection.best.p, selection.best.sensitivity
     p = np.where(sd > 0.0, np.clip(p, -3.0 * sd, 3.0 * sd), 0.0)
     best = fit(simulator, p, sd, near, renewals=0, chosen=chosen) or selection.best

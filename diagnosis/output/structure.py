@@ -185,8 +185,6 @@ def sensed(rig: Rig, model: NominalModel, unknowns: Unknowns, p: Array, delays: 
 def lag_of_drive(unknowns: Unknowns, p: Array) -> tuple[float, float]:
     """Time [s] by which the torque reaches the rotor after its channel shows it, and its standard deviation on sound
     rigs."""
-    if LATE not in unknowns.slices:
-        return 0.0, 0.0
     return float(p[unknowns[LATE]][0]), float(unknowns.group(LATE).sd[0])
 
 

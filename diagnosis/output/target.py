@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.diagnosis.forces.condition import Condition
-from gearbench.diagnosis.forces.covariance import KINDS, kinds_of
+from gearbench.diagnosis.forces.covariance import KINDS, SHAFTS, kinds_of
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.intake.signals import bands, frequencies, measured_channels, noise_of_mean
 
@@ -34,7 +34,6 @@ BY_TEETH = 0.5
 LEVEL = 1e-2  # part of the measured level below which no model is right
 REACH = 1e-4  # part of the channel's whole fluctuation that leaks into any line
 TINY = 1e-60
-SHAFTS = ("driver-shaft", "driven-shaft")  # kinds of lines: sidebands of the gears
 
 
 @dataclass(frozen=True)

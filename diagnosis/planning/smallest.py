@@ -92,10 +92,7 @@ class View:
 
 def wide_prior(known: Known, one: Hypothesis) -> Array:
     """Priors (size,) under a hypothesis."""
-    out = known.narrow.copy()
-    for wide in one.wide:
-        wide.into(known.unknowns, out)
-    return out
+    return one.widened(known.unknowns, known.narrow)
 
 
 def direction(known: Known, one: Hypothesis) -> Array:

@@ -12,7 +12,7 @@ from gearbench.diagnosis.effects.profile_error import FLANKS, PROFILE_ERROR
 from gearbench.diagnosis.forces.basis import PLACES_ON_PATH
 from gearbench.diagnosis.output.contrast import CONTRAST, CONTRAST_SD, is_strange
 from gearbench.diagnosis.output.reshaped import has_shapes, reshaped
-from gearbench.diagnosis.output.selection import prior_of, widened_prior
+from gearbench.diagnosis.output.selection import prior_of
 
 RELIEF = 18e-6
 
@@ -45,7 +45,7 @@ def test_deep_reliefs_are_found_from_a_shape() -> None:
     assert lines is not None
     simulator = replace(simulator, target=replace(simulator.target, lines=lines))
     _, form = PROFILE_ERROR.hypotheses(simulator.layout.model)
-    found = reshaped(simulator, form, widened_prior(unknowns, prior_of(simulator, unknowns.prior()), form))
+    found = reshaped(simulator, form, form.widened(unknowns, prior_of(simulator, unknowns.prior())))
     assert found is not None
     flanks = found.p[unknowns[FLANKS]]
     assert flanks[[0, -1]] - flanks[3] == pytest.approx(-RELIEF, rel=0.15)
