@@ -28,7 +28,6 @@ from gearbench.identification.smooth.choice import choose_smooth
 from gearbench.identification.smooth.estimate import smooth_branches
 from gearbench.identification.spectra.course import Course
 from gearbench.identification.spectra.joint import Spectra
-from gearbench.identification.spectra.records import EXCITED
 from gearbench.identification.task import Task
 from gearbench.identification.truth.periodic import itf_from_htf
 
@@ -36,8 +35,9 @@ from gearbench.identification.truth.periodic import itf_from_htf
 DOUBTFUL = 0.1
 # Expected error of polynomials beyond which smooth branches are tried as well.
 ENOUGH = 0.01
-# Part of the band's lines below which an excitation leaves classes of lines empty.
-SPARSE = 0.4
+# Part of the band's lines below which an excitation leaves classes of lines empty, and of the strongest line's force
+# below which a line counts as left out: a measured torque is never without noise.
+SPARSE, LEFT_OUT = 0.4, 0.03
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,7 @@ def _sparse(task: Task) -> bool:
     spectra = task.spectra
     low, high = (round(end / spectra.spacing) for end in task.excited)
     size = np.abs(spectra.force[:, max(low, 1) : high + 1]).max(axis=0)
-    excited = np.count_nonzero(size > EXCITED * size.max(initial=0.0))
+    excited = np.count_nonzero(size > LEFT_OUT * size.max(initial=0.0))
     return excited * spectra.repeats < SPARSE * size.size
 
 

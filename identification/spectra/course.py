@@ -14,6 +14,7 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy.interpolate import make_lsq_spline
 
+from gearbench.identification.spectra.excited import excited_lines
 from gearbench.identification.spectra.joint import Floats, Spectra, SpectraError
 from gearbench.identification.spectra.transmission_error import dte, force
 from gearbench.records.even_speed import departure, mesh_phase
@@ -75,7 +76,7 @@ def excited_rows(records: Sequence[xr.Dataset]) -> tuple[list[tuple[Floats, Floa
     strength = np.sqrt(np.mean([np.abs(np.fft.rfft(one[1] - one[1].mean())) ** 2 for one in rows], axis=0))
     if not strength.max() > 1e-12 * size * max(abs(float(one[1].mean())) for one in rows):
         raise SpectraError("the force is constant: without excitation nothing can be identified")
-    excited = np.flatnonzero(strength > EXCITED * strength.max())
+    excited = np.flatnonzero(excited_lines(strength**2, least=EXCITED))
     return rows, rate, max(int(excited[0]), 1), int(excited[-1])
 
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
+from gearbench.identification.spectra.excited import excited_lines
 from gearbench.identification.spectra.joint import (
     STEADY,
     Floats,
@@ -20,8 +21,6 @@ from gearbench.identification.spectra.joint import (
 )
 from gearbench.identification.spectra.transmission_error import AngleOnlyWarning, dte, force
 
-# A line counts as excited if its force exceeds this part of the strongest line's (rms over realisations).
-EXCITED = 1e-3
 # Largest departure of the mesh phase from a straight line [cycles] that is passed over.
 PHASE_WANDER = 2e-3
 # Largest drift of the mesh phase against the mesh period over a record [cycles].
@@ -99,17 +98,18 @@ def _signals(record: xr.Dataset, notes: list[str]) -> Iterator[tuple[Floats, Flo
 
 
 def _excited_band(records: Sequence[xr.Dataset], sampling: Sampling) -> tuple[float, float]:
-    """Lowest and highest frequency [Hz] that the forces excite."""
-    power = np.zeros((sampling.joint - 1) // 2 + 1)
+    """Lowest and highest frequency [Hz] that the forces excite above their noise."""
+    power, noise, count = np.zeros((sampling.joint - 1) // 2 + 1), np.zeros((sampling.joint - 1) // 2 + 1), 0
     for record in records:
         for realisation in range(record.sizes["realisation"]):
             signal = force(record.isel(realisation=[realisation])).values[0]
-            power += np.abs(period_spectra(signal, sampling.joint, power.size - 1)[0]) ** 2
-    size = power[0]
-    power[0] = 0.0
-    if not power.max() > 1e-24 * max(size, np.finfo(float).tiny):
+            mean, _, scatter = period_spectra(signal, sampling.joint, power.size - 1)
+            power += np.abs(mean) ** 2
+            if scatter is not None:
+                noise, count = noise + scatter, count + 1
+    if not power[1:].max() > 1e-24 * max(power[0], np.finfo(float).tiny):
         raise SpectraError("the force is constant: without excitation nothing can be identified")
-    excited = np.flatnonzero(power > EXCITED**2 * power.max())
+    excited = np.flatnonzero(excited_lines(power, noise if count else None))
     spacing = sampling.rate / sampling.joint
     return float(excited[0] * spacing), float(excited[-1] * spacing)
 
