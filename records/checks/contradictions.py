@@ -130,7 +130,7 @@ def _late(look: Look, what: str, names: frozenset[str], delay: float) -> list[Fi
     words = ("lag behind" if delay > 0 else "lead") if len(names) > 1 else ("lags behind" if delay > 0 else "leads")
     return [
         Finding(
-            f"{what} {words} the other channels by {1e6 * abs(delay):.3g} us ({abs(delay) * look.rate:.2g} samples),"
+            f"{what} {words} the other channels by {1e6 * abs(delay):.4g} us ({abs(delay) * look.rate:.2g} samples),"
             f" which the balance of forces at the gears shows; it costs about {error:.0%} of the response",
             refused=False,
             error=error,

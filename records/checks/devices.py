@@ -7,15 +7,18 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.records.checks.look import GEARS, Look
+from gearbench.records.checks.look import EXCITED, GEARS, Complexes, Look
 from gearbench.records.checks.mesh_force import Accounts
 
 Array = NDArray[np.float64]
+Lines = NDArray[np.int64]
 
 # Misfit of the accounts below which no delay is looked for, what a delay may leave, and of what was before.
 SUSPICIOUS, EXACT, EXPLAINED = 0.03, 0.06, 1 / 3
 # Relative error of the response that counts at most on one line.
 MOST = 2.0
+# Branches by which what the mesh turns aside is judged, and excited lines that tell how much of it there is.
+SIDE, GROUP = (-6, -4, -2, -1, 1, 2, 4, 6), 8
 
 
 def groups_of(accounts: Accounts) -> Iterator[tuple[str, frozenset[str]]]:
@@ -62,36 +65,75 @@ def _worst(accounts: Accounts, relations: list[tuple[str, str]], names: frozense
 
 def error_of_lag(look: Look, names: frozenset[str], delay: float) -> float:
     """Relative rms error of the response over the excited lines that channels late by `delay` [s] make; on one line
-    MOST of the response at most."""
+    MOST of the response at most.
+
+    What the mesh turns aside is counted by itself: force and dte may both change by the same factor on every line, so
+    that their ratio is right and sidebands, which come from another line, are not.
+    """
     force, error = look.force, look.dte
     if force is None or error is None:
         return 0.0
-    lines = look.excited(force)
+    lines = look.lines[look.excited(force)]
+    d = 0
     if look.mesh_period is not None:  # there the operating response hides what the excitation makes
-        cycles = look.omega / (2 * np.pi) * look.mesh_period
-        between = lines & (np.abs(cycles - np.round(cycles)) > 1e-6)
-        lines = between if between.any() else lines
-    if not lines.any():
+        cycles = lines * look.rate / look.samples * look.mesh_period
+        between = np.abs(cycles - np.round(cycles)) > 1e-6
+        lines = lines[between] if between.any() else lines
+        d = round(look.samples / look.rate / look.mesh_period)
+    if not lines.size:
         return 0.0
-    turn = (np.exp(1j * look.omega * delay) - 1)[lines]
-    driving, response = look.spectrum(force)[lines], look.spectrum(error)[lines]
-    of_force, of_dte = (np.zeros(turn.size, dtype=complex) for _ in range(2))
+    driving = _changes(look, names, delay, force, "torque_")
+    response = _changes(look, names, delay, error, "")
+    direct = _wrong(response, driving, lines, lines)
+    inside = [lines[(lines - n * d > 0) & (lines - n * d <= look.lines[-1])] for n in SIDE] if d else []
+    asides = [_wrong(response, driving, some, some - n * d) for n, some in zip(SIDE, inside, strict=True) if some.size]
+    share = _turned_aside(driving[0], response[0], int(look.lines[-1]), d)
+    aside = float(np.sqrt(share * np.mean(np.square(asides)))) if asides else 0.0
+    return max(direct, aside)
+
+
+def _changes(look: Look, names: frozenset[str], delay: float, now: Array, kind: str) -> tuple[Complexes, Complexes]:
+    """Spectra of force (`kind` "torque_") or dte as it is, and as it is without the lag."""
+    omega = 2 * np.pi * np.arange(look.samples // 2 + 1) * look.rate / look.samples
+    found = np.fft.rfft(now)
+    right = found.copy()
     for name in names:
-        part = _part(look, name)
+        part = _part(look, name) if name.startswith("torque_") == bool(kind) else None
         if part is not None:
-            target = of_force if name.startswith("torque_") else of_dte
-            target += turn * part[lines]
+            right += (np.exp(1j * omega * delay) - 1) * np.fft.rfft(part)
+    return found, right
+
+
+def _wrong(
+    response: tuple[Complexes, Complexes], driving: tuple[Complexes, Complexes], to: Lines, come_from: Lines
+) -> float:
+    """Relative rms error of the branches that lead from lines of the force to lines of the dte."""
+    found, right = (one[to] for one in response)
     tiny = np.finfo(float).tiny
-    whole = np.where(np.abs(driving + of_force) > tiny, driving + of_force, tiny)
-    right = (response + of_dte) * driving / whole
-    wrong = np.minimum(np.abs(right - response), MOST * np.abs(response))
+    before, after = (one[come_from] for one in driving)
+    wanted = right * before / np.where(np.abs(after) > tiny, after, tiny)
+    wrong = np.minimum(np.abs(wanted - found), MOST * np.abs(found))
     # Relative to the lesser of the right response and the one that is found: neither is known to be the truth.
-    size = min(float(np.linalg.norm(response)), float(np.linalg.norm(right)))
+    size = min(float(np.linalg.norm(found)), float(np.linalg.norm(wanted)))
     return float(np.linalg.norm(wrong)) / max(size, tiny)
 
 
-def _part(look: Look, name: str) -> NDArray[np.complex128] | None:
-    """What a channel contributes to force or dte (lines,), with its sign; None where it does not."""
+def _turned_aside(driving: Complexes, response: Complexes, top: int, d: int) -> float:
+    """Part of the dte's power that does not go with the force of its own line, over groups of GROUP excited lines; 0
+    without mesh lines. Noise is in it."""
+    size = np.abs(driving[: top + 1])
+    lines = np.flatnonzero(size >= EXCITED * size[1:].max(initial=0.0))
+    lines = lines[(lines > 0) & (lines % d > 0)] if d else lines[:0]
+    lines = lines[: lines.size // GROUP * GROUP].reshape(-1, GROUP)
+    if not lines.size:
+        return 0.0
+    u, y = driving[lines], response[lines]
+    own = np.abs((u.conj() * y).sum(axis=1)) ** 2 / (np.abs(u) ** 2).sum(axis=1)
+    return float(1 - own.sum() / (np.abs(y) ** 2).sum())
+
+
+def _part(look: Look, name: str) -> Array | None:
+    """What a channel contributes to force or dte (samples,), with its sign; None where it does not."""
     quantity, gear = name.split("_")
     radius = look.number(f"base_radius_{gear}")
     values = look.swing(gear) if quantity == "angle" else look.channel(name)
@@ -99,15 +141,15 @@ def _part(look: Look, name: str) -> NDArray[np.complex128] | None:
         return None
     sign = 1.0 if gear == "driver" else -1.0
     if quantity == "angle":
-        return sign * look.spectrum(values) * radius
+        return sign * values * radius
     if quantity == "y":
-        return sign * look.spectrum(values) * (look.support_factor or 1.0)
+        return sign * values * (look.support_factor or 1.0)
     if look.record.attrs.get("driven_boundary") == "speed":
-        return look.spectrum(values) / radius if gear == "driver" else None
+        return values / radius if gear == "driver" else None
     radii = [look.number(f"base_radius_{one}") for one in GEARS]
     inertias = [look.number(f"inertia_{one}") for one in GEARS]
     if None in radii or None in inertias:
         return None
     r1, r2, j1, j2 = (float(one or 0.0) for one in (*radii, *inertias))
     mass = j1 * j2 / (j1 * r2**2 + j2 * r1**2)
-    return look.spectrum(values) * mass * (r1 / j1 if gear == "driver" else r2 / j2)
+    return values * mass * (r1 / j1 if gear == "driver" else r2 / j2)

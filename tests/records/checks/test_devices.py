@@ -95,3 +95,18 @@ def test_one_clock_says_nothing(record: xr.Dataset) -> None:
     assert clocks_agree(Look(record)) == []
     everything = tuple(str(name) for name in record.data_vars if name != "mesh_phase")
     assert clocks_agree(Look(late(record, everything, 40))) == []
+
+
+def test_a_lag_that_leaves_dte_over_force_as_it_is_spoils_the_sidebands() -> None:
+    """Two equal gears swing against one another: one side late by tau multiplies force and dte of a line alike, by
+    cos(w tau / 2), but sidebands come from the force of another line."""
+    own = gb.simulate(gb.read_case("quick_lumped", ["experiment.realisations=8"])).drop_vars(["dte", "force"])
+    moved = late(own, DEVICES["driver's channels"], 20)
+    assert cost(own, moved) < 0.01
+    (found,) = clocks_agree(Look(moved))
+    settings = gb.IdentificationSettings(harmonics=8, order=1, window=12, band=(800.0, 1700.0), phases=32, modes=0)
+    right, wrong = (gb.identify([one], settings) for one in (own, moved))
+    sound, spoilt = (one["itf_re"].values + 1j * one["itf_im"].values for one in (right, wrong))
+    difference = float(np.linalg.norm(spoilt - sound) / np.linalg.norm(sound))
+    assert difference > 0.1
+    assert found.error > 0.2 * difference  # an order of size: the force of whole lines is lost
