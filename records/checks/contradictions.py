@@ -7,7 +7,7 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.records.checks.devices import error_of_lag, late_device
+from gearbench.records.checks.devices import error_of_lag, far_side, late_device
 from gearbench.records.checks.finding import Finding
 from gearbench.records.checks.look import GEARS, Complexes, Look
 from gearbench.records.checks.mesh_force import Accounts, accounts_of
@@ -117,6 +117,7 @@ def clocks_agree(look: Look) -> list[Finding]:
         if (clean or noisy) and (best is None or after < best[0]):
             best = (after, name, delay)
     device = late_device(accounts, delays)
+    device = far_side(look, accounts) if device is None and best is None else device
     if device is not None and (best is None or device[0] < BETTER * best[0]):
         return _late(look, f"the {device[1]} ({', '.join(sorted(device[2]))})", device[2], device[3])
     return [] if best is None else _late(look, best[1], frozenset([best[1]]), best[2])
@@ -128,10 +129,13 @@ def _late(look: Look, what: str, names: frozenset[str], delay: float) -> list[Fi
     if error < MATTERS and abs(delay) < 0.1 / look.rate:
         return []
     words = ("lag behind" if delay > 0 else "lead") if len(names) > 1 else ("lags behind" if delay > 0 else "leads")
+    late = 1e6 * abs(delay)
+    size = f"{late:.4g}" if late < 1e4 else f"{late:.0f}"
     return [
         Finding(
-            f"{what} {words} the other channels by {1e6 * abs(delay):.4g} us ({abs(delay) * look.rate:.2g} samples),"
-            f" which the balance of forces at the gears shows; it costs about {error:.0%} of the response",
+            f"{what} {words} the other channels by {size} us ({abs(delay) * look.rate:.3g} samples),"
+            " which the balance of forces at the gears shows (delay_s of a channel map takes it off); it costs about"
+            f" {error:.0%} of the response",
             refused=False,
             error=error,
         )

@@ -58,6 +58,43 @@ def late_device(accounts: Accounts, delays: Array) -> tuple[float, str, frozense
     return best
 
 
+def far_side(look: Look, accounts: Accounts) -> tuple[float, str, frozenset[str], float] | None:
+    """As `late_device`, for all of the driver's channels, late by any part of an excitation period: devices that were
+    not started together. The force on one gear against that on the other, correlated at all delays."""
+    if set(accounts.gears) != set(GEARS) or float(accounts.misfit(GEARS)[0]) < SUSPICIOUS:
+        return None
+    own = {name for name in look.record.data_vars if str(name).endswith("_driver")}
+    names = frozenset(str(name) for name in own if str(name).split("_")[0] in ("torque", "angle", "y"))
+    first, second = (_force(look, gear) for gear in GEARS)
+    product = np.fft.irfft(first * second.conj(), look.samples)
+    period = int(look.number("samples_per_period") or look.samples)
+    if look.samples % period == 0:
+        product = product.reshape(-1, period).sum(axis=0)
+    late = int(np.argmax(product))
+    late -= product.size * (late > product.size // 2)
+    fine = (late + np.linspace(-1.0, 1.0, 81)) / look.rate
+    found = _worst(accounts, [GEARS], names, fine)
+    after, delay = float(found.min()), float(fine[int(np.argmin(found))])
+    if after >= EXACT or after >= EXPLAINED * float(accounts.misfit(GEARS)[0]):
+        return None
+    return after, "driver's channels", names, delay
+
+
+def _force(look: Look, gear: str) -> Complexes:
+    """Spectrum of the force [N] on the mesh as a gear's torque and acceleration have it, up to the highest line looked
+    at."""
+    torque, swing = look.channel(f"torque_{gear}"), look.swing(gear)
+    radius, inertia = look.number(f"base_radius_{gear}") or 1.0, look.number(f"inertia_{gear}")
+    assert torque is not None  # there is an account of this gear
+    total = np.fft.rfft(torque)
+    omega = 2 * np.pi * np.arange(total.size) * look.rate / look.samples
+    if swing is not None and inertia is not None:
+        total += (1.0 if gear == "driver" else -1.0) * inertia * omega**2 * np.fft.rfft(swing)
+    total[int(look.lines[-1]) + 1 :] = 0.0
+    total[0] = 0.0
+    return np.asarray(total / radius)
+
+
 def _worst(accounts: Accounts, relations: list[tuple[str, str]], names: frozenset[str], at: Array) -> Array:
     turn = np.exp(1j * np.outer(at, accounts.omega))
     return np.asarray(np.max([accounts.misfit(relation, names, turn) for relation in relations], axis=0))

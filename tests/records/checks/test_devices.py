@@ -73,6 +73,17 @@ def test_a_late_device_is_named_with_its_delay(record: xr.Dataset, device: str, 
     assert found.error == pytest.approx(cost(record, late(record, DEVICES[device], samples)), rel=0.4)
 
 
+@pytest.mark.parametrize("samples", [1500, -3001])
+def test_a_device_that_was_started_at_another_time(record: xr.Dataset, samples: int) -> None:
+    """0.1 and 0.2 s of a period of half a second: found by correlating the forces on both gears."""
+    (found,) = clocks_agree(Look(late(record, DEVICES["driver's channels"], samples)))
+    words = "lag behind" if samples > 0 else "lead"
+    assert f"y_driver) {words} the other channels by " in found.sentence
+    told = float(found.sentence.split("channels by ")[1].split(" us")[0])
+    assert told == pytest.approx(1e6 * abs(samples) / record.attrs["sampling_rate"], abs=3.0)
+    assert found.error > 0.3
+
+
 def test_a_single_channel_is_still_named(record: xr.Dataset) -> None:
     (found,) = clocks_agree(Look(late(record, ("angle_driven",), 2)))
     assert found.sentence.startswith("angle_driven lags behind the other channels by 12")
