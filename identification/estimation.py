@@ -105,7 +105,7 @@ def _identified(records: Sequence[xr.Dataset], settings: IdentificationSettings,
         raise
     require_mesh_periods(spectra)
     report(0.05, "what the records say about themselves")
-    doubts, cost = _doubts(records)
+    doubts, cost = _doubts(records, settings.band)
     simulated = _simulated(records)
     said = [*doubts, *notes]
     return identify_spectra(
@@ -174,7 +174,7 @@ def _feedback_at_varying_speed(
     records: Sequence[xr.Dataset], settings: IdentificationSettings, report: Progress
 ) -> xr.Dataset:
     """Mesh feedback with the measured phase."""
-    doubts, cost = _doubts(records)
+    doubts, cost = _doubts(records, settings.band)
     signals, spectra = signals_of(records, ENOUGH)
     excited = (signals.lowest * spectra.spacing, signals.excited * spectra.spacing)
     frf = varying_frf(
@@ -205,7 +205,7 @@ def _local_at_varying_speed(
     records: Sequence[xr.Dataset], settings: IdentificationSettings, report: Progress
 ) -> xr.Dataset:
     """The local method with the measured phase."""
-    doubts, cost = _doubts(records)
+    doubts, cost = _doubts(records, settings.band)
     spectra, course = course_spectra(records, SIDEBANDS if settings.harmonics is None else settings.harmonics)
     excited = (course.lowest * spectra.spacing, course.excited * spectra.spacing)
     lines = output_lines(spectra, settings.band or excited, excited, settings.step)
@@ -236,9 +236,9 @@ def _second_opinion(frf: xr.Dataset, polynomials: Callable[[], xr.Dataset]) -> x
     return other
 
 
-def _doubts(records: Sequence[xr.Dataset]) -> tuple[list[str], float]:
-    """What is doubtful about the records, and the rms error that it may leave: records count alike, doubts about one
-    are independent."""
+def _doubts(records: Sequence[xr.Dataset], band: tuple[float, float] | None) -> tuple[list[str], float]:
+    """What is doubtful about the records, and the rms error that it may leave in the band: records count alike, doubts
+    about one are independent."""
     copies = same_samples(records)
     if copies is not None and copies[0][0] != copies[1][0]:
         first, second = (place[0] + 1 for place in copies)
@@ -248,6 +248,8 @@ def _doubts(records: Sequence[xr.Dataset]) -> tuple[list[str], float]:
         source = f"record {number} of {len(records)}" if len(records) > 1 else ""
         for finding in check_record(record, source):
             sentences.append(f"{source}: {finding.sentence}" if source else finding.sentence)
+            if finding.above is not None and band is not None and band[1] <= finding.above:
+                continue
             power += finding.error**2 / len(records)
         if lost := int(record.attrs.get("contact_lost_samples", 0)):
             total = record.sizes["realisation"] * record.sizes["time"]

@@ -32,6 +32,7 @@ from gearbench.records.checks.look import Look
 from gearbench.records.checks.mesh_lines import mesh_lines_stand_out
 from gearbench.records.checks.passive import force_feeds_the_rig
 from gearbench.records.checks.periods import periods_repeat
+from gearbench.records.checks.sampled import sampled_fast_enough
 from gearbench.records.checks.torques import load_balances, torque_as_declared
 from gearbench.records.errors import RecordError
 
@@ -61,6 +62,7 @@ CHECKS: tuple[Check, ...] = (
     boundary_as_declared,
     inertias_as_declared,
     not_clipped,
+    sampled_fast_enough,
     clocks_agree,
     force_and_dte_in_step,
     clocks_keep_pace,

@@ -17,12 +17,14 @@ class Finding:
     """One thing found in a record.
 
     `sentence` names field, value and limit. `refused`: the record cannot be used. Of what can be right `error` says
-    what it costs if it is not: the relative rms error, |G_est - G| / |G|, that it leaves in an identified response.
+    what it costs if it is not: the relative rms error, |G_est - G| / |G|, that it leaves in an identified response;
+    `above` [Hz]: only there.
     """
 
     sentence: str
     refused: bool = True
     error: float = 0.0
+    above: float | None = None
 
 
 def unit_hint(factor: float, units: dict[float, str], channel: str, verb: str = "is") -> str:

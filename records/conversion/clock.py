@@ -76,10 +76,10 @@ def clock_of_times(time: Array, name: str, notes: list[str]) -> Clock:
         return Clock(float(time[0]), rate, time.size)
     usual = float(np.median(steps))
     longest = int(steps.argmax())
-    if steps[longest] > LONGEST_GAP * usual:
+    if steps[longest] > LONGEST_GAP * (1 + UNIFORM) * usual:
         raise RecordError(
             f"{name} has a gap of {steps[longest]:.4g} s after sample {longest}, {steps[longest] / usual:.3g} usual"
-            f" steps of {usual:.4g} s (limit {LONGEST_GAP:g})"
+            f" steps of {usual:.4g} s (limit {LONGEST_GAP:g}): convert what lies before or after it"
         )
     missing = int(np.round(steps / usual - 1).clip(0).sum())
     notes.append(

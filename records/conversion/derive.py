@@ -22,6 +22,9 @@ SPEED = 0.01
 WHOLE_TEETH = 0.05
 # Interpolation errors beyond this part of a signal are said to be large.
 DOUBTFUL = 0.01
+# Frequencies over the sampling rate up to which interpolation errs by 2 %: quintic splines, 1 / (1 + (x / (1 - x))^6)
+# (Unser 1999), and the windowed sinc.
+SPLINES, SINC = 0.35, 0.47
 # Integration of vibrations leaves out what lies below this [Hz], unless the map says otherwise.
 LOWEST = 5.0
 # What was integrated keeps a channel of its own.
@@ -61,6 +64,7 @@ def put_on_clock(work: Assembly, signal: Signal, mesh_period: float | None, prog
     )
     if error is not None:
         said["interpolation_error"] = error
+        said["believed_to_hz"] = (SPLINES if signal.clock.time is not None else SINC) * signal.clock.rate
         was = "single times" if signal.clock.time is not None else f"{signal.clock.rate:.9g} Hz"
         work.notes.append(
             f"{signal.name} is interpolated from {was} to {common.rate:.9g} Hz, relative error {error:.1g}"
@@ -164,6 +168,11 @@ def add_mesh_phase(work: Assembly, mesh_period: float | None) -> None:
     start = np.mean(phases, axis=0)
     work.channels["mesh_phase"] = start[:, np.newaxis] + steps
     relative = [signal.name for signal, _ in turning if not signal.absolute]
+    if relative and work.attributes.get("mesh_phase_origin") == "geometry":
+        work.notes.append(
+            f"{', '.join(relative)}: counted without an absolute zero, so that mesh phase 0 is not the geometry's, as"
+            " mesh_phase_origin says"
+        )
     if relative and start.size > 1:
         work.notes.append(
             f"{', '.join(relative)}: without an absolute zero the runs' mesh phases against one another are not known,"
