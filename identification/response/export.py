@@ -27,7 +27,8 @@ def export_frf(frf: xr.Dataset, path: str | Path) -> None:
 
     Universal file: dataset 164 (SI), then one complex function 58 [m/N] for each phase of the ITF ("ITF at mesh
     phase 0.25", response node 1 + number of the phase) and for each branch of the HTF ("HTF of harmonic -2",
-    response node 1001 + number of the branch); frequencies have that format's six digits. MAT-file (version 5):
+    response node 1001 + number of the branch, above 1000 phases
+    the next thousand); frequencies have that format's six digits. MAT-file (version 5):
     struct `frf` with the complex matrices itf (frequency x phase) and htf (harmonic x frequency), every other
     variable and coordinate under its name, `units` and `attributes`. Raises FrfError for another suffix or dataset.
 
@@ -69,8 +70,9 @@ def _write_universal(frf: xr.Dataset, path: Path) -> None:
         (phases.values[:, number], f"ITF at mesh phase {phase:.6g}", 1 + number)
         for number, phase in enumerate(frf["phase"].values)
     ]
+    first = 1 + 1000 * -(-max(frf.sizes["phase"], 1) // 1000)
     functions += [
-        (branches.values[number], f"HTF of harmonic {harmonic}", 1001 + number)
+        (branches.values[number], f"HTF of harmonic {harmonic}", first + number)
         for number, harmonic in enumerate(frf["harmonic"].values)
     ]
     # pyuff reads the whole file again after each dataset: each one gets a file of its own, which are then joined.
