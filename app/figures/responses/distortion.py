@@ -30,11 +30,11 @@ def draw_distortion(path: Path, split: xr.Dataset) -> None:
             own = (part == order.index(name)) & (size > floor)
             rms = 1e9 * float(split["rms"].sel(part=name))
             if own.any():
-                axes.scatter(frequency[own], size[own], s=dot, color=colour, lw=0, label=f"{label}, {rms:.3g} nm rms")
+                axes.scatter(frequency[own], size[own], s=dot, color=colour, lw=0, label=f"{label}, {_length(rms)} rms")
         known = np.isfinite(noise) & (noise > floor)
         if known.any():
             rms = 1e9 * float(split.attrs["noise_rms"])
-            axes.plot(frequency[known], noise[known], color=GREEN, lw=0.8, label=f"noise, {rms:.3g} nm rms", zorder=0)
+            axes.plot(frequency[known], noise[known], color=GREEN, lw=0.8, label=f"noise, {_length(rms)} rms", zorder=0)
         axes.set_yscale("log")
         log_ticks(axes.yaxis, *axes.get_ylim())
         axes.set_xlim(0.0, frequency[-1])
@@ -43,6 +43,10 @@ def draw_distortion(path: Path, split: xr.Dataset) -> None:
         axes.set_title(_title(split))
         axes.legend(loc="upper right", frameon=True, framealpha=0.9, markerscale=2.0, fontsize=9)
         save(drawing, path)
+
+
+def _length(nanometres: float) -> str:
+    return f"{nanometres:.3g} nm" if nanometres < 1e3 else f"{nanometres / 1e3:.3g} um"
 
 
 def _title(split: xr.Dataset) -> str:
