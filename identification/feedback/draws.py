@@ -37,11 +37,22 @@ def response_variances(
     )
 
 
-def add_mesh_curves(frf: xr.Dataset, model: Model, draws: Sequence[Model], data: ClassData) -> None:
-    """Add `mesh_stiffness` and `mesh_damping` (phase) and their variances to a response."""
+def add_mesh_curves(
+    frf: xr.Dataset, model: Model, draws: Sequence[Model], data: ClassData, *, angle_only: bool = False
+) -> None:
+    """Add `mesh_stiffness` and `mesh_damping` (phase) and their variances to a response.
+
+    From angles alone (`angle_only`) any part e of the supports' static compliance may stand in the mesh, which they
+    are in series with: k = k' / (1 - e k'), c = c' / (1 - e k')^2 explain a record as well as k', c'. e below the least
+    compliance of the mesh is all that is known, and its size is taken for a deviation.
+    """
     phases = frf.sizes["phase"]
     curves = np.array([along_phase(one, data, phases) for one in (model, *draws)])
     spread = np.mean(((curves[1:] - curves[0]) / STEP) ** 2, axis=0)
+    if angle_only:
+        stiffness, damping = curves[0]
+        largest = float(np.abs(stiffness).max())
+        spread += np.square(np.array([stiffness**2, 2 * damping * stiffness]) / largest)
     for number, (name, unit) in enumerate((("mesh_stiffness", "N/m"), ("mesh_damping", "N s/m"))):
         frf[name] = ("phase", curves[0, number], {"units": unit})
         frf[f"{name}_var"] = ("phase", spread[number], {"units": f"({unit})^2"})

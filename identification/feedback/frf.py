@@ -89,7 +89,7 @@ def feedback_frf(
             "warnings": "\n".join([*notes, *_doubts(found, spectra, natural[0], variance, apart, ratio)]),
         },
     )
-    add_mesh_curves(frf, model, draws, data)
+    add_mesh_curves(frf, model, draws, data, angle_only=spectra.angle_only)
     return frf
 
 
@@ -143,7 +143,8 @@ def _doubts(
     if found.model.torsional:
         notes.append(
             "dte of angles alone: the centres' motion is identified as a part of its own, and the response is that of"
-            " the angles; mesh stiffness and damping have a factor that is uncertain beyond their variance"
+            " the angles; of the mesh stiffness k only 1/k plus a constant is known: the supports yield in series with"
+            " the mesh, and without y channels any part of their compliance may stand in it (its variance holds that)"
         )
     lowest = found.data.lowest * spectra.spacing
     if natural.size and np.isfinite(natural[0]).any() and lowest > GAUGED * float(np.nanmin(natural[0])):

@@ -89,6 +89,20 @@ def by_mesh_feedback(record: xr.Dataset) -> xr.Dataset:
     return by_feedback(Task(spectra, lines, settings, excited, tuple(notes), 0.0, lambda part, message: None))
 
 
+def test_stiffness_from_angles_is_known_but_for_a_compliance_in_series() -> None:
+    """1/k' = 1/k + e: a spring in series with the mesh, which the supports are; the variance holds it."""
+    found = by_mesh_feedback(angle_record(0.01))
+    k = RIG.stiffness(found.phase.values)
+    told, deviation = found["mesh_stiffness"].values, np.sqrt(found["mesh_stiffness_var"].values)
+    (slope, series), *_ = np.linalg.lstsq(np.stack([1 / k, np.full(k.size, 1e-8)], axis=1), 1 / told, rcond=None)
+    assert slope == pytest.approx(1.0, abs=0.03)
+    assert 0 < series * 1e-8 < 1.5 * sum(1 / support for support in RIG.support_stiffness)
+    assert np.std(1 / told - slope / k) < 0.05 * np.std(1 / told)
+    assert told.mean() < 0.8 * k.mean()
+    assert (np.abs(told - k) < 2 * deviation).all()
+    assert "only 1/k plus a constant is known" in found.attrs["warnings"]
+
+
 @pytest.mark.validation
 def test_the_response_of_angles_alone_is_found_with_the_centres_motion() -> None:
     """Supports softer than the mesh, half a second at 40 dB: the form with the centres is chosen, knows its error, and
