@@ -161,10 +161,10 @@ def _turned_aside(driving: Complexes, response: Complexes, top: int, d: int) -> 
     size = np.abs(driving[: top + 1])
     lines = np.flatnonzero(size >= EXCITED * size[1:].max(initial=0.0))
     lines = lines[(lines > 0) & (lines % d > 0)] if d else lines[:0]
-    lines = lines[: lines.size // GROUP * GROUP].reshape(-1, GROUP)
-    if not lines.size:
+    groups = lines[: lines.size // GROUP * GROUP].reshape(-1, GROUP)
+    if not groups.size:
         return 0.0
-    u, y = driving[lines], response[lines]
+    u, y = driving[groups], response[groups]
     own = np.abs((u.conj() * y).sum(axis=1)) ** 2 / (np.abs(u) ** 2).sum(axis=1)
     return float(1 - own.sum() / (np.abs(y) ** 2).sum())
 
