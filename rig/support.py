@@ -5,9 +5,13 @@ from __future__ import annotations
 from math import pi
 from typing import ClassVar, Literal, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import model_validator
 
 from gearbench.rig.value import Value, format_number, quantity
+
+Array = NDArray[np.float64]
 
 
 class Across(Value):
@@ -111,7 +115,8 @@ class Housing(Value):
 
     It takes each support along by a share of its own motion h: shares 1 and 1 are a body that moves along, 1 and 0.3
     one that stands softer at the driver. `mass`, `stiffness` and `damping` belong to h. The mesh pushes both supports
-    apart: a body that moves along hardly feels it, one that rocks feels all of it.
+    apart: a body that moves along hardly feels it, one that rocks feels all of it. Displacement sensors that stand
+    on it show what is left of the gears' motion (`sensor_share`).
     """
 
     mass: float = quantity(unit="kg", gt=0.0, le=1e7, doc="mass of the housing")
@@ -119,4 +124,15 @@ class Housing(Value):
     damping: float = quantity(0.0, "n_s_per_m", ge=0.0, doc="damping of the housing to the ground")
     driver_share: float = quantity(1.0, ge=-100.0, le=100.0, doc="part of its motion that the driver's support makes")
     driven_share: float = quantity(1.0, ge=-100.0, le=100.0, doc="part of it that the driven gear's support makes")
+    sensor_share: float = quantity(
+        0.0, ge=0.0, le=1.0, doc="part of the supports' motion with it that the displacement sensors make: 0 on the"
+        " ground, 1 on the housing"
+    )
     rocking: Rocking | None = quantity(None, doc="absent: it does not rock")
+
+    def feet(self, moved: Array, rocked: Array) -> tuple[Array, Array]:
+        """Motions (n,) [m] of the supports of driver and driven gear with both motions (n,) [m] of the housing."""
+        one, two = self.driver_share * moved, self.driven_share * moved
+        if self.rocking is None:
+            return one, two
+        return one + self.rocking.driver_share * rocked, two + self.rocking.driven_share * rocked

@@ -14,7 +14,7 @@ from gearbench.lumped.nonlinear.coordinates import IN_MESH, NAMES
 from gearbench.lumped.nonlinear.law import MeshLaw
 from gearbench.lumped.nonlinear.model import NonLinear
 from gearbench.lumped.nonlinear.pressing import Pressed, of_pairs, pressed
-from gearbench.lumped.nonlinear.rest import inverse_masses, springs_and_dampers
+from gearbench.lumped.nonlinear.rest import displacement_directions, inverse_masses, springs_and_dampers
 from gearbench.lumped.nonlinear.step import columns
 from gearbench.lumped.nonlinear.tables import instants
 from gearbench.lumped.nonlinear.tangent import Tangent, departures
@@ -29,7 +29,7 @@ STABLE = 1.8  # largest rate of a mode times the step: Runge-Kutta bears 2.8
 TRANSIENT = 1e-9
 AT_ONCE = 96  # departures carried together: their states stay in the fastest memory
 
-U1, Y1, Y2, U2, W, LOAD = (NAMES.index(name) for name in ("u1", "y1", "y2", "u2", "w", "load"))
+U1, U2, W, LOAD = (NAMES.index(name) for name in ("u1", "u2", "w", "load"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +72,8 @@ class Along:
         parts = np.array_split(np.arange(len(on)), max(ceil(len(on) / AT_ONCE), 1))
         found = [departures(self.tangent, forces[:, one], on[one], self.substeps, self.early) for one in parts]
         places = np.concatenate([one for one, _ in found], axis=2)
-        u1, y1, y2, u2 = (np.ascontiguousarray(places[:, number, :].T) for number in (U1, Y1, Y2, U2))
+        u1, u2 = (np.ascontiguousarray(places[:, number, :].T) for number in (U1, U2))
+        y1, y2 = (np.einsum("scn,c->ns", places, row.astype(places.dtype)) for row in self._displaced)
         dte = u1 - u2 + self.model.factor * (y1 - y2)
         seen = {"dte": dte, "angle_driver": u1, "angle_driven": u2, "y_driver": y1, "y_driven": y2}
         twist = u2 - places[:, LOAD, :].T if self.model.rig.load.twists else None
@@ -82,6 +83,12 @@ class Along:
         held = (on == LOAD) | ((on == U2) & (self.tangent.inverse[U2] == 0.0))
         reaction[held] += forces[:: 2 * self.substeps, held].T
         return {**seen, "reaction": reaction}
+
+    @cached_property
+    def _displaced(self) -> tuple[Array, Array]:
+        """What each coordinate contributes to what both displacement sensors show."""
+        housing = self.model.rig.housing
+        return displacement_directions(self.model.structure, housing.sensor_share if housing is not None else 0.0)
 
     def _twisted(self, twist: Array) -> Array:
         """Force [N] of the load's shaft twisted by so much (columns, samples) [m]."""

@@ -46,6 +46,17 @@ def dte_of(
     return along if x_driver is None or x_driven is None else along + across * (x_driver - x_driven)
 
 
+def displacements(
+    rig: Rig, y_driver: Array, y_driven: Array, moved: Array, rocked: Array
+) -> tuple[Array, Array]:
+    """What displacement sensors show (n,) [m] of the centres' motions along their supports, beside both motions of the
+    housing (n,) [m]: those that stand on it go along."""
+    if rig.housing is None or not rig.housing.sensor_share:
+        return y_driver, y_driven
+    one, two = rig.housing.feet(moved, rocked)
+    return y_driver - rig.housing.sensor_share * one, y_driven - rig.housing.sensor_share * two
+
+
 def turned_by(meshing: Pair, angle_driver: Array, angle_driven: Array) -> Array:
     """What both rotations contribute to the DTE [m]."""
     return np.asarray(meshing.driver.base_radius * angle_driver - meshing.driven.base_radius * angle_driven)

@@ -29,7 +29,7 @@ from gearbench.diagnosis.effects.torque_ripple import ORDERS
 from gearbench.diagnosis.forces.basis import on_path, waves
 from gearbench.diagnosis.output.contrast import CONTRAST, series_at
 from gearbench.diagnosis.output.layout import Layout
-from gearbench.diagnosis.output.structure import GAIN, LATE, LEAST_STEP, PHASE, STRUCTURE
+from gearbench.diagnosis.output.structure import GAIN, LATE, LEAST_STEP, PHASE, SEAT, STRUCTURE
 from gearbench.diagnosis.output.target import Target
 from gearbench.diagnosis.output.viscous import LOADED, damping_reference
 from gearbench.lumped.nonlinear.coordinates import IN_MESH
@@ -48,7 +48,7 @@ AROUND, APART = ("stiffness", "damping", "mass", "inertia", *BEARINGS.values(), 
 # Moved and simulated, by this part of their standard deviation, where no difference between rigs says what they do: so
 # are the lag of the drive and the delay of the driven angle, since a replay is given both channels.
 FOLLOWED = DELAYS["angle_driven"]
-MOVED, STEP = (FRICTION, COMPLIANCE, *STRUCTURE, LATE, FOLLOWED), 0.05
+MOVED, STEP = (FRICTION, COMPLIANCE, *STRUCTURE, SEAT, LATE, FOLLOWED), 0.05
 SMALLEST = 1e-4  # of the load at which an exponent changes nothing, below which its logarithm is cut
 
 

@@ -118,6 +118,14 @@ def support_directions(s: Structure | None) -> tuple[Array, Array]:
     return first, y2 - s.housing.share2 * housing - s.rocking.share2 * rocking
 
 
+def displacement_directions(s: Structure | None, sensor_share: float) -> tuple[Array, Array]:
+    """What each coordinate contributes to what the displacement sensors of driver and driven gear show, which make that
+    part of the supports' motion with the housing; (5,) or (10,)."""
+    (first, second), (one, two) = support_directions(None), support_directions(s)
+    first, second = (np.pad(ground, (0, len(one) - COORDINATES)) for ground in (first, second))
+    return first + sensor_share * (one - first), second + sensor_share * (two - second)
+
+
 class SupportSpring(NamedTuple):
     """A support: what coordinates contribute to its deflection (n,), stiffness [N/m], exponent and reference [m]."""
 

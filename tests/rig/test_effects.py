@@ -57,7 +57,7 @@ def refusal(*settings: str) -> str:
         (SHAFT, lambda rig: tuple(rig.load.coupling.model_dump().values()), (0.02, 4e4, 2.0)),
         (ACROSS, lambda rig: tuple(rig.support.driven.across.model_dump().values()), (2e7, 300.0, -3e6)),
         (ACROSS.replace(".driven", ""), lambda rig: rig.support.driver.across.coupling, -3e6),
-        (HOUSING, lambda rig: tuple(rig.housing.model_dump().values()), (40.0, 1e9, 2e3, 1.0, 1.0, None)),
+        (HOUSING, lambda rig: tuple(rig.housing.model_dump().values()), (40.0, 1e9, 2e3, 1.0, 1.0, 0.0, None)),
         ("rig.mesh.stiffness_drift=-0.004", lambda rig: rig.mesh.stiffness_drift, -0.004),
         ("rig.sensors.encoder_runout_driven_urad=20.1", lambda rig: rig.sensors.encoder_runout_driven, 20.1e-6),
         ("rig.sensors.encoder_runout_driver_phase_deg=90", lambda rig: rig.sensors.encoder_runout_driver_phase, pi / 2),
