@@ -20,6 +20,7 @@ from gearbench.bench.protocol import Channels, Drive, Note
 from gearbench.bench.record.attributes import turning_inertias
 from gearbench.bench.record.channels import (
     PAIRS,
+    Displacements,
     across_factor,
     displacements,
     dte_of,
@@ -156,18 +157,18 @@ class Elastic:
         out, rig = columns(outputs), self.elastic.rig
         across, held = rig.support.move_across, rig.drive.boundary == "speed"
         applied = out.torque_driver if held else torque
-        y_driver, y_driven = displacements(rig, out.y_driver, out.y_driven, out.housing, out.rocking)
-        shown = out._replace(y_driver=y_driver, y_driven=y_driven)
+        centres = Displacements(out.y_driver, out.y_driven, out.x_driver, out.x_driven)
+        shown = out._replace(**displacements(rig, centres, out.housing, out.rocking)._asdict())
         return Channels(
             torque_driven=out.torque_driven,
             angle_driver=out.angle_driver,
             angle_driven=out.angle_driven,
-            y_driver=y_driver,
-            y_driven=y_driven,
+            y_driver=shown.y_driver,
+            y_driven=shown.y_driven,
             dte=self._dte(shown),
             force=generalised_force(rig, self.elastic.pair, applied, out.torque_driven),
-            x_driver=out.x_driver if across else None,
-            x_driven=out.x_driven if across else None,
+            x_driver=shown.x_driver if across else None,
+            x_driven=shown.x_driven if across else None,
             torque_driver=applied if held else None,
             tooth_force={name: getattr(out, name) for name in (*PAIRS, "back")} if self.teeth else None,
         )

@@ -46,15 +46,22 @@ def dte_of(
     return along if x_driver is None or x_driven is None else along + across * (x_driver - x_driven)
 
 
-def displacements(
-    rig: Rig, y_driver: Array, y_driven: Array, moved: Array, rocked: Array
-) -> tuple[Array, Array]:
-    """What displacement sensors show (n,) [m] of the centres' motions along their supports, beside both motions of the
-    housing (n,) [m]: those that stand on it go along."""
+class Displacements(NamedTuple):
+    """Motions (n,) [m] of both centres along their supports and across them."""
+
+    y_driver: Array
+    y_driven: Array
+    x_driver: Array
+    x_driven: Array
+
+
+def displacements(rig: Rig, centres: Displacements, moved: Array, rocked: Array) -> Displacements:
+    """What displacement sensors show of the `centres` beside both motions of the housing (n,) [m]: those that stand on
+    it go along."""
     if rig.housing is None or not rig.housing.sensor_share:
-        return y_driver, y_driven
-    one, two = rig.housing.feet(moved, rocked)
-    return y_driver - rig.housing.sensor_share * one, y_driven - rig.housing.sensor_share * two
+        return centres
+    feet = (*rig.housing.feet(moved, rocked), *rig.housing.feet_across(moved, rocked))
+    return Displacements(*(one - rig.housing.sensor_share * foot for one, foot in zip(centres, feet, strict=True)))
 
 
 def turned_by(meshing: Pair, angle_driver: Array, angle_driven: Array) -> Array:
