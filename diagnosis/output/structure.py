@@ -38,6 +38,8 @@ MODE, MODE_SD, MODE_LARGEST, HOUSING_RATIO = "housing-mode", 0.7, 2.0, 0.05
 MOTIONS = ("along", "rocking")
 SHAPE, SHAPE_SD, SHAPE_LARGEST = "housing-shape", 0.4, pi / 4
 EQUAL = (pi / 4, -pi / 4)
+# Shares across of either motion, over the root mean square of those along: few housings move along alone.
+OBLIQUE, OBLIQUE_SD, OBLIQUE_LARGEST = "housing-across", 0.5, 2.0
 # Part of the supports' motion with the housing that displacement sensors make: most stand on the ground, some on it.
 SEAT, SEAT_SD = "seat", 0.5
 # Gain of the reaction's sensor: torque sensors are good to a few tenths of a per cent, their mounting to one.
@@ -55,9 +57,9 @@ FELT, STIFFEST = 0.01, 0.03
 LEAST_STEP: Mapping[str, float] = {ACROSS: STIFFEST, HOUSING: 0.05 * HOUSING_SD}
 NONE = 1e-4  # compliance of a housing below which there is none
 # What holds the gears beside the nominal rig's supports.
-STRUCTURE = (ACROSS, CROSS, HOUSING, MODE, SHAPE)
+STRUCTURE = (ACROSS, CROSS, HOUSING, MODE, SHAPE, OBLIQUE)
 # The housing as a rig has it.
-HOUSED = (HOUSING, MODE, SHAPE, SEAT)
+HOUSED = (HOUSING, MODE, SHAPE, OBLIQUE, SEAT)
 # What is told of the structure that was found.
 NAMES = (
     (ACROSS, "support compliance across over along", "1"),
@@ -91,6 +93,9 @@ def structure_groups(rig: Rig, model: NominalModel) -> list[Group]:
                             high=MODE_LARGEST))  # fmt: skip
         groups.append(group(SHAPE, "rad", MOTIONS, SHAPE_SD, slot="structure", first=16, low=-SHAPE_LARGEST,
                             high=SHAPE_LARGEST))  # fmt: skip
+        shares = [f"{one}.{side}" for one in MOTIONS for side in SIDES]
+        groups.append(group(OBLIQUE, "1", shares, OBLIQUE_SD, slot="structure", first=21, low=-OBLIQUE_LARGEST,
+                            high=OBLIQUE_LARGEST))  # fmt: skip
         groups.append(group(SEAT, "1", ("displacements",), SEAT_SD, slot="structure", first=20, low=0.0, high=1.0))
     return groups
 
@@ -149,14 +154,19 @@ def held(rig: Rig, model: NominalModel, unknowns: Unknowns, p: Array) -> Rig:
         supports[side] = support
     rig = changed(rig, "support", **supports)
     if HOUSING in unknowns.slices and p[unknowns[HOUSING]].max() > NONE:
-        values = (p[unknowns[key]] for key in HOUSED)
-        rig = rig.model_copy(update={"housing": housing_of(model, *values)})
+        compliance, modes, shapes, oblique, seat = (p[unknowns[key]] for key in HOUSED)
+        # What does not move across its support is not moved across by a housing either.
+        free = [getattr(rig.support, side).across is not None for side in SIDES]
+        housing = housing_of(model, compliance, modes, shapes, np.where(free * len(MOTIONS), oblique, 0.0), seat)
+        rig = rig.model_copy(update={"housing": housing})
     return rig
 
 
-def housing_of(model: NominalModel, compliance: Array, modes: Array, shapes: Array, seat: Array) -> Housing:
-    """The housing of compliances (2,), frequencies and dampings (4,), shapes (2,) and the sensors' seat (1,) as
-    unknowns, one compliance at least above `NONE`."""
+def housing_of(
+    model: NominalModel, compliance: Array, modes: Array, shapes: Array, oblique: Array, seat: Array
+) -> Housing:
+    """The housing of compliances (2,), frequencies and dampings (4,), shapes (2,), shares across (4,) and the sensors'
+    seat (1,) as unknowns, one compliance at least above `NONE`."""
     mean = 2.0 / (1.0 / model.stiffness[0] + 1.0 / model.stiffness[1])
     pace = sqrt(mean / (0.5 * (model.mass[0] + model.mass[1])))
     motions = []
@@ -171,6 +181,8 @@ def housing_of(model: NominalModel, compliance: Array, modes: Array, shapes: Arr
                 "damping": 2 * HOUSING_RATIO * exp(damping) * omega * mass,
                 "driver_share": sqrt(2) * cos(angle),
                 "driven_share": sqrt(2) * sin(angle),
+                "driver_share_across": float(oblique[2 * number]),
+                "driven_share_across": float(oblique[2 * number + 1]),
             }
         )
     rocking = Rocking(**motions[1]) if len(motions) > 1 else None
