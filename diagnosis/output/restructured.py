@@ -49,8 +49,7 @@ def begun_at_nominal(simulator: Simulator, found: Optimum, kept: Flags) -> Optim
     p = np.where(kept, found.p, 0.0)
     if cost_of(simulator, p, found.sd) > NEAR * found.cost:
         return found
-    chosen = np.ones(p.size, dtype=bool)
-    return better(found, fit(simulator, p, found.sd, found.sensitivity, renewals=1, chosen=chosen))
+    return better(found, fit(simulator, p, found.sd, found.sensitivity, renewals=1))
 
 
 def better(found: Optimum, other: Optimum | None) -> Optimum:
@@ -97,8 +96,7 @@ def _otherwise(simulator: Simulator, found: Optimum, report: Report) -> Optimum 
         return again
     if again.left > SETTLED:
         report("simulating: another structure, further")
-        chosen = np.ones(found.p.size, dtype=bool)
-        again = fit(simulator, again.p, found.sd, again.sensitivity, renewals=RENEWALS, chosen=chosen) or again
+        again = fit(simulator, again.p, found.sd, again.sensitivity, renewals=RENEWALS) or again
     return again
 
 
