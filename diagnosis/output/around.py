@@ -33,6 +33,7 @@ from gearbench.diagnosis.output.layout import Layout
 from gearbench.diagnosis.output.structure import (
     ACROSS,
     CROSS,
+    DAMPED,
     GAIN,
     HOUSED,
     HOUSING,
@@ -47,7 +48,7 @@ Complex = NDArray[np.complex128]
 Integers = NDArray[np.int64]
 
 # What is found, beside whatever else is held.
-KEYS = ("stiffness", "damping", "mass", "inertia", ACROSS, CROSS, GAIN, *DELAYS.values())
+KEYS = ("stiffness", "damping", "mass", "inertia", ACROSS, CROSS, DAMPED, GAIN, *DELAYS.values())
 # Channels that a coordinate each, or a few, make; the reaction is the force itself.
 MOVED = ("angle_driver", "y_driver", "y_driven")
 REACTION = "torque_driven"
@@ -190,7 +191,7 @@ def _fitted(
     sd = unknowns.prior()[at]
     # Without cross-coupling nothing shows how a support yields across.
     unseen = np.zeros(unknowns.size, dtype=bool)
-    for key in (ACROSS, CROSS):
+    for key in (ACROSS, CROSS, DAMPED):
         unseen[unknowns[key]] = begin[unknowns[CROSS]] == 0.0
     kept = (sd > 0.0) & ~unseen[at]
     at, sd = at[kept], sd[kept]
