@@ -33,10 +33,12 @@ from gearbench.diagnosis.output.layout import Layout
 from gearbench.diagnosis.output.structure import (
     ACROSS,
     CROSS,
+    DAMPED,
     GAIN,
     HOUSED,
     HOUSING,
     MOTIONS,
+    SEAT,
     seated,
     with_motion,
 )
@@ -47,7 +49,7 @@ Complex = NDArray[np.complex128]
 Integers = NDArray[np.int64]
 
 # What is found, beside whatever else is held.
-KEYS = ("stiffness", "damping", "mass", "inertia", ACROSS, CROSS, GAIN, *DELAYS.values())
+KEYS = ("stiffness", "damping", "mass", "inertia", ACROSS, CROSS, DAMPED, GAIN, *DELAYS.values())
 # Channels that a coordinate each, or a few, make; the reaction is the force itself.
 MOVED = ("angle_driver", "y_driver", "y_driven")
 REACTION = "torque_driven"
@@ -96,7 +98,8 @@ class _System(NamedTuple):
 
 def around(layout: Layout, conditions: Sequence[Condition], held: Array) -> Array | None:
     """Unknowns (size,): `held` with those of supports, masses and housing that the records show; None where records
-    have no displacement of the gears or no line, or no rig answers."""
+    have no displacement of the gears or no line, or no rig answers. Displacement sensors that are not held to stand on
+    a housing are tried there too."""
     load = layout.nominal.rig.load
     # Held behind itself the driven gear hands on what its inertia leaves of the mesh's force.
     reaction = (REACTION,) if load.boundary == "speed" and not load.twists else ()
@@ -105,23 +108,27 @@ def around(layout: Layout, conditions: Sequence[Condition], held: Array) -> Arra
     lines = [one for one in found if one is not None]
     if not lines:
         return None
-    begun = [held, seated(layout.unknowns, held)] if HOUSING in layout.unknowns.slices else [held]
-    try:
-        rigs = [_found(layout, lines, one) for one in begun]
-    except ValueError:  # no rig there
-        return None
-    return min(rigs, key=lambda p: _misfit(layout, lines, p) + prior_cost(p, layout.unknowns.prior()))
-
-
-def _found(layout: Layout, lines: Sequence[_Lines], held: Array) -> Array:
-    """The rig without a housing first, then with each motion of it that is seen best beside the other."""
     unknowns = layout.unknowns
-    motions = range(len(MOTIONS)) if HOUSING in unknowns.slices else ()
-    held = held.copy()
+    plain = held.copy()
     for key in (CROSS, HOUSING):
         if key in unknowns.slices:
-            held[unknowns[key]] = 0.0
-    cost, best = _fitted(layout, lines, held, KEYS, LEVELS[:1])
+            plain[unknowns[key]] = 0.0
+    try:
+        cost, best = _fitted(layout, lines, plain, KEYS, LEVELS[:1])
+        begun = [best]
+        if HOUSING in unknowns.slices and not held[unknowns[SEAT]].any():
+            begun.append(seated(unknowns, best))
+        rigs = [_found(layout, lines, cost, one) for one in begun]
+    except ValueError:  # no rig there
+        return None
+    return min(rigs, key=lambda p: _misfit(layout, lines, p) + prior_cost(p, unknowns.prior()))
+
+
+def _found(layout: Layout, lines: Sequence[_Lines], cost: float, best: Array) -> Array:
+    """The rig `best` (size,), which has no housing and costs so many nats, with each motion of a housing that is seen
+    best beside the other."""
+    unknowns = layout.unknowns
+    motions = range(len(MOTIONS)) if HOUSING in unknowns.slices else ()
     for _ in range(ROUNDS):
         begin = best
         for side in range(len(SIDES)):
@@ -190,7 +197,7 @@ def _fitted(
     sd = unknowns.prior()[at]
     # Without cross-coupling nothing shows how a support yields across.
     unseen = np.zeros(unknowns.size, dtype=bool)
-    for key in (ACROSS, CROSS):
+    for key in (ACROSS, CROSS, DAMPED):
         unseen[unknowns[key]] = begin[unknowns[CROSS]] == 0.0
     kept = (sd > 0.0) & ~unseen[at]
     at, sd = at[kept], sd[kept]

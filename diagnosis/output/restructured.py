@@ -17,7 +17,7 @@ from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.output.beginning import Around, levelled, seen_by
 from gearbench.diagnosis.output.fit import SETTLED, Optimum, cost_of, fit, fit_afresh
 from gearbench.diagnosis.output.simulator import Simulator
-from gearbench.diagnosis.output.structure import otherwise
+from gearbench.diagnosis.output.structure import SEAT, otherwise
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -70,7 +70,7 @@ def _from_around(simulator: Simulator, found: Optimum, around: Around | None, re
     widened = found.sd > unknowns.prior()
     chosen = widened | ~_of(unknowns, ROTATION)
     # Effects stay; what was fitted around the wrong structure goes.
-    held = np.where(widened, found.p, 0.0)
+    held = np.where(widened | _of(unknowns, (SEAT,)), found.p, 0.0)
     seen = seen_by(around, unknowns, held)
     if seen is None:
         return None

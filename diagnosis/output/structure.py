@@ -29,6 +29,8 @@ Array = NDArray[np.float64]
 ACROSS, ACROSS_SD, ACROSS_LARGEST = "across", 0.15, 1.0
 # Stiffness that couples both directions over the root of their product: asymmetric pedestals have a tenth.
 CROSS, CROSS_SD, CROSS_LARGEST = "cross", 0.1, 0.7
+# Logarithm of its damping over that of the same loss factor as along, by the root of both stiffnesses.
+DAMPED, DAMPED_SD, DAMPED_LARGEST = "across-damping", 0.5, 2.0
 # Housing: compliance over the supports' mean one (half a per cent to ten are usual), logarithms of its frequency over
 # that of a gear on its support, and of its damping ratio over a twentieth.
 HOUSING, HOUSING_SD, HOUSING_LARGEST = "housing", 0.04, 0.5
@@ -57,7 +59,7 @@ FELT, STIFFEST = 0.01, 0.03
 LEAST_STEP: Mapping[str, float] = {ACROSS: STIFFEST, HOUSING: 0.05 * HOUSING_SD}
 NONE = 1e-4  # compliance of a housing below which there is none
 # What holds the gears beside the nominal rig's supports.
-STRUCTURE = (ACROSS, CROSS, HOUSING, MODE, SHAPE, OBLIQUE)
+STRUCTURE = (ACROSS, CROSS, DAMPED, HOUSING, MODE, SHAPE, OBLIQUE)
 # The housing as a rig has it.
 HOUSED = (HOUSING, MODE, SHAPE, OBLIQUE, SEAT)
 # What is told of the structure that was found.
@@ -81,6 +83,7 @@ def structure_groups(rig: Rig, model: NominalModel) -> list[Group]:
     groups = [
         group(ACROSS, "1", SIDES, ACROSS_SD, slot="structure", low=0.0, high=ACROSS_LARGEST),
         group(CROSS, "1", SIDES, CROSS_SD, slot="structure", first=4, low=-CROSS_LARGEST, high=CROSS_LARGEST),
+        group(DAMPED, "1", SIDES, DAMPED_SD, slot="structure", first=25, low=-DAMPED_LARGEST, high=DAMPED_LARGEST),
         group(GAIN, "1", ("torque_driven",), GAIN_SD, slot="structure", first=2),
         group(PHASE, "1", ("mesh",), PHASE_SD, slot="structure", first=18, low=-PHASE_LARGEST, high=PHASE_LARGEST),
         group(LATE, "s", ("torque_driver",), LATE_SD / model.resonance, slot="structure", first=19),
@@ -139,7 +142,7 @@ def with_motion(unknowns: Unknowns, p: Array, motion: int, frequency: float, com
 
 def held(rig: Rig, model: NominalModel, unknowns: Unknowns, p: Array) -> Rig:
     """The rig with its supports across and its housing."""
-    soft, cross = p[unknowns[ACROSS]], p[unknowns[CROSS]]
+    soft, cross, damped = (p[unknowns[key]] for key in (ACROSS, CROSS, DAMPED))
     supports = {}
     for number, side in enumerate(SIDES):
         support = getattr(rig.support, side)
@@ -147,7 +150,7 @@ def held(rig: Rig, model: NominalModel, unknowns: Unknowns, p: Array) -> Rig:
             along, ratio = support.stiffness, 1.0 / max(float(soft[number]), STIFFEST)
             across = Across(
                 stiffness=along * ratio,
-                damping=support.damping * ratio**0.5,
+                damping=support.damping * ratio**0.5 * exp(float(damped[number])),
                 coupling=float(cross[number]) * along * ratio**0.5,
             )
             support = support.model_copy(update={"across": across})
