@@ -149,7 +149,7 @@ def judged_on(
 ) -> Judged | None:
     """The selection with only those effects that close a part of the gap of `measured`; None where the rig found cannot
     answer that record. Those of the records `searched` whose flanks part, which the fit leaves out, judge what
-    `measured` does not feel."""
+    `measured` does not feel, or feels too little of to speak for or against it."""
     band = problem.conditions[0].band
     noise = noise_left(found.layout.nominal, measured, found.simulator.simulate)
     target = target_of([measured], [prepare(measured, problem.model, band)], [noise])
@@ -202,7 +202,8 @@ def _closings(
         optimum = taken_out(simulator, selection, one)
         closing = closing_of(target, simulator.channels(optimum.p, measured), signals)
         lacking = inf if one.lacking and not apart else one.lacking
-        if parted and not one.lacking and not feels(target, closing.without, signals):
+        silent = not feels(target, closing.without, signals) or (not closing.due and closing.gain > -GAIN)
+        if parted and not one.lacking and silent:
             told = [_closing_there(simulator, there, optimum.p, selection.best.p) for there in parted]
             closing = replace(max(told, key=lambda there: there.gain), without=closing.without)
         closings[one.hypothesis.name] = replace(closing, optimum=optimum, lacking=lacking)
