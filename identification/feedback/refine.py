@@ -71,7 +71,7 @@ def _shown(model: Model, data: ClassData, deflection: Complexes) -> Complexes:
 
 
 def refined(model: Model, data: ClassData, settled: float = SETTLED, mesh: Mesh | None = None) -> Refined:
-    """The model of least output error, from a first one; rounds end at a relative decrease of the cost by `settled`.
+    """The model of least output error, from a first one; rounds end where the objective falls by less than `settled`.
 
     `mesh`: what the model's mesh is made of, with the amplitudes that it has; of harmonics unless given.
     """
@@ -84,8 +84,10 @@ def refined(model: Model, data: ClassData, settled: float = SETTLED, mesh: Mesh 
         trial, damping = _damped(now, system, data, noise, damping)
         if trial is None:
             break  # no step along this direction helps
-        before, now = now.cost, replace(trial, mesh=trial.mesh.told(root[model.free :]))
-        if before - now.cost < settled * before:
+        gained = now.objective(noise) - trial.objective(noise)
+        last = gained < settled * now.objective(noise)
+        now = replace(trial, mesh=trial.mesh.told(root[model.free :]))
+        if last:
             break
     left = np.where(data.dte != 0, data.dte - _shown(now.model, data, now.deflection), 0.0)
     freedom = _freedom(data, now)
