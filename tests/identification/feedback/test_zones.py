@@ -1,6 +1,6 @@
 """Zones of phase: their functions, their evidence, and the fit in them against the rig that made the record."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -177,6 +177,19 @@ def test_stiffness_lies_within_its_band(identified: xr.Dataset) -> None:
     apart = (identified.mesh_stiffness.values - wanted) / np.sqrt(identified.mesh_stiffness_var.values)
     assert np.sqrt(np.mean(apart**2)) < 3.0
     assert np.linalg.norm(identified.mesh_stiffness.values - wanted) < 0.01 * np.linalg.norm(wanted)
+
+
+def test_the_response_at_another_mesh_frequency_is_predicted(record: xr.Dataset) -> None:
+    """In zones, from 64 to 150 Hz, against the exact ITF there."""
+    settings = IdentificationSettings(
+        method="mesh-feedback", band=(800.0, 1600.0), phases=64, step=16, modes=0, mesh_frequency=150.0
+    )
+    found = identify([record], settings)
+    fast = replace(RIG, mesh_frequency=150.0)
+    exact = exact_itf(fast.system(1024), found.frequency.values, found.phase.values)
+    error = np.linalg.norm(itf(found).values - exact) / np.linalg.norm(exact)
+    assert found.attrs["mesh_basis"] == "zones"
+    assert error < 0.015 and 0.5 < found.attrs["expected_error"] / error < 2.0
 
 
 @dataclass(frozen=True)
