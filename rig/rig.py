@@ -91,4 +91,10 @@ class Rig(Value):
                 raise ValueError(
                     f"support.{side}.stiffness_n_per_m is missing: behind rigid supports there is no housing"
                 )
+            across = getattr(self.support, side).across
+            if self.housing is not None and self.housing.goes_across(side) and across is None:
+                raise ValueError(
+                    f"housing.{side}_share_across moves a support across its direction, where it holds its gear only"
+                    f" with support.{side}.across"
+                )
         return self

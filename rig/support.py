@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from math import pi
-from typing import ClassVar, Literal, NamedTuple
+from typing import Any, ClassVar, Literal, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import model_validator
 
 from gearbench.rig.value import Value, format_number, quantity
+
+Array = NDArray[np.float64]
 
 
 class Across(Value):
@@ -93,6 +97,10 @@ class Supports(Value):
         return self.driver.across is not None or self.driven.across is not None
 
 
+def _across(whose: str) -> Any:
+    return quantity(0.0, ge=-100.0, le=100.0, doc=f"part of it that the {whose} support moves by across its direction")
+
+
 class Rocking(Value):
     """A second motion of the housing: with its own shares 1 and -1 it rocks about the middle between both gears.
 
@@ -104,14 +112,18 @@ class Rocking(Value):
     damping: float = quantity(0.0, "n_s_per_m", ge=0.0, doc="damping of it, seen where the share is 1")
     driver_share: float = quantity(1.0, ge=-100.0, le=100.0, doc="part of it that the driver's support moves by")
     driven_share: float = quantity(-1.0, ge=-100.0, le=100.0, doc="part of it that the driven gear's support moves by")
+    driver_share_across: float = _across("driver's")
+    driven_share_across: float = _across("driven gear's")
 
 
 class Housing(Value):
-    """One rigid body between both supports and the ground, which moves along the supports' direction, and may rock.
+    """One body between both supports and the ground, which moves along the supports' direction, and may rock.
 
     It takes each support along by a share of its own motion h: shares 1 and 1 are a body that moves along, 1 and 0.3
     one that stands softer at the driver. `mass`, `stiffness` and `damping` belong to h. The mesh pushes both supports
-    apart: a body that moves along hardly feels it, one that rocks feels all of it.
+    apart: a body that moves along hardly feels it, one that rocks feels all of it. With
+    `driver_share_across` and `driven_share_across` it moves obliquely. Displacement sensors that stand on it show what
+    is left of the gears' motion (`sensor_share`).
     """
 
     mass: float = quantity(unit="kg", gt=0.0, le=1e7, doc="mass of the housing")
@@ -119,4 +131,29 @@ class Housing(Value):
     damping: float = quantity(0.0, "n_s_per_m", ge=0.0, doc="damping of the housing to the ground")
     driver_share: float = quantity(1.0, ge=-100.0, le=100.0, doc="part of its motion that the driver's support makes")
     driven_share: float = quantity(1.0, ge=-100.0, le=100.0, doc="part of it that the driven gear's support makes")
+    driver_share_across: float = _across("driver's")
+    driven_share_across: float = _across("driven gear's")
+    sensor_share: float = quantity(
+        0.0, ge=0.0, le=1.0, doc="part of the supports' motion with it that the displacement sensors make: 0 on the"
+        " ground, 1 on the housing"
+    )
     rocking: Rocking | None = quantity(None, doc="absent: it does not rock")
+
+    def feet(self, moved: Array, rocked: Array) -> tuple[Array, Array]:
+        """Motions (n,) [m] of the supports of driver and driven gear with both motions (n,) [m] of the housing."""
+        one, two = self.driver_share * moved, self.driven_share * moved
+        if self.rocking is None:
+            return one, two
+        return one + self.rocking.driver_share * rocked, two + self.rocking.driven_share * rocked
+
+    def feet_across(self, moved: Array, rocked: Array) -> tuple[Array, Array]:
+        """The same across the supports' direction."""
+        one, two = self.driver_share_across * moved, self.driven_share_across * moved
+        if self.rocking is None:
+            return one, two
+        return one + self.rocking.driver_share_across * rocked, two + self.rocking.driven_share_across * rocked
+
+    def goes_across(self, side: str) -> bool:
+        """Whether the support of a `side`, driver or driven, moves across its direction with the housing."""
+        moves = (self, self.rocking) if self.rocking is not None else (self,)
+        return any(getattr(one, f"{side}_share_across") for one in moves)

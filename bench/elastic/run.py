@@ -20,7 +20,9 @@ from gearbench.bench.protocol import Channels, Drive, Note
 from gearbench.bench.record.attributes import turning_inertias
 from gearbench.bench.record.channels import (
     PAIRS,
+    Displacements,
     across_factor,
+    displacements,
     dte_of,
     generalised_force,
     support_factor,
@@ -31,7 +33,7 @@ from gearbench.fem.motion.machine import Machine
 from gearbench.fem.motion.scheme import Scheme, make_scheme
 from gearbench.fem.motion.start import State as Step
 from gearbench.fem.motion.start import initial_state
-from gearbench.fem.motion.transient import CHANNELS, PARTS, advance, columns
+from gearbench.fem.motion.transient import CHANNELS, PARTS, Samples, advance, columns
 from gearbench.rig import Case
 
 Array = NDArray[np.float64]
@@ -143,26 +145,30 @@ class Elastic:
         return State(state.sample + samples, step, outputs[-1]), begun_with(state.here, outputs)
 
     def dte(self, outputs: Array) -> Array:
-        out = columns(outputs)
+        return self._dte(columns(outputs))
+
+    def _dte(self, out: Samples) -> Array:
         turned = turned_by(self.elastic.pair, out.angle_driver, out.angle_driven)
         rig, meshing = self.elastic.rig, self.elastic.pair
         across = (out.x_driver, out.x_driven, across_factor(rig, meshing)) if rig.support.move_across else ()
         return dte_of(turned, out.y_driver, out.y_driven, support_factor(rig, meshing), *across)
 
     def channels(self, outputs: Array, torque: Array) -> Channels:
-        dte, out, rig = self.dte(outputs), columns(outputs), self.elastic.rig
+        out, rig = columns(outputs), self.elastic.rig
         across, held = rig.support.move_across, rig.drive.boundary == "speed"
         applied = out.torque_driver if held else torque
+        centres = Displacements(out.y_driver, out.y_driven, out.x_driver, out.x_driven)
+        shown = out._replace(**displacements(rig, centres, out.housing, out.rocking)._asdict())
         return Channels(
             torque_driven=out.torque_driven,
             angle_driver=out.angle_driver,
             angle_driven=out.angle_driven,
-            y_driver=out.y_driver,
-            y_driven=out.y_driven,
-            dte=dte,
+            y_driver=shown.y_driver,
+            y_driven=shown.y_driven,
+            dte=self._dte(shown),
             force=generalised_force(rig, self.elastic.pair, applied, out.torque_driven),
-            x_driver=out.x_driver if across else None,
-            x_driven=out.x_driven if across else None,
+            x_driver=shown.x_driver if across else None,
+            x_driven=shown.x_driven if across else None,
             torque_driver=applied if held else None,
             tooth_force={name: getattr(out, name) for name in (*PAIRS, "back")} if self.teeth else None,
         )

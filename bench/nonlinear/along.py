@@ -10,13 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.bench.nonlinear.replay import Steady, resampled
+from gearbench.bench.record.sensors import change_shown
 from gearbench.lumped.nonlinear.coordinates import IN_MESH, NAMES
 from gearbench.lumped.nonlinear.law import MeshLaw
 from gearbench.lumped.nonlinear.model import NonLinear
 from gearbench.lumped.nonlinear.pressing import Pressed, of_pairs, pressed
-from gearbench.lumped.nonlinear.rest import inverse_masses, springs_and_dampers
+from gearbench.lumped.nonlinear.rest import displacement_directions, inverse_masses, springs_and_dampers
+from gearbench.lumped.nonlinear.rubbing import rubbed_along
 from gearbench.lumped.nonlinear.step import columns
-from gearbench.lumped.nonlinear.tables import instants
+from gearbench.lumped.nonlinear.tables import Table, instants
 from gearbench.lumped.nonlinear.tangent import Tangent, departures
 
 Array = NDArray[np.float64]
@@ -29,7 +31,7 @@ STABLE = 1.8  # largest rate of a mode times the step: Runge-Kutta bears 2.8
 TRANSIENT = 1e-9
 AT_ONCE = 96  # departures carried together: their states stay in the fastest memory
 
-U1, Y1, Y2, U2, W, LOAD = (NAMES.index(name) for name in ("u1", "y1", "y2", "u2", "w", "load"))
+U1, U2, W, LOAD = (NAMES.index(name) for name in ("u1", "u2", "w", "load"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,22 +68,33 @@ class Along:
         return W if self.model.elastic_shaft else U1
 
     def answers(self, forces: Array, on: Integers) -> dict[str, Array]:
-        """Changes (columns, samples) of the channels under forces (entries, columns) [N], each added in the mesh or on
-        a coordinate, `on` (columns,): dte [m], rb times angles [m], y [m], and the load's force at its base circle [N],
-        `reaction`."""
+        """Changes (columns, samples) of the channels, as the rig's sensors show them, under forces (entries, columns)
+        [N], each added in the mesh or on a coordinate, `on` (columns,): dte [m], rb times angles [m], y [m], and the
+        load's torque over the driven gear's base radius [N]."""
         parts = np.array_split(np.arange(len(on)), max(ceil(len(on) / AT_ONCE), 1))
         found = [departures(self.tangent, forces[:, one], on[one], self.substeps, self.early) for one in parts]
         places = np.concatenate([one for one, _ in found], axis=2)
-        u1, y1, y2, u2 = (np.ascontiguousarray(places[:, number, :].T) for number in (U1, Y1, Y2, U2))
-        dte = u1 - u2 + self.model.factor * (y1 - y2)
-        seen = {"dte": dte, "angle_driver": u1, "angle_driven": u2, "y_driver": y1, "y_driven": y2}
+        u1, u2 = (np.ascontiguousarray(places[:, number, :].T) for number in (U1, U2))
+        y1, y2 = (np.einsum("scn,c->ns", places, row.astype(places.dtype)) for row in self._displaced)
         twist = u2 - places[:, LOAD, :].T if self.model.rig.load.twists else None
         mesh = np.concatenate([two for _, two in found], axis=1).T
+        mesh *= -(self.tangent.mesh[U2] + self.tangent.rubbed[:: 2 * self.substeps, U2]).astype(mesh.dtype)
         reaction = mesh if twist is None else self._twisted(twist)
         # What pushes at an end that is held is borne there.
         held = (on == LOAD) | ((on == U2) & (self.tangent.inverse[U2] == 0.0))
         reaction[held] += forces[:: 2 * self.substeps, held].T
-        return {**seen, "reaction": reaction}
+        moved = {"angle_driver": u1, "angle_driven": u2, "y_driver": y1, "y_driven": y2, "torque_driven": reaction}
+        sensors, rate = self.model.rig.sensors, self.sampling_rate
+        seen = {name: change_shown(change, sensors, name, rate) for name, change in moved.items()}
+        y = seen["y_driver"] - seen["y_driven"]
+        seen["dte"] = seen["angle_driver"] - seen["angle_driven"] + self.model.factor * y
+        return seen
+
+    @cached_property
+    def _displaced(self) -> tuple[Array, Array]:
+        """What each coordinate contributes to what both displacement sensors show."""
+        housing = self.model.rig.housing
+        return displacement_directions(self.model.structure, housing.sensor_share if housing is not None else 0.0)
 
     def _twisted(self, twist: Array) -> Array:
         """Force [N] of the load's shaft twisted by so much (columns, samples) [m]."""
@@ -157,13 +170,18 @@ def along(steady: Steady) -> Along:
     at = instants(model, table, turned, entries)
     fine = resampled(travel, entries)
     force, slope = pressed(model.law, at, fine)
-    row = 1.0 / model.law.phases
-    after, before = (pressed(model.law, at._replace(phase=turned + part), fine).force for part in (row, -row))
-    turning = (after - before) / (2 * row)
+    closing = resampled(rate, entries) + table.excess_rate[:entries]
+
+    def force_at(phase: Array) -> Array:
+        elastic, tangent = pressed(model.law, at._replace(phase=np.clip(phase, 0.0, 1.0 - 1e-12)), fine)
+        return np.asarray(elastic + model.viscosity(np.maximum(tangent, 0.0), np.abs(elastic)) * closing)
+
+    # Between two rows of the law the motion sees a straight line.
+    row = np.floor(turned * model.law.phases)
+    turning = (force_at((row + 1) / model.law.phases) - force_at(row / model.law.phases)) * model.law.phases
     level = (np.abs(force / at.gain) / model.rig.mesh.reference_force) ** (1.0 / (1.0 + model.rig.mesh.exponent))
     slope = np.maximum(slope, 0.0)
     damping = model.viscosity(slope, np.abs(force))
-    closing = resampled(rate, entries) + table.excess_rate[:entries]
     # Damping that grows with the force is the stiffer for being pressed while the flanks close.
     stiffer = 1.0 + model.rig.damping.mesh_exponent * damping * closing / np.maximum(np.abs(force), 1e-9 * force.max())
     decay = max(model.slowest_decay(float(steady.drive.fine.mean())), 1e-9)
@@ -182,6 +200,7 @@ def along(steady: Steady) -> Along:
             *_bearings(model, places, entries),
             model.turned_on(np.eye(model.size)),
             turning,
+            _rubbed(steady, table, places, turned * model.law.phases),
         ),
         substeps=substeps,
         early=min(ceil(log(1 / TRANSIENT) / decay / step), samples * substeps),
@@ -205,6 +224,17 @@ def _linear(model: NonLinear) -> tuple[Array, Array, Array]:
     still[LOAD:][:1] = False
     springs[still], dampers[still] = 0.0, 0.0
     return springs, dampers, masses
+
+
+def _rubbed(steady: Steady, table: Table, places: Array, position: Array) -> Array:
+    """What friction adds to the direction of a force in the mesh (entries, n), at the places (samples, n) and positions
+    (entries,) in rows of the mesh law."""
+    setup, entries = steady.setup, len(position)
+    frequency = np.fft.rfftfreq(len(places), 1 / setup.sampling_rate)
+    rates = np.fft.irfft(2j * np.pi * frequency[:, None] * np.fft.rfft(places, axis=0), len(places), axis=0)
+    fine = np.stack([resampled(one, entries) for one in rates.T], axis=1)
+    pace = table.pace[:entries] if table.pace.size else np.ones(entries)
+    return rubbed_along(setup.model, position, pace, fine, setup.mesh_frequency)
 
 
 def _bearings(model: NonLinear, places: Array, entries: int) -> tuple[Array, Array]:

@@ -23,7 +23,7 @@ from gearbench.bench.plan.settling import Keep
 from gearbench.bench.plan.substeps import runge_kutta_substeps
 from gearbench.bench.protocol import Channels, Drive
 from gearbench.bench.record.attributes import turning_inertias
-from gearbench.bench.record.channels import dte_of, generalised_force, turned_by
+from gearbench.bench.record.channels import Displacements, displacements, dte_of, generalised_force, turned_by
 from gearbench.bench.record.sensors import repeated
 from gearbench.bench.refusals.effects import refuse_unknown
 from gearbench.geometry import Pair, pair
@@ -227,17 +227,21 @@ class Setup:
         r1, r2 = self.model.base_radii
         one, two = out.u1 / r1, out.u2 / r2
         across, held = self.model.rig.support.move_across, self.model.rig.drive.boundary == "speed"
+        seen = displacements(
+            self.model.rig, Displacements(out.y1, out.y2, out.x1, out.x2), out.housing, out.rocking
+        )
+        shown = out._replace(y1=seen.y_driver, y2=seen.y_driven, x1=seen.x_driver, x2=seen.x_driven)
         load, applied = out.load_force * r2, out.drive_force * r1 if held else torque
         return Channels(
             torque_driven=load,
             angle_driver=one,
             angle_driven=two,
-            y_driver=out.y1,
-            y_driven=out.y2,
-            dte=self._dte(turned_by(self.meshing, one, two), out),
+            y_driver=shown.y1,
+            y_driven=shown.y2,
+            dte=self._dte(turned_by(self.meshing, one, two), shown),
             force=generalised_force(self.model.rig, self.meshing, applied, load),
-            x_driver=out.x1 if across else None,
-            x_driven=out.x2 if across else None,
+            x_driver=shown.x1 if across else None,
+            x_driven=shown.x2 if across else None,
             torque_driver=applied if held else None,
         )
 

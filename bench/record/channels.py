@@ -46,6 +46,24 @@ def dte_of(
     return along if x_driver is None or x_driven is None else along + across * (x_driver - x_driven)
 
 
+class Displacements(NamedTuple):
+    """Motions (n,) [m] of both centres along their supports and across them."""
+
+    y_driver: Array
+    y_driven: Array
+    x_driver: Array
+    x_driven: Array
+
+
+def displacements(rig: Rig, centres: Displacements, moved: Array, rocked: Array) -> Displacements:
+    """What displacement sensors show of the `centres` beside both motions of the housing (n,) [m]: those that stand on
+    it go along."""
+    if rig.housing is None or not rig.housing.sensor_share:
+        return centres
+    feet = (*rig.housing.feet(moved, rocked), *rig.housing.feet_across(moved, rocked))
+    return Displacements(*(one - rig.housing.sensor_share * foot for one, foot in zip(centres, feet, strict=True)))
+
+
 def turned_by(meshing: Pair, angle_driver: Array, angle_driven: Array) -> Array:
     """What both rotations contribute to the DTE [m]."""
     return np.asarray(meshing.driver.base_radius * angle_driver - meshing.driven.base_radius * angle_driven)

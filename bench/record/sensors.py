@@ -100,6 +100,18 @@ def imposed(recorded: Array, sensors: Sensors, sampling_rate: float) -> Array:
     return taken_back(torque, sensors, sensors.delay_torque_driver, sampling_rate)
 
 
+def change_shown(change: Array, sensors: Sensors, channel: str, sampling_rate: float) -> Array:
+    """What a channel's sensor shows of a change (..., n) that repeats: late, behind the filter, by its gain."""
+    gain, delay = getattr(sensors, f"gain_{channel}", 1.0), getattr(sensors, f"delay_{channel}")
+    if delay or sensors.filter is not None:
+        frequency = np.fft.rfftfreq(change.shape[-1], 1 / sampling_rate)
+        response = np.exp(-2j * np.pi * frequency * delay)
+        if sensors.filter is not None:
+            response *= filter_response(frequency, sensors.filter)
+        change = answered(change, response)
+    return change if gain == 1.0 else gain * change
+
+
 def taken_back(recorded: Array, sensors: Sensors, delay: float, sampling_rate: float) -> Array:
     """What a sensor with this delay [s] saw (..., n), which repeats, from what it recorded: delay and filter taken
     back. Where the filter leaves less than LEFT of a line, the line stays as it is."""

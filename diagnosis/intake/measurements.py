@@ -18,6 +18,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from gearbench.diagnosis.errors import DiagnosisError
+from gearbench.diagnosis.intake.passing import passing
 from gearbench.diagnosis.intake.plausible import (
     GEARS,
     Facts,
@@ -135,6 +136,9 @@ def measurement(
     whole = _usable(whole, notes)
     periods = {key: values.reshape(repetitions, samples) for key, values in whole.items()}
     drift = drift_of(periods, facts.base_radii, notes) if repetitions > 1 else 0.0
+    passed = {key: passing(values) for key, values in periods.items()}
+    record = _settled(record, passed)
+    periods = {key: values - passed[key] for key, values in periods.items()}
     if repetitions == 1:
         _one_repetition(record, notes)
     if record.sizes["realisation"] > 1:
@@ -280,6 +284,17 @@ def _completed(record: xr.Dataset, repetition: tuple[int, int], frequency: float
     samples, repetitions = repetition
     whole = record.isel(time=slice(0, samples * repetitions))
     return whole.assign_attrs(filled | {"samples_per_period": samples, "periods": repetitions})
+
+
+def _settled(record: xr.Dataset, passed: dict[str, Array]) -> xr.Dataset:
+    """The record without what passes away in the channels of its first realisation."""
+    moved = {key: values.ravel() for key, values in passed.items() if values.any()}
+    if not moved:
+        return record
+    channels = {key: record[key].copy(data=record[key].values.copy()) for key in moved}
+    for key, values in moved.items():
+        channels[key].values[0] -= values
+    return record.assign(channels)
 
 
 def _departures(

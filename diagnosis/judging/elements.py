@@ -115,6 +115,5 @@ def refitted(elements: Simulator, optimum: Optimum, open_teeth: bool) -> Optimum
     jacobian = optimum.sensitivity.jacobian
     active = np.flatnonzero(np.abs(jacobian).max(axis=1) > 0.0)
     near = Sensitivity(jacobian, quadratic_of(target, target.lines - lines, jacobian, active))
-    chosen = np.ones(p.size, dtype=bool)
-    better = fit(elements, p, sd, near, renewals=0, chosen=chosen)
+    better = fit(elements, p, sd, near)
     return better if better is not None else replace(optimum, p=p, sd=sd)

@@ -28,8 +28,20 @@ from gearbench.diagnosis.forces.condition import Condition, force_at_load
 from gearbench.diagnosis.forces.covariance import KINDS, kinds_of
 from gearbench.diagnosis.forces.nominal import NominalModel
 from gearbench.diagnosis.forces.unknowns import Unknowns
+from gearbench.diagnosis.output.fit import prior_cost
 from gearbench.diagnosis.output.layout import Layout
-from gearbench.diagnosis.output.structure import ACROSS, CROSS, GAIN, HOUSING, MODE, MOTIONS, SHAPE, with_motion
+from gearbench.diagnosis.output.structure import (
+    ACROSS,
+    CROSS,
+    DAMPED,
+    GAIN,
+    HOUSED,
+    HOUSING,
+    MOTIONS,
+    SEAT,
+    seated,
+    with_motion,
+)
 from gearbench.lumped.nonlinear.coordinates import COORDINATES
 
 Array = NDArray[np.float64]
@@ -37,10 +49,9 @@ Complex = NDArray[np.complex128]
 Integers = NDArray[np.int64]
 
 # What is found, beside whatever else is held.
-KEYS = ("stiffness", "damping", "mass", "inertia", ACROSS, CROSS, GAIN, *DELAYS.values())
-HOUSED = (HOUSING, MODE, SHAPE)
-# Channels, and the coordinate that each is; the reaction is the force itself.
-COORDINATE = {"angle_driver": 0, "y_driver": 1, "y_driven": 2}
+KEYS = ("stiffness", "damping", "mass", "inertia", ACROSS, CROSS, DAMPED, GAIN, *DELAYS.values())
+# Channels that a coordinate each, or a few, make; the reaction is the force itself.
+MOVED = ("angle_driver", "y_driver", "y_driven")
 REACTION = "torque_driven"
 LINES, FEWEST = 200, 80  # of all records and of each, excited and operating, that are enough
 # Parts of the local level below which no model is right: wide first, so that distant resonances pull.
@@ -72,43 +83,52 @@ class _Lines:
 
 class _System(NamedTuple):
     """A rig without its mesh: numbers of its free coordinates, springs, dampers and masses between them, what forces of
-    the mesh and of the drive do (n, 2), the gain of the reaction's sensor, and delays of the others by channel [s]."""
+    the mesh and of the drive do (n, 2), what each contributes to a channel (n,) by its name, the gain of the reaction's
+    sensor, and delays of the others by channel [s]."""
 
     free: Integers
     springs: Array
     dampers: Array
     mass: Array
     forces: Array
+    shown: Mapping[str, Array]
     gain: float
     late: Mapping[str, float]
 
 
 def around(layout: Layout, conditions: Sequence[Condition], held: Array) -> Array | None:
     """Unknowns (size,): `held` with those of supports, masses and housing that the records show; None where records
-    have no displacement of the gears or no line, or no rig answers."""
+    have no displacement of the gears or no line, or no rig answers. Displacement sensors that are not held to stand on
+    a housing are tried there too."""
     load = layout.nominal.rig.load
     # Held behind itself the driven gear hands on what its inertia leaves of the mesh's force.
     reaction = (REACTION,) if load.boundary == "speed" and not load.twists else ()
-    wanted, most = (*COORDINATE, *reaction), max(LINES // len(conditions), FEWEST)
+    wanted, most = (*MOVED, *reaction), max(LINES // len(conditions), FEWEST)
     found = (_lines_of(layout.model, one, wanted, most) for one in conditions)
     lines = [one for one in found if one is not None]
     if not lines:
         return None
-    try:
-        return _found(layout, lines, held)
-    except ValueError:  # no rig there
-        return None
-
-
-def _found(layout: Layout, lines: Sequence[_Lines], held: Array) -> Array:
-    """The rig without a housing first, then with each motion of it that is seen best beside the other."""
     unknowns = layout.unknowns
-    motions = range(len(MOTIONS)) if HOUSING in unknowns.slices else ()
-    held = held.copy()
+    plain = held.copy()
     for key in (CROSS, HOUSING):
         if key in unknowns.slices:
-            held[unknowns[key]] = 0.0
-    cost, best = _fitted(layout, lines, held, KEYS, LEVELS[:1])
+            plain[unknowns[key]] = 0.0
+    try:
+        cost, best = _fitted(layout, lines, plain, KEYS, LEVELS[:1])
+        begun = [best]
+        if HOUSING in unknowns.slices and not held[unknowns[SEAT]].any():
+            begun.append(seated(unknowns, best))
+        rigs = [_found(layout, lines, cost, one) for one in begun]
+    except ValueError:  # no rig there
+        return None
+    return min(rigs, key=lambda p: _misfit(layout, lines, p) + prior_cost(p, unknowns.prior()))
+
+
+def _found(layout: Layout, lines: Sequence[_Lines], cost: float, best: Array) -> Array:
+    """The rig `best` (size,), which has no housing and costs so many nats, with each motion of a housing that is seen
+    best beside the other."""
+    unknowns = layout.unknowns
+    motions = range(len(MOTIONS)) if HOUSING in unknowns.slices else ()
     for _ in range(ROUNDS):
         begin = best
         for side in range(len(SIDES)):
@@ -177,7 +197,7 @@ def _fitted(
     sd = unknowns.prior()[at]
     # Without cross-coupling nothing shows how a support yields across.
     unseen = np.zeros(unknowns.size, dtype=bool)
-    for key in (ACROSS, CROSS):
+    for key in (ACROSS, CROSS, DAMPED):
         unseen[unknowns[key]] = begin[unknowns[CROSS]] == 0.0
     kept = (sd > 0.0) & ~unseen[at]
     at, sd = at[kept], sd[kept]
@@ -219,7 +239,12 @@ def _left_over(layout: Layout, system: _System, lines: _Lines, level: float) -> 
 def _system(layout: Layout, p: Array) -> _System:
     # The model's time loop is compiled on import, which not every user of this module wants.
     from gearbench.lumped.nonlinear.model import nonlinear_model
-    from gearbench.lumped.nonlinear.rest import inverse_masses, mesh_direction, springs_and_dampers
+    from gearbench.lumped.nonlinear.rest import (
+        displacement_directions,
+        inverse_masses,
+        mesh_direction,
+        springs_and_dampers,
+    )
 
     model = nonlinear_model(layout.case(p).rig, layout.meshing, layout.model.law)
     c, s = model.constants(), model.structure
@@ -230,9 +255,13 @@ def _system(layout: Layout, p: Array) -> _System:
     forces = np.zeros((len(free), 2))
     forces[:, 0] = -mesh[free]
     forces[np.flatnonzero(free == (0 if c.rigid else COORDINATES - 1)), 1] = 1.0
+    housing = model.rig.housing
+    shown = displacement_directions(s, housing.sensor_share if housing is not None else 0.0)
+    rows = dict(zip(MOVED, (np.eye(len(inverse))[0], *shown), strict=True))
     gain = exp(float(p[layout.unknowns[GAIN]][0]))
     late = {channel: float(p[layout.unknowns[key]][0]) for channel, key in DELAYS.items()}
-    return _System(free, springs[inside], dampers[inside], np.diag(1.0 / inverse[free]), forces, gain, late)
+    return _System(free, springs[inside], dampers[inside], np.diag(1.0 / inverse[free]), forces,
+                   {name: row[free] for name, row in rows.items()}, gain, late)  # fmt: skip
 
 
 def _answers(layout: Layout, system: _System, lines: _Lines) -> Complex:
@@ -246,7 +275,7 @@ def _answers(layout: Layout, system: _System, lines: _Lines) -> Complex:
             answer[:, column, 0] = layout.model.base_radius[1] * system.gain
         else:
             late = np.exp(-1j * lines.omega * system.late[name])[:, None]
-            answer[:, column] = moved[:, list(system.free).index(COORDINATE[name])] * late
+            answer[:, column] = np.einsum("n,knf->kf", system.shown[name], moved) * late
     return answer
 
 

@@ -52,5 +52,5 @@ def begun_by_forces(
         return base, None
     p = found.p.copy()
     p[start.hypothesis.entries(unknowns)] = 0.0
-    again = fit(simulator, p, base.sd, found.sensitivity, renewals=RENEWALS, chosen=np.ones(p.size, dtype=bool))
+    again = fit(simulator, p, base.sd, found.sensitivity, renewals=RENEWALS)
     return better(base, again), Start(start.hypothesis, found.p, start.log_bayes_factor)

@@ -70,8 +70,10 @@ class Optimum:
         return out
 
 
-def sensitivity_of(simulator: Simulator, p: Array, sd: Array, chosen: Flags) -> Sensitivity | None:
-    """Sensitivities of the chosen unknowns (size,) at `p`, moved by parts of `sd`; None where no rig is there."""
+def sensitivity_of(simulator: Simulator, p: Array, sd: Array, chosen: Flags | None = None) -> Sensitivity | None:
+    """Sensitivities of the chosen unknowns (size,; None: all) at `p`, moved by parts of `sd`; None where no rig is
+    there."""
+    chosen = np.ones(p.size, dtype=bool) if chosen is None else chosen
     lines = simulator.lines(p)
     jacobian = simulator.jacobian(p, sd, chosen) if lines is not None else None
     if lines is None or jacobian is None:
@@ -139,16 +141,21 @@ def fit_afresh(
     simulator: Simulator, p: Array, sd: Array, *, renewals: int, chosen: Flags | None = None
 ) -> Optimum | None:
     """As `fit`, with derivatives by the chosen unknowns (None: all) taken at `p` (size,)."""
-    chosen = np.ones(p.size, dtype=bool) if chosen is None else chosen
     first = sensitivity_of(simulator, p, simulator.layout.unknowns.prior(), chosen)
     return fit(simulator, p, sd, first, renewals=renewals, chosen=chosen) if first else None
 
 
 def fit(
-    simulator: Simulator, p: Array, sd: Array, sensitivity: Sensitivity, *, renewals: int, chosen: Flags
+    simulator: Simulator,
+    p: Array,
+    sd: Array,
+    sensitivity: Sensitivity,
+    *,
+    renewals: int = 0,
+    chosen: Flags | None = None,
 ) -> Optimum | None:
     """The optimum under the prior `sd` (size,) near `p` (size,), with at most so many renewals of the Jacobian of the
-    chosen unknowns; None where `p` is no rig."""
+    chosen unknowns (None: all); None where `p` is no rig."""
     target, bounds = simulator.target, simulator.layout.unknowns.bounds()
     p = np.clip(p, *bounds)
     # What these records do not show is left at nothing.

@@ -29,7 +29,7 @@ from gearbench.diagnosis.effects.torque_ripple import ORDERS
 from gearbench.diagnosis.forces.basis import on_path, waves
 from gearbench.diagnosis.output.contrast import CONTRAST, series_at
 from gearbench.diagnosis.output.layout import Layout
-from gearbench.diagnosis.output.structure import GAIN, LATE, LEAST_STEP, PHASE, STRUCTURE
+from gearbench.diagnosis.output.structure import GAIN, LATE, LEAST_STEP, PHASE, SEAT, STRUCTURE
 from gearbench.diagnosis.output.target import Target
 from gearbench.diagnosis.output.viscous import LOADED, damping_reference
 from gearbench.lumped.nonlinear.coordinates import IN_MESH
@@ -44,11 +44,12 @@ Flags = NDArray[np.bool_]
 Integers = NDArray[np.int64]
 
 # What holds the gears: by the difference between two rigs that are so far apart, in standard deviations as background.
-AROUND, APART = ("stiffness", "damping", "mass", "inertia", *BEARINGS.values(), COMPLIANCE, *STRUCTURE), 1e-3
+AROUND, APART = ("stiffness", "damping", "mass", "inertia", *BEARINGS.values(), *STRUCTURE), 1e-3
 # Moved and simulated, by this part of their standard deviation, where no difference between rigs says what they do: so
-# are the lag of the drive and the delay of the driven angle, since a replay is given both channels.
+# are the lag of the drive and the delay of the driven angle, since a replay is given both channels. A compliant
+# coupling twists at frequencies that samples do not hold; the zero of the mesh phase turns friction round with it.
 FOLLOWED = DELAYS["angle_driven"]
-MOVED, STEP = (FRICTION, COMPLIANCE, *STRUCTURE, LATE, FOLLOWED), 0.05
+MOVED, STEP = (FRICTION, COMPLIANCE, *STRUCTURE, SEAT, LATE, FOLLOWED, PHASE), 0.05
 SMALLEST = 1e-4  # of the load at which an exponent changes nothing, below which its logarithm is cut
 
 
@@ -110,12 +111,10 @@ def mesh_forces(layout: Layout, along: Along, chosen: Flags) -> tuple[Array, Int
     put("mesh-ratio", damped)
     put("curvature", (along.elastic * np.log(np.maximum(along.level, SMALLEST)))[:, None])
     mesh = along.model.rig.mesh
-    departure, slope = series_at(mesh.stiffness_cos, mesh.stiffness_sin, phase)
-    series, (_, error_slope) = 1.0 + departure, series_at(mesh.error_cos, mesh.error_sin, phase)
+    departure, _ = series_at(mesh.stiffness_cos, mesh.stiffness_sin, phase)
+    series = 1.0 + departure
     put(CONTRAST, stiffer * (series_at(layout.modulation[0], layout.modulation[1], phase)[0] / series)[:, None])
     put("shape", stiffer * (wave / series[:, None]))
-    turned = along.tangent.turning[:, None] + stiffer * (slope / series)[:, None]
-    put(PHASE, -(turned + along.of_excess(error_slope[:, None])))
     put("offset", along.of_excess(np.ones((len(phase), 1))))
     put("profile", along.of_excess(wave))
     put(FLANKS, _of_flanks(along, numbers, layout.model.path))
@@ -178,7 +177,7 @@ def others_of(layout: Layout, p: Array, sd: Array, chosen: Flags) -> list[Other]
     out = []
     for key in AROUND:
         for index in range(*unknowns[key].indices(unknowns.size)) if key in unknowns.slices else ():
-            absent = 0.0 <= p[index] < LEAST_STEP.get(key, 0.0) or (key == COMPLIANCE and not here.elastic_shaft)
+            absent = 0.0 <= p[index] < LEAST_STEP.get(key, 0.0)
             if absent or not chosen[index] or sd[index] <= 0.0:
                 continue
             step = APART * sd[index]

@@ -17,7 +17,7 @@ from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.output.beginning import Around, levelled, seen_by
 from gearbench.diagnosis.output.fit import SETTLED, Optimum, cost_of, fit, fit_afresh
 from gearbench.diagnosis.output.simulator import Simulator
-from gearbench.diagnosis.output.structure import otherwise
+from gearbench.diagnosis.output.structure import SEAT, otherwise
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -49,8 +49,7 @@ def begun_at_nominal(simulator: Simulator, found: Optimum, kept: Flags) -> Optim
     p = np.where(kept, found.p, 0.0)
     if cost_of(simulator, p, found.sd) > NEAR * found.cost:
         return found
-    chosen = np.ones(p.size, dtype=bool)
-    return better(found, fit(simulator, p, found.sd, found.sensitivity, renewals=1, chosen=chosen))
+    return better(found, fit(simulator, p, found.sd, found.sensitivity, renewals=1))
 
 
 def better(found: Optimum, other: Optimum | None) -> Optimum:
@@ -71,7 +70,7 @@ def _from_around(simulator: Simulator, found: Optimum, around: Around | None, re
     widened = found.sd > unknowns.prior()
     chosen = widened | ~_of(unknowns, ROTATION)
     # Effects stay; what was fitted around the wrong structure goes.
-    held = np.where(widened, found.p, 0.0)
+    held = np.where(widened | _of(unknowns, (SEAT,)), found.p, 0.0)
     seen = seen_by(around, unknowns, held)
     if seen is None:
         return None
@@ -97,8 +96,7 @@ def _otherwise(simulator: Simulator, found: Optimum, report: Report) -> Optimum 
         return again
     if again.left > SETTLED:
         report("simulating: another structure, further")
-        chosen = np.ones(found.p.size, dtype=bool)
-        again = fit(simulator, again.p, found.sd, again.sensitivity, renewals=RENEWALS, chosen=chosen) or again
+        again = fit(simulator, again.p, found.sd, again.sensitivity, renewals=RENEWALS) or again
     return again
 
 

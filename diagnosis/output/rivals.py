@@ -48,8 +48,7 @@ def compared(simulator: Simulator, base: Optimum, weighed: Sequence[Weighed]) ->
     p[usual.hypothesis.entries(unknowns)] += best.hypothesis.usual[1] * p[own]
     p[own] = 0.0
     sd = usual.hypothesis.widened(unknowns, base.sd)
-    chosen = np.ones(unknowns.size, dtype=bool)
-    found = fit(simulator, p, sd, best.optimum.sensitivity, renewals=RENEWALS, chosen=chosen)
+    found = fit(simulator, p, sd, best.optimum.sensitivity, renewals=RENEWALS)
     if found is None:
         return list(weighed)
     factor = found.evidence - base.evidence - float(np.log(usual.hypothesis.choices))

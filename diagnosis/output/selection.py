@@ -20,7 +20,7 @@ from gearbench.diagnosis.output.background import prior_of
 from gearbench.diagnosis.output.beginning import Around
 from gearbench.diagnosis.output.by_forces import Start, begun_by_forces
 from gearbench.diagnosis.output.contrast import is_strange
-from gearbench.diagnosis.output.fit import SETTLED, Optimum, Sensitivity, cost_of, fit, sensitivity_of
+from gearbench.diagnosis.output.fit import SETTLED, Optimum, cost_of, fit, fit_afresh
 from gearbench.diagnosis.output.jacobian import FOLLOWED
 from gearbench.diagnosis.output.reshaped import has_shapes, reshaped
 from gearbench.diagnosis.output.restructured import begun_at_nominal, better, restructured
@@ -95,7 +95,6 @@ def select(
     hypothesis' name; `around`: the rig around its mesh, as the records show it; `apart`: a record that has no part in
     this judges what enters."""
     unknowns = simulator.layout.unknowns
-    chosen = np.ones(unknowns.size, dtype=bool)
     base, begun = begun_by_forces(simulator, base, hypotheses, starts, report)
     starts = {**starts, begun.hypothesis.name: begun} if begun else starts
     best, weighed = base, None
@@ -112,18 +111,16 @@ def select(
             break
         entered.append(replace(winner, rivals=rivals_of(winner, found)))
         best = winner.optimum
-        renewed = sensitivity_of(simulator, best.p, unknowns.prior(), chosen)
-        if renewed is not None:
-            best = fit(simulator, best.p, best.sd, renewed, renewals=0, chosen=chosen) or best
+        best = fit_afresh(simulator, best.p, best.sd, renewals=0) or best
     best, kept = _needed(simulator, best, entered, apart)
     if kept and best.left > SETTLED:
         report("simulating: all together")
-        best = fit(simulator, best.p, best.sd, best.sensitivity, renewals=RENEWALS_LAST, chosen=chosen) or best
+        best = fit(simulator, best.p, best.sd, best.sensitivity, renewals=RENEWALS_LAST) or best
     if kept:
         best = restructured(simulator, best, around, report)
         report("simulating: all together, from the nominal rig")
         best = begun_at_nominal(simulator, best, _entries(unknowns, kept))
-    bare = _without(simulator, base, kept, chosen)
+    bare = _without(simulator, base, kept)
     return Selection(base, bare, best, kept, tuple(weighed or ()))
 
 
@@ -240,9 +237,7 @@ def _refit(
     seen = np.isin(np.arange(unknowns.size), active)
     costs = [cost_of(simulator, np.where(seen, np.clip(p, *unknowns.bounds()), 0.0), sd) for p in trials]
     begin = trials[int(np.argmin(costs))]
-    chosen = np.ones(unknowns.size, dtype=bool)
-    near: Sensitivity = base.sensitivity
-    return fit(simulator, begin, sd, near, renewals=renewals, chosen=chosen)
+    return fit(simulator, begin, sd, base.sensitivity, renewals=renewals)
 
 
 def relief(unknowns: Unknowns, narrow: Array, hypothesis: Hypothesis, p: Array, sd: Array) -> float:
@@ -257,15 +252,13 @@ def relief(unknowns: Unknowns, narrow: Array, hypothesis: Hypothesis, p: Array, 
 def with_entered(simulator: Simulator, selection: Selection, one: Weighed) -> Selection:
     """The selection with an effect entered that was weighed and simulated but did not clear the limit."""
     assert one.optimum is not None
-    chosen = np.ones(simulator.layout.unknowns.size, dtype=bool)
-    bare = _without(simulator, selection.base, [one], chosen)
+    bare = _without(simulator, selection.base, [one])
     return replace(selection, bare=bare, best=one.optimum, entered=(one,))
 
 
 def only(simulator: Simulator, selection: Selection, kept: Sequence[Weighed]) -> Selection:
     """The selection with only these of the effects that entered: the others go back to a background's size."""
     base, unknowns = selection.base, simulator.layout.unknowns
-    chosen = np.ones(unknowns.size, dtype=bool)
     if not kept:
         return replace(selection, bare=base, best=base, entered=())
     sd = base.sd
@@ -273,8 +266,8 @@ def only(simulator: Simulator, selection: Selection, kept: Sequence[Weighed]) ->
         sd = one.hypothesis.widened(unknowns, sd)
     p, near = selection.best.p, selection.best.sensitivity
     p = np.where(sd > 0.0, np.clip(p, -3.0 * sd, 3.0 * sd), 0.0)
-    best = fit(simulator, p, sd, near, renewals=0, chosen=chosen) or selection.best
-    bare = _without(simulator, base, kept, chosen)
+    best = fit(simulator, p, sd, near) or selection.best
+    bare = _without(simulator, base, kept)
     return replace(selection, bare=bare, best=best, entered=tuple(kept))
 
 
@@ -291,10 +284,10 @@ def taken_out(simulator: Simulator, selection: Selection, effect: Weighed) -> Op
     for one in selection.entered:
         held[one.hypothesis.entries(unknowns)] = False
     base = replace(selection.best, sd=np.where(held, 0.0, selection.best.sd))
-    return _without(simulator, base, [effect], np.ones(unknowns.size, dtype=bool))
+    return _without(simulator, base, [effect])
 
 
-def _without(simulator: Simulator, base: Optimum, effects: Sequence[Weighed], chosen: NDArray[np.bool_]) -> Optimum:
+def _without(simulator: Simulator, base: Optimum, effects: Sequence[Weighed]) -> Optimum:
     """The background's optimum with the unknowns of these effects and their rivals held at zero, and numbers of the
     nominal rig where its uncertainty ends, within which recalibration moves them; itself where that is no rig."""
     sd, p, unknowns = base.sd.copy(), base.p.copy(), simulator.layout.unknowns
@@ -302,7 +295,7 @@ def _without(simulator: Simulator, base: Optimum, effects: Sequence[Weighed], ch
         at = wide.entries(unknowns)
         low, high = (0.0, 0.0) if is_own(unknowns, wide) else known_within(unknowns.prior()[at])
         sd[at], p[at] = 0.0, np.clip(p[at], low, high)
-    return (fit(simulator, p, sd, base.sensitivity, renewals=0, chosen=chosen) or base) if effects else base
+    return (fit(simulator, p, sd, base.sensitivity) or base) if effects else base
 
 
 def known_within(sd: Array) -> tuple[Array, Array]:

@@ -122,7 +122,7 @@ class Simulator:
             tangent = along(steady_motion(case, measured.record, law_of(self.layout.model.sound, case)))
             forces = forces_of(self.layout, tangent, measured.name, chosen, others)
             answers = tangent.answers(forces.values, forces.on)
-            answers["torque_driven"] = self.layout.model.base_radius[1] * answers.pop("reaction")
+            answers["torque_driven"] *= self.layout.model.base_radius[1]
             sensed = sensor_columns(self.layout, self.target, number, self.channels(p, measured))
             return forces.at, answers, sensed
 

@@ -29,6 +29,8 @@ Array = NDArray[np.float64]
 ACROSS, ACROSS_SD, ACROSS_LARGEST = "across", 0.15, 1.0
 # Stiffness that couples both directions over the root of their product: asymmetric pedestals have a tenth.
 CROSS, CROSS_SD, CROSS_LARGEST = "cross", 0.1, 0.7
+# Logarithm of its damping over that of the same loss factor as along, by the root of both stiffnesses.
+DAMPED, DAMPED_SD, DAMPED_LARGEST = "across-damping", 0.5, 2.0
 # Housing: compliance over the supports' mean one (half a per cent to ten are usual), logarithms of its frequency over
 # that of a gear on its support, and of its damping ratio over a twentieth.
 HOUSING, HOUSING_SD, HOUSING_LARGEST = "housing", 0.04, 0.5
@@ -38,6 +40,10 @@ MODE, MODE_SD, MODE_LARGEST, HOUSING_RATIO = "housing-mode", 0.7, 2.0, 0.05
 MOTIONS = ("along", "rocking")
 SHAPE, SHAPE_SD, SHAPE_LARGEST = "housing-shape", 0.4, pi / 4
 EQUAL = (pi / 4, -pi / 4)
+# Shares across of either motion, over the root mean square of those along: few housings move along alone.
+OBLIQUE, OBLIQUE_SD, OBLIQUE_LARGEST = "housing-across", 0.5, 2.0
+# Part of the supports' motion with the housing that displacement sensors make: most stand on the ground, some on it.
+SEAT, SEAT_SD = "seat", 0.5
 # Gain of the reaction's sensor: torque sensors are good to a few tenths of a per cent, their mounting to one.
 GAIN, GAIN_SD = "gain", 0.01
 # Mesh phase [cycles] that the encoders show at that of the gears: zeros are set by a tooth that touches, not better
@@ -53,12 +59,15 @@ FELT, STIFFEST = 0.01, 0.03
 LEAST_STEP: Mapping[str, float] = {ACROSS: STIFFEST, HOUSING: 0.05 * HOUSING_SD}
 NONE = 1e-4  # compliance of a housing below which there is none
 # What holds the gears beside the nominal rig's supports.
-STRUCTURE = (ACROSS, CROSS, HOUSING, MODE, SHAPE)
+STRUCTURE = (ACROSS, CROSS, DAMPED, HOUSING, MODE, SHAPE, OBLIQUE)
+# The housing as a rig has it.
+HOUSED = (HOUSING, MODE, SHAPE, OBLIQUE, SEAT)
 # What is told of the structure that was found.
 NAMES = (
     (ACROSS, "support compliance across over along", "1"),
     (CROSS, "support cross-coupling over root of both stiffnesses", "1"),
     (HOUSING, "housing compliance over the supports'", "1"),
+    (SEAT, "part of the housing's motion that the displacement sensors make", "1"),
     (GAIN, "gain of the reaction torque (logarithm)", "1"),
     (PHASE, "zero of the mesh phase in cycles", "1"),
     (LATE, "lag of the drive's torque behind its channel", "s"),
@@ -74,6 +83,7 @@ def structure_groups(rig: Rig, model: NominalModel) -> list[Group]:
     groups = [
         group(ACROSS, "1", SIDES, ACROSS_SD, slot="structure", low=0.0, high=ACROSS_LARGEST),
         group(CROSS, "1", SIDES, CROSS_SD, slot="structure", first=4, low=-CROSS_LARGEST, high=CROSS_LARGEST),
+        group(DAMPED, "1", SIDES, DAMPED_SD, slot="structure", first=25, low=-DAMPED_LARGEST, high=DAMPED_LARGEST),
         group(GAIN, "1", ("torque_driven",), GAIN_SD, slot="structure", first=2),
         group(PHASE, "1", ("mesh",), PHASE_SD, slot="structure", first=18, low=-PHASE_LARGEST, high=PHASE_LARGEST),
         group(LATE, "s", ("torque_driver",), LATE_SD / model.resonance, slot="structure", first=19),
@@ -86,6 +96,10 @@ def structure_groups(rig: Rig, model: NominalModel) -> list[Group]:
                             high=MODE_LARGEST))  # fmt: skip
         groups.append(group(SHAPE, "rad", MOTIONS, SHAPE_SD, slot="structure", first=16, low=-SHAPE_LARGEST,
                             high=SHAPE_LARGEST))  # fmt: skip
+        shares = [f"{one}.{side}" for one in MOTIONS for side in SIDES]
+        groups.append(group(OBLIQUE, "1", shares, OBLIQUE_SD, slot="structure", first=21, low=-OBLIQUE_LARGEST,
+                            high=OBLIQUE_LARGEST))  # fmt: skip
+        groups.append(group(SEAT, "1", ("displacements",), SEAT_SD, slot="structure", first=20, low=0.0, high=1.0))
     return groups
 
 
@@ -128,7 +142,7 @@ def with_motion(unknowns: Unknowns, p: Array, motion: int, frequency: float, com
 
 def held(rig: Rig, model: NominalModel, unknowns: Unknowns, p: Array) -> Rig:
     """The rig with its supports across and its housing."""
-    soft, cross = p[unknowns[ACROSS]], p[unknowns[CROSS]]
+    soft, cross, damped = (p[unknowns[key]] for key in (ACROSS, CROSS, DAMPED))
     supports = {}
     for number, side in enumerate(SIDES):
         support = getattr(rig.support, side)
@@ -136,21 +150,26 @@ def held(rig: Rig, model: NominalModel, unknowns: Unknowns, p: Array) -> Rig:
             along, ratio = support.stiffness, 1.0 / max(float(soft[number]), STIFFEST)
             across = Across(
                 stiffness=along * ratio,
-                damping=support.damping * ratio**0.5,
+                damping=support.damping * ratio**0.5 * exp(float(damped[number])),
                 coupling=float(cross[number]) * along * ratio**0.5,
             )
             support = support.model_copy(update={"across": across})
         supports[side] = support
     rig = changed(rig, "support", **supports)
     if HOUSING in unknowns.slices and p[unknowns[HOUSING]].max() > NONE:
-        values = (p[unknowns[key]] for key in (HOUSING, MODE, SHAPE))
-        rig = rig.model_copy(update={"housing": housing_of(model, *values)})
+        compliance, modes, shapes, oblique, seat = (p[unknowns[key]] for key in HOUSED)
+        # What does not move across its support is not moved across by a housing either.
+        free = [getattr(rig.support, side).across is not None for side in SIDES]
+        housing = housing_of(model, compliance, modes, shapes, np.where(free * len(MOTIONS), oblique, 0.0), seat)
+        rig = rig.model_copy(update={"housing": housing})
     return rig
 
 
-def housing_of(model: NominalModel, compliance: Array, modes: Array, shapes: Array) -> Housing:
-    """The housing of compliances (2,), frequencies and dampings (4,) and shapes (2,) as unknowns, one compliance at
-    least above `NONE`."""
+def housing_of(
+    model: NominalModel, compliance: Array, modes: Array, shapes: Array, oblique: Array, seat: Array
+) -> Housing:
+    """The housing of compliances (2,), frequencies and dampings (4,), shapes (2,), shares across (4,) and the sensors'
+    seat (1,) as unknowns, one compliance at least above `NONE`."""
     mean = 2.0 / (1.0 / model.stiffness[0] + 1.0 / model.stiffness[1])
     pace = sqrt(mean / (0.5 * (model.mass[0] + model.mass[1])))
     motions = []
@@ -165,9 +184,19 @@ def housing_of(model: NominalModel, compliance: Array, modes: Array, shapes: Arr
                 "damping": 2 * HOUSING_RATIO * exp(damping) * omega * mass,
                 "driver_share": sqrt(2) * cos(angle),
                 "driven_share": sqrt(2) * sin(angle),
+                "driver_share_across": float(oblique[2 * number]),
+                "driven_share_across": float(oblique[2 * number + 1]),
             }
         )
-    return Housing(**motions[0], rocking=Rocking(**motions[1]) if len(motions) > 1 else None)
+    rocking = Rocking(**motions[1]) if len(motions) > 1 else None
+    return Housing(**motions[0], sensor_share=float(seat[0]), rocking=rocking)
+
+
+def seated(unknowns: Unknowns, p: Array) -> Array:
+    """`p` (size,) with displacement sensors that stand on the housing."""
+    out = p.copy()
+    out[unknowns[SEAT]] = 1.0
+    return out
 
 
 def sensed(rig: Rig, model: NominalModel, unknowns: Unknowns, p: Array, delays: Mapping[str, str]) -> Rig:

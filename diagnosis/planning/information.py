@@ -86,14 +86,14 @@ def known_of(plan: Planned) -> Known:
     """Derivatives of all planned records at the nominal rig. Raises DiagnosisError where it cannot be simulated."""
     simulator = Simulator(plan.layout, target_of(plan.fitted, plan.conditions), plan.simulate)
     unknowns = plan.layout.unknowns
-    nothing, chosen = np.zeros(unknowns.size), np.ones(unknowns.size, dtype=bool)
-    found = sensitivity_of(simulator, nothing, unknowns.prior(), chosen)
+    nothing = np.zeros(unknowns.size)
+    found = sensitivity_of(simulator, nothing, unknowns.prior())
     one, condition = plan.judged
     # Ripple has unknowns for each condition of the search; the judged record's is like that of the first of them, whose
     # name it takes.
     alike = replace(one, name=plan.fitted[0].name)
     other = Simulator(plan.layout, target_of([alike], [condition]), plan.simulate)
-    here, jacobian = other.lines(nothing), other.jacobian(nothing, unknowns.prior(), chosen)
+    here, jacobian = other.lines(nothing), other.jacobian(nothing, unknowns.prior(), np.ones(unknowns.size, dtype=bool))
     if found is None or here is None or jacobian is None:
         raise DiagnosisError(
             "the nominal rig does not settle under the planned conditions: nothing can be told of them"

@@ -116,7 +116,10 @@ def hubs_of(rig: Rig, bodies: tuple[Body, Body]) -> Hubs:
         if x != ABSENT:
             mass[x] = body.mass
             held[x] = support.across is None
-            _across(stiffness, damping, row, x, support)
+            aside = _row(count, x)
+            for place, move in moves:
+                aside[place] = -(move.driver_share_across, move.driven_share_across)[number]
+            _across(stiffness, damping, row, aside, support)
     for place, move in moves:
         mass[place] = move.mass
         _between(stiffness, damping, _row(count, place), (move.stiffness, move.damping))
@@ -157,13 +160,12 @@ def _between(stiffness: Array, damping: Array, row: Array, spring: tuple[float, 
     damping += spring[1] * np.outer(row, row)
 
 
-def _across(stiffness: Array, damping: Array, row: Array, x: int, support: Support) -> None:
-    """Add what holds a centre across its support, whose deflection is `row`."""
+def _across(stiffness: Array, damping: Array, row: Array, aside: Array, support: Support) -> None:
+    """Add what holds a centre across its support, which deflects by `row` along and `aside` across."""
     if support.across is None:
         return
-    side = _row(len(row), x)
-    _between(stiffness, damping, side, (support.across.stiffness, support.across.damping))
-    stiffness += support.across.coupling * (np.outer(row, side) + np.outer(side, row))
+    _between(stiffness, damping, aside, (support.across.stiffness, support.across.damping))
+    stiffness += support.across.coupling * (np.outer(row, aside) + np.outer(aside, row))
 
 
 def _springs(springs: list[tuple[Array, float, float, float]], count: int) -> Springs:

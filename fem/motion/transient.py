@@ -30,6 +30,8 @@ class Samples(NamedTuple):
     y_driven: Array
     x_driver: Array  # [m]; 0 where the centres do not move across their supports
     x_driven: Array
+    housing: Array  # both its motions [m]; 0 where it has none
+    rocking: Array
     torque_driver: Array  # that holds the driver at its speed [N m], where that is prescribed
     torque_driven: Array  # [N m]
     loaded: Array  # number of pairs that carry
@@ -154,6 +156,10 @@ def sample(machine: Machine, now: Stage, run: Run, room: Room, k: int, out: Samp
     out.y_driver[k], out.y_driven[k] = now.d[at.y1], now.d[at.y2]
     if at.x1 >= 0:
         out.x_driver[k], out.x_driven[k] = now.d[at.x1], now.d[at.x2]
+    if at.housing >= 0:
+        out.housing[k] = now.d[at.housing]
+    if at.rocking >= 0:
+        out.rocking[k] = now.d[at.rocking]
     held = torques(machine, now, run.pairs, run.torque, pace(machine, run.t), room)
     out.torque_driver[k], out.torque_driven[k] = held.driver, held.driven
     nearest = floor(theta2 / machine.law.driven.pitch + 0.5)

@@ -96,8 +96,16 @@ def _structured(
     y2 = q.y2 - h.share2 * e.housing - k.share2 * e.rocking
     u1 = v.y1 - h.share1 * r.housing - k.share1 * r.rocking
     u2 = v.y2 - h.share2 * r.housing - k.share2 * r.rocking
-    one = p.damping1 * u1 + spring(y1, p.stiffness1, p.exponent1, p.reference1) + s.coupling1 * e.x1
-    two = p.damping2 * u2 + spring(y2, p.stiffness2, p.exponent2, p.reference2) + s.coupling2 * e.x2
+    x1 = e.x1 - h.across1 * e.housing - k.across1 * e.rocking
+    x2 = e.x2 - h.across2 * e.housing - k.across2 * e.rocking
+    w1 = r.x1 - h.across1 * r.housing - k.across1 * r.rocking
+    w2 = r.x2 - h.across2 * r.housing - k.across2 * r.rocking
+    one = p.damping1 * u1 + spring(y1, p.stiffness1, p.exponent1, p.reference1) + s.coupling1 * x1
+    two = p.damping2 * u2 + spring(y2, p.stiffness2, p.exponent2, p.reference2) + s.coupling2 * x2
+    side1 = s.damping1 * w1 + s.stiffness1 * x1 + s.coupling1 * y1
+    side2 = s.damping2 * w2 + s.stiffness2 * x2 + s.coupling2 * y2
+    onto_h = h.share1 * one + h.share2 * two + h.across1 * side1 + h.across2 * side2
+    onto_k = k.share1 * one + k.share2 * two + k.across1 * side1 + k.across2 * side2
     acceleration = Coordinates(
         u1=p.inverse_u1 * (p.rigid * felt.drive + felt.shaft - f - rubbed.driver),
         y1=p.inverse_y1 * (-along - one),
@@ -107,10 +115,10 @@ def _structured(
     )
     further = Further(
         load=s.inverse_load * (twist - load),
-        housing=h.inverse * (h.share1 * one + h.share2 * two - h.damping * r.housing - h.stiffness * e.housing),
-        rocking=k.inverse * (k.share1 * one + k.share2 * two - k.damping * r.rocking - k.stiffness * e.rocking),
-        x1=s.inverse_x1 * (-across - s.damping1 * r.x1 - s.stiffness1 * e.x1 - s.coupling1 * y1),
-        x2=s.inverse_x2 * (across - s.damping2 * r.x2 - s.stiffness2 * e.x2 - s.coupling2 * y2),
+        housing=h.inverse * (onto_h - h.damping * r.housing - h.stiffness * e.housing),
+        rocking=k.inverse * (onto_k - k.damping * r.rocking - k.stiffness * e.rocking),
+        x1=s.inverse_x1 * (-across - side1),
+        x2=s.inverse_x2 * (across - side2),
     )
     return Answer(acceleration, further, f, load, felt.shaft + p.rigid * (f + rubbed.driver))
 

@@ -281,8 +281,9 @@ class NonLinear:
         coordinates, then their rates. A housing that takes both supports along alike is where it is without load."""
         (y1, x1), (y2, x2) = self.centres(force)
         structure = self.structure
-        housed, lifted = housing_at_rest(structure, self.factor * force)
-        y1, y2 = y1 + lifted[0], y2 + lifted[1]
+        housed = housing_at_rest(structure, self.factor * force, self.slide * force)
+        y1, y2 = y1 + housed.along[0], y2 + housed.along[1]
+        x1, x2 = x1 + housed.across[0], x2 + housed.across[1]
         apart = float(travel_under(self.law, at, np.array([force]))[0]) - self.factor * (y1 - y2)
         twist = force / self.shaft[0] if self.elastic_shaft else 0.0
         if structure is None:
@@ -291,7 +292,7 @@ class NonLinear:
         out = self._load_twist(force)
         # The end whose speed is prescribed is where it would be in steady rotation.
         u2 = -twist - apart if self.rig.drive.boundary == "speed" else structure.held * out
-        place = Coordinates(u2 + apart, y1, y2, u2, u2 + apart + twist), Further(u2 - out, *housed, x1, x2)
+        place = Coordinates(u2 + apart, y1, y2, u2, u2 + apart + twist), Further(u2 - out, *housed.motions, x1, x2)
         return np.array([*place[0], *place[1], *np.zeros(self.size)])
 
     def _load_twist(self, force: float) -> float:

@@ -83,15 +83,31 @@ def _along_less(support: Support, stiffness: float, push: float, softer: float) 
     return float(np.sign(push)) * high
 
 
-def housing_at_rest(s: Structure | None, push: float) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Both motions of the housing [m], and those of driver's and driven support with them, where the mesh pushes the
-    supports apart: the driver's by -push [N], the driven gear's by push."""
+class Lifted(NamedTuple):
+    """A housing at rest: both its motions [m], and those of driver's and driven support with them, along and across."""
+
+    motions: tuple[float, float]
+    along: tuple[float, float]
+    across: tuple[float, float]
+
+
+def housing_at_rest(s: Structure | None, push: float, aside: float) -> Lifted:
+    """The housing where the mesh pushes the supports apart: the driver's by -push along and -aside across [N], the
+    driven gear's by push and aside."""
     if s is None:
-        return (0.0, 0.0), (0.0, 0.0)
-    moves = s.housing, s.rocking
-    one, two = (push * (move.share2 - move.share1) / move.stiffness if move.inverse else 0.0 for move in moves)
-    first, second = moves
-    return (one, two), (first.share1 * one + second.share1 * two, first.share2 * one + second.share2 * two)
+        return Lifted((0.0, 0.0), (0.0, 0.0), (0.0, 0.0))
+    h, k = s.housing, s.rocking
+    one, two = (
+        (push * (move.share2 - move.share1) + aside * (move.across2 - move.across1)) / move.stiffness
+        if move.inverse
+        else 0.0
+        for move in (h, k)
+    )
+    return Lifted(
+        (one, two),
+        (h.share1 * one + k.share1 * two, h.share2 * one + k.share2 * two),
+        (h.across1 * one + k.across1 * two, h.across2 * one + k.across2 * two),
+    )
 
 
 def inverse_masses(c: Constants, s: Structure | None) -> Array:
@@ -116,6 +132,21 @@ def support_directions(s: Structure | None) -> tuple[Array, Array]:
     _, y1, y2, _, _, _, housing, rocking, _, _ = np.eye(COORDINATES + FURTHER)
     first = y1 - s.housing.share1 * housing - s.rocking.share1 * rocking
     return first, y2 - s.housing.share2 * housing - s.rocking.share2 * rocking
+
+
+def across_directions(s: Structure) -> tuple[Array, Array]:
+    """What each coordinate contributes to the deflections of both supports across their direction; (10,)."""
+    housing, rocking, x1, x2 = np.eye(COORDINATES + FURTHER)[-4:]
+    first = x1 - s.housing.across1 * housing - s.rocking.across1 * rocking
+    return first, x2 - s.housing.across2 * housing - s.rocking.across2 * rocking
+
+
+def displacement_directions(s: Structure | None, sensor_share: float) -> tuple[Array, Array]:
+    """What each coordinate contributes to what the displacement sensors of driver and driven gear show, which make that
+    part of the supports' motion with the housing; (5,) or (10,)."""
+    (first, second), (one, two) = support_directions(None), support_directions(s)
+    first, second = (np.pad(ground, (0, len(one) - COORDINATES)) for ground in (first, second))
+    return first + sensor_share * (one - first), second + sensor_share * (two - second)
 
 
 class SupportSpring(NamedTuple):
@@ -162,8 +193,8 @@ def springs_and_dampers(c: Constants, s: Structure | None, tangents: tuple[float
             springs[row, row] += k
             dampers[row, row] += d
         return springs, dampers
-    load, housing, rocking, x1, x2 = one[COORDINATES:]
-    first, second = support_directions(s)
+    load, housing, rocking = one[COORDINATES:-2]
+    (first, second), (x1, x2) = support_directions(s), across_directions(s)
     pairs = (
         (u2 - load, s.load_stiffness, s.load_damping),
         (housing, s.housing.stiffness, s.housing.damping),

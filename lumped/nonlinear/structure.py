@@ -2,13 +2,14 @@
 supports, supports across, and other boundaries than those of the plain model.
 
     M_l o''  = S_l (u2 - o) + D_l (u2' - o') - T2/rb2       the driven gear then feels S_l (o - u2) + D_l (o' - u2')
-    m_h h''  = b_1 P_1 + b_2 P_2 - c_h h' - k_h h                                            and r with d_i likewise
-    m_i x_i'' = -+ (sin(a) f - mu f s cos(a)) - c_xi x_i' - k_xi x_i - k_ci z_i              - driver, + driven gear
-    P_i      = c_i z_i' + k_i z_i |z_i/y_ref|^e + k_ci x_i,   z_i = y_i - b_i h - d_i r      what the supports pull with
+    m_h h''  = b_i P_i + e_i Q_i - c_h h' - k_h h, over both i                               and r with d_i, f_i
+    m_i x_i'' = -+ (sin(a) f - mu f s cos(a)) - Q_i                                          - driver, + driven gear
+    P_i      = c_i z_i' + k_i z_i |z_i/y_ref|^e + k_ci w_i,   z_i = y_i - b_i h - d_i r      what the supports pull with
+    Q_i      = c_xi w_i' + k_xi w_i + k_ci z_i,               w_i = x_i - e_i h - f_i r      across
 
-h and r are the housing's motions, b_i and d_i the shares of them that a support makes. a is the angle from the
-supports' direction to the line of action: the working pressure angle where they are tangential, else 0. To the
-deflection of the mesh x adds sin(a) (x1 - x2), and to the sliding velocity -cos(a) (x1' - x2').
+h and r are the housing's motions, b_i and d_i the shares of them that a support makes, e_i and f_i across. a is the
+angle from the supports' direction to the line of action: the working pressure angle where they are tangential, else 0.
+To the deflection of the mesh x adds sin(a) (x1 - x2), and to the sliding velocity -cos(a) (x1' - x2').
 """
 
 from __future__ import annotations
@@ -20,16 +21,18 @@ from gearbench.rig import Housing, Rig, Rocking
 
 class Moves(NamedTuple):
     """A motion of the housing: stiffness [N/m], damping [N s/m], inverse mass [1/kg], 0 where there is none, and the
-    shares of it that the supports of driver and driven gear make."""
+    shares of it that the supports of driver and driven gear make, along their direction and across."""
 
     stiffness: float
     damping: float
     inverse: float
     share1: float
     share2: float
+    across1: float
+    across2: float
 
 
-STANDS = Moves(0.0, 0.0, 0.0, 0.0, 0.0)
+STANDS = Moves(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class Structure(NamedTuple):
@@ -103,4 +106,12 @@ def structure_of(
 def _moves(one: Housing | Rocking | None) -> Moves:
     if one is None:
         return STANDS
-    return Moves(one.stiffness, one.damping, 1.0 / one.mass, one.driver_share, one.driven_share)
+    return Moves(
+        one.stiffness,
+        one.damping,
+        1.0 / one.mass,
+        one.driver_share,
+        one.driven_share,
+        one.driver_share_across,
+        one.driven_share_across,
+    )

@@ -3,14 +3,15 @@ one coordinate, does to every coordinate.
 
 Along a given motion the mesh is a spring k(t) and a damper c(t), so that departures q obey
 
-    M q'' + C q' + K q = -m (k(t) m.q + c(t) m.q' + w(t) n.q + f(t)) - sum b_i s_i(t) b_i.q + d g(t)
+    M q'' + C q' + K q = -(m + r(t)) (k(t) m.q + c(t) m.q' + w(t) n.q + f(t)) - sum b_i s_i(t) b_i.q + d g(t)
 
 with m what each coordinate contributes to the deflection, n to the phase of the mesh, which the force grows with by
 w(t), b_i likewise that of a support whose stiffness departs by
 s_i(t) from the mean one, f(t) the force that a change of the rig adds in the mesh at
-unchanged motion, and g(t) that on one coordinate d: a support, the driver, its shaft. Friction is left out:
-it turns a few per cent of a departure. Many departures are carried at once by the classical Runge-Kutta method, in
-single precision, which leaves 1e-6 of the largest departure.
+unchanged motion, and g(t) that on one coordinate d: a support, the driver, its shaft. r(t) is the friction that comes
+with a normal force (`rubbing`); that its levers change with the departures, as sliding turns round, is left out. Many
+departures are carried at once by the classical Runge-Kutta method, in single precision, which leaves 1e-6 of the
+largest departure.
 """
 
 from __future__ import annotations
@@ -36,7 +37,8 @@ class Tangent(NamedTuple):
     deflection (n,), and of the mesh on the half-step grid of one repetition stiffness k and damping c (entries,);
     `step` [s] is two entries. Of supports whose stiffness varies what coordinates contribute to their deflection (b, n)
     and by how much it departs from that in K (entries, b). By how much coordinates turn the mesh on (n,) [cycles/m],
-    and what its force grows by with that (entries,) [N/cycle]."""
+    and what its force grows by with that (entries,) [N/cycle]. `rubbed` (entries, n): what friction adds to the
+    direction of a force in the mesh."""
 
     springs: Array
     dampers: Array
@@ -49,6 +51,7 @@ class Tangent(NamedTuple):
     stiffer: Array
     turned_on: Array
     turning: Array
+    rubbed: Array
 
 
 def departures(
@@ -64,9 +67,10 @@ def departures(
     places, pushes = np.empty((samples, size, columns), np.float32), np.empty((samples, columns), np.float32)
     inverse = tangent.inverse[:, None]
     in_mesh = on == IN_MESH
-    direction = inverse * np.where(in_mesh, -tangent.mesh[:, None], np.arange(size)[:, None] == on)
+    direction = np.where(in_mesh, 0.0, inverse * (np.arange(size)[:, None] == on))
     values = (
-        -inverse * tangent.springs, -inverse * tangent.dampers, tangent.mesh, -tangent.inverse * tangent.mesh,
+        -inverse * tangent.springs, -inverse * tangent.dampers, tangent.mesh,
+        -tangent.inverse * (tangent.mesh + tangent.rubbed),
         direction, in_mesh, tangent.stiffness, tangent.damping, forces, tangent.bearings,
         -inverse.T * tangent.bearings, tangent.stiffer, tangent.turned_on, tangent.turning,
     )  # fmt: skip
@@ -78,13 +82,13 @@ def departures(
 @compiled(fastmath=ROUNDING)
 def _rates(
     q: Single, v: Single, springs: Single, dampers: Single, mesh: Single, pushed: Single, direction: Single,
-    k: np.float32, c: np.float32, force: Single, bearings: Single, held: Single, stiffer: Single, turned: Single,
-    w: np.float32, out: Single, push: Single,
+    in_mesh: Single, k: np.float32, c: np.float32, force: Single, bearings: Single, held: Single, stiffer: Single,
+    turned: Single, w: np.float32, out: Single, push: Single,
 ) -> None:  # fmt: skip
-    """Accelerations `out` (n, columns) and the mesh's elastic and damping force `push` (columns,)."""
+    """Accelerations `out` (n, columns) and the force `push` (columns,) in the mesh."""
     size, columns = q.shape
     for p in range(columns):
-        push[p] = 0.0
+        push[p] = in_mesh[p] * force[p]
     for i in range(size):
         if mesh[i] != 0.0:
             spring, damper = mesh[i] * k + turned[i] * w, mesh[i] * c
@@ -122,33 +126,33 @@ def _run(
     for number in range(-early, steps):
         i = (2 * number) % entries
         middle, after = i + 1, (i + 2) % entries
-        _rates(q, v, springs, dampers, mesh, pushed, direction, stiffness[i], damping[i], forces[i],
-               bearings, held, stiffer[i], turned, turning[i], a1, push)  # fmt: skip
+        _rates(q, v, springs, dampers, mesh, pushed[i], direction, in_mesh, stiffness[i], damping[i],
+               forces[i], bearings, held, stiffer[i], turned, turning[i], a1, push)  # fmt: skip
         if number >= 0 and number % substeps == 0:
             sample = number // substeps
             for c in range(size):
                 for p in range(columns):
                     places[sample, c, p] = q[c, p]
             for p in range(columns):
-                pushes[sample, p] = push[p] + in_mesh[p] * forces[i, p]
+                pushes[sample, p] = push[p]
         for c in range(size):
             for p in range(columns):
                 q2[c, p] = q[c, p] + HALF * h * v[c, p]
                 v2[c, p] = v[c, p] + HALF * h * a1[c, p]
-        _rates(q2, v2, springs, dampers, mesh, pushed, direction, stiffness[middle], damping[middle], forces[middle],
-               bearings, held, stiffer[middle], turned, turning[middle], a2, push)  # fmt: skip
+        _rates(q2, v2, springs, dampers, mesh, pushed[middle], direction, in_mesh, stiffness[middle], damping[middle],
+               forces[middle], bearings, held, stiffer[middle], turned, turning[middle], a2, push)  # fmt: skip
         for c in range(size):
             for p in range(columns):
                 q2[c, p] = q[c, p] + HALF * h * v2[c, p]
                 v3[c, p] = v[c, p] + HALF * h * a2[c, p]
-        _rates(q2, v3, springs, dampers, mesh, pushed, direction, stiffness[middle], damping[middle], forces[middle],
-               bearings, held, stiffer[middle], turned, turning[middle], a3, push)  # fmt: skip
+        _rates(q2, v3, springs, dampers, mesh, pushed[middle], direction, in_mesh, stiffness[middle], damping[middle],
+               forces[middle], bearings, held, stiffer[middle], turned, turning[middle], a3, push)  # fmt: skip
         for c in range(size):
             for p in range(columns):
                 q2[c, p] = q[c, p] + h * v3[c, p]
                 v4[c, p] = v[c, p] + h * a3[c, p]
-        _rates(q2, v4, springs, dampers, mesh, pushed, direction, stiffness[after], damping[after], forces[after],
-               bearings, held, stiffer[after], turned, turning[after], a4, push)  # fmt: skip
+        _rates(q2, v4, springs, dampers, mesh, pushed[after], direction, in_mesh, stiffness[after], damping[after],
+               forces[after], bearings, held, stiffer[after], turned, turning[after], a4, push)  # fmt: skip
         for c in range(size):
             for p in range(columns):
                 q[c, p] += SIXTH * h * (v[c, p] + TWO * (v2[c, p] + v3[c, p]) + v4[c, p])

@@ -57,7 +57,11 @@ def refusal(*settings: str) -> str:
         (SHAFT, lambda rig: tuple(rig.load.coupling.model_dump().values()), (0.02, 4e4, 2.0)),
         (ACROSS, lambda rig: tuple(rig.support.driven.across.model_dump().values()), (2e7, 300.0, -3e6)),
         (ACROSS.replace(".driven", ""), lambda rig: rig.support.driver.across.coupling, -3e6),
-        (HOUSING, lambda rig: tuple(rig.housing.model_dump().values()), (40.0, 1e9, 2e3, 1.0, 1.0, None)),
+        (
+            HOUSING,
+            lambda rig: tuple(rig.housing.model_dump().values()),
+            (40.0, 1e9, 2e3, 1.0, 1.0, 0.0, 0.0, 0.0, None),
+        ),
         ("rig.mesh.stiffness_drift=-0.004", lambda rig: rig.mesh.stiffness_drift, -0.004),
         ("rig.sensors.encoder_runout_driven_urad=20.1", lambda rig: rig.sensors.encoder_runout_driven, 20.1e-6),
         ("rig.sensors.encoder_runout_driver_phase_deg=90", lambda rig: rig.sensors.encoder_runout_driver_phase, pi / 2),
@@ -256,6 +260,10 @@ def test_a_gear_with_its_own_support_across_keeps_none_of_the_common_one() -> No
         ("rig.drive.boundary=torqe", ["rig.drive.boundary", 'did you mean "torque"?']),
         (ACROSS.replace("-3e6", "1.2e7"), ["rig.support.driven", "across.coupling_n_per_m = 12000000", "1.09545e+07"]),
         (ACROSS.replace("stiffness_n_per_m = 2e7, ", ""), ["rig.support.driven.across.stiffness_n_per_m is missing"]),
+        (
+            HOUSING.replace("40", "40, driver_share_across = 0.4"),
+            ["housing.driver_share_across moves", "support.driver.across"],
+        ),
         (HOUSING.replace("40", "0"), ["rig.housing.mass_kg = 0", "greater than 0 kg"]),
         (HOUSING.replace("mass_kg = 40, ", ""), ["rig.housing.mass_kg is missing"]),
         ("rig.mesh.stiffness_drift=-1", ["rig.mesh.stiffness_drift = -1", "greater than -1"]),

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from shared.effect_rig import GEARS, MASSES, ZETA
 from shared.hat_mesh import ALPHA, BASE_PITCH, BEND, PITCH_ROLL, RADII, TOP, hat, stiffness
 
-from gearbench.rig import Coupling, Rig, Support
+from gearbench.rig import Coupling, Housing, Rig, Rocking, Support
 
 Array = NDArray[np.float64]
 
@@ -45,14 +45,19 @@ def pull(support: Support, y: float, vy: float, x: float, vx: float) -> tuple[fl
     return (along, 0.0) if a is None else (along + a.coupling * x, a.stiffness * x + a.damping * vx + a.coupling * y)
 
 
-def lift(rig: Rig, d: Array) -> tuple[float, float]:
-    """How far the housing carries both supports."""
-    one = two = 0.0
+def shares(part: Housing | Rocking) -> Array:
+    """Shares (2, 2) of a motion of the housing: of both supports, along and across."""
+    return np.array([[part.driver_share, part.driver_share_across], [part.driven_share, part.driven_share_across]])
+
+
+def lift(rig: Rig, d: Array) -> Array:
+    """How far (2, 2) the housing carries both supports along and across."""
+    out = np.zeros((2, 2))
     if rig.housing is not None:
         for k, part in ((4, rig.housing), (9, rig.housing.rocking)):
             if part is not None:
-                one, two = one + part.driver_share * d[k], two + part.driven_share * d[k]
-    return one, two
+                out = out + d[k] * shares(part)
+    return out
 
 
 def plain_rates(rig: Rig, frequency: float, torque: Callable[[float], float], mean: float) -> Callable[..., Array]:
@@ -103,9 +108,9 @@ def plain_rates(rig: Rig, frequency: float, torque: Callable[[float], float], me
         d, v = q[:10], q[10:]
         force, with1, with2, lost1, lost2 = flanks(t, d, v)
         first, second = twist(rotor, d[0] - d[1], v[0] - v[1]), twist(brake, d[2] - d[3], v[2] - v[3])
-        carried = lift(rig, d), lift(rig, v)
-        one = pull(rig.support.driver, d[5] - carried[0][0], v[5] - carried[1][0], d[6], v[6])
-        two = pull(rig.support.driven, d[7] - carried[0][1], v[7] - carried[1][1], d[8], v[8])
+        (y, x), (vy, vx) = (d[[5, 7]], d[[6, 8]]) - lift(rig, d).T, (v[[5, 7]], v[[6, 8]]) - lift(rig, v).T
+        one = pull(rig.support.driver, y[0], vy[0], x[0], vx[0])
+        two = pull(rig.support.driven, y[1], vy[1], x[1], vx[1])
         driving = torque(t)
         # What both ends leave free is held in the mean by the load, which makes up for the losses.
         load = r2 / r1 * (driving if rig.load.boundary == "torque" else mean)
@@ -125,7 +130,7 @@ def plain_rates(rig: Rig, frequency: float, torque: Callable[[float], float], me
         if rig.housing is not None:
             for k, part in ((4, rig.housing), (9, rig.housing.rocking)):
                 if part is not None:
-                    push = part.driver_share * one[0] + part.driven_share * two[0]
+                    push = float((shares(part) * [one, two]).sum())
                     a[k] = (push - part.stiffness * d[k] - part.damping * v[k]) / part.mass
         for k, support, sign, mass, held in (
             (5, rig.support.driver, -1, MASSES[0], one),

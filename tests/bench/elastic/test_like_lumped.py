@@ -19,6 +19,9 @@ SHAFT = "{inertia_kg_m2=0.01, stiffness_nm_per_rad=2e4, damping_nm_s_per_rad=20.
 RIPPLE = "rig.drive.ripple={orders=[20], amplitude_nm=[5.0], phase_deg=[20.0]}"
 SIDE = "{stiffness_n_per_m=1e8, damping_n_s_per_m=1e4, coupling_n_per_m=2e7}"
 ROCKING = "{mass_kg=20.0, stiffness_n_per_m=8e8, damping_n_s_per_m=3e5, driver_share=1.0, driven_share=-0.6}"
+SEATED = "{mass_kg=20.0, stiffness_n_per_m=1e8, damping_n_s_per_m=1e5, driven_share=0.3, sensor_share=0.8}"
+OBLIQUE = "{mass_kg=20.0, stiffness_n_per_m=8e8, damping_n_s_per_m=2e5, driven_share=-0.3, driver_share_across=0.7}"
+SIDEWAYS = "rig.housing.sensor_share=1.0"
 
 # Settings, bound of the difference of means, and of the rms of the swings over their range.
 EFFECTS: dict[str, tuple[list[str], float, float]] = {
@@ -30,6 +33,8 @@ EFFECTS: dict[str, tuple[list[str], float, float]] = {
     "shaft": ([f"rig.load.coupling={SHAFT}"], 5e-4, 3e-3),
     "housing": (["rig.housing={mass_kg=20.0, stiffness_n_per_m=1e8, damping_n_s_per_m=1e5}"], 5e-4, 3e-3),
     "rocking": ([f"rig.housing={ROCKING}"], 5e-4, 3e-3),
+    "oblique": ([f"rig.housing={OBLIQUE}", f"rig.support.driver.across={SIDE}", SIDEWAYS], 2e-3, 1e-2),
+    "seated": ([f"rig.housing={SEATED}"], 5e-4, 3e-3),
     # Teeth that bear 800 N in the mean: the force at which nothing changes lies far below.
     "hardening": (["rig.mesh.exponent=0.2", "rig.mesh.reference_force_n=300"], 5e-4, 3e-3),
     "across": ([f"rig.support.driver.across={SIDE}"], 2e-3, 1e-2),

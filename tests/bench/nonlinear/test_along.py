@@ -20,8 +20,9 @@ Array = NDArray[np.float64]
 SMALL = 1e-7  # [m]
 
 
-def test_an_error_of_one_tooth_does_what_two_simulations_differ_by() -> None:
-    case = read_case(case_files()["gap_demo"])
+@pytest.mark.parametrize("friction", [0.0, 0.1])
+def test_an_error_of_one_tooth_does_what_two_simulations_differ_by(friction: float) -> None:
+    case = read_case(case_files()["gap_demo"], [f"rig.friction.coefficient={friction}"])
     record = simulate(case.under(case.conditions[0]))
     law = mesh_law(case.rig, case.simulation, 200.0)
 

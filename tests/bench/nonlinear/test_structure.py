@@ -70,6 +70,21 @@ def make_case(experiment: dict[str, Any] | None = None, **rig: Any) -> Case:
     return Case(name="test", rig=Rig(**values), experiment=Experiment(**run), simulation=simulation)
 
 
+@pytest.mark.parametrize("share", [0.0, 0.4, 1.0])
+def test_sensors_on_the_housing_show_the_supports_deflection(share: float) -> None:
+    """Slowly turned, a support of 1e8 N/m deflects by its force; the housing's rocking is that of both over 2e8 N/m."""
+    housing = Housing(mass=2.0, stiffness=2e8, damping=1e5, driver_share=1.0, driven_share=-0.5, sensor_share=share)
+    supports = Supports(driver=Support(stiffness=1e8, damping=3e4), driven=Support(stiffness=1.3e8, damping=3e4))
+    case = make_case({"mesh_frequency": 20.0, "multisine": None}, support=supports, housing=housing)
+    record = simulate(case)
+    push = np.cos(case.rig.driver.pressure_angle) * 100.0 / record.attrs["base_radius_driver"]
+    rocked = push * (-0.5 - 1.0) / 2e8
+    feet = {"y_driver": -push / 1e8 + (1.0 - share) * rocked, "y_driven": push / 1.3e8 - 0.5 * (1.0 - share) * rocked}
+    for name, value in feet.items():
+        assert record[name].values.mean() == pytest.approx(value, rel=2e-3), name
+    np.testing.assert_allclose(record["dte"].values, dte_of_channels(record).values, atol=1e-12)
+
+
 def test_a_record_has_the_motion_across_and_its_dte_too() -> None:
     record = simulate(make_case(**FULL))
     validate_record(record)

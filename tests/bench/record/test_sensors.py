@@ -13,6 +13,7 @@ from gearbench.bench import BenchError
 from gearbench.bench.record.sensors import (
     CHANNELS,
     Signal,
+    change_shown,
     check_delays,
     delayed,
     encoder_error,
@@ -141,6 +142,21 @@ def test_gain_filter_and_steps_act_in_the_order_of_the_chain() -> None:
     for values, step in ((angle, 0.01), (seen["torque_driven"].swing[0], 0.02)):
         assert np.abs(values / step - np.round(values / step)).max() < 1e-6
     assert len(np.unique(np.round(angle / 0.01))) > 100
+
+
+def test_a_small_change_is_shown_as_two_records_differ() -> None:
+    time = np.arange(SAMPLES) / RATE
+    rig = rig_with(gain_torque_driven=1.25, delay_torque_driven=80e-6, delay_y_driver=-30e-6, filter=700.0)
+    change = np.stack([np.cos(2 * np.pi * 40 * time), np.sin(2 * np.pi * 300 * time + 1)])
+    for name in ("torque_driven", "y_driver", "angle_driver"):
+        before, after = (
+            measured({name: Signal(wave(time) + part * change)}, rig, RATE, seed=1, samples=SAMPLES,
+                     samples_per_period=SAMPLES)[name].swing
+            for part in (0.0, 1.0)
+        )  # fmt: skip
+        shown = change_shown(change, rig.sensors, name, RATE)
+        np.testing.assert_allclose(shown, after - before, atol=1e-12)
+        assert np.abs(shown - change).max() > 0.005
 
 
 def test_a_driver_torque_is_recovered_from_what_its_sensor_shows() -> None:

@@ -19,10 +19,9 @@ SD = np.array([0.1, 0.1, 0.1, 0.5, 0.01, 0.01, 0.0, 0.0])
 def test_the_fit_of_another_model_ends_at_the_truth_that_the_lumped_one_bends() -> None:
     held = target(TRUE @ ELEMENTS)
     simple = FakeSimulator(lambda p: p @ LUMPED, held)
-    chosen = np.ones(SD.size, dtype=bool)
-    first = sensitivity_of(simple, np.zeros(SD.size), np.where(SD > 0, SD, 1.0), chosen)  # type: ignore[arg-type]
+    first = sensitivity_of(simple, np.zeros(SD.size), np.where(SD > 0, SD, 1.0))  # type: ignore[arg-type]
     assert first is not None
-    bent = fit(simple, np.zeros(SD.size), SD, first, renewals=1, chosen=chosen)  # type: ignore[arg-type]
+    bent = fit(simple, np.zeros(SD.size), SD, first, renewals=1)  # type: ignore[arg-type]
     assert bent is not None
     elements = FakeSimulator(lambda p: p @ ELEMENTS, held)
     found = refitted(elements, bent, False)  # type: ignore[arg-type]
@@ -34,12 +33,12 @@ def test_cracked_teeth_stay_as_they_are_and_a_model_without_an_answer_says_so() 
     truth = TRUE.copy()
     truth[6] = 0.1
     held = target(truth @ ELEMENTS)
-    simple, chosen = FakeSimulator(lambda p: p @ LUMPED, held), np.ones(SD.size, dtype=bool)
+    simple = FakeSimulator(lambda p: p @ LUMPED, held)
     sd = SD.copy()
     sd[6] = 0.35
-    first = sensitivity_of(simple, np.zeros(SD.size), np.where(sd > 0, sd, 1.0), chosen)  # type: ignore[arg-type]
+    first = sensitivity_of(simple, np.zeros(SD.size), np.where(sd > 0, sd, 1.0))  # type: ignore[arg-type]
     assert first is not None
-    cracked = fit(simple, np.zeros(SD.size), sd, first, renewals=1, chosen=chosen)  # type: ignore[arg-type]
+    cracked = fit(simple, np.zeros(SD.size), sd, first, renewals=1)  # type: ignore[arg-type]
     assert cracked is not None and cracked.p[6] != 0.0
     found = refitted(FakeSimulator(lambda p: p @ ELEMENTS, held), cracked, False)  # type: ignore[arg-type]
     assert found.p[6] == cracked.p[6]

@@ -15,7 +15,7 @@ from gearbench.diagnosis.forces.condition import Condition
 from gearbench.diagnosis.intake.measurements import measurement
 from gearbench.diagnosis.output.around import around
 from gearbench.diagnosis.output.layout import Layout, layout_of
-from gearbench.diagnosis.output.structure import HOUSING, MODE, SHAPE
+from gearbench.diagnosis.output.structure import HOUSING, MODE, SEAT, SHAPE
 from gearbench.rig import read_case
 
 K1, K2, HOUSED, RATIO = 0.93e8, 1.08e8, 0.06, 0.05  # stiffness of the supports, compliance of the housing, damping
@@ -36,9 +36,11 @@ def recorded(
     heavier: float = 1.0,
     shares: tuple[float, float] = (1.0, 1.0),
     late: float = 0.0,
+    seat: float = 0.0,
 ) -> Condition:
     """A condition whose rig has a housing of that logarithm of frequency (None: none), of which the supports make these
-    shares, a late sensor of the driver's displacement [s], and any force in the mesh."""
+    shares, a late sensor of the driver's displacement [s], displacement sensors that make a part `seat` of the
+    supports' motion, and any force in the mesh."""
     m = layout.model
     rng = np.random.default_rng(3)
     omega = like.omega[: like.bins]
@@ -65,7 +67,8 @@ def recorded(
     if frequency is None:
         y = np.array([push[0] / rows[0, 0], push[1] / rows[1, 1]])
     else:
-        y = np.linalg.solve(np.moveaxis(rows, 2, 0), push.T[..., None])[:, :2, 0].T
+        moved = np.linalg.solve(np.moveaxis(rows, 2, 0), push.T[..., None])[:, :, 0].T
+        y = moved[:2] - seat * np.outer(shares, moved[2])
     # The driven gear turns with a load of ten times its inertia, of which it takes its own part of the force.
     driven = force * m.base_radius[1] ** 2 / (11 * m.inertia[1] * s**2 + (omega == 0))
     reaction = m.base_radius[1] * force - m.inertia[1] * s**2 * driven / m.base_radius[1]
@@ -105,6 +108,17 @@ def test_a_housing_that_rocks_is_found_a_late_sensor_and_inertia(rig: tuple[Layo
     assert found[unknowns[MODE]][2] == pytest.approx(0.3, abs=0.01)
     assert np.tan(found[unknowns[SHAPE]][1] - np.pi / 4) == pytest.approx(shares[1] / shares[0], abs=0.02)
     assert found[unknowns["delay-y_driver"]][0] == pytest.approx(late, rel=0.05)
+
+
+def test_sensors_on_the_housing_are_found_with_it(rig: tuple[Layout, Condition]) -> None:
+    layout, like = rig
+    shares = (1.0, -0.8)
+    found = around(layout, [recorded(layout, like, -0.3, shares=shares, seat=1.0)], np.zeros(layout.size))
+    assert found is not None
+    unknowns, size = layout.unknowns, (shares[0] ** 2 + shares[1] ** 2) / 2
+    assert found[unknowns[SEAT]] == pytest.approx([1.0], abs=0.05)
+    assert found[unknowns[HOUSING]] == pytest.approx([0.0, size * HOUSED], abs=0.05 * HOUSED)
+    assert found[unknowns[MODE]][2] == pytest.approx(-0.3, abs=0.02)
 
 
 @pytest.mark.validation

@@ -27,10 +27,9 @@ def test_a_fit_in_a_valley_beside_the_nominal_rig_is_begun_there_again() -> None
     sd[3], sd[6:] = 0.5, 0.0
     far = true.copy()
     far[0] = 0.25
-    every = np.ones(8, dtype=bool)
-    first = sensitivity_of(simulator, far, sd, every)
+    first = sensitivity_of(simulator, far, sd)
     assert first is not None
-    stuck = fit(simulator, far, sd, first, renewals=3, chosen=every)
+    stuck = fit(simulator, far, sd, first, renewals=3)
     assert stuck is not None and stuck.cost > 5.0 + cost_of(simulator, true, sd)
     kept = np.arange(8) == 3
     again = begun_at_nominal(simulator, stuck, kept)

@@ -14,7 +14,6 @@ from gearbench.diagnosis.output.fit import Optimum, fit, sensitivity_of
 MATRIX = sensitivities()
 FRICTION = Hypothesis("friction", "mesh", (Wide("friction"),))
 TRUE = np.array([0.05, 0.17, -0.05, 0.3, 0.0, 0.0, 0.0, 0.0])
-ALL = np.ones(8, dtype=bool)
 
 
 def valleys(p: np.ndarray) -> np.ndarray:
@@ -31,9 +30,9 @@ def simulator() -> FakeSimulator:
 
 def background(simulator: FakeSimulator) -> Optimum:
     sd = prior_of(simulator, unknowns().prior())  # type: ignore[arg-type]
-    first = sensitivity_of(simulator, np.zeros(8), unknowns().prior(), ALL)  # type: ignore[arg-type]
+    first = sensitivity_of(simulator, np.zeros(8), unknowns().prior())  # type: ignore[arg-type]
     assert first is not None
-    found = fit(simulator, np.zeros(8), sd, first, renewals=8, chosen=ALL)  # type: ignore[arg-type]
+    found = fit(simulator, np.zeros(8), sd, first, renewals=8)  # type: ignore[arg-type]
     assert found is not None
     return found
 

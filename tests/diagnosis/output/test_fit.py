@@ -26,9 +26,9 @@ def noise(size: float) -> np.ndarray:
 
 def test_it_converges_to_the_rig_that_made_the_records() -> None:
     simulator = FakeSimulator(curved, target(curved(TRUE) + noise(1e-3)))
-    first = sensitivity_of(simulator, np.zeros(8), SD, ALL)
+    first = sensitivity_of(simulator, np.zeros(8), SD)
     assert first is not None
-    best = fit(simulator, np.zeros(8), SD, first, renewals=4, chosen=ALL)
+    best = fit(simulator, np.zeros(8), SD, first, renewals=4)
     assert best is not None and best.left < 0.5
     assert best.p == pytest.approx(TRUE, abs=2e-3)
     assert best.cost == pytest.approx(best.misfit + prior_cost(best.p, SD))
@@ -43,24 +43,24 @@ def test_it_converges_to_the_rig_that_made_the_records() -> None:
 
 def test_a_step_to_where_no_rig_is_is_shortened() -> None:
     simulator = FakeSimulator(curved, target(curved(TRUE) + noise(1e-3)), largest=0.31)
-    first = sensitivity_of(simulator, np.zeros(8), SD, ALL)
+    first = sensitivity_of(simulator, np.zeros(8), SD)
     assert first is not None
-    best = fit(simulator, np.zeros(8), SD, first, renewals=4, chosen=ALL)
+    best = fit(simulator, np.zeros(8), SD, first, renewals=4)
     assert best is not None and np.abs(best.p).max() <= 0.31
     assert best.cost < 0.6 * simulator.target.cost(simulator.target.lines)
-    assert fit(simulator, np.full(8, 1.0), SD, first, renewals=1, chosen=ALL) is None
+    assert fit(simulator, np.full(8, 1.0), SD, first, renewals=1) is None
 
 
 def test_unknowns_without_a_prior_stay_and_bounds_hold() -> None:
     true = TRUE.copy()
     true[6] = -0.2  # a tooth cannot gain stiffness
     simulator = FakeSimulator(lambda p: p @ MATRIX, target(true @ MATRIX))
-    first = sensitivity_of(simulator, np.zeros(8), np.ones(8), ALL)
+    first = sensitivity_of(simulator, np.zeros(8), np.ones(8))
     assert first is not None
     sd = SD.copy()
-    assert fit(simulator, np.zeros(8), sd, first, renewals=0, chosen=ALL).p[6] == 0.0  # type: ignore[union-attr]
+    assert fit(simulator, np.zeros(8), sd, first, renewals=0).p[6] == 0.0  # type: ignore[union-attr]
     sd[6] = 0.35
-    assert fit(simulator, np.zeros(8), sd, first, renewals=0, chosen=ALL).p[6] >= 0.0  # type: ignore[union-attr]
+    assert fit(simulator, np.zeros(8), sd, first, renewals=0).p[6] >= 0.0  # type: ignore[union-attr]
     assert unknowns().group("crack").low == 0.0
 
 
@@ -68,9 +68,9 @@ def test_what_the_records_do_not_show_is_known_as_before() -> None:
     blind = MATRIX.copy()
     blind[4] = 0.0
     simulator = FakeSimulator(lambda p: p @ blind, target(TRUE @ blind + noise(1e-3)))
-    first = sensitivity_of(simulator, np.zeros(8), SD, ALL)
+    first = sensitivity_of(simulator, np.zeros(8), SD)
     assert first is not None
-    best = fit(simulator, np.zeros(8), SD, first, renewals=1, chosen=ALL)
+    best = fit(simulator, np.zeros(8), SD, first, renewals=1)
     assert best is not None and best.p[4] == 0.0
     assert best.std[4] == SD[4] and 0.0 < best.std[0] < SD[0]
 
@@ -92,9 +92,9 @@ def test_what_is_not_felt_yet_does_not_stand_in_the_way(monkeypatch: pytest.Monk
     monkeypatch.setattr("gearbench.diagnosis.output.fit.LEAST_STEP", {"friction": 0.2})
     simulator = Jumping(lambda p: np.where(np.arange(8) == 3, p * (p >= 0.2), p) @ ALIKE, target(0.12 * MATRIX[0]))
     sd = np.array([0.02, *SD[1:]])
-    first = sensitivity_of(simulator, np.zeros(8), sd, ALL)
+    first = sensitivity_of(simulator, np.zeros(8), sd)
     assert first is not None
-    best = fit(simulator, np.zeros(8), sd, first, renewals=2, chosen=ALL)
+    best = fit(simulator, np.zeros(8), sd, first, renewals=2)
     assert best is not None and best.left < 0.5
     assert best.p[0] == pytest.approx(0.12, abs=2e-3)
 
@@ -109,8 +109,8 @@ def test_a_valley_that_bends_is_followed_to_its_end() -> None:
     begin = np.array([-0.5, -0.5, 0.05, 0.3, 0.0, 0.0, 0.0, 0.0])
     wide = np.where(SD > 0.0, 10.0, 0.0)
     simulator = FakeSimulator(bent, target(bent(true) + noise(1e-3)))
-    first = sensitivity_of(simulator, begin, wide, ALL)
+    first = sensitivity_of(simulator, begin, wide)
     assert first is not None
-    best = fit(simulator, begin, wide, first, renewals=20, chosen=ALL)
+    best = fit(simulator, begin, wide, first, renewals=20)
     assert best is not None and best.left < 0.5
     assert best.p == pytest.approx(true, abs=5e-3)

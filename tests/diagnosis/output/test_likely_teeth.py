@@ -14,7 +14,6 @@ from gearbench.diagnosis.output.fit import fit, sensitivity_of
 from gearbench.diagnosis.output.likely_teeth import LIKELY, gains_of, with_likely_teeth
 
 SD = np.array([0.1, 0.1, 0.1, 0.01, 0.01, 0.01, 0.0, 0.0])
-ALL = np.ones(8, dtype=bool)
 CRACKED = 7  # of the driven gear: its number among all teeth is 27
 
 
@@ -22,9 +21,9 @@ def test_gains_are_those_of_least_squares_beside_all_that_may_move() -> None:
     matrix = sensitivities(5)
     lines = np.array([0.08, -0.1, 0.02, 0.0, 0.0, 0.0, 0.0, 0.15]) @ matrix
     simulator = FakeSimulator(lambda p: p @ matrix, target(lines, floor=1e-3))
-    first = sensitivity_of(simulator, np.zeros(8), SD, ALL)
+    first = sensitivity_of(simulator, np.zeros(8), SD)
     assert first is not None
-    base = fit(simulator, np.zeros(8), SD, first, renewals=2, chosen=ALL)
+    base = fit(simulator, np.zeros(8), SD, first, renewals=2)
     assert base is not None
     wide = np.array([0.35, 0.35])
     gains = gains_of(base, wide, matrix[6:])
@@ -61,10 +60,9 @@ def test_the_cracked_tooth_of_a_rig_is_among_them_though_nobody_ranked_it() -> N
     made = replace(simulator, target=replace(simulator.target, lines=lines), _kept={})
     sd = unknowns.prior()
     sd[unknowns[CRACK]] = 0.0
-    chosen = np.ones(unknowns.size, dtype=bool)
-    first = sensitivity_of(made, np.zeros(unknowns.size), unknowns.prior(), chosen)
+    first = sensitivity_of(made, np.zeros(unknowns.size), unknowns.prior())
     assert first is not None
-    base = fit(made, np.zeros(unknowns.size), sd, first, renewals=0, chosen=chosen)
+    base = fit(made, np.zeros(unknowns.size), sd, first)
     assert base is not None
     found, again = with_likely_teeth(made, base, (3,))
     assert found.layout.teeth[0] == 3 and len(found.layout.teeth) <= LIKELY + 1

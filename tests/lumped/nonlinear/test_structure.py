@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from shared.effect_rig import FORCE, GEARS, MASSES, make_model, make_rig, run
 from shared.hat_mesh import ALPHA, RADII, hat_law
-from shared.plain_structure import UNKNOWNS, plain_rates
+from shared.plain_structure import UNKNOWNS, plain_rates, shares
 
 from gearbench.lumped import LumpedError
 from gearbench.lumped.nonlinear.coordinates import NAMES
@@ -59,10 +59,14 @@ def supports(across: float | None = 1.0, direction: str = "tangential", exponent
 
 ROTOR = Coupling(inertia=2e-3, stiffness=9e3, damping=0.6)
 SHAFT = OutputShaft(inertia=6e-3, stiffness=2e4, damping=1.1)
-HOUSING = Housing(
+STRAIGHT = Housing(
     mass=25.0, stiffness=6e8, damping=4e3, driven_share=0.7,
     rocking=Rocking(mass=12.0, stiffness=9e8, damping=3e3, driven_share=-0.8),
 )  # fmt: skip
+HOUSING = STRAIGHT.model_copy(update={
+    "driver_share_across": 0.4, "driven_share_across": -0.6,
+    "rocking": STRAIGHT.rocking.model_copy(update={"driver_share_across": -0.3, "driven_share_across": 0.9}),
+})  # fmt: skip
 
 
 def full_rig(**fields: Any) -> Rig:
@@ -130,7 +134,8 @@ EVERY = set(UNKNOWNS)
             EVERY - {"rotor"},
         ),
         (
-            {"drive": Drive(boundary="speed"), "load": Load(boundary="torque"), "support": supports(None)},
+            {"drive": Drive(boundary="speed"), "load": Load(boundary="torque"), "support": supports(None),
+             "housing": STRAIGHT},
             {"driven", "housing", "rocking", "y1", "y2"},
         ),
     ],
@@ -165,7 +170,7 @@ def dte(rig: Rig) -> Array:
     [
         ({"housing": Housing(mass=20.0, stiffness=1e13, damping=1e5)}, {"housing": None}),
         ({"housing": Housing(mass=1e7, stiffness=1e8)}, {"housing": None}),
-        ({"support": supports(1e4)}, {"support": supports(None)}),
+        ({"support": supports(1e4), "housing": STRAIGHT}, {"support": supports(None), "housing": STRAIGHT}),
         (
             {"load": Load(boundary="torque", coupling=OutputShaft(inertia=6e-3, stiffness=3e8))},
             {"load": Load(boundary="torque", coupling=OutputShaft(inertia=6e-3))},
@@ -220,8 +225,9 @@ def test_energy_is_balanced(load: str) -> None:
     rocks = house.rocking
     assert rocks is not None
     bodies += (("rocking", rocks.mass),)
-    along = {"y1": place["y1"] - house.driver_share * place["housing"] - rocks.driver_share * place["rocking"]}
-    along["y2"] = place["y2"] - house.driven_share * place["housing"] - rocks.driven_share * place["rocking"]
+    feet = place["housing"] * shares(house)[..., None] + place["rocking"] * shares(rocks)[..., None]
+    along = {"y1": place["y1"] - feet[0, 0], "y2": place["y2"] - feet[1, 0]}
+    across = {"x1": place["x1"] - feet[0, 1], "x2": place["x2"] - feet[1, 1]}
     kinetic = sum(0.5 * mass * rate[name] ** 2 for name, mass in bodies)
     deflection = RADII[0] * place["driver"] - RADII[1] * place["driven"]
     deflection = deflection + cos(ALPHA) * (place["y1"] - place["y2"]) + sin(ALPHA) * (place["x1"] - place["x2"])
@@ -233,13 +239,13 @@ def test_energy_is_balanced(load: str) -> None:
         (place["rocking"], rocks.stiffness, rocks.damping),
         (along["y1"], one.stiffness, one.damping),
         (along["y2"], two.stiffness, two.damping),
-        (place["x1"], one.across.stiffness, one.across.damping),
-        (place["x2"], two.across.stiffness, two.across.damping),
+        (across["x1"], one.across.stiffness, one.across.damping),
+        (across["x2"], two.across.stiffness, two.across.damping),
     ]
     potential = sum(0.5 * k * d**2 for d, k, _ in springs)
     for name, support in (("1", one), ("2", two)):
         assert support.across is not None
-        potential = potential + support.across.coupling * along[f"y{name}"] * place[f"x{name}"]
+        potential = potential + support.across.coupling * along[f"y{name}"] * across[f"x{name}"]
     lost = sum(c * np.gradient(d, step) ** 2 for d, _, c in springs)
     power = torque(time) * rate["rotor"] - out.load_force * RADII[1] * rate["load"]
     stored = kinetic + potential

@@ -28,6 +28,7 @@ def oscillator(on_mesh: float) -> tuple[Tangent, float]:
         stiffer=np.empty((entries, 0)),
         turned_on=np.zeros(1),
         turning=np.zeros(entries),
+        rubbed=np.zeros((entries, 1)),
     )
     return tangent, 900.0
 

@@ -1,0 +1,44 @@
+"""Friction along a motion: which forces come with a normal force in the mesh, at every instant of it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.lumped.nonlinear.coordinates import NAMES
+from gearbench.lumped.nonlinear.model import NonLinear
+
+Array = NDArray[np.float64]
+
+U1, Y1, Y2, U2 = (NAMES.index(name) for name in ("u1", "y1", "y2", "u2"))
+X1, X2 = (NAMES.index(name) for name in ("x1", "x2"))
+
+
+def rubbed_along(model: NonLinear, position: Array, pace: Array, rates: Array, mesh_frequency: float) -> Array:
+    """What friction adds to the deflection's direction (entries, n): a normal force f in the mesh pushes coordinate i
+    by -f (m_i + this), m_i being what it contributes to the deflection.
+
+    `position` (entries,) in rows of the mesh law, `pace` (entries,) the speed of the rotation over that of
+    `mesh_frequency` [Hz], `rates` (entries, n) of the coordinates [m/s]. The levers are those of `forces.friction`.
+    """
+    out = np.zeros_like(rates)
+    r = model.rubbing(mesh_frequency)
+    if r is None:
+        return out
+    further = rates.shape[1] > X2
+    aside = model.factor * (rates[:, X1] - rates[:, X2]) if further else 0.0
+    u1, u2, closing = rates[:, U1], rates[:, U2], rates[:, Y1] - rates[:, Y2]
+    middle = r.centre1 * u1 - r.centre2 * u2 + r.slide * closing - aside
+    slope = pace * r.drift + r.pitch1 * u1 + r.pitch2 * u2
+    rows = len(r.share) - 1
+    row = np.minimum(position.astype(int), rows - 1)
+    share = r.share[row] + (position - row)[:, None] * (r.share[row + 1] - r.share[row])
+    away = (position / rows - r.offset)[:, None] - np.arange(r.share.shape[1])
+    part = share * r.coefficient * np.tanh((middle[:, None] + away * slope[:, None]) * r.steepness)
+    along = part.sum(axis=1)
+    out[:, U1] = (part * (r.centre1 + away * r.pitch1)).sum(axis=1)
+    out[:, U2] = -(part * (r.centre2 - away * r.pitch2)).sum(axis=1)
+    out[:, Y1], out[:, Y2] = r.slide * along, -r.slide * along
+    if further:
+        out[:, X1], out[:, X2] = -model.factor * along, model.factor * along
+    return out
