@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from math import hypot, sqrt
+from math import hypot, pi, sqrt
 
 import xarray as xr
 
@@ -56,6 +56,9 @@ def identify(
     '12%'
     """
     frf = _identified(records, settings or IdentificationSettings(), progress or (lambda fraction, message: None))
+    teeth = records[0].attrs.get("teeth_driver")
+    if teeth and "switch_phases" in frf.attrs:
+        frf.attrs["switch_angles_driver"] = [2 * pi * float(phase / teeth) for phase in frf.attrs["switch_phases"]]
     if not _simulated(records):
         _require_response(frf)
     return frf

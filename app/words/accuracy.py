@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import degrees
 from typing import Any
 
 ENOUGH = 0.02  # expected rms error of the ITF above which pictures carry a warning
@@ -128,8 +129,22 @@ def _polynomial_fit(found: dict[str, Any]) -> list[str]:
 
 def _feedback_fit(found: dict[str, Any]) -> list[str]:
     return [
-        f"Mesh feedback with {found['mesh_harmonics']} harmonics of the mesh: {found['unknowns']} unknowns from"
-        f" {found['equations']} equations.",
+        f"Mesh feedback with {_basis(found)}: {found['unknowns']} unknowns from {found['equations']} equations.",
         f"Expected error of the ITF: {found['expected_error']:.2%} of its rms (variance {found['variance_error']:.2%},"
         f" not explained by a varying mesh force {found['unexplained_error']:.2%}).",
     ]
+
+
+def _basis(found: dict[str, Any]) -> str:
+    """What the mesh's stiffness and damping were told by."""
+    if found.get("mesh_basis") != "zones":
+        return f"{found['mesh_harmonics']} harmonics of the mesh"
+    first, second = found["switch_phases"]
+    angles = found.get("switch_angles_driver")
+    turn = f" ({degrees(angles[0]):.3g} and {degrees(angles[1]):.3g} degrees of the driver)" if angles else ""
+    return (
+        f"zones of phase and a remainder of harmonics: switches at {first:.4g} and {second:.4g} of the mesh cycle"
+        f"{turn}, {found['switch_width']:.2g} wide, {found['switch_cubics']} cubic(s) across each, which gain"
+        f" {found['evidence_gain']:.0f} in twice the logarithm of the evidence over harmonics; the record determines"
+        f" {found['mesh_determined']:.0f} numbers of the mesh"
+    )

@@ -113,13 +113,28 @@ def _about_fit(found: Feedback, spectra: Spectra, ratio: float) -> dict[str, Any
     """Attributes that say what was fitted, how well, and of a prediction for which mesh frequency."""
     own = found.data.mesh_lines * spectra.spacing
     predicted = {} if ratio == 1.0 else {"mesh_frequency": own * ratio, "identified_at_mesh_frequency": own}
-    return predicted | {
+    return predicted | _about_basis(found) | {
         "form": "centres from angles" if found.model.torsional else "dte",
         "mesh_harmonics": found.model.harmonics,
         "pole_pairs": found.model.basis.pairs.shape[0],
-        "unknowns": found.model.vector().size,
+        "unknowns": found.refined.root.shape[1],
         "equations": round(found.data.equations),
         "residual": float(np.sqrt(found.refined.noise)),
+    }
+
+
+def _about_basis(found: Feedback) -> dict[str, Any]:
+    """Attributes that say what the mesh was told by: phases in cycles, the gain in twice the log evidence."""
+    zones = found.zones
+    if zones is None:
+        return {"mesh_basis": "harmonics"}
+    return {
+        "mesh_basis": "zones",
+        "switch_phases": list(zones.switches),
+        "switch_width": zones.width,
+        "switch_cubics": zones.pieces,
+        "evidence_gain": found.gain,
+        "mesh_determined": found.refined.mesh.determined if found.refined.mesh else 0.0,
     }
 
 

@@ -1,10 +1,11 @@
-"""Gauss-Newton on the output error Y - A^-1 N U, with a prior on how fast the mesh's harmonics decay.
+"""Gauss-Newton on the output error Y - A^-1 N U, with a prior on what the mesh is made of.
 
     d(A^-1 N U) = A^-1 (dN U - dA Y^),  Y^ = A^-1 N U: columns are made from the model's response, not from the measured
     one, so that noise does not bias them.
 
 The harmonics of a piecewise smooth stiffness fall like 1/l (with edges of finite width faster): k_l has the prior
-variance tau^2 / l^2, c_l likewise. tau follows from the estimate itself (MacKay 1992, evidence approximation).
+variance tau^2 / l^2, c_l likewise. tau follows from the estimate itself (MacKay 1992, evidence approximation). Zones of
+phase bring a prior of their own (`shapes.py`).
 """
 
 from __future__ import annotations
@@ -16,7 +17,8 @@ from scipy.linalg import cho_factor, cho_solve, solve_triangular
 
 from gearbench.identification.feedback.data import ClassData
 from gearbench.identification.feedback.model import Model, Operator
-from gearbench.identification.feedback.start import gauged
+from gearbench.identification.feedback.shapes import Mesh, Shapes
+from gearbench.identification.feedback.start import gauge_factor
 from gearbench.identification.spectra.joint import Complexes, Floats
 
 ROUNDS = 12
@@ -34,14 +36,15 @@ GAUGE = 1e3
 @dataclass(frozen=True)
 class Refined:
     """Model, the residual of its response (C, S, E) in units of the data, on all lines that dte is known on, `noise`
-    variance per complex equation, `root` (P, P) of the covariance of the real parameters, and `freedom`: complex
-    equations less parameters."""
+    variance per complex equation, `root` (P, X) of the covariance of the real parameters, `freedom`: complex equations
+    less parameters that they determine; `mesh`: what the model's mesh is made of, harmonics for None."""
 
     model: Model
     left: Complexes
     noise: float
     root: Floats
     freedom: float
+    mesh: Mesh | None = None
 
     @property
     def covariance(self) -> Floats:
@@ -67,36 +70,36 @@ def _shown(model: Model, data: ClassData, deflection: Complexes) -> Complexes:
     return model.shown(data.omega[:, :, None], deflection, data.force) * data.modelled[:, :, None]
 
 
-def refined(model: Model, data: ClassData, settled: float = SETTLED) -> Refined:
-    """The model of least output error, from a first one; rounds end at a relative decrease of the cost by `settled`."""
-    operator = Operator(model, data.omega, data.modelled)
-    predicted = _deflection(operator, data)
-    cost = _cost(data, _shown(model, data, predicted))
-    prior = _prior(model, None)
-    damping = 0.0
+def refined(model: Model, data: ClassData, settled: float = SETTLED, mesh: Mesh | None = None) -> Refined:
+    """The model of least output error, from a first one; rounds end where the objective falls by less than `settled`.
+
+    `mesh`: what the model's mesh is made of, with the amplitudes that it has; of harmonics unless given.
+    """
+    mesh = mesh or Mesh.of_harmonics(model.vector()[model.free :])
+    now, damping = _State.of(model, mesh, data), 0.0
     for _ in range(ROUNDS):
-        gram, right = _normal(model, data, operator, predicted)
-        freedom = _freedom(data, model)
-        noise = cost / freedom
-        system = _System(model, gram, right, noise, prior)
+        noise = now.cost / _freedom(data, now)
+        system = _system(now, data, noise)
         root = system.root()
-        trial, operator_of, of_trial, cost_of, damping = _damped(model, system, data, cost, damping)
-        if cost_of > cost * (1 + SETTLED):
+        trial, damping = _damped(now, system, data, noise, damping)
+        if trial is None:
             break  # no step along this direction helps
-        before, cost = cost, cost_of
-        model, operator, predicted, prior = trial, operator_of, of_trial, _prior(trial, root)
-        if before - cost < settled * before:
+        gained = now.objective(noise) - trial.objective(noise)
+        last = gained < settled * now.objective(noise)
+        now = replace(trial, mesh=trial.mesh.told(root[model.free :]))
+        if last:
             break
-    left = np.where(data.dte != 0, data.dte - _shown(model, data, predicted), 0.0)
-    return Refined(model, left, cost / _freedom(data, model), root, _freedom(data, model))
+    left = np.where(data.dte != 0, data.dte - _shown(now.model, data, now.deflection), 0.0)
+    freedom = _freedom(data, now)
+    return Refined(now.model, left, now.cost / freedom, now.mesh.of_model(root, model.free), freedom, now.mesh)
 
 
 def settled_covariance(fit: Refined, data: ClassData) -> Refined:
     """The same with the covariance at the model itself; that of `refined` belongs to the model before its last step,
     which is another one where a pole comes near zero frequency."""
-    gram, right = linearised(fit.model, data)
-    system = _System(fit.model, gram, right, fit.noise, _prior(fit.model, fit.root))
-    return replace(fit, root=system.root())
+    assert fit.mesh is not None
+    root = _system(_State.of(fit.model, fit.mesh, data), data, fit.noise).root()
+    return replace(fit, root=fit.mesh.of_model(root, fit.model.free))
 
 
 def output_error(model: Model, data: ClassData) -> float:
@@ -104,27 +107,64 @@ def output_error(model: Model, data: ClassData) -> float:
     return _cost(data, response(model, data))
 
 
-def linearised(model: Model, data: ClassData) -> tuple[Floats, Floats]:
-    """J^T J and J^T r of the output error of a model."""
+def linearised(model: Model, data: ClassData, shapes: Shapes | None = None) -> tuple[Floats, Floats]:
+    """J^T J and J^T r of the output error of a model; with respect to its parameters, or to those of D and N and the
+    amplitudes of `shapes` of its mesh."""
     operator = Operator(model, data.omega, data.modelled)
-    return _normal(model, data, operator, _deflection(operator, data))
+    return _normal(model, data, operator, _deflection(operator, data), shapes)
+
+
+@dataclass(frozen=True)
+class _State:
+    """A model, what its mesh is made of, and its response."""
+
+    model: Model
+    mesh: Mesh
+    operator: Operator
+    deflection: Complexes
+    cost: float
+
+    @staticmethod
+    def of(model: Model, mesh: Mesh, data: ClassData) -> _State:
+        operator = Operator(model, data.omega, data.modelled)
+        deflection = _deflection(operator, data)
+        return _State(model, mesh, operator, deflection, _cost(data, _shown(model, data, deflection)))
+
+    def objective(self, noise: float) -> float:
+        """What a step must lower: the error and, in its units, how unlikely amplitudes are under a prior that is held.
+        One that follows the estimate does not hold a step back."""
+        return self.cost + (0.5 * noise * self.mesh.unlikely if self.mesh.held else 0.0)
+
+    def moved(self, step: Floats, data: ClassData) -> _State:
+        """The same with parameters moved by a step of D, N and the amplitudes, its common factor that of its own N."""
+        free, mesh = self.model.free, self.mesh.moved(step[self.model.free :])
+        model = self.model.moved(np.concatenate([self.model.vector()[:free] + step[:free], mesh.harmonics]))
+        factor = gauge_factor(model, data)
+        return _State.of(model.scaled(factor), mesh.scaled(factor**model.gauge), data)
+
+
+def _system(now: _State, data: ClassData, noise: float) -> _System:
+    """Normal equations at a state."""
+    model, mesh, free = now.model, now.mesh, now.model.free
+    gram, right = _normal(model, data, now.operator, now.deflection, mesh.shapes)
+    vector = np.concatenate([model.vector()[:free], mesh.amplitudes])
+    direction = np.concatenate([model.scale_direction()[:free], model.gauge * mesh.amplitudes])
+    prior = np.concatenate([np.zeros(free), mesh.precision])
+    return _System(vector, direction, gram, right, noise, prior)
 
 
 def _damped(
-    model: Model, system: _System, data: ClassData, cost: float, damping: float
-) -> tuple[Model, Operator, Complexes, float, float]:
-    """The model after the step, or the first of ever more damped ones that does not raise the cost; the damping that
-    the next step begins with."""
+    now: _State, system: _System, data: ClassData, noise: float, damping: float
+) -> tuple[_State | None, float]:
+    """The state after the step, or the first of ever more damped ones that lowers the objective (does not raise it by
+    SETTLED of it, where the prior is renewed all the same), if any; the damping that the next step begins with."""
+    least = now.objective(noise) * (1.0 if now.mesh.held else 1.0 + SETTLED)
     for _ in range(TRIALS):
-        trial = gauged(model.moved(model.vector() + system.step(damping)), data)
-        operator = Operator(trial, data.omega, data.modelled)
-        predicted = _deflection(operator, data)
-        found = _cost(data, _shown(trial, data, predicted))
-        if found < cost * (1 + SETTLED):
-            break
+        trial = now.moved(system.step(damping), data)
+        if trial.objective(noise) < least:
+            return trial, damping / GROWTH if damping > DAMPING else 0.0
         damping = max(GROWTH * damping, DAMPING)
-    following = damping / GROWTH if damping > DAMPING else 0.0
-    return trial, operator, predicted, found, following
+    return None, damping
 
 
 def _cost(data: ClassData, predicted: Complexes) -> float:
@@ -134,29 +174,17 @@ def _cost(data: ClassData, predicted: Complexes) -> float:
     return value if np.isfinite(value) else np.inf
 
 
-def _freedom(data: ClassData, model: Model) -> float:
-    return max(data.equations - 0.5 * model.vector().size, 1.0)
+def _freedom(data: ClassData, now: _State) -> float:
+    return max(data.equations - 0.5 * (now.model.free + now.mesh.determined), 1.0)
 
 
-def _prior(model: Model, root: Floats | None) -> Floats:
-    """Prior precision of each real parameter, 0 for those of D and N, from their values and their covariance's root."""
-    harmonics = model.harmonics
-    order = np.arange(1, harmonics + 1)
+def _normal(
+    model: Model, data: ClassData, operator: Operator, deflection: Complexes, shapes: Shapes | None = None
+) -> tuple[Floats, Floats]:
+    """J^T J and J^T r of the stacked real equations, at the model's own `deflection` (C, S, E), with respect to its
+    parameters, or to those of D and N and the amplitudes of `shapes` of the mesh."""
     free = model.free
-    precision = np.zeros(free + 4 * harmonics)
-    spread = np.zeros(4 * harmonics) if root is None else np.sum(root[free:] ** 2, axis=1)
-    for first, values in ((0, model.k), (2 * harmonics, model.c)):
-        own = spread[first : first + 2 * harmonics].reshape(2, harmonics)
-        size = np.mean(order**2 * (values.real**2 + values.imag**2 + own[0] + own[1])) / 2
-        for part in (0, 1):
-            start = free + first + part * harmonics
-            precision[start : start + harmonics] = order**2 / max(size, np.finfo(float).tiny)
-    return precision
-
-
-def _normal(model: Model, data: ClassData, operator: Operator, deflection: Complexes) -> tuple[Floats, Floats]:
-    """J^T J and J^T r of the stacked real equations, at the model's own `deflection` (C, S, E)."""
-    count = model.vector().size
+    count = model.vector().size if shapes is None else free + shapes.weight.size
     gram, right = np.zeros((count, count)), np.zeros(count)
     for index in range(data.lines.shape[0]):
         omega, valid, modelled = data.omega[index], data.valid[index], data.modelled[index]
@@ -168,6 +196,8 @@ def _normal(model: Model, data: ClassData, operator: Operator, deflection: Compl
             y = deflection[index, :, experiment] * modelled
             u = data.force[index, :, experiment]
             columns = -model.columns(values, omega, y, u)
+            if shapes is not None:
+                columns = np.concatenate([columns[:, :free], shapes.columns(columns[:, free:])], axis=1)
             columns = operator.solve(index, columns * modelled[:, None])
             columns = model.shown_columns(values, omega, columns, y, u) * data.weight[index]
             own = valid & (omega >= 0) if 2 * data.weight[index] ** 2 <= 1.01 else valid
@@ -181,16 +211,19 @@ def _normal(model: Model, data: ClassData, operator: Operator, deflection: Compl
 
 
 class _System:
-    """Normal equations of all real parameters, scaled to a diagonal of one; `noise`: variance of a complex equation."""
+    """Normal equations of all real parameters `vector`, scaled to a diagonal of one; `direction`: along which all have
+    a common factor; `noise`: variance of a complex equation."""
 
-    def __init__(self, model: Model, gram: Floats, right: Floats, noise: float, prior: Floats) -> None:
+    def __init__(
+        self, vector: Floats, direction: Floats, gram: Floats, right: Floats, noise: float, prior: Floats
+    ) -> None:
         precision = 2.0 / noise
         total = precision * gram + np.diag(prior)
         self.size = np.sqrt(np.maximum(np.diagonal(total), TINY * np.diagonal(total).max()))
-        self.pull = (precision * right - prior * model.vector()) / self.size
+        self.pull = (precision * right - prior * vector) / self.size
         self.total = total / self.size / self.size[:, None]
         self.total[np.diag_indices_from(self.total)] += TINY
-        scaled = model.scale_direction() * self.size
+        scaled = direction * self.size
         scaled /= np.linalg.norm(scaled)
         self.total += GAUGE * np.outer(scaled, scaled)
 

@@ -153,7 +153,8 @@ def unexplained(found: Feedback, band: tuple[int, int]) -> float:
 
     It is what the residuals share with the inputs, less what noise would (docs/identification.md, "How far a result
     goes"); and, where a window has more branches than equations, so that chance hides much, one deviation of chance as
-    far as residuals exceed those of quiet windows.
+    far as residuals exceed those of quiet windows. As far as they are as even as noise, what is shared must exceed that
+    deviation: chance alone would make half of all records promise too little of themselves.
     """
     data, d = found.data, found.data.mesh_lines
     size = 2 * data.top + 1
@@ -188,7 +189,9 @@ def unexplained(found: Feedback, band: tuple[int, int]) -> float:
         levels, weights = np.array(above).T
         quietest = np.quantile(levels, QUIET) * (1.0 + LEAST_OF_WINDOWS / np.sqrt(width * left.shape[1]))
         hidden = max(float((levels - quietest) @ weights), 0.0)
-        total = max(total, 0.0) + min(float(np.sqrt(chance)), hidden)
+        deviation = float(np.sqrt(chance))
+        hidden = min(deviation, hidden)
+        total = max(total - (deviation - hidden), 0.0) + hidden
     return total / data.stiffness_unit**2
 
 

@@ -85,9 +85,17 @@ def _gram(data: ClassData, model: Model, weights: Floats) -> Floats:
 
 
 def gauged(model: Model, data: ClassData) -> Model:
-    """The same response with N real and 1 on average over the lowest twentieth of the excited band.
+    """The same response with N real and 1 at frequency 0.
 
     All of D, N, k, c may be multiplied by one real number without a change of the response.
     """
-    scale = 1.0 / float(model.functions(data.begins)[1].real.mean())
-    return model.scaled(scale)
+    return model.scaled(gauge_factor(model, data))
+
+
+def gauge_factor(model: Model, data: ClassData) -> float:
+    """The number that N has to be multiplied by for that: N = N(0) (1 - w^2 ..) over the lowest twentieth of the band.
+
+    On average over these lines N is less than 1 by some thousandths, and k would be more by as much.
+    """
+    position = data.begins
+    return 1.0 / float(np.polyfit(position**2, model.functions(position)[1].real, 1)[1])

@@ -19,7 +19,7 @@ from gearbench.figures.responses import frf as figures_frf
 from gearbench.figures.responses.frf import draw_itf, draw_natural_frequencies
 from gearbench.geometry import pair
 from gearbench.rig import read_case
-from gearbench.words.accuracy import honest_warning
+from gearbench.words.accuracy import honest_warning, trust
 from gearbench.words.summary import headline
 
 
@@ -124,6 +124,23 @@ def test_warning_names_what_limits_and_what_helps() -> None:
     feedback = {"method": "mesh-feedback", "unexplained_error": 0.0, "variance_error": 0.1}
     assert "noise (10.0%)" in honest_warning(numbers(**given | feedback))
     assert "does not explain" in honest_warning(numbers(**given | feedback | {"unexplained_error": 0.1}))
+
+
+def test_what_a_mesh_was_told_by_is_said() -> None:
+    given = {
+        "method": "mesh-feedback", "mesh_harmonics": 150, "unknowns": 440, "equations": 3000, "expected_error": 0.002,
+        "variance_error": 0.002, "unexplained_error": 0.0,
+    }  # fmt: skip
+    zones = {
+        "mesh_basis": "zones", "switch_phases": [0.0, 0.6], "switch_width": 0.02, "switch_cubics": 2,
+        "evidence_gain": 1290.4, "mesh_determined": 29.7,
+    }  # fmt: skip
+    assert "with 150 harmonics of the mesh: 440 unknowns" in trust(numbers(**given))[0]
+    said = trust(numbers(**given, **zones))[0]
+    assert "switches at 0 and 0.6 of the mesh cycle, 0.02 wide, 2 cubic(s)" in said
+    assert "gain 1290 in twice the logarithm" in said and "determines 30 numbers" in said
+    turned = trust(numbers(**given, **zones, switch_angles_driver=[0.0, 0.06]))[0]
+    assert "(0 and 3.44 degrees of the driver)" in turned
 
 
 def test_headline_orders_the_answers() -> None:

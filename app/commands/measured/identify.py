@@ -88,6 +88,12 @@ def _tell(summary: Mapping[str, Any], out: Path) -> None:
         f"{out}: {mode}; {summary['unknowns']} unknowns, {summary['equations']} equations"
         f" a window; expected error of the ITF {summary['expected_error']:.1%}"
     )
+    if summary.get("mesh_basis") == "zones":
+        first, second = summary["switch_phases"]
+        typer.echo(
+            f"mesh in zones of phase: switches at {first:.4g} and {second:.4g} of the mesh cycle,"
+            f" {summary['switch_width']:.2g} wide"
+        )
     for line in distortion_lines(summary["distortion"]) if "distortion" in summary else []:
         typer.echo(line)
     for warning in summary["warnings"]:
@@ -110,7 +116,10 @@ def frf_summary(found: xr.Dataset, path: Path) -> dict[str, Any]:
     """What a frequency response says about itself."""
     from gearbench.bench.results.measures import mode_range
 
-    keys = ("branches", "harmonics", "order", "window", "unknowns", "equations", "condition_number", "expected_error")
+    keys = (
+        *("branches", "harmonics", "order", "window", "unknowns", "equations", "condition_number", "expected_error"),
+        *("mesh_basis", "switch_phases", "switch_angles_driver", "switch_width", "evidence_gain"),
+    )
     numbers = {key: found.attrs[key] for key in keys if key in found.attrs}
     warnings = [line for line in str(found.attrs.get("warnings", "")).splitlines() if line]
     return {"file": str(path), "first_mode_hz": mode_range(found), **numbers, "warnings": warnings}

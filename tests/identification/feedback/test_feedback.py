@@ -20,6 +20,7 @@ from gearbench.identification.feedback.functions import Basis, Fractions, Spline
 from gearbench.identification.feedback.model import Model
 from gearbench.identification.feedback.refine import Refined, response
 from gearbench.identification.feedback.result import along_phase, htf_on
+from gearbench.identification.feedback.start import gauged
 from gearbench.identification.spectra.records import record_spectra
 from gearbench.identification.truth.monodromy import exact_itf
 from gearbench.identification.truth.periodic import itf_from_htf, truncation_error
@@ -145,6 +146,14 @@ def test_sidebands_beyond_the_lines_act_back() -> None:
     for lowest, part in ((0, 1e-3), (data.excited, 8e-3)):
         there = (data.valid & (np.abs(data.lines) > lowest))[1:]
         assert np.linalg.norm(left[there]) < part * np.linalg.norm(data.dte[1:][there])
+
+
+def test_functions_refer_to_frequency_zero(record: xr.Dataset) -> None:
+    """The rig's own N is 1 there, and 0.998 on average over the lowest lines."""
+    spectra, excited, _ = record_spectra([record], sidebands=40)
+    data = class_data(spectra, round(excited[1]))
+    model = rig_model(RIG, data)
+    assert gauged(model.scaled(1.7), data).k == pytest.approx(model.k, rel=1e-4)
 
 
 def test_derivatives_of_the_equations(record: xr.Dataset) -> None:
