@@ -4,33 +4,33 @@ from __future__ import annotations
 
 from gearbench.diagnosis.odds import Calibration, Odds
 
-# Fitted by benchmarks/diagnosis_population.py to 51 drawn rigs of the calibration family (seed 60523): weights
-# of 1, evidence, named, root of the share closed;
+# Fitted by benchmarks/diagnosis_population.py to 51 drawn rigs of the calibration family (seed 60523), and updated by
+# 50 of the development family (seeds 9912407 and 20260771): weights of 1, evidence, named, root of the share closed;
 EFFECT = Odds(
-    weights=(-4.962, 0.746, 4.368, 2.598),
+    weights=(-4.662, 1.025, 4.282, 2.446),
     covariance=(
-        (0.3491, 0.05402, -0.4023, -0.058),
-        (0.05402, 0.3141, -0.5255, -0.1527),
-        (-0.4023, -0.5255, 1.905, -0.5559),
-        (-0.058, -0.1527, -0.5559, 3.89),
+        (0.1201, -0.01986, -0.08746, 6.55e-05),
+        (-0.01986, 0.05511, -0.06086, -0.0162),
+        (-0.08746, -0.06086, 0.4553, -0.4362),
+        (6.55e-05, -0.0162, -0.4362, 2.707),
     ),
-    cases=552,
-    true=18,
+    cases=1192,
+    true=54,
 )
 # and of 1, logarithm of the largest sign over its limit.
 UNKNOWN = Odds(
-    weights=(0.6261, 1.363),
+    weights=(0.601, 1.405),
     covariance=(
-        (0.3477, 0.1722),
-        (0.1722, 0.2449),
+        (0.3048, 0.1591),
+        (0.1591, 0.1701),
     ),
-    cases=28,
-    true=12,
+    cases=45,
+    true=15,
 )
 
 # Limits: a drift of 0.4 % changes 0.0014 of the nominal gap, sound and slipping rigs of the development family up to
 # 0.006, a support that drifts by 4 % 0.08. Of a channel's fluctuation sound rigs leave up to 0.18 and not much
 # at one place.
 POPULATION = Calibration(
-    source="population", effect=EFFECT, unknown=UNKNOWN, rigs=51, structure=0.2, changing=0.03
+    source="population", effect=EFFECT, unknown=UNKNOWN, rigs=101, structure=0.2, changing=0.03
 )
