@@ -29,7 +29,7 @@ from gearbench.diagnosis.forces.covariance import KINDS, kinds_of
 from gearbench.diagnosis.forces.nominal import NominalModel
 from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.output.fit import prior_cost
-from gearbench.diagnosis.output.layout import Layout
+from gearbench.diagnosis.output.layout import Layout, around_mesh
 from gearbench.diagnosis.output.structure import (
     ACROSS,
     CROSS,
@@ -246,7 +246,7 @@ def _system(layout: Layout, p: Array) -> _System:
         springs_and_dampers,
     )
 
-    model = nonlinear_model(layout.case(p).rig, layout.meshing, layout.model.law)
+    model = nonlinear_model(around_mesh(layout, p), layout.meshing, layout.model.law)
     c, s = model.constants(), model.structure
     springs, dampers = springs_and_dampers(c, s, (c.stiffness1, c.stiffness2))
     inverse, mesh = inverse_masses(c, s), mesh_direction(c, s)

@@ -92,6 +92,14 @@ class Layout:
         return with_rig(case, rig)
 
 
+def around_mesh(layout: Layout, p: Array) -> Rig:
+    """What holds and drives the gears in the rig of these unknowns (size,), without what is in their mesh and sensors.
+    Raises ValueError for values that no rig may have."""
+    fitted = layout.fitted(p)
+    rig = _supports(recalibrated(layout.nominal, fitted).rig, layout, p)
+    return _drive(held(rig, layout.model, layout.unknowns, p), layout, fitted, None)
+
+
 def _all_of(name: str) -> Hypothesis:
     """A hypothesis of which only the values count, not the estimates."""
     return Hypothesis(name, "none", ())

@@ -145,7 +145,8 @@ def displacement_directions(s: Structure | None, sensor_share: float) -> tuple[A
     """What each coordinate contributes to what the displacement sensors of driver and driven gear show, which make that
     part of the supports' motion with the housing; (5,) or (10,)."""
     (first, second), (one, two) = support_directions(None), support_directions(s)
-    first, second = (np.pad(ground, (0, len(one) - COORDINATES)) for ground in (first, second))
+    further = np.zeros(len(one) - COORDINATES)
+    first, second = (np.concatenate([ground, further]) for ground in (first, second))
     return first + sensor_share * (one - first), second + sensor_share * (two - second)
 
 
