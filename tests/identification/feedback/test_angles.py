@@ -90,12 +90,14 @@ def by_mesh_feedback(record: xr.Dataset) -> xr.Dataset:
 
 
 def test_stiffness_from_angles_is_known_but_for_a_compliance_in_series() -> None:
-    """1/k' = 1/k + e: a spring in series with the mesh, which the supports are; the variance holds it."""
+    """1/k' = 1/k + e: a spring in series with the mesh, which the supports are; the variance holds it. The slope is
+    the square of N at frequency 0, of which a quarter of a second says little: over draws of noise 0.993 to 1.041, with
+    a standard deviation of 0.024."""
     found = by_mesh_feedback(angle_record(0.01))
     k = RIG.stiffness(found.phase.values)
     told, deviation = found["mesh_stiffness"].values, np.sqrt(found["mesh_stiffness_var"].values)
     (slope, series), *_ = np.linalg.lstsq(np.stack([1 / k, np.full(k.size, 1e-8)], axis=1), 1 / told, rcond=None)
-    assert slope == pytest.approx(1.0, abs=0.03)
+    assert slope == pytest.approx(1.0, abs=0.07)
     assert 0 < series * 1e-8 < 1.5 * sum(1 / support for support in RIG.support_stiffness)
     assert np.std(1 / told - slope / k) < 0.05 * np.std(1 / told)
     assert told.mean() < 0.8 * k.mean()
