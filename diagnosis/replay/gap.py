@@ -136,8 +136,8 @@ def band_energy(energy: Array, repeats: Flags, noise: float | None) -> BandEnerg
     if noise is not None:
         steady = np.maximum(energy[repeats] - noise, 0.0)
         variance += float((2 * noise * steady + noise**2).sum())
-    # Energy E of nu degrees of freedom has variance 2 E^2 / nu.
-    return BandEnergy(total, 2 * total**2 / variance if variance > 0 else np.inf)
+    # Energy E of nu degrees of freedom has variance 2 E^2 / nu; a sum of squares has one at least, whatever its noise.
+    return BandEnergy(total, max(2 * total**2 / variance, 1.0) if variance > 0 else np.inf)
 
 
 def _band_gap(

@@ -195,3 +195,9 @@ def test_means_carry_the_scatter_of_the_rows() -> None:
     assert gap.floor is not None and gap.floor.value == pytest.approx(1e-6)
     assert gap.nominal.value == pytest.approx(5e-6)
     assert gap.nominal.high - gap.nominal.low == pytest.approx(2 * 1.645e-6, rel=1e-3)
+
+
+def test_noise_far_beyond_what_is_left_keeps_an_interval() -> None:
+    """A tone that does not repeat leaves lines that are all noise."""
+    found = band_energy(np.full(4, 1e-14), np.ones(4, dtype=bool), 1e-9).rms()
+    assert 0.0 < found.low <= found.value <= found.high < 100 * found.value
