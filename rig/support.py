@@ -121,9 +121,9 @@ class Housing(Value):
 
     It takes each support along by a share of its own motion h: shares 1 and 1 are a body that moves along, 1 and 0.3
     one that stands softer at the driver. `mass`, `stiffness` and `damping` belong to h. The mesh pushes both supports
-    apart: a body that moves along hardly feels it, one that rocks feels all of it. With
-    `driver_share_across` and `driven_share_across` it moves obliquely. Displacement sensors that stand on it show what
-    is left of the gears' motion (`sensor_share`).
+    apart: a body that moves along hardly feels it, one that rocks feels all of it. With `driver_share_across` and
+    `driven_share_across` it moves obliquely. Displacement sensors that stand on it show what is left of the gears'
+    motion (`sensor_share`).
     """
 
     mass: float = quantity(unit="kg", gt=0.0, le=1e7, doc="mass of the housing")
@@ -141,17 +141,18 @@ class Housing(Value):
 
     def feet(self, moved: Array, rocked: Array) -> tuple[Array, Array]:
         """Motions (n,) [m] of the supports of driver and driven gear with both motions (n,) [m] of the housing."""
-        one, two = self.driver_share * moved, self.driven_share * moved
-        if self.rocking is None:
-            return one, two
-        return one + self.rocking.driver_share * rocked, two + self.rocking.driven_share * rocked
+        return self._feet(moved, rocked, "share")
 
     def feet_across(self, moved: Array, rocked: Array) -> tuple[Array, Array]:
         """The same across the supports' direction."""
-        one, two = self.driver_share_across * moved, self.driven_share_across * moved
+        return self._feet(moved, rocked, "share_across")
+
+    def _feet(self, moved: Array, rocked: Array, share: str) -> tuple[Array, Array]:
+        one, two = (getattr(self, f"{side}_{share}") * moved for side in ("driver", "driven"))
         if self.rocking is None:
             return one, two
-        return one + self.rocking.driver_share_across * rocked, two + self.rocking.driven_share_across * rocked
+        more = [getattr(self.rocking, f"{side}_{share}") * rocked for side in ("driver", "driven")]
+        return one + more[0], two + more[1]
 
     def goes_across(self, side: str) -> bool:
         """Whether the support of a `side`, driver or driven, moves across its direction with the housing."""

@@ -15,7 +15,7 @@ from gearbench.lumped.nonlinear.coordinates import IN_MESH, NAMES
 from gearbench.lumped.nonlinear.law import MeshLaw
 from gearbench.lumped.nonlinear.model import NonLinear
 from gearbench.lumped.nonlinear.pressing import Pressed, of_pairs, pressed
-from gearbench.lumped.nonlinear.rest import displacement_directions, inverse_masses, springs_and_dampers
+from gearbench.lumped.nonlinear.rest import inverse_masses, springs_and_dampers
 from gearbench.lumped.nonlinear.rubbing import rubbed_along
 from gearbench.lumped.nonlinear.step import columns
 from gearbench.lumped.nonlinear.tables import Table, instants
@@ -75,7 +75,7 @@ class Along:
         found = [departures(self.tangent, forces[:, one], on[one], self.substeps, self.early) for one in parts]
         places = np.concatenate([one for one, _ in found], axis=2)
         u1, u2 = (np.ascontiguousarray(places[:, number, :].T) for number in (U1, U2))
-        y1, y2 = (np.einsum("scn,c->ns", places, row.astype(places.dtype)) for row in self._displaced)
+        y1, y2 = (np.einsum("scn,c->ns", places, row.astype(places.dtype)) for row in self.model.displacements)
         twist = u2 - places[:, LOAD, :].T if self.model.rig.load.twists else None
         mesh = np.concatenate([two for _, two in found], axis=1).T
         mesh *= -(self.tangent.mesh[U2] + self.tangent.rubbed[:: 2 * self.substeps, U2]).astype(mesh.dtype)
@@ -89,12 +89,6 @@ class Along:
         y = seen["y_driver"] - seen["y_driven"]
         seen["dte"] = seen["angle_driver"] - seen["angle_driven"] + self.model.factor * y
         return seen
-
-    @cached_property
-    def _displaced(self) -> tuple[Array, Array]:
-        """What each coordinate contributes to what both displacement sensors show."""
-        housing = self.model.rig.housing
-        return displacement_directions(self.model.structure, housing.sensor_share if housing is not None else 0.0)
 
     def _twisted(self, twist: Array) -> Array:
         """Force [N] of the load's shaft twisted by so much (columns, samples) [m]."""
@@ -158,8 +152,7 @@ def along(steady: Steady) -> Along:
     places = np.stack([getattr(out, name) for name in NAMES[: model.size]], axis=1)
     around = model.around(_mean_deflections(model, places))
     travel = places @ around.mesh
-    spectrum = np.fft.rfft(travel)
-    rate = np.fft.irfft(2j * np.pi * np.fft.rfftfreq(samples, 1 / setup.sampling_rate) * spectrum, samples)
+    rates = _rates_of(places, setup.sampling_rate)
     substeps = _substeps(steady)
     entries = 2 * substeps * samples
     step = 1.0 / (setup.sampling_rate * substeps)
@@ -170,7 +163,7 @@ def along(steady: Steady) -> Along:
     at = instants(model, table, turned, entries)
     fine = resampled(travel, entries)
     force, slope = pressed(model.law, at, fine)
-    closing = resampled(rate, entries) + table.excess_rate[:entries]
+    closing = resampled(rates @ around.mesh, entries) + table.excess_rate[:entries]
 
     def force_at(phase: Array) -> Array:
         elastic, tangent = pressed(model.law, at._replace(phase=np.clip(phase, 0.0, 1.0 - 1e-12)), fine)
@@ -200,7 +193,7 @@ def along(steady: Steady) -> Along:
             *_bearings(model, places, entries),
             model.turned_on(np.eye(model.size)),
             turning,
-            _rubbed(steady, table, places, turned * model.law.phases),
+            _rubbed(steady, table, rates, turned * model.law.phases),
         ),
         substeps=substeps,
         early=min(ceil(log(1 / TRANSIENT) / decay / step), samples * substeps),
@@ -226,12 +219,19 @@ def _linear(model: NonLinear) -> tuple[Array, Array, Array]:
     return springs, dampers, masses
 
 
-def _rubbed(steady: Steady, table: Table, places: Array, position: Array) -> Array:
-    """What friction adds to the direction of a force in the mesh (entries, n), at the places (samples, n) and positions
+def _rates_of(places: Array, sampling_rate: float) -> Array:
+    """Time derivatives (samples, n) of places (samples, n) that repeat."""
+    frequency = np.fft.rfftfreq(len(places), 1 / sampling_rate)
+    lines = 2j * np.pi * frequency[:, None] * np.fft.rfft(places, axis=0)
+    return np.asarray(np.fft.irfft(lines, len(places), axis=0))
+
+
+def _rubbed(steady: Steady, table: Table, rates: Array, position: Array) -> Array:
+    """What friction adds to the direction of a force in the mesh (entries, n), at the rates (samples, n) and positions
     (entries,) in rows of the mesh law."""
     setup, entries = steady.setup, len(position)
-    frequency = np.fft.rfftfreq(len(places), 1 / setup.sampling_rate)
-    rates = np.fft.irfft(2j * np.pi * frequency[:, None] * np.fft.rfft(places, axis=0), len(places), axis=0)
+    if setup.model.rig.friction.coefficient == 0.0:
+        return np.zeros((entries, rates.shape[1]))
     fine = np.stack([resampled(one, entries) for one in rates.T], axis=1)
     pace = table.pace[:entries] if table.pace.size else np.ones(entries)
     return rubbed_along(setup.model, position, pace, fine, setup.mesh_frequency)

@@ -102,14 +102,10 @@ def imposed(recorded: Array, sensors: Sensors, sampling_rate: float) -> Array:
 
 def change_shown(change: Array, sensors: Sensors, channel: str, sampling_rate: float) -> Array:
     """What a channel's sensor shows of a change (..., n) that repeats: late, behind the filter, by its gain."""
-    gain, delay = getattr(sensors, f"gain_{channel}", 1.0), getattr(sensors, f"delay_{channel}")
-    if delay or sensors.filter is not None:
-        frequency = np.fft.rfftfreq(change.shape[-1], 1 / sampling_rate)
-        response = np.exp(-2j * np.pi * frequency * delay)
-        if sensors.filter is not None:
-            response *= filter_response(frequency, sensors.filter)
-        change = answered(change, response)
-    return change if gain == 1.0 else gain * change
+    late = delayed(Signal(change), getattr(sensors, f"delay_{channel}"), sampling_rate)
+    seen = filtered(late, sensors.filter, sampling_rate).swing
+    gain = getattr(sensors, f"gain_{channel}", 1.0)
+    return seen if gain == 1.0 else gain * seen
 
 
 def taken_back(recorded: Array, sensors: Sensors, delay: float, sampling_rate: float) -> Array:

@@ -239,12 +239,7 @@ def _left_over(layout: Layout, system: _System, lines: _Lines, level: float) -> 
 def _system(layout: Layout, p: Array) -> _System:
     # The model's time loop is compiled on import, which not every user of this module wants.
     from gearbench.lumped.nonlinear.model import nonlinear_model
-    from gearbench.lumped.nonlinear.rest import (
-        displacement_directions,
-        inverse_masses,
-        mesh_direction,
-        springs_and_dampers,
-    )
+    from gearbench.lumped.nonlinear.rest import inverse_masses, mesh_direction, springs_and_dampers
 
     model = nonlinear_model(around_mesh(layout, p), layout.meshing, layout.model.law)
     c, s = model.constants(), model.structure
@@ -255,9 +250,7 @@ def _system(layout: Layout, p: Array) -> _System:
     forces = np.zeros((len(free), 2))
     forces[:, 0] = -mesh[free]
     forces[np.flatnonzero(free == (0 if c.rigid else COORDINATES - 1)), 1] = 1.0
-    housing = model.rig.housing
-    shown = displacement_directions(s, housing.sensor_share if housing is not None else 0.0)
-    rows = dict(zip(MOVED, (np.eye(len(inverse))[0], *shown), strict=True))
+    rows = dict(zip(MOVED, (np.eye(len(inverse))[0], *model.displacements), strict=True))
     gain = exp(float(p[layout.unknowns[GAIN]][0]))
     late = {channel: float(p[layout.unknowns[key]][0]) for channel, key in DELAYS.items()}
     return _System(free, springs[inside], dampers[inside], np.diag(1.0 / inverse[free]), forces,

@@ -27,10 +27,10 @@ def export_frf(frf: xr.Dataset, path: str | Path) -> None:
 
     Universal file: dataset 164 (SI), then one complex function 58 [m/N] for each phase of the ITF ("ITF at mesh
     phase 0.25", response node 1 + number of the phase) and for each branch of the HTF ("HTF of harmonic -2",
-    response node 1001 + number of the branch, above 1000 phases
-    the next thousand); frequencies have that format's six digits. MAT-file (version 5):
-    struct `frf` with the complex matrices itf (frequency x phase) and htf (harmonic x frequency), every other
-    variable and coordinate under its name, `units` and `attributes`. Raises FrfError for another suffix or dataset.
+    response node 1001 + number of the branch, above 1000 phases the next thousand); frequencies have that format's
+    six digits. MAT-file (version 5): struct `frf` with the complex matrices itf (frequency x phase) and htf (harmonic x
+    frequency), every other variable and coordinate under its name, `units` and `attributes`. Raises FrfError for
+    another suffix or dataset.
 
     >>> import gearbench as gb
     >>> record = gb.simulate(gb.read_case("quick_lumped", ["experiment.realisations=2"]))

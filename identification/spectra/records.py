@@ -99,7 +99,8 @@ def _signals(record: xr.Dataset, notes: list[str]) -> Iterator[tuple[Floats, Flo
 
 def _excited_band(records: Sequence[xr.Dataset], sampling: Sampling) -> tuple[float, float]:
     """Lowest and highest frequency [Hz] that the forces excite above their noise."""
-    power, noise, count = np.zeros((sampling.joint - 1) // 2 + 1), np.zeros((sampling.joint - 1) // 2 + 1), 0
+    power = np.zeros((sampling.joint - 1) // 2 + 1)
+    noise, count = np.zeros_like(power), 0
     for record in records:
         for realisation in range(record.sizes["realisation"]):
             signal = force(record.isel(realisation=[realisation])).values[0]

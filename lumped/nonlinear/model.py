@@ -62,6 +62,7 @@ from gearbench.lumped.nonlinear.rest import (
     Around,
     SupportSpring,
     centre_at_rest,
+    displacement_directions,
     housing_at_rest,
     inverse_masses,
     mesh_direction,
@@ -304,6 +305,12 @@ class NonLinear:
     def support_springs(self) -> tuple[SupportSpring, SupportSpring]:
         """The supports of driver and driven gear along their direction."""
         return support_springs(self.constants(), self.structure)
+
+    @cached_property
+    def displacements(self) -> tuple[Array, Array]:
+        """What each coordinate contributes to what the displacement sensors of driver and driven gear show (size,)."""
+        housing = self.rig.housing
+        return displacement_directions(self.structure, housing.sensor_share if housing is not None else 0.0)
 
     def around(self, deflections: tuple[float, float]) -> Around:
         """The rig around its mesh, with its supports as stiff as they are about these deflections [m]."""

@@ -7,11 +7,12 @@ from typing import Literal
 import numpy as np
 import pytest
 import xarray as xr
+from shared.predicted import assert_deviations_are_as_predicted
 from shared.ptv import periodic_filter
 from shared.reference_rig import ReferenceRig, reference_record
 from shared.rig_model import rig_model, stiffness_and_damping
 
-from gearbench.identification import IdentificationSettings, LpmError, SpectraError, htf, identify, itf
+from gearbench.identification import IdentificationSettings, LpmError, SpectraError, identify, itf
 from gearbench.identification.feedback import branches
 from gearbench.identification.feedback import frf as frf_of_feedback
 from gearbench.identification.feedback.data import class_data
@@ -231,14 +232,7 @@ def test_predicted_standard_deviations_are_those_of_repeated_noise() -> None:
     for seed in range(8):
         noise = size * np.random.default_rng(seed).standard_normal(clean.dte.shape)
         found.append(identify([clean.assign(dte=clean.dte + noise)], settings))
-    for values, variance in (
-        ([itf(frf).values for frf in found], "itf_var"),
-        ([htf(frf).values for frf in found], "htf_var"),
-        ([frf.mesh_stiffness.values for frf in found], "mesh_stiffness_var"),
-    ):
-        empirical = np.mean(np.var(np.array(values), axis=0, ddof=1))
-        predicted = np.mean([frf[variance].values.mean() for frf in found])
-        assert 0.8 < np.sqrt(predicted / empirical) < 1.6, variance
+    assert_deviations_are_as_predicted(found)
 
 
 def test_record_that_no_mesh_force_explains_is_told() -> None:

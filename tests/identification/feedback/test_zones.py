@@ -7,10 +7,11 @@ import pytest
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicHermiteSpline
+from shared.predicted import assert_deviations_are_as_predicted
 from shared.reference_rig import ReferenceRig, reference_record
 from shared.rig_model import rig_model
 
-from gearbench.identification import IdentificationSettings, htf, identify, itf
+from gearbench.identification import IdentificationSettings, identify, itf
 from gearbench.identification.feedback.data import class_data
 from gearbench.identification.feedback.evidence import Evident, Marginal, averaged, evident
 from gearbench.identification.feedback.refine import output_error, refined
@@ -228,11 +229,4 @@ def test_predicted_deviations_in_zones_are_those_of_repeated_noise() -> None:
         noise = size * np.random.default_rng(seed).standard_normal(clean.dte.shape)
         found.append(identify([clean.assign(dte=clean.dte + noise)], settings))
     assert all(frf.attrs["mesh_basis"] == "zones" for frf in found)
-    for values, variance in (
-        ([itf(frf).values for frf in found], "itf_var"),
-        ([htf(frf).values for frf in found], "htf_var"),
-        ([frf.mesh_stiffness.values for frf in found], "mesh_stiffness_var"),
-    ):
-        empirical = np.mean(np.var(np.array(values), axis=0, ddof=1))
-        predicted = np.mean([frf[variance].values.mean() for frf in found])
-        assert 0.8 < np.sqrt(predicted / empirical) < 1.6, variance
+    assert_deviations_are_as_predicted(found)
