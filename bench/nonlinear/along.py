@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil, log
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,7 +68,7 @@ class Along:
         """The coordinate that the driver's torque acts on."""
         return W if self.model.elastic_shaft else U1
 
-    def answers(self, forces: Array, on: Integers) -> dict[str, Array]:
+    def answers(self, forces: NDArray[np.floating[Any]], on: Integers) -> dict[str, Array]:
         """Changes (columns, samples) of the channels, as the rig's sensors show them, under forces (entries, columns)
         [N], each added in the mesh or on a coordinate, `on` (columns,): dte [m], rb times angles [m], y [m], and the
         load's torque over the driven gear's base radius [N]."""

@@ -70,12 +70,14 @@ class Optimum:
         return out
 
 
-def sensitivity_of(simulator: Simulator, p: Array, sd: Array, chosen: Flags | None = None) -> Sensitivity | None:
-    """Sensitivities of the chosen unknowns (size,; None: all) at `p`, moved by parts of `sd`; None where no rig is
-    there."""
+def sensitivity_of(
+    simulator: Simulator, p: Array, sd: Array, chosen: Flags | None = None, near: Complex | None = None
+) -> Sensitivity | None:
+    """Sensitivities of the chosen unknowns (size,; None: all) at `p`, moved by parts of `sd`, or as they were `near` by
+    (size, K); None where no rig is there."""
     chosen = np.ones(p.size, dtype=bool) if chosen is None else chosen
     lines = simulator.lines(p)
-    jacobian = simulator.jacobian(p, sd, chosen) if lines is not None else None
+    jacobian = simulator.jacobian(p, sd, chosen, near) if lines is not None else None
     if lines is None or jacobian is None:
         return None
     active = np.flatnonzero(np.abs(jacobian).max(axis=1) > 0.0)
@@ -182,7 +184,7 @@ def fit(
             # A rig that bends gives little of what is promised, but does so again from there.
             if renewals == 0 or (fresh and gain < max(GAIN, LITTLE * hoped)):
                 break
-            renewed = sensitivity_of(simulator, p, np.where(sd > 0, sd, 1.0), chosen)
+            renewed = sensitivity_of(simulator, p, np.where(sd > 0, sd, 1.0), chosen, sensitivity.jacobian)
             if renewed is None:
                 break
             sensitivity, renewals, fresh = renewed, renewals - 1, True

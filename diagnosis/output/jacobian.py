@@ -65,7 +65,7 @@ class Forces(NamedTuple):
     """Forces (entries, columns) [N] per unit of unknowns, these unknowns' indices (columns,), and what each force acts
     on (columns,): a coordinate or the mesh."""
 
-    values: Array
+    values: NDArray[np.float32]
     at: Integers
     on: Integers
 
@@ -73,20 +73,22 @@ class Forces(NamedTuple):
 def forces_of(layout: Layout, along: Along, condition: str, chosen: Flags, others: Sequence[Other]) -> Forces:
     """All forces that stand for the chosen unknowns (size,) along a motion of a record; what holds the gears by
     `others`."""
-    mesh, in_mesh = mesh_forces(layout, along, chosen)
+    parts, in_mesh = mesh_forces(layout, along, chosen)
     drive, on_drive = drive_forces(layout, along, condition)
     held = around_forces(along, others)
     used = chosen[on_drive]
-    values = [mesh, drive[:, used], *(force[:, None] for _, _, force in held)]
+    parts += [drive[:, used], *(force[:, None] for _, _, force in held)]
+    values = np.empty((len(along.phase), sum(one.shape[1] for one in parts)), np.float32)
     return Forces(
-        np.concatenate(values, axis=1),
+        np.concatenate(parts, axis=1, out=values),
         np.array([*in_mesh, *on_drive[used], *(index for index, _, _ in held)], dtype=np.int64),
         np.array([*[IN_MESH] * len(in_mesh), *[along.drive] * int(used.sum()), *(on for _, on, _ in held)]),
     )
 
 
-def mesh_forces(layout: Layout, along: Along, chosen: Flags) -> tuple[Array, Integers]:
-    """Force (entries, columns) [N] per unit of the chosen unknowns (size,) that act in the mesh, and their indices."""
+def mesh_forces(layout: Layout, along: Along, chosen: Flags) -> tuple[list[Array], Integers]:
+    """Forces (entries, n) [N] per unit of the chosen unknowns (size,) that act in the mesh, group by group, and the
+    unknowns' indices."""
     unknowns, law, phase = layout.unknowns, along.law, along.phase
     z1, z2 = layout.model.teeth
     parts: list[Array] = []
@@ -136,7 +138,7 @@ def mesh_forces(layout: Layout, along: Along, chosen: Flags) -> tuple[Array, Int
         keep = chosen[indices]
         parts.append(np.stack(soft, axis=1)[:, keep])
         at.extend(indices[keep])
-    return np.concatenate(parts, axis=1), np.array(at)
+    return parts, np.array(at)
 
 
 def _of_flanks(along: Along, numbers: NDArray[np.int64], path: tuple[float, float]) -> Array:

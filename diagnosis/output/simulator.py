@@ -69,8 +69,9 @@ class Simulator:
         replayed = self.simulate(self.layout.case(p, measured.name), measured.record)
         return simulated_channels(measured, replayed)
 
-    def jacobian(self, p: Array, sd: Array, chosen: Flags) -> Complex | None:
-        """Derivatives (size, K) of the lines by the chosen unknowns, zero for the others; None where `p` is no rig."""
+    def jacobian(self, p: Array, sd: Array, chosen: Flags, near: Complex | None = None) -> Complex | None:
+        """Derivatives (size, K) of the lines by the chosen unknowns, zero for the others; None where `p` is no rig.
+        What has to be moved and simulated stays as it was `near` (size, K) by, if that is given."""
         here = self.lines(p)
         if here is None:
             return None
@@ -80,8 +81,20 @@ class Simulator:
             self._by_forces(out, p, chosen, others)
         except ValueError:
             return None
-        known = [one.number for one in others]
-        self._by_moves(out, p, sd, chosen & ~np.isin(np.arange(p.size), known))
+        left = chosen & self._is_moved() & ~np.isin(np.arange(p.size), [one.number for one in others])
+        if near is None:
+            self._by_moves(out, p, sd, left)
+        else:
+            out[left] = near[left]
+        return out
+
+    def _is_moved(self) -> Flags:
+        """Which unknowns (size,) may have to be moved and simulated."""
+        unknowns = self.layout.unknowns
+        out = np.zeros(unknowns.size, dtype=bool)
+        for key in MOVED:
+            if key in unknowns.slices:
+                out[unknowns[key]] = True
         return out
 
     def _by_moves(self, out: Complex, p: Array, sd: Array, chosen: Flags) -> None:

@@ -16,7 +16,7 @@ largest departure.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,7 +55,7 @@ class Tangent(NamedTuple):
 
 
 def departures(
-    tangent: Tangent, forces: Array, on: Integers, substeps: int, early: int
+    tangent: Tangent, forces: NDArray[np.floating[Any]], on: Integers, substeps: int, early: int
 ) -> tuple[Single, Single]:
     """Departures (samples, n, columns) of the coordinates [m] and (samples, columns) of the mesh force [N] under forces
     (entries, columns) [N], each in the mesh or on one coordinate, `on` (columns,): its number or `IN_MESH`; `early`

@@ -93,7 +93,9 @@ class FakeSimulator:
     def lines(self, p: np.ndarray) -> np.ndarray | None:
         return None if np.abs(p).max() > self.largest else self.of(p)
 
-    def jacobian(self, p: np.ndarray, sd: np.ndarray, chosen: np.ndarray) -> np.ndarray | None:
+    def jacobian(
+        self, p: np.ndarray, sd: np.ndarray, chosen: np.ndarray, near: np.ndarray | None = None
+    ) -> np.ndarray | None:
         self.jacobians += 1
         if self.lines(p) is None:
             return None

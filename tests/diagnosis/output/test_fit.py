@@ -78,7 +78,7 @@ def test_what_the_records_do_not_show_is_known_as_before() -> None:
 class Jumping(FakeSimulator):
     """Feels friction from 0.2 on; the derivative is that of the jump there."""
 
-    def jacobian(self, p: np.ndarray, sd: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+    def jacobian(self, p: np.ndarray, sd: np.ndarray, chosen: np.ndarray, near: np.ndarray | None = None) -> np.ndarray:
         return np.where(chosen[:, None], ALIKE, 0.0)
 
 

@@ -96,7 +96,7 @@ def test_the_usual_one_is_fitted_from_where_the_rare_one_got() -> None:
     alike = MATRIX.copy()
     alike[7] = 0.5 * alike[6]
     simulator = FakeSimulator(lambda q: q @ alike, target(0.2 * alike[6] + 0.08 * alike[0]))
-    simulator.jacobian = lambda p, sd, chosen: alike  # type: ignore[method-assign, assignment]
+    simulator.jacobian = lambda p, sd, chosen, near=None: alike  # type: ignore[method-assign, assignment]
     found = chosen(simulator, (CRACKS[0],), [np.zeros(8)], {})
     assert found is not None and names(found) == ["tooth-crack 0"]
     first = Weighed(replace(CRACKS[0], usual=("crack", 2.0)), 1e6, found.best)
@@ -137,7 +137,7 @@ def test_a_start_of_the_force_residuals_is_tried_even_if_the_quadratic_does_not_
 
     true = np.array([0.05, 0, 0, 0.4, 0, 0, 0, 0])
     simulator = FakeSimulator(lines_of, target(lines_of(true)))
-    simulator.jacobian = lambda p, sd, chosen: np.where(  # type: ignore[method-assign, assignment]
+    simulator.jacobian = lambda p, sd, chosen, near=None: np.where(  # type: ignore[method-assign, assignment]
         np.arange(8)[:, None] == 3, 40 * (p[3] + 1e-3) * MATRIX, np.where(np.arange(8)[:, None] < 3, MATRIX, 0)
     )
     start = Start(FRICTION, np.array([0, 0, 0, 0.35, 0, 0, 0, 0.0]), 30.0)
