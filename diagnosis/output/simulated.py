@@ -86,7 +86,8 @@ def simulated(
     simulator = Simulator(layout, target_of(chosen, conditions, noises), simulate)
 
     def seen(held: Array) -> Array | None:
-        return around(layout, conditions, held)
+        # What acts in the mesh may be anything, an impact too.
+        return around(layout, problem.conditions, held)
 
     by_forces = carried_over(layout, problem.unknowns, found.base.p)
     base = background(simulator, _beginnings(layout, by_forces), seen, report)

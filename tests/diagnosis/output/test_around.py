@@ -38,15 +38,18 @@ def recorded(
     shares: tuple[float, float] = (1.0, 1.0),
     late: float = 0.0,
     seat: float = 0.0,
+    parted: bool = False,
 ) -> Condition:
     """A condition whose rig has a housing of that logarithm of frequency (None: none), of which the supports make these
     shares, a late sensor of the driver's displacement [s], displacement sensors that make a part `seat` of the
-    supports' motion, and any force in the mesh."""
+    supports' motion, and any force in the mesh, `parted` half of the time."""
     m = layout.model
     rng = np.random.default_rng(3)
     omega = like.omega[: like.bins]
     torque = like.spectra["torque_driver"][: like.bins]
     force = 300.0 * (rng.standard_normal(like.bins) + 1j * rng.standard_normal(like.bins))
+    if parted:
+        force = np.fft.rfft(np.maximum(np.fft.irfft(force), 0.0))[: like.bins]
     mean = 2 / (1 / m.stiffness[0] + 1 / m.stiffness[1])
     big = mean / SOFTNESS
     heavy = np.exp(-2.0 * (frequency or 0.0)) * 0.5 * (m.mass[0] + m.mass[1]) * big / mean
@@ -111,10 +114,12 @@ def test_a_housing_that_rocks_is_found_a_late_sensor_and_inertia(rig: tuple[Layo
     assert found[unknowns["delay-y_driver"]][0] == pytest.approx(late, rel=0.05)
 
 
-def test_sensors_on_the_housing_are_found_with_it(rig: tuple[Layout, Condition]) -> None:
+@pytest.mark.parametrize("parted", [False, True])
+def test_sensors_on_the_housing_are_found_with_it(rig: tuple[Layout, Condition], parted: bool) -> None:
     layout, like = rig
     shares = (1.0, -0.8)
-    found = around(layout, [recorded(layout, like, -0.3, shares=shares, seat=1.0)], np.zeros(layout.size))
+    record = recorded(layout, like, -0.3, shares=shares, seat=1.0, parted=parted)
+    found = around(layout, [record], np.zeros(layout.size))
     assert found is not None
     unknowns, size = layout.unknowns, (shares[0] ** 2 + shares[1] ** 2) / 2
     assert found[unknowns[SEAT]] == pytest.approx([1.0], abs=0.05)
