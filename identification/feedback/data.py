@@ -118,6 +118,12 @@ def fewer_classes(data: ClassData, equations: int) -> ClassData:
     return replace(data, **parts, equations=_equations(parts["valid"], parts["dte"], parts["weight"]))
 
 
+def only_lines(data: ClassData, kept: NDArray[np.bool_]) -> ClassData:
+    """The same with equations of `kept` lines (C, S) only."""
+    valid = data.valid & kept
+    return replace(data, valid=valid, equations=_equations(valid, data.dte, data.weight))
+
+
 def class_data(spectra: Spectra, excited: int) -> ClassData:
     """Lines up to a little beyond the highest `excited` one, without the operating response (class 0 of its records).
 

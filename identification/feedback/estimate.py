@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.identification.feedback.data import ClassData, class_data, fewer_classes
-from gearbench.identification.feedback.folding import Folding, folded, folded_of, folding_of
+from gearbench.identification.feedback.data import ClassData, class_data, fewer_classes, only_lines
+from gearbench.identification.feedback.folding import Folding, clear_lines, folded, folded_of, folding_of
 from gearbench.identification.feedback.functions import Fractions, Splines, common_pairs
 from gearbench.identification.feedback.model import Model
-from gearbench.identification.feedback.phase import in_zones
+from gearbench.identification.feedback.phase import InZones, in_zones
 from gearbench.identification.feedback.poles import linear_models
 from gearbench.identification.feedback.refine import (
     SETTLED,
@@ -108,51 +108,84 @@ def mesh_feedback(
         other = with_centres(tried, part, report)
         best = min((best, other), key=lambda fit: criterion(fit, part))
     report(0.95, "mesh feedback: zones of phase")
-    best, part, folding = _unfolded(best, part, data)
-    told = in_zones(best, part, IN_ZONES) if harmonics is None else None
-    if told is not None:
-        best = _with_more_poles(told.fit, part)
+    found = search(best, part, data, zones=harmonics is None)
+    best = found.fit if found.told is None else _with_more_poles(found.told.fit, found.part)
     report(1.0, "mesh feedback: last rounds")
-    found = _last_rounds(best, data, folding, SETTLED if told is None else IN_ZONES)
-    return found if told is None else replace(found, zones=told.zones, gain=told.gain)
+    return _last_rounds(best, data, found)
 
 
-def _unfolded(best: Refined, part: ClassData, data: ClassData) -> tuple[Refined, ClassData, Folding | None]:
-    """The fit `best` to a `part` of the data, this part without what folds back into it, and that, where the model
-    foretells any.
+@dataclass(frozen=True)
+class Found:
+    """A `fit` in harmonics to a `part` of the data without what folds back; what is `told` in zones, if it is; and the
+    `folding`, where the model foretells any."""
 
-    A fit to a record that was not filtered may have taken in what folds back, and foretells something else. Hence one
-    to the record without is found as well, and speaks if it errs less.
+    fit: Refined
+    part: ClassData
+    told: InZones | None
+    folding: Folding | None = None
+
+    @property
+    def last(self) -> Refined:
+        """The fit in zones, or else that in harmonics."""
+        return self.told.fit if self.told is not None else self.fit
+
+    @property
+    def value(self) -> float:
+        """Schwarz's criterion with the noise that is left beside what the record tells of the mesh."""
+        count = 2 * self.part.equations
+        return count * float(np.log(self.last.noise)) + self.last.model.free * float(np.log(count))
+
+
+def search(best: Refined, part: ClassData, data: ClassData, *, zones: bool) -> Found:
+    """What the record tells in `zones`, or harmonics, from the fit `best` to a `part` of it, without what folds back.
+
+    A fit to a record that was not filtered takes in what folds back, and foretells something else then. Hence one to
+    the record without the folded lines is found as well, beginning on lines that next to nothing folds onto, and speaks
+    if it leaves less.
     """
-    taken, lines, least = best, folded_of(best, data), criterion(best, part)
+    found = Found(best, part, in_zones(best, part, IN_ZONES) if zones else None)
+    lines = folded_of(best, data)
     if lines is None:
-        return best, part, None
+        return found
+    taken, least = best, (np.inf, best, part)
+    clear = fewer_classes(only_lines(data, clear_lines(lines, data, best.noise)), SEARCHED)
+    taken = refined(best.model, clear, COMPARED)
+    lines = folded(response(taken.model, data), data)
     for _ in range(APPROACHED):
         clean = fewer_classes(replace(data, dte=data.dte - lines), SEARCHED)
         taken = refined(taken.model, clean, COMPARED)
         lines = folded(response(taken.model, data), data)
-        if (value := criterion(taken, clean)) < least:
-            best, least = taken, value
-    folding = folding_of(best, data)
-    if folding is None:
-        return best, part, None
+        least = min(least, (criterion(taken, clean), taken, clean), key=lambda each: each[0])
+    _, taken, clean = least
+    other = Found(taken, clean, in_zones(taken, clean, IN_ZONES) if zones else None)
+    if found.value <= other.value:
+        return replace(found, folding=folding_of(found.last, data, 0.0))
+    folding = folding_of(other.last, data, 1.0)
+    if folding is None or not zones:
+        return replace(other, folding=folding)
+    # Zones foretell it better than harmonics, and switches that begin with what these leave stay where they are.
     clean = fewer_classes(folding.removed(data), SEARCHED)
-    return refined(best.model, clean, COMPARED), clean, folding
+    taken = refined(taken.model, clean, COMPARED)
+    return Found(taken, clean, in_zones(taken, clean, IN_ZONES), folding)
 
 
-def _last_rounds(best: Refined, data: ClassData, folding: Folding | None, settled: float) -> Feedback:
+def _last_rounds(best: Refined, data: ClassData, found: Found) -> Feedback:
     """The fit refined on all `data`, with what folds back foretold by ever better models."""
+    folding, told = found.folding, found.told
     clean = folding.removed(data) if folding is not None else data
-    mesh = best.mesh if best.mesh is not None and best.mesh.held else None
+    settled, mesh = (SETTLED, None) if told is None else (IN_ZONES, best.mesh)
     last = refined(best.model, clean, settled, mesh)
+    # Harmonics, which their prior holds back, tell less than the whole of what folds.
+    believed = float(folding.part > 0.5) if folding is not None and told is None else None
     for _ in range(FORETOLD if folding is not None else 0):
-        before, folding = folding, folding_of(last, data)
+        before, folding = folding, folding_of(last, data, believed)
         if folding is None or folding.like(before, last.noise):
             break
         clean = folding.removed(data)
-        last = refined(last.model, clean, settled, last.mesh if mesh is not None else None)
+        last = refined(last.model, clean, settled, last.mesh if told is not None else None)
     last = settled_covariance(last, clean)
-    return Feedback(clean, folding.counted(last) if folding is not None else last, folding=folding)
+    last = folding.counted(last) if folding is not None else last
+    return Feedback(clean, last, told.zones if told else None, told.gain if told else 0.0, folding)
 
 
 def _with_more_poles(best: Refined, part: ClassData) -> Refined:

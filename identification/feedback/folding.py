@@ -13,11 +13,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import expit
 
 from gearbench.identification.feedback.data import ClassData
-from gearbench.identification.feedback.refine import Refined, told_beside
-from gearbench.identification.feedback.refine import response as response_of
+from gearbench.identification.feedback.refine import Refined, response, told_beside
 from gearbench.identification.spectra.joint import Complexes, Floats
 
 # Squared size of the folded lines over the noise of one equation below which they move nothing by more than a third of
@@ -57,34 +57,42 @@ class Folding:
         return replace(fit, root=np.column_stack([fit.root, self.deviation * self.shift]))
 
 
-def folding_of(fit: Refined, data: ClassData) -> Folding | None:
+def folding_of(fit: Refined, data: ClassData, believed: float | None = None) -> Folding | None:
     """What of the model's lines beyond half the sampling rate the `data`, as recorded, hold; None where these are
-    nothing beside the noise."""
+    nothing beside the noise. `believed` as in `likely`."""
     lines = folded_of(fit, data)
     if lines is None:
         return None
-    left = np.where(data.dte != 0, data.dte - response_of(fit.model, data), 0.0)
-    told, deviation, shift = told_beside(fit, data, left, lines)
-    return Folding(*likely(told, deviation), lines, shift)
+    told, deviation, shift = told_beside(fit, data, lines)
+    return Folding(*likely(told, deviation, believed), lines, shift)
 
 
 def folded_of(fit: Refined, data: ClassData) -> Complexes | None:
     """`folded` lines of the model; None where these are nothing beside the noise."""
     if not data.folds:
         return None
-    lines = folded(response_of(fit.model, data), data)
+    lines = folded(response(fit.model, data), data)
     felt = np.sum(np.abs(lines[data.valid]) ** 2)
     return lines if felt > FELT * fit.noise else None
 
 
-def likely(told: float, deviation: float) -> tuple[float, float]:
+def clear_lines(lines: Complexes, data: ClassData, noise: float) -> NDArray[np.bool_]:
+    """Lines (C, S) onto which less folds than there is noise, and half of them at least."""
+    power = np.sum(np.abs(lines) ** 2, axis=2) / lines.shape[2]
+    return np.asarray(power <= max(noise, float(np.median(power[data.valid]))))
+
+
+def likely(told: float, deviation: float, believed: float | None = None) -> tuple[float, float]:
     """The part that is in the record, and its deviation, where the residual has `told` it within a `deviation`.
 
     There was a filter or there was none, each as likely as the other at first: the part is the probability of none, by
-    Bayes. Where neither agrees with what is told, this is the part, and off by its distance from the nearer of both.
+    Bayes. Where neither agrees with what is told, this is the part, and off by its distance from the nearer of both;
+    or the part is the `believed` one (0 or 1), where another comparison has told that, and off by what is told beside.
     """
     distance = min(abs(told), abs(told - 1.0))
     if distance > NEITHER * deviation:
+        if believed is not None:
+            return believed, min(abs(told - believed), 1.0)
         return min(max(told, 0.0), 1.0), min(distance, 1.0)
     part = float(expit((told - 0.5) / max(deviation**2, np.finfo(float).tiny)))
     return part, float(np.sqrt(part * (1.0 - part)))
