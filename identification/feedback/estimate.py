@@ -156,17 +156,22 @@ def search(best: Refined, part: ClassData, data: ClassData, *, zones: bool) -> F
         taken = refined(taken.model, clean, COMPARED)
         lines = folded(response(taken.model, data), data)
         least = min(least, (criterion(taken, clean), taken, clean), key=lambda each: each[0])
-    _, taken, clean = least
+    value, taken, clean = least
     other = Found(taken, clean, in_zones(taken, clean, IN_ZONES) if zones else None)
-    if found.value <= other.value:
+    if min(value - criterion(best, part), other.value - found.value) >= 0.0:
         return replace(found, folding=folding_of(found.last, data, 0.0))
-    folding = folding_of(other.last, data, 1.0)
-    if folding is None or not zones:
-        return replace(other, folding=folding)
+    other = replace(other, folding=folding_of(other.last, data, 1.0))
     # Zones foretell it better than harmonics, and switches that begin with what these leave stay where they are.
-    clean = fewer_classes(folding.removed(data), SEARCHED)
-    taken = refined(taken.model, clean, COMPARED)
-    return Found(taken, clean, in_zones(taken, clean, IN_ZONES), folding)
+    for _ in range(FORETOLD if zones else 0):
+        if other.folding is None:
+            break
+        clean = fewer_classes(other.folding.removed(data), SEARCHED)
+        taken = refined(other.fit.model, clean, COMPARED)
+        before, other = other, Found(taken, clean, in_zones(taken, clean, IN_ZONES), other.folding)
+        other = replace(other, folding=folding_of(other.last, data, 1.0))
+        if other.folding is None or other.folding.like(before.folding, other.last.noise):
+            break
+    return other
 
 
 def _last_rounds(best: Refined, data: ClassData, found: Found) -> Feedback:
@@ -175,8 +180,7 @@ def _last_rounds(best: Refined, data: ClassData, found: Found) -> Feedback:
     clean = folding.removed(data) if folding is not None else data
     settled, mesh = (SETTLED, None) if told is None else (IN_ZONES, best.mesh)
     last = refined(best.model, clean, settled, mesh)
-    # Harmonics, which their prior holds back, tell less than the whole of what folds.
-    believed = float(folding.part > 0.5) if folding is not None and told is None else None
+    believed = float(folding.part > 0.5) if folding is not None else 0.0
     for _ in range(FORETOLD if folding is not None else 0):
         before, folding = folding, folding_of(last, data, believed)
         if folding is None or folding.like(before, last.noise):

@@ -57,7 +57,7 @@ class Folding:
         return replace(fit, root=np.column_stack([fit.root, self.deviation * self.shift]))
 
 
-def folding_of(fit: Refined, data: ClassData, believed: float | None = None) -> Folding | None:
+def folding_of(fit: Refined, data: ClassData, believed: float) -> Folding | None:
     """What of the model's lines beyond half the sampling rate the `data`, as recorded, hold; None where these are
     nothing beside the noise. `believed` as in `likely`."""
     lines = folded_of(fit, data)
@@ -82,18 +82,15 @@ def clear_lines(lines: Complexes, data: ClassData, noise: float) -> NDArray[np.b
     return np.asarray(power <= max(noise, float(np.median(power[data.valid]))))
 
 
-def likely(told: float, deviation: float, believed: float | None = None) -> tuple[float, float]:
+def likely(told: float, deviation: float, believed: float) -> tuple[float, float]:
     """The part that is in the record, and its deviation, where the residual has `told` it within a `deviation`.
 
     There was a filter or there was none, each as likely as the other at first: the part is the probability of none, by
-    Bayes. Where neither agrees with what is told, this is the part, and off by its distance from the nearer of both;
-    or the part is the `believed` one (0 or 1), where another comparison has told that, and off by what is told beside.
+    Bayes. Where neither agrees with what is told (harmonics, which their prior holds back, tell less than the whole),
+    the part is the `believed` one, 0 or 1, and off by its distance from what is told.
     """
-    distance = min(abs(told), abs(told - 1.0))
-    if distance > NEITHER * deviation:
-        if believed is not None:
-            return believed, min(abs(told - believed), 1.0)
-        return min(max(told, 0.0), 1.0), min(distance, 1.0)
+    if min(abs(told), abs(told - 1.0)) > NEITHER * deviation:
+        return believed, min(abs(told - believed), 1.0)
     part = float(expit((told - 0.5) / max(deviation**2, np.finfo(float).tiny)))
     return part, float(np.sqrt(part * (1.0 - part)))
 

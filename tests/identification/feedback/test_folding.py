@@ -79,13 +79,13 @@ def test_lines_come_back_as_a_sampler_makes_them() -> None:
 
 
 def test_there_was_a_filter_or_none_unless_neither_agrees() -> None:
-    assert likely(0.5, 0.3) == pytest.approx((0.5, 0.5))
+    assert likely(0.5, 0.3, 0.0) == pytest.approx((0.5, 0.5))
     part = 1.0 / (1.0 + np.exp(-((0.7**2 - 0.3**2) / (2 * 0.5**2))))  # of two normal densities
-    assert likely(0.7, 0.5) == pytest.approx((part, np.sqrt(part * (1 - part))))
-    assert likely(0.97, 0.01) == pytest.approx((1.0, 0.0))
-    assert likely(0.6, 0.01) == pytest.approx((0.6, 0.4))
-    assert likely(1.2, 0.01) == pytest.approx((1.0, 0.2))
-    assert likely(0.7, 0.01, believed=1.0) == pytest.approx((1.0, 0.3))
+    assert likely(0.7, 0.5, 0.0) == pytest.approx((part, np.sqrt(part * (1 - part))))
+    assert likely(0.97, 0.01, 0.0) == pytest.approx((1.0, 0.0))
+    assert likely(1.2, 0.01, 1.0) == pytest.approx((1.0, 0.2))
+    assert likely(0.7, 0.01, 1.0) == pytest.approx((1.0, 0.3))
+    assert likely(0.7, 0.01, 0.0) == pytest.approx((0.0, 0.7))
 
 
 def test_the_residual_tells_a_change_beside_all_parameters(fast: xr.Dataset) -> None:
@@ -128,8 +128,8 @@ def test_nothing_folds_where_the_model_ends_below_half_the_rate(fast: xr.Dataset
 @pytest.mark.validation
 @pytest.mark.parametrize("filtered", [False, True])
 def test_expected_error_is_the_true_one_with_and_without_a_filter(fast: xr.Dataset, filtered: bool) -> None:
-    """Ten draws of noise, 50 dB: rms of what is expected over rms of the errors."""
-    errors, expected, _ = zip(
-        *(result(thinned(fast, filtered=filtered, noise=0.003, seed=seed)) for seed in range(10)), strict=True
-    )
-    assert 0.8 < np.linalg.norm(expected) / np.linalg.norm(errors) < 1.3
+    """Eight draws of noise, 50 dB; in a draw whose folded lines are not told within their deviation more is expected."""
+    found = [result(thinned(fast, filtered=filtered, noise=0.003, seed=seed)) for seed in range(8)]
+    ratios = [expected / error for error, expected, _ in found]
+    assert 0.8 < np.median(ratios) < 1.3
+    assert min(ratios) > 0.6
