@@ -128,7 +128,7 @@ def test_nothing_folds_where_the_model_ends_below_half_the_rate(fast: xr.Dataset
 @pytest.mark.validation
 @pytest.mark.parametrize("filtered", [False, True])
 def test_expected_error_is_the_true_one_with_and_without_a_filter(fast: xr.Dataset, filtered: bool) -> None:
-    """Eight draws of noise, 50 dB; in a draw whose folded lines are not told within their deviation more is expected."""
+    """Eight draws of noise, 50 dB; where folded lines are not told within their deviation more is expected."""
     found = [result(thinned(fast, filtered=filtered, noise=0.003, seed=seed)) for seed in range(8)]
     ratios = [expected / error for error, expected, _ in found]
     assert 0.8 < np.median(ratios) < 1.3
