@@ -157,7 +157,7 @@ def diagnosed(
     simulate = replays_of(inputs.nominal, inputs.all)
     said("cause")
     finding = find_cause(inputs.measurements, inputs.nominal, held_out=inputs.held_out, without=inputs.without,
-                         known=inputs.known)  # fmt: skip
+                         report=said, known=inputs.known)  # fmt: skip
     said("how far the gap shrinks")
     plain = inputs.damped(finding.recalibrated)
     improved = inputs.damped(finding.with_effect) if finding.with_effect is not None else None

@@ -9,14 +9,15 @@ from numpy.typing import NDArray
 
 from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
 from gearbench.diagnosis.output.beginning import Around, beginning
-from gearbench.diagnosis.output.fit import Optimum, fit_afresh
-from gearbench.diagnosis.output.restructured import better, is_close, restructured
+from gearbench.diagnosis.output.fit import Optimum, fit, fit_afresh
+from gearbench.diagnosis.output.restructured import better, is_close
 from gearbench.diagnosis.output.simulator import Simulator
 
 Array = NDArray[np.float64]
 Report = Callable[[str], None]
 
-RENEWALS = 8  # of the Jacobian
+# Of the Jacobian, and of the fit from another beginning until it is seen whether it comes closer.
+RENEWALS, RENEWALS_FIRST = 8, 2
 
 
 def background(
@@ -37,8 +38,16 @@ def background(
     if not is_close(simulator, base):
         other = beginning(simulator, beginnings[:1], around, sd)
         if not np.array_equal(begin, other):
-            base = better(base, fit_afresh(simulator, other, sd, renewals=RENEWALS))
-    return restructured(simulator, base, around, report)
+            base = _raced(simulator, base, fit_afresh(simulator, other, sd, renewals=RENEWALS_FIRST))
+    return base
+
+
+def _raced(simulator: Simulator, base: Optimum, other: Optimum | None) -> Optimum:
+    """The better of an optimum and of another that may still be on its way: gone on with where it can catch up."""
+    if other is None or other.cost - other.left > base.cost:
+        return base
+    more = fit(simulator, other.p, other.sd, other.sensitivity, renewals=RENEWALS - RENEWALS_FIRST)
+    return better(base, more or other)
 
 
 def prior_of(simulator: Simulator, sd: Array) -> Array:

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.diagnosis.effects.effect import Hypothesis
+from gearbench.diagnosis.output.beginning import Around
 from gearbench.diagnosis.output.fit import Optimum, fit, fit_afresh
-from gearbench.diagnosis.output.restructured import better, is_close
+from gearbench.diagnosis.output.restructured import better, is_close, restructured
 from gearbench.diagnosis.output.simulator import Simulator
 
 Array = NDArray[np.float64]
@@ -36,21 +37,31 @@ def begun_by_forces(
     base: Optimum,
     hypotheses: Sequence[Hypothesis],
     starts: Mapping[str, Start],
+    around: Around | None = None,
     report: Report = lambda step: None,
-) -> tuple[Optimum, Start | None]:
+) -> tuple[Optimum, dict[str, Start]]:
     """The background's optimum, or the one of more evidence that is found beside the effect that the force residuals
-    speak for most, and a start where that effect's own fit ended; none where little is left, or they do not speak."""
+    speak for most or with another structure (`around`: the rig around its mesh, as the records show it), and the
+    starts, with where that effect's own fit ended.
+
+    Where that effect comes close to the records, no other structure is sought beside its absence: it would imitate it.
+    """
+    if is_close(simulator, base):
+        return base, {**starts}
     listed = [starts[one.name] for one in hypotheses if one.name in starts]
     start = max(listed, key=lambda one: one.log_bayes_factor, default=None)
-    if start is None or start.log_bayes_factor < SPEAKS or is_close(simulator, base):
-        return base, None
-    report(f"simulating: {start.hypothesis.name}, as the force residuals have it")
-    unknowns = simulator.layout.unknowns
-    sd = start.hypothesis.widened(unknowns, base.sd)
-    found = fit_afresh(simulator, np.where(sd > 0.0, start.p, 0.0), sd, renewals=RENEWALS)
-    if found is None:
-        return base, None
+    found = None
+    if start is not None and start.log_bayes_factor >= SPEAKS:
+        report(f"simulating: {start.hypothesis.name}, as the force residuals have it")
+        unknowns = simulator.layout.unknowns
+        sd = start.hypothesis.widened(unknowns, base.sd)
+        found = fit_afresh(simulator, np.where(sd > 0.0, start.p, 0.0), sd, renewals=RENEWALS)
+    if start is None or found is None:
+        return restructured(simulator, base, around, report), {**starts}
     p = found.p.copy()
     p[start.hypothesis.entries(unknowns)] = 0.0
-    again = fit(simulator, p, base.sd, found.sensitivity, renewals=RENEWALS)
-    return better(base, again), Start(start.hypothesis, found.p, start.log_bayes_factor)
+    base = better(base, fit(simulator, p, base.sd, found.sensitivity, renewals=RENEWALS))
+    if not is_close(simulator, found):
+        base = restructured(simulator, base, around, report)
+    begun = Start(start.hypothesis, found.p, start.log_bayes_factor)
+    return base, {**starts, start.hypothesis.name: begun}

@@ -167,7 +167,7 @@ def fit(
     for _ in range(STEPS):
         lines = simulator.lines(p)
         assert lines is not None
-        near = sensitivity.quadratic.moved(target.lines - lines, sensitivity.jacobian)
+        near = sensitivity.quadratic.moved(target.lines - lines)
         before = cost
         standing = _standing(simulator.layout.unknowns, p)
         short = [(_within(standing, p, sd, reach), 0) for reach in REACHES]
@@ -190,7 +190,7 @@ def fit(
         fresh = False
     lines = simulator.lines(p)
     assert lines is not None
-    near = sensitivity.quadratic.moved(target.lines - lines, sensitivity.jacobian)
+    near = sensitivity.quadratic.moved(target.lines - lines)
     _, promised, _ = near.best(p, sd, _standing(simulator.layout.unknowns, p))
     here = near.information(np.zeros(len(near.active)))
     return Optimum(

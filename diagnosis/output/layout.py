@@ -93,11 +93,11 @@ class Layout:
 
 
 def around_mesh(layout: Layout, p: Array) -> Rig:
-    """What holds and drives the gears in the rig of these unknowns (size,), without what is in their mesh and sensors.
+    """What holds the gears in the rig of these unknowns (size,), without what is in their mesh, drive and sensors.
     Raises ValueError for values that no rig may have."""
     fitted = layout.fitted(p)
     rig = _supports(recalibrated(layout.nominal, fitted).rig, layout, p)
-    return _drive(held(rig, layout.model, layout.unknowns, p), layout, fitted, None)
+    return _coupled(held(rig, layout.model, layout.unknowns, p), layout, fitted)
 
 
 def _all_of(name: str) -> Hypothesis:
@@ -143,10 +143,15 @@ def _supports(rig: Rig, layout: Layout, p: Array) -> Rig:
     return changed(rig, "support", **update)
 
 
-def _drive(rig: Rig, layout: Layout, fitted: Fitted, condition: str | None) -> Rig:
+def _coupled(rig: Rig, layout: Layout, fitted: Fitted) -> Rig:
     least = NEARLY_RIGID * layout.unknowns.group(COMPLIANCE).wide[0]
     if layout.model.rotor > 0.0 and layout.model.compliance + float(fitted.of(COMPLIANCE)[0]) > least:
         rig = COUPLING.add(rig, _all_of("coupling"), fitted)[0]
+    return rig
+
+
+def _drive(rig: Rig, layout: Layout, fitted: Fitted, condition: str | None) -> Rig:
+    rig = _coupled(rig, layout, fitted)
     if not np.any(fitted.of(RIPPLE)):
         return rig
     ripple = next(one for one in LIBRARY if one.name == "torque-ripple")

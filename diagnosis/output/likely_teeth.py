@@ -16,7 +16,7 @@ from scipy.linalg import cho_factor, cho_solve
 
 from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
 from gearbench.diagnosis.output.fit import Optimum, Sensitivity
-from gearbench.diagnosis.output.quadratic import quadratic_of
+from gearbench.diagnosis.output.quadratic import quadratic_of, real_parts
 from gearbench.diagnosis.output.simulator import Simulator
 
 Array = NDArray[np.float64]
@@ -57,8 +57,8 @@ def gains_of(base: Optimum, wide: Array, columns: Complex) -> Array:
     target, width = quadratic.target, base.sd[quadratic.active]
     at = quadratic.active[width > 0.0]
     weight = np.sqrt(quadratic.weights(np.zeros(len(quadratic.active))))[target.of_line]
-    rest = _real((target.lines - base.lines) * weight)
-    others, own = (_real(one * weight) for one in (base.sensitivity.jacobian[at], columns))
+    rest = real_parts((target.lines - base.lines) * weight)
+    others, own = (real_parts(one * weight) for one in (base.sensitivity.jacobian[at], columns))
     scale = base.sd[at]
     matrix = cho_factor(others @ others.T * scale[:, None] * scale[None, :] + np.eye(len(at)), lower=True)
     between = (others @ own.T) * scale[:, None]
@@ -66,8 +66,3 @@ def gains_of(base: Optimum, wide: Array, columns: Complex) -> Array:
     along = own @ rest - between.T @ cho_solve(matrix, pull)
     curvature = (own**2).sum(axis=1) - np.einsum("ot,ot->t", between, cho_solve(matrix, between)) + wide**-2.0
     return np.asarray(np.where(along > 0.0, 0.5 * along**2 / curvature, 0.0))
-
-
-def _real(values: Complex) -> Array:
-    """Real and imaginary parts (..., 2 K)."""
-    return np.concatenate([values.real, values.imag], axis=-1)

@@ -1,7 +1,7 @@
 """The cost near a rig, from its residual and Jacobian alone: block by block a quadratic, so that any prior can be tried
 without simulating.
 
-With residual r and Jacobian J of a block, C(step) = (r.r - 2 g.step + step.A step) / size, A = Re J* J, g = Re J* r.
+With residual r and Jacobian J of a block, C(step) = |r - J step|^2 / size; `squares` are Re J* J, `slopes` Re J* r.
 The logarithm is concave: least squares with weights n / (s^2 + C) bound the cost from above, and their solutions walk
 downhill to its minimum under a prior.
 """
@@ -26,26 +26,33 @@ ENOUGH = 0.1  # nats
 
 @dataclass(frozen=True)
 class Quadratic:
-    """`squares` (blocks, q, q), `slopes` (blocks, q), `energy` (blocks,) over the active unknowns `active` (q,)."""
+    """`squares` (blocks, q, q) and `slopes` (blocks, q) over the active unknowns `active` (q,); real and imaginary
+    parts of residual (2 K,) and derivatives (q, 2 K), line by line in the order of the target's blocks."""
 
     target: Target
     active: NDArray[np.int64]
     squares: Array
     slopes: Array
-    energy: Array
+    residual: Array
+    derivatives: Array
 
-    def moved(self, residual: Complex, jacobian: Complex) -> Quadratic:
-        """The same curvature about another residual (K,); jacobian (size, K)."""
-        slopes, energy = _slopes(self.target, residual, jacobian[self.active])
-        return Quadratic(self.target, self.active, self.squares, slopes, energy)
+    def moved(self, residual: Complex) -> Quadratic:
+        """The same curvature about another residual (K,)."""
+        parts = real_parts(residual[self.target.order])
+        slopes = _slopes(self.target, parts, self.derivatives)
+        return Quadratic(self.target, self.active, self.squares, slopes, parts, self.derivatives)
+
+    @property
+    def energy(self) -> Array:
+        """Sums of squares (blocks,) of the residual."""
+        return _summed(self.target, self.residual)
 
     def cost(self, step: Array) -> float:
         """Nats of the data after a step (q,)."""
         return float(np.sum(self.target.counts * self.target.nats(self._energies(step))))
 
     def _energies(self, step: Array) -> Array:
-        whole = self.energy - 2 * self.slopes @ step + (self.squares @ step) @ step
-        return np.asarray(np.maximum(whole, 0.0) / self.target.sizes)
+        return _summed(self.target, self.residual - step @ self.derivatives) / self.target.sizes
 
     def weights(self, step: Array) -> Array:
         """2 n / ((s^2 + C) size) (blocks,) after a step."""
@@ -113,23 +120,29 @@ class Quadratic:
 
 def quadratic_of(target: Target, residual: Complex, jacobian: Complex, active: NDArray[np.int64]) -> Quadratic:
     """The quadratic about a residual (K,) with Jacobian (size, K) for the active unknowns."""
-    chosen = jacobian[active]
+    derivatives = real_parts(jacobian[active][:, target.order])
     squares = np.empty((len(target.floors), len(active), len(active)))
-    real = _real(chosen[:, target.order])
-    for block, inside in enumerate(target.runs):
-        part = real[:, inside].reshape(len(active), -1)
+    for block, inside in enumerate(_inside(target)):
+        part = derivatives[:, inside]
         squares[block] = part @ part.T
-    slopes, energy = _slopes(target, residual, chosen)
-    return Quadratic(target, active, squares, slopes, energy)
+    parts = real_parts(residual[target.order])
+    return Quadratic(target, active, squares, _slopes(target, parts, derivatives), parts, derivatives)
 
 
-def _real(values: Complex) -> Array:
-    """Real and imaginary parts (..., K, 2)."""
-    return np.stack([values.real, values.imag], axis=-1)
+def real_parts(values: Complex) -> Array:
+    """Real and imaginary parts (..., 2 K), line by line."""
+    return np.ascontiguousarray(values).view(np.float64)
 
 
-def _slopes(target: Target, residual: Complex, chosen: Complex) -> tuple[Array, Array]:
-    product = (chosen * residual.conj()).real
-    sums = [np.bincount(target.of_line, row, len(target.floors)) for row in product]
-    energy = np.asarray(np.bincount(target.of_line, np.abs(residual) ** 2, len(target.floors)), dtype=np.float64)
-    return np.stack(sums, axis=1), energy
+def _inside(target: Target) -> list[slice]:
+    """Where the parts of each block lie."""
+    return [slice(2 * one.start, 2 * one.stop) for one in target.runs]
+
+
+def _summed(target: Target, parts: Array) -> Array:
+    """Sums (blocks,) of the squares of parts (2 K,)."""
+    return np.array([parts[inside] @ parts[inside] for inside in _inside(target)])
+
+
+def _slopes(target: Target, residual: Array, derivatives: Array) -> Array:
+    return np.array([derivatives[:, inside] @ residual[inside] for inside in _inside(target)])

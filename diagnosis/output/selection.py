@@ -18,7 +18,7 @@ from gearbench.diagnosis.effects.effect import BEYOND, Hypothesis, Wide
 from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.output.background import prior_of
 from gearbench.diagnosis.output.beginning import Around
-from gearbench.diagnosis.output.by_forces import Start, begun_by_forces
+from gearbench.diagnosis.output.by_forces import Start
 from gearbench.diagnosis.output.contrast import is_strange
 from gearbench.diagnosis.output.fit import SETTLED, Optimum, cost_of, fit, fit_afresh
 from gearbench.diagnosis.output.jacobian import FOLLOWED
@@ -95,8 +95,6 @@ def select(
     hypothesis' name; `around`: the rig around its mesh, as the records show it; `apart`: a record that has no part in
     this judges what enters."""
     unknowns = simulator.layout.unknowns
-    base, begun = begun_by_forces(simulator, base, hypotheses, starts, report)
-    starts = {**starts, begun.hypothesis.name: begun} if begun else starts
     best, weighed = base, None
     entered: list[Weighed] = []
     while len(entered) < MOST:

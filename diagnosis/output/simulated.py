@@ -19,7 +19,7 @@ from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.output.around import around
 from gearbench.diagnosis.output.background import background
-from gearbench.diagnosis.output.by_forces import Start
+from gearbench.diagnosis.output.by_forces import Start, begun_by_forces
 from gearbench.diagnosis.output.layout import Layout, layout_of
 from gearbench.diagnosis.output.likely_teeth import with_likely_teeth
 from gearbench.diagnosis.output.passed_noise import noise_left
@@ -92,11 +92,15 @@ def simulated(
     base = background(simulator, _beginnings(layout, by_forces), seen, report)
     if base is None:
         return None
+    ranked = _cracked_by_forces(problem, found, cracks) if cracks else []
+    simulator = replace(simulator, layout=replace(layout, teeth=tuple(ranked)))
+    starts = _starts(layout, problem.unknowns, found, _weighed(listed, simulator.layout))
+    base, starts = begun_by_forces(simulator, base, listed, starts, seen, report)
     if cracks:
-        simulator, base = with_likely_teeth(simulator, base, _cracked_by_forces(problem, found, cracks))
+        simulator, base = with_likely_teeth(simulator, base, ranked)
     layout = simulator.layout
-    weighed = [one for one in listed if one.wide[0].key != CRACK or one.wide[0].at in layout.teeth]
-    starts = _starts(layout, problem.unknowns, found, weighed)
+    weighed = _weighed(listed, layout)
+    starts = {**_starts(layout, problem.unknowns, found, weighed), **starts}
     selection = select(simulator, base, weighed, starts, report, seen, apart=apart)
     std = selection.best.std
     rough = [number for number in range(len(measurements)) if number not in smooth]
@@ -111,6 +115,11 @@ def simulated(
             selection = opened
             std[layout.unknowns[BACKLASH]] = SPACING * selection.best.p[layout.unknowns[BACKLASH]]
     return Simulated(layout, simulator, selection, std)
+
+
+def _weighed(listed: Sequence[Hypothesis], layout: Layout) -> list[Hypothesis]:
+    """Those listed whose teeth may be cracked."""
+    return [one for one in listed if one.wide[0].key != CRACK or one.wide[0].at in layout.teeth]
 
 
 def _cracked_by_forces(problem: Problem, found: Search, cracks: Sequence[Hypothesis]) -> list[int]:

@@ -13,7 +13,7 @@ from gearbench.diagnosis.effects.effect import Hypothesis
 from gearbench.diagnosis.forces.unknowns import Unknowns, group, unknowns_of
 from gearbench.diagnosis.output.background import background
 from gearbench.diagnosis.output.beginning import Around
-from gearbench.diagnosis.output.by_forces import Start
+from gearbench.diagnosis.output.by_forces import Start, begun_by_forces
 from gearbench.diagnosis.output.selection import Selection, select
 from gearbench.diagnosis.output.target import Block, Target
 
@@ -62,7 +62,10 @@ def chosen(
     """The selection beside the background's optimum; None without one."""
     here: Any = simulator
     base = background(here, beginnings, around)
-    return select(here, base, hypotheses, starts, around=around, apart=apart) if base is not None else None
+    if base is None:
+        return None
+    base, begun = begun_by_forces(here, base, hypotheses, starts, around)
+    return select(here, base, hypotheses, begun, around=around, apart=apart)
 
 
 def sensitivities(seed: int = 0) -> np.ndarray:

@@ -13,12 +13,13 @@ from gearbench.cases import case_files
 from gearbench.diagnosis.evidence.problem import problem_of
 from gearbench.diagnosis.forces.condition import Condition
 from gearbench.diagnosis.intake.measurements import measurement
-from gearbench.diagnosis.output.around import around
+from gearbench.diagnosis.output.answering import left_over, lines_of, slopes_left_over, slopes_of, system_of
+from gearbench.diagnosis.output.around import KEYS, MOVED, REACTION, around
 from gearbench.diagnosis.output.layout import Layout, layout_of
-from gearbench.diagnosis.output.structure import HOUSING, MODE, SEAT, SHAPE
+from gearbench.diagnosis.output.structure import ACROSS, CROSS, HOUSED, HOUSING, MODE, SEAT, SHAPE
 from gearbench.rig import read_case
 
-K1, K2, HOUSED, RATIO = 0.93e8, 1.08e8, 0.06, 0.05  # stiffness of the supports, compliance of the housing, damping
+K1, K2, SOFTNESS, RATIO = 0.93e8, 1.08e8, 0.06, 0.05  # stiffness of the supports, compliance of the housing, damping
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +48,7 @@ def recorded(
     torque = like.spectra["torque_driver"][: like.bins]
     force = 300.0 * (rng.standard_normal(like.bins) + 1j * rng.standard_normal(like.bins))
     mean = 2 / (1 / m.stiffness[0] + 1 / m.stiffness[1])
-    big = mean / HOUSED
+    big = mean / SOFTNESS
     heavy = np.exp(-2.0 * (frequency or 0.0)) * 0.5 * (m.mass[0] + m.mass[1]) * big / mean
     damped = 2 * RATIO * np.sqrt(big * heavy)
     s = 1j * omega
@@ -93,7 +94,7 @@ def test_a_housing_is_found_with_the_supports(rig: tuple[Layout, Condition], fre
     assert found is not None
     unknowns, model = layout.unknowns, layout.model
     assert found[unknowns["stiffness"]] == pytest.approx(np.log([K1, K2] / np.array(model.stiffness)), abs=0.005)
-    assert found[unknowns[HOUSING]] == pytest.approx([HOUSED, 0.0], abs=0.05 * HOUSED)
+    assert found[unknowns[HOUSING]] == pytest.approx([SOFTNESS, 0.0], abs=0.05 * SOFTNESS)
     assert found[unknowns[MODE]][:2] == pytest.approx([frequency, 0.0], abs=0.1)
 
 
@@ -104,7 +105,7 @@ def test_a_housing_that_rocks_is_found_a_late_sensor_and_inertia(rig: tuple[Layo
     assert found is not None
     assert turning(layout, found) == pytest.approx(1.02, abs=0.003)
     unknowns, size = layout.unknowns, (shares[0] ** 2 + shares[1] ** 2) / 2
-    assert found[unknowns[HOUSING]] == pytest.approx([0.0, size * HOUSED], abs=0.03 * HOUSED)
+    assert found[unknowns[HOUSING]] == pytest.approx([0.0, size * SOFTNESS], abs=0.03 * SOFTNESS)
     assert found[unknowns[MODE]][2] == pytest.approx(0.3, abs=0.01)
     assert np.tan(found[unknowns[SHAPE]][1] - np.pi / 4) == pytest.approx(shares[1] / shares[0], abs=0.02)
     assert found[unknowns["delay-y_driver"]][0] == pytest.approx(late, rel=0.05)
@@ -117,7 +118,7 @@ def test_sensors_on_the_housing_are_found_with_it(rig: tuple[Layout, Condition])
     assert found is not None
     unknowns, size = layout.unknowns, (shares[0] ** 2 + shares[1] ** 2) / 2
     assert found[unknowns[SEAT]] == pytest.approx([1.0], abs=0.05)
-    assert found[unknowns[HOUSING]] == pytest.approx([0.0, size * HOUSED], abs=0.05 * HOUSED)
+    assert found[unknowns[HOUSING]] == pytest.approx([0.0, size * SOFTNESS], abs=0.05 * SOFTNESS)
     assert found[unknowns[MODE]][2] == pytest.approx(-0.3, abs=0.02)
 
 
@@ -139,3 +140,25 @@ def test_without_displacements_nothing_is_read(rig: tuple[Layout, Condition]) ->
     layout, like = rig
     spectra = {name: values for name, values in like.spectra.items() if not name.startswith("y_")}
     assert around(layout, [replace(like, spectra=spectra)], np.zeros(layout.size)) is None
+
+
+@pytest.mark.parametrize("level", [0.1, 0.01])
+def test_derivatives_are_those_of_differences(rig: tuple[Layout, Condition], level: float) -> None:
+    layout, like = rig
+    unknowns = layout.unknowns
+    lines = lines_of(layout.model, recorded(layout, like, -0.3, seat=1.0), (*MOVED, REACTION), 60)
+    assert lines is not None
+    p = np.zeros(layout.size)
+    for key, value in ((HOUSING, 0.02), (CROSS, 0.05), (ACROSS, 0.2), (SEAT, 0.5), ("delay-y_driver", 4e-6)):
+        p[unknowns[key]] = value
+    at = np.concatenate([np.arange(*unknowns[key].indices(unknowns.size)) for key in (*KEYS, *HOUSED)])
+    at = at[unknowns.prior()[at] > 0.0]
+    sd = unknowns.prior()[at]
+    system = system_of(layout, p)
+    found = slopes_left_over(layout, system, slopes_of(layout, p, system, at, sd), lines, level)
+    assert (np.abs(found).max(axis=1) > 0.0).sum() > 20
+    for index, width, slope in zip(at, sd, found, strict=True):
+        step = 1e-5 * width * (np.arange(unknowns.size) == index)
+        high, low = (left_over(layout, system_of(layout, one), lines, level) for one in (p + step, p - step))
+        wanted = (high - low) / (2e-5 * width)
+        assert np.abs(slope - wanted).max() <= 1e-3 * np.abs(wanted).max()

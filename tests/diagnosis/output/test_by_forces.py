@@ -7,6 +7,7 @@ import pytest
 from shared.fake_simulator import LINES, FakeSimulator, sensitivities, target, unknowns
 
 from gearbench.diagnosis.effects.effect import Hypothesis, Wide
+from gearbench.diagnosis.output import by_forces
 from gearbench.diagnosis.output.background import prior_of
 from gearbench.diagnosis.output.by_forces import SPEAKS, Start, begun_by_forces
 from gearbench.diagnosis.output.fit import Optimum, fit, sensitivity_of
@@ -42,7 +43,7 @@ def test_what_the_force_residuals_found_leads_the_background_out_of_its_valley(s
     assert abs(base.p[1] - TRUE[1]) > 0.05
     start = Start(FRICTION, TRUE + 0.01, 2 * SPEAKS)
     better, begun = begun_by_forces(simulator, base, (FRICTION,), {"friction": start})  # type: ignore[arg-type]
-    assert begun is not None and begun.p == pytest.approx(TRUE, abs=0.03)
+    assert begun["friction"].p == pytest.approx(TRUE, abs=0.03)
     # The background goes with it, so that the effect is held against the best rig without it.
     assert better.evidence > base.evidence + 3.0 and better.p[1] == pytest.approx(TRUE[1], abs=0.02)
     assert (better.sd == base.sd).all() and abs(better.p[3]) < 0.1
@@ -50,10 +51,23 @@ def test_what_the_force_residuals_found_leads_the_background_out_of_its_valley(s
 
 def test_a_background_that_is_close_or_forces_that_say_little_begin_nothing(simulator: FakeSimulator) -> None:
     base = background(simulator)
-    weak = Start(FRICTION, TRUE, 0.5 * SPEAKS)
-    assert begun_by_forces(simulator, base, (FRICTION,), {"friction": weak}) == (base, None)  # type: ignore[arg-type]
-    assert begun_by_forces(simulator, base, (FRICTION,), {}) == (base, None)  # type: ignore[arg-type]
+    weak = {"friction": Start(FRICTION, TRUE, 0.5 * SPEAKS)}
+    assert begun_by_forces(simulator, base, (FRICTION,), weak) == (base, weak)  # type: ignore[arg-type]
+    assert begun_by_forces(simulator, base, (FRICTION,), {}) == (base, {})  # type: ignore[arg-type]
     close = FakeSimulator(valleys, target(valleys(np.zeros(8))))
     near = background(close)
-    strong = Start(FRICTION, TRUE, 10 * SPEAKS)
-    assert begun_by_forces(close, near, (FRICTION,), {"friction": strong}) == (near, None)  # type: ignore[arg-type]
+    strong = {"friction": Start(FRICTION, TRUE, 10 * SPEAKS)}
+    assert begun_by_forces(close, near, (FRICTION,), strong) == (near, strong)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("there", [True, False])
+def test_another_structure_is_sought_unless_an_effect_explains_the_records(
+    there: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    simulator = FakeSimulator(valleys, target(valleys(TRUE)))
+    sought = []
+    monkeypatch.setattr(by_forces, "restructured", lambda here, base, *more: sought.append(base) or base)
+    starts = {"friction": Start(FRICTION, TRUE if there else -3.0 * TRUE, 2 * SPEAKS)}
+    base = background(simulator)
+    begun_by_forces(simulator, base, (FRICTION,), starts)  # type: ignore[arg-type]
+    assert len(sought) == (0 if there else 1)

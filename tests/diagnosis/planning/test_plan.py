@@ -46,12 +46,12 @@ def test_an_effect_of_the_stated_size_is_what_a_record_calls_for(made: tuple[Pla
         after = simulator.lines(part * found * direction(known, one))
         assert after is not None
         noise = known.search.target.lines - before
-        quadratic = known.search.quadratic.moved(after - before + noise, jacobian)
+        quadratic = known.search.quadratic.moved(after - before + noise)
         wide, p = wide_prior(known, one), part * found * direction(known, one)
         _, cost, information = quadratic.best(nothing, known.narrow, unknowns.bounds())
         plain = quadratic.evidence(cost, information, known.narrow)
         # The effect's own fit ends at the truth, to which one step need not get.
-        truth = known.search.quadratic.moved(noise, jacobian)
+        truth = known.search.quadratic.moved(noise)
         cost, information = (
             truth.target.cost(noise) + prior_cost(p, wide),
             truth.information(np.zeros(known.active.size)),

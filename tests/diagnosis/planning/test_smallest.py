@@ -42,7 +42,7 @@ def test_evidence_is_that_of_the_two_optima() -> None:
     for number, hypothesis in enumerate(HYPOTHESES):
         size = 0.02
         lines = size * direction(one, hypothesis) @ sensitivities()
-        quadratic = base.moved(lines, sensitivities())
+        quadratic = base.moved(lines)
         evidence = []
         for prior in (one.narrow, wide_prior(one, hypothesis)):
             _, cost, information = quadratic.best(np.zeros(8), prior, bounds)
