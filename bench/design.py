@@ -9,7 +9,7 @@ get is carried out on them, and both what it expects of itself and what it errs 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil
 
 import numpy as np
@@ -203,7 +203,7 @@ def _spectra(case: Case, htf: CubicSpline) -> tuple[Spectra, float, float]:
         dte[:, -rows[below]] += part[:, below].conj()
     periods = experiment.periods // repeats
     start = np.zeros(experiment.realisations)
-    return Spectra(force, dte, spacing, d, start, True, periods, repeats), peak, rms
+    return Spectra(force, dte, spacing, d, start, True, periods, repeats, samples=samples), peak, rms
 
 
 def _noisy(clean: Spectra, band: tuple[float, float], snr_db: float, seed: int) -> Spectra:
@@ -214,17 +214,7 @@ def _noisy(clean: Spectra, band: tuple[float, float], snr_db: float, seed: int) 
     draw = np.random.default_rng(seed).standard_normal((2, *clean.dte.shape))
     noise = size * (draw[0] + 1j * draw[1])
     known = np.full(clean.highest + 1, 2 * size**2) if clean.periods > 1 else None
-    return Spectra(
-        clean.force,
-        clean.dte + noise,
-        clean.spacing,
-        clean.mesh_lines,
-        clean.start_phase,
-        True,
-        clean.periods,
-        clean.repeats,
-        known,
-    )
+    return replace(clean, dte=clean.dte + noise, noise=known)
 
 
 def _headroom(case: Case, system: PeriodicSystem, clean: Spectra) -> float:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.identification.lpm.regression import prepare
+from gearbench.identification.lpm.regression import prepare, rotated
 from gearbench.identification.spectra.joint import Complexes, Floats, Spectra
 
 # Lines beyond the excited ones that are kept, as part of the highest and in mesh harmonics: sidebands act back on the
@@ -32,7 +32,8 @@ class ClassData:
     modelled and not valid, dte is there as far as the record goes, for comparison;
     `weight` (C,): 1, or 1/sqrt(2) for classes that are their own mirror image and hold every equation twice.
     `omega` (C, S): angular frequency over `omega_unit` [rad/s]. `excited`: highest excited line. `equations`: complex
-    ones, each counted once.
+    ones, each counted once. `samples` of the joint period, 0 where nothing can have folded; `start_phase` (E,) [cycles]
+    by which records were delayed, and the `rotation` (E, E) of the realisations after that.
     """
 
     lines: NDArray[np.int64]
@@ -48,6 +49,14 @@ class ClassData:
     force_unit: float
     dte_unit: float
     equations: float
+    samples: int = 0
+    start_phase: Floats = field(default_factory=lambda: np.zeros(1))
+    rotation: Floats = field(default_factory=lambda: np.eye(1))
+
+    @property
+    def folds(self) -> bool:
+        """Whether the model has lines beyond half the sampling rate."""
+        return 0 < self.samples < 2 * self.furthest
 
     @property
     def omega_unit(self) -> float:
@@ -109,6 +118,12 @@ def fewer_classes(data: ClassData, equations: int) -> ClassData:
     return replace(data, **parts, equations=_equations(parts["valid"], parts["dte"], parts["weight"]))
 
 
+def only_lines(data: ClassData, kept: NDArray[np.bool_]) -> ClassData:
+    """The same with equations of `kept` lines (C, S) only."""
+    valid = data.valid & kept
+    return replace(data, valid=valid, equations=_equations(valid, data.dte, data.weight))
+
+
 def class_data(spectra: Spectra, excited: int) -> ClassData:
     """Lines up to a little beyond the highest `excited` one, without the operating response (class 0 of its records).
 
@@ -147,6 +162,9 @@ def class_data(spectra: Spectra, excited: int) -> ClassData:
         force_unit,
         dte_unit,
         _equations(valid, dte, weight),
+        spectra.samples,
+        regression.start_phase,
+        rotated(np.eye(spectra.realisations)),
     )
 
 

@@ -3,17 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.identification.feedback.data import ClassData, class_data, fewer_classes
+from gearbench.identification.feedback.data import ClassData, class_data, fewer_classes, only_lines
+from gearbench.identification.feedback.folding import Folding, clear_lines, folded, folded_of, folding_of
 from gearbench.identification.feedback.functions import Fractions, Splines, common_pairs
 from gearbench.identification.feedback.model import Model
-from gearbench.identification.feedback.phase import in_zones
+from gearbench.identification.feedback.phase import InZones, in_zones
 from gearbench.identification.feedback.poles import linear_models
-from gearbench.identification.feedback.refine import Refined, linearised, output_error, refined, settled_covariance
+from gearbench.identification.feedback.refine import (
+    SETTLED,
+    Refined,
+    linearised,
+    output_error,
+    refined,
+    response,
+    settled_covariance,
+)
 from gearbench.identification.feedback.shapes import Shapes
 from gearbench.identification.feedback.start import first_model
 from gearbench.identification.feedback.zones import Zones
@@ -44,6 +53,9 @@ GAIN = 4.0
 COMPARED = 0.02
 # The same in zones of phase, whose few numbers are known so well that less tells: of 12000 real equations one.
 IN_ZONES = 1e-4
+# Times that what folds back is foretold anew in the last rounds, and in the search from a model that has taken it in:
+# there it begins at twice its size and swings.
+FORETOLD, APPROACHED = 2, 6
 # Where further pairs of poles are tried, as parts of the excited band, and their damping ratios: the lowest are those
 # of over-damped supports.
 PLACES = (0.01, 0.04, 0.08, 0.14, 0.2, 0.26, 0.32, 0.38, 0.44, 0.52, 0.6, 0.7, 0.85)
@@ -55,12 +67,14 @@ FIRMNESS = 1e-9
 @dataclass(frozen=True)
 class Feedback:
     """The data, and the refined model of least criterion; `zones` of phase that its mesh is told by, if it is, and
-    their `gain` in twice the log evidence over harmonics."""
+    their `gain` in twice the log evidence over harmonics; `folding` beyond half the sampling rate that was taken out of
+    the data, where the model foretells any."""
 
     data: ClassData
     refined: Refined
     zones: Zones | None = None
     gain: float = 0.0
+    folding: Folding | None = None
 
     @property
     def model(self) -> Model:
@@ -94,13 +108,88 @@ def mesh_feedback(
         other = with_centres(tried, part, report)
         best = min((best, other), key=lambda fit: criterion(fit, part))
     report(0.95, "mesh feedback: zones of phase")
-    told = in_zones(best, part, IN_ZONES) if harmonics is None else None
+    found = search(best, part, data, zones=harmonics is None)
+    best = found.fit if found.told is None else _with_more_poles(found.told.fit, found.part)
     report(1.0, "mesh feedback: last rounds")
-    if told is None:
-        return Feedback(data, settled_covariance(refined(best.model, data), data))
-    best = _with_more_poles(told.fit, part)
-    last = settled_covariance(refined(best.model, data, IN_ZONES, best.mesh), data)
-    return Feedback(data, last, told.zones, told.gain)
+    return _last_rounds(best, data, found)
+
+
+@dataclass(frozen=True)
+class Found:
+    """A `fit` in harmonics to a `part` of the data without what folds back; what is `told` in zones, if it is; and the
+    `folding`, where the model foretells any."""
+
+    fit: Refined
+    part: ClassData
+    told: InZones | None
+    folding: Folding | None = None
+
+    @property
+    def last(self) -> Refined:
+        """The fit in zones, or else that in harmonics."""
+        return self.told.fit if self.told is not None else self.fit
+
+    @property
+    def value(self) -> float:
+        """Schwarz's criterion with the noise that is left beside what the record tells of the mesh."""
+        count = 2 * self.part.equations
+        return count * float(np.log(self.last.noise)) + self.last.model.free * float(np.log(count))
+
+
+def search(best: Refined, part: ClassData, data: ClassData, *, zones: bool) -> Found:
+    """What the record tells in `zones`, or harmonics, from the fit `best` to a `part` of it, without what folds back.
+
+    A fit to a record that was not filtered takes in what folds back, and foretells something else then. Hence one to
+    the record without the folded lines is found as well, beginning on lines that next to nothing folds onto, and speaks
+    if it leaves less.
+    """
+    found = Found(best, part, in_zones(best, part, IN_ZONES) if zones else None)
+    lines = folded_of(best, data)
+    if lines is None:
+        return found
+    taken, least = best, (np.inf, best, part)
+    clear = fewer_classes(only_lines(data, clear_lines(lines, data, best.noise)), SEARCHED)
+    taken = refined(best.model, clear, COMPARED)
+    lines = folded(response(taken.model, data), data)
+    for _ in range(APPROACHED):
+        clean = fewer_classes(replace(data, dte=data.dte - lines), SEARCHED)
+        taken = refined(taken.model, clean, COMPARED)
+        lines = folded(response(taken.model, data), data)
+        least = min(least, (criterion(taken, clean), taken, clean), key=lambda each: each[0])
+    value, taken, clean = least
+    other = Found(taken, clean, in_zones(taken, clean, IN_ZONES) if zones else None)
+    if min(value - criterion(best, part), other.value - found.value) >= 0.0:
+        return replace(found, folding=folding_of(found.last, data, 0.0))
+    other = replace(other, folding=folding_of(other.last, data, 1.0))
+    # Zones foretell it better than harmonics, and switches that begin with what these leave stay where they are.
+    for _ in range(FORETOLD if zones else 0):
+        if other.folding is None:
+            break
+        clean = fewer_classes(other.folding.removed(data), SEARCHED)
+        taken = refined(other.fit.model, clean, COMPARED)
+        before, other = other, Found(taken, clean, in_zones(taken, clean, IN_ZONES), other.folding)
+        other = replace(other, folding=folding_of(other.last, data, 1.0))
+        if other.folding is None or other.folding.like(before.folding, other.last.noise):
+            break
+    return other
+
+
+def _last_rounds(best: Refined, data: ClassData, found: Found) -> Feedback:
+    """The fit refined on all `data`, with what folds back foretold by ever better models."""
+    folding, told = found.folding, found.told
+    clean = folding.removed(data) if folding is not None else data
+    settled, mesh = (SETTLED, None) if told is None else (IN_ZONES, best.mesh)
+    last = refined(best.model, clean, settled, mesh)
+    believed = float(folding.part > 0.5) if folding is not None else 0.0
+    for _ in range(FORETOLD if folding is not None else 0):
+        before, folding = folding, folding_of(last, data, believed)
+        if folding is None or folding.like(before, last.noise):
+            break
+        clean = folding.removed(data)
+        last = refined(last.model, clean, settled, last.mesh if told is not None else None)
+    last = settled_covariance(last, clean)
+    last = folding.counted(last) if folding is not None else last
+    return Feedback(clean, last, told.zones if told else None, told.gain if told else 0.0, folding)
 
 
 def _with_more_poles(best: Refined, part: ClassData) -> Refined:

@@ -30,6 +30,8 @@ from gearbench.identification.truth.periodic import itf_from_htf
 
 # N is 1 only far below the first mode: beyond this part of its frequency k(theta) has a free factor.
 GAUGED = 0.2
+# Part of the sidebands beyond half the sampling rate from which on a note says that they are there.
+SEEN = 0.01
 # Pairs of poles of a machine on two supports.
 SUPPORTS = 2
 
@@ -113,7 +115,9 @@ def _about_fit(found: Feedback, spectra: Spectra, ratio: float) -> dict[str, Any
     """Attributes that say what was fitted, how well, and of a prediction for which mesh frequency."""
     own = found.data.mesh_lines * spectra.spacing
     predicted = {} if ratio == 1.0 else {"mesh_frequency": own * ratio, "identified_at_mesh_frequency": own}
-    return predicted | _about_basis(found) | {
+    folding = found.folding
+    folded = {} if folding is None else {"folded_part": folding.part, "folded_part_sd": folding.deviation}
+    return predicted | folded | _about_basis(found) | {
         "form": "centres from angles" if found.model.torsional else "dte",
         "mesh_harmonics": found.model.harmonics,
         "pole_pairs": found.model.basis.pairs.shape[0],
@@ -138,6 +142,17 @@ def _about_basis(found: Feedback) -> dict[str, Any]:
     }
 
 
+def _folded(found: Feedback) -> list[str]:
+    """The note on sidebands beyond half the sampling rate that are in the record."""
+    if found.folding is None or found.folding.part < SEEN:
+        return []
+    share = found.folding.part * found.folding.size / float(np.linalg.norm(found.data.dte))
+    return [
+        f"sidebands beyond half the sampling rate are in this record, as without a filter before sampling: {share:.2%}"
+        f" of its response, {found.folding.part:.0%} of what the model foretells; taken out"
+    ]
+
+
 def _predicted(own: float, ratio: float) -> list[str]:
     """The warning of a response at another mesh frequency than the record's `own` [Hz]."""
     if ratio == 1.0:
@@ -152,7 +167,7 @@ def _predicted(own: float, ratio: float) -> list[str]:
 def _doubts(
     found: Feedback, spectra: Spectra, natural: Floats, variance: float, apart: float, ratio: float
 ) -> list[str]:
-    notes = [*_predicted(found.data.mesh_lines * spectra.spacing, ratio), *doubt_of(apart, variance)]
+    notes = [*_predicted(found.data.mesh_lines * spectra.spacing, ratio), *doubt_of(apart, variance), *_folded(found)]
     if not spectra.steady:
         notes.append("the steady state is not verified, and mesh-feedback assumes it")
     if found.model.torsional:

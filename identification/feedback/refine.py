@@ -114,6 +114,29 @@ def linearised(model: Model, data: ClassData, shapes: Shapes | None = None) -> t
     return _normal(model, data, operator, _deflection(operator, data), shapes)
 
 
+def told_beside(fit: Refined, data: ClassData, change: Complexes) -> tuple[float, float, Floats]:
+    """Part of a `change` (C, S, E) of the response that is in the residual of a fit on the `data`, its deviation, and
+    the shift (P,) of the parameters that the whole change makes: least squares beside all parameters, whose Jacobian
+    and prior are those of `refined` (separable least squares; Golub and Pereyra 1973)."""
+    assert fit.mesh is not None
+    state, free = _State.of(fit.model, fit.mesh, data), fit.model.free
+    system = _system(state, data, fit.noise)
+    seen = _shown(fit.model, data, state.deflection)
+    _, along = _normal(fit.model, replace(data, dte=seen + change), state.operator, state.deflection, fit.mesh.shapes)
+    precision = 2.0 / fit.noise
+    counted = data.weight[:, None, None] ** 2 * data.valid[:, :, None] * (data.dte != 0)
+    size, product = (
+        precision * float(np.sum(counted * (change.conj() * other).real)) for other in (change, data.dte - seen)
+    )
+    taken = precision * along / system.size
+    shift = cho_solve(cho_factor(system.total, lower=True), taken)
+    # What the parameters cannot take in, of which rounding leaves a little all the same.
+    told_by = max(size - float(taken @ shift), TINY * size)
+    moved = shift / system.size
+    whole = np.concatenate([moved[:free], fit.mesh.shapes.of(moved[free:])])
+    return (product - float(shift @ system.pull)) / told_by, float(told_by**-0.5), whole
+
+
 @dataclass(frozen=True)
 class _State:
     """A model, what its mesh is made of, and its response."""

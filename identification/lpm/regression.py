@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import lru_cache
+from typing import TypeVar
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -19,6 +20,8 @@ from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
 from gearbench.identification.spectra.joint import Complexes, Floats, Spectra
+
+Values = TypeVar("Values", Floats, Complexes)
 
 # A line counts as excited if its rms force over the experiments exceeds this part of the largest one's.
 EXCITATION_FLOOR = 1e-3
@@ -159,8 +162,8 @@ def prepare(spectra: Spectra, *, transient: bool, reach: int) -> Regression:
     phase = spectra.start_phase % 1.0
     same = bool(np.abs(spectra.relative()).max() < 1e-9) or not transient
     force, dte = (_two_sided(s, phase, d) for s in (spectra.force, spectra.dte))
-    if spectra.realisations > 1 and same:
-        force, dte = _rotate(force), _rotate(dte)
+    if same:
+        force, dte = rotated(force), rotated(dte)
     lost = 1 if same else spectra.realisations
     operating = np.arange(-highest, highest + 1) % d == 0
     force[:lost, operating] = 0.0
@@ -196,10 +199,12 @@ def _two_sided(one_sided: Complexes, phase: Floats, mesh_lines: int) -> Complexe
     return full * np.exp(-2j * np.pi * np.outer(phase, lines) / mesh_lines)
 
 
-def _rotate(values: Complexes) -> Complexes:
-    """Householder reflection of the experiments that turns their mean into experiment 0."""
+def rotated(values: Values) -> Values:
+    """Householder reflection of the experiments (E, ...) that turns their mean into experiment 0."""
     count = values.shape[0]
+    if count == 1:
+        return values
     direction = np.full(count, 1.0 / np.sqrt(count))
     direction[0] -= 1.0
     direction /= np.linalg.norm(direction)
-    return values - 2.0 * np.outer(direction, direction @ values)
+    return values - 2.0 * np.outer(direction, direction @ values)  # type: ignore[return-value]

@@ -33,7 +33,8 @@ class Spectra:
     state was verified, `periods` how many joint periods were averaged, `repeats` how many excitation
     periods make a joint period (only every `repeats`-th line can be excited), `noise` (lines,) the variance
     of a line's dte from the scatter of the periods, or None, `angle_only` whether dte lacks the motion of the
-    gear centres, and `duration` [s] the joint period.
+    gear centres, `duration` [s] the joint period, and `samples` how many of them it has, or 0 where nothing can have
+    come back from beyond half the sampling rate.
     """
 
     force: Complexes
@@ -46,6 +47,7 @@ class Spectra:
     repeats: int = 1
     noise: Floats | None = None
     angle_only: bool = False
+    samples: int = 0
 
     @property
     def realisations(self) -> int:

@@ -80,6 +80,7 @@ def record_spectra(
         sampling.repeats,
         np.mean(noises, axis=0) if noises else _declared_noise(records[0], sampling, highest),
         angles,
+        sampling.joint,
     )
     return spectra, band, list(dict.fromkeys(notes))
 
