@@ -147,7 +147,7 @@ def search(best: Refined, part: ClassData, data: ClassData, *, zones: bool) -> F
     lines = folded_of(best, data)
     if lines is None:
         return found
-    taken, least = best, (np.inf, best, part)
+    least = (np.inf, best, part)
     clear = fewer_classes(only_lines(data, clear_lines(lines, data, best.noise)), SEARCHED)
     taken = refined(best.model, clear, COMPARED)
     lines = folded(response(taken.model, data), data)
