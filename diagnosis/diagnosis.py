@@ -150,14 +150,20 @@ def on_finite_elements(nominal: Case) -> Case:
 
 
 def diagnosed(
-    inputs: Inputs, progress: Progress | None = None, *, quick: bool = False, confirm: bool = False
+    inputs: Inputs,
+    progress: Progress | None = None,
+    *,
+    doing: Progress = lambda what: None,
+    quick: bool = False,
+    confirm: bool = False,
 ) -> Diagnosis:
-    """The diagnosis of records that were taken in; arguments as in `diagnose`."""
+    """The diagnosis of records that were taken in; arguments as in `diagnose`. `doing` is told what the search for the
+    cause is at, by several threads."""
     said = progress or (lambda step: None)
     simulate = replays_of(inputs.nominal, inputs.all)
     said("cause")
     finding = find_cause(inputs.measurements, inputs.nominal, held_out=inputs.held_out, without=inputs.without,
-                         report=said, known=inputs.known)  # fmt: skip
+                         report=doing, known=inputs.known)  # fmt: skip
     said("how far the gap shrinks")
     plain = inputs.damped(finding.recalibrated)
     improved = inputs.damped(finding.with_effect) if finding.with_effect is not None else None

@@ -85,6 +85,16 @@ class Progress:
             self._spoke = now
             self._line(f"{self._step}{f', {note}' if note else ''}: {100 * fraction:.0f} %{self._left(now, fraction)}")
 
+    def doing(self, what: str) -> None:
+        """What the present step is at, which has no known end; several may be at something side by side."""
+        if self._bar is not None:
+            self._bar.update(self._task, description=f"{self.title}: {self._step}, {what}")
+            return
+        now = time.monotonic()
+        if now - self._spoke >= _SECONDS_BETWEEN_LINES:
+            self._spoke = now
+            self._line(f"{self._step}, {what}: {now - self._began:.0f} s")
+
     def _left(self, now: float, fraction: float) -> str:
         """How long the step will still take, at its pace since its first piece: that one compiles loops, or comes from
         a checkpoint."""

@@ -84,7 +84,7 @@ def diagnose(
             progress.step("calibrating on truth rigs around this one")
             inputs = replace(inputs, known=limits_of(inputs, calibrate, diagnose_case, progress))
         with claimed(out, "diagnose", _identity(inputs, confirm), force) as output:
-            diagnosis = diagnosis_in(output, inputs, progress.step, confirm)
+            diagnosis = diagnosis_in(output, inputs, progress, confirm)
             progress.step("report")
             write_report(diagnosis, output)
     if as_json:
@@ -105,7 +105,7 @@ def _tell(diagnosis: Diagnosis, out: Path) -> None:
 
 
 def diagnosis_in(
-    output: Output, inputs: Inputs, progress: Callable[[str], None], confirm: bool = False
+    output: Output, inputs: Inputs, progress: Progress, confirm: bool = False
 ) -> Diagnosis:
     """The diagnosis that an earlier run left in the folder; else made, and written to it."""
     from gearbench.diagnosis.diagnosis import Diagnosis, diagnosed
@@ -116,7 +116,7 @@ def diagnosis_in(
         verdict = read_verdict(output.path("verdict.json"))
         updated = read_case(output.path("updated.toml")) if verdict.verdict == "effects" else None
         return Diagnosis(inputs, verdict, read_case(output.path("recalibrated.toml")), updated)
-    made = diagnosed(inputs, progress, confirm=confirm)
+    made = diagnosed(inputs, progress.step, doing=progress.doing, confirm=confirm)
     output.write("recalibrated.toml", partial(_write_case, made.recalibrated))
     output.write("updated.toml", partial(_write_case, made.updated))
     output.write_text("verdict.json", verdict_json(made.verdict))

@@ -21,3 +21,17 @@ def test_the_first_piece_is_no_measure_of_the_pace(
     told = [line.rpartition(" %")[2] for line in capsys.readouterr().err.splitlines() if "left" in line]
     # From the first piece on a hundredth takes 4.3 to 4.5 s: 95 of them 428 s. At the pace since the beginning, 35 min.
     assert told == [", 7 min left", ", 7 min left", ", 7 min left"][: len(told)] and told
+
+
+def test_what_a_step_is_at_is_told_now_and_then(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    now = [0.0]
+    monkeypatch.setattr(module.time, "monotonic", lambda: now[0])
+    with Progress("job") as progress:
+        progress.step("cause")
+        for at, what in ((1.0, "friction"), (6.0, "backlash"), (7.0, "ripple"), (12.0, "delay")):
+            now[0] = at
+            progress.doing(what)
+    told = capsys.readouterr().err.splitlines()
+    assert told == ["job: cause, backlash: 6 s", "job: cause, delay: 12 s", "job: cause: done in 12.0 s"]

@@ -7,6 +7,7 @@ import io
 import json
 import re
 import shutil
+from collections.abc import Callable
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -76,7 +77,10 @@ def stand_in(monkeypatch: pytest.MonkeyPatch) -> dict:
     """Stand in for the search and the replay; what the search was asked, and what it is to find."""
     said: dict = {"find": friction_found, "calls": 0}
 
-    def search(measurements: tuple, case: Case, *, held_out: object, without: tuple, known: object) -> object:
+    def search(
+        measurements: tuple, case: Case, *, held_out: object, without: tuple, report: Callable, known: object
+    ) -> object:
+        report("simulating: background")
         said.update(names=[one.name for one in measurements], held_out=held_out, without=without)
         said["calls"] += 1
         return said["find"](case)
