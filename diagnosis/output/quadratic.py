@@ -67,10 +67,10 @@ class Quadratic:
         self, p: Array, sd: Array, bounds: tuple[Array, Array], start: Array | None = None
     ) -> tuple[Array, float, Array]:
         """The step (q,) to the least cost under the prior `sd` (size,) from unknowns `p` (size,) within bounds (size,),
-        what it costs with the prior, and the information there. Unknowns of sd 0 stay."""
+        what it costs with the prior, and the information there. Unknowns of sd 0 stay, or go where their bounds are."""
         here, width = p[self.active], sd[self.active]
         low, high = (bound[self.active] - here for bound in bounds)
-        step = np.zeros(len(here)) if start is None else start.copy()
+        step = np.clip(np.zeros(len(here)) if start is None else start, low, high)
         free = width > 0.0
         cost, information = self._whole(step, here, width), self.information(step)
         for _ in range(ROUNDS):
@@ -90,7 +90,7 @@ class Quadratic:
     ) -> Array:
         """Least squares under the prior; what would leave its bounds stays on them."""
         low, high = bounds
-        step = np.zeros(len(here))
+        step = np.clip(np.zeros(len(here)), low, high)
         free = free.copy()
         for _ in range(len(here)):
             scale = width[free]

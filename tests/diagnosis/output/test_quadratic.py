@@ -68,3 +68,17 @@ def test_evidence_of_a_linear_problem_is_that_of_its_gaussian() -> None:
     posterior = np.linalg.inv(information + np.diag(sd**-2.0))
     wanted = -cost + 0.5 * np.linalg.slogdet(posterior)[1] - np.log(sd).sum()
     assert quadratic.evidence(cost, information, sd) == pytest.approx(wanted, rel=1e-9)
+
+
+def test_what_has_no_prior_goes_where_its_bounds_are() -> None:
+    """So is an effect taken out of a fit again that the background does not know, as a crack."""
+    where, quadratic = made()
+    p, sd = np.zeros(8), np.full(8, 0.5)
+    sd[3] = 0.0
+    low, high = np.full(8, -np.inf), np.full(8, np.inf)
+    low[3] = high[3] = -0.4
+    step, cost, _ = quadratic.best(p, sd, (low, high))
+    assert step[3] == -0.4
+    assert cost == pytest.approx(where.cost(RESIDUAL - step @ MATRIX) + 0.5 * float((step[sd > 0] ** 2).sum()) / 0.25)
+    stays, least, _ = quadratic.best(p, sd, FREE)
+    assert stays[3] == 0.0 and cost > least + 5.0
