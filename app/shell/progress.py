@@ -81,19 +81,23 @@ class Progress:
         if self._bar is not None:
             text = f"{self.title}: {self._step}" + (f", {note}" if note else "")
             self._bar.update(self._task, completed=fraction, total=1.0, description=text)
-        elif now - self._spoke >= _SECONDS_BETWEEN_LINES:
-            self._spoke = now
-            self._line(f"{self._step}{f', {note}' if note else ''}: {100 * fraction:.0f} %{self._left(now, fraction)}")
+        else:
+            done = f"{100 * fraction:.0f} %{self._left(now, fraction)}"
+            self._now_and_then(now, f"{self._step}{f', {note}' if note else ''}: {done}")
 
     def doing(self, what: str) -> None:
         """What the present step is at, which has no known end; several may be at something side by side."""
         if self._bar is not None:
             self._bar.update(self._task, description=f"{self.title}: {self._step}, {what}")
-            return
-        now = time.monotonic()
+        else:
+            now = time.monotonic()
+            self._now_and_then(now, f"{self._step}, {what}: {now - self._began:.0f} s")
+
+    def _now_and_then(self, now: float, text: str) -> None:
+        """Tell it unless a line was told a moment ago."""
         if now - self._spoke >= _SECONDS_BETWEEN_LINES:
             self._spoke = now
-            self._line(f"{self._step}, {what}: {now - self._began:.0f} s")
+            self._line(text)
 
     def _left(self, now: float, fraction: float) -> str:
         """How long the step will still take, at its pace since its first piece: that one compiles loops, or comes from

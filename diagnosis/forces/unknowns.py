@@ -83,6 +83,14 @@ class Unknowns:
         """The group of that key."""
         return next(one for one in self.groups if one.key == key)
 
+    def of(self, keys: Sequence[str]) -> NDArray[np.bool_]:
+        """Which unknowns (size,) are of the groups of these keys, as far as there are such."""
+        out = np.zeros(self.size, dtype=bool)
+        for key in keys:
+            if key in self.slices:
+                out[self.slices[key]] = True
+        return out
+
     def names(self) -> tuple[str, ...]:
         """`key.name` of every unknown."""
         return tuple(f"{one.key}.{name}" for one in self.groups for name in one.names)

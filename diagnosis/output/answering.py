@@ -78,30 +78,31 @@ class Slope(NamedTuple):
 
 def left_over(layout: Layout, system: System, lines: Lines, level: float) -> Complex:
     """What no force in the mesh explains of the channels (K * C,), over their noise and a part of their level."""
-    answer = _answers(layout, system, lines, _moved(system, lines))
-    along, seen = _weighted(layout, answer, lines, level)
-    along /= np.linalg.norm(along, axis=1, keepdims=True)
-    return np.asarray((seen - along * (along.conj() * seen).sum(axis=1, keepdims=True)).ravel())
+    return left_over_moved(layout, system, (), lines, level)[0]
 
 
-def slopes_left_over(
+def left_over_moved(
     layout: Layout, system: System, slopes: Sequence[Slope], lines: Lines, level: float
-) -> Complex:
-    """Derivatives (slopes, K * C) of `left_over`."""
+) -> tuple[Complex, Complex]:
+    """`left_over` and its derivatives (slopes, K * C)."""
     moved = _moved(system, lines)
     answer = _answers(layout, system, lines, moved)
-    change = _changes(layout, system, slopes, lines, moved, answer)
-    along, seen = _weighted(layout, answer, lines, level)
-    weight = _weight(lines, level)
-    d_along = change[..., 0] * weight
-    d_seen = -change[..., 1] * (lines.torque / layout.model.base_radius[0])[:, None] * weight
+    weight = 1.0 / np.sqrt(lines.noise + level**2 * lines.level)
+    force = (lines.torque / layout.model.base_radius[0])[:, None]
+    along, seen = answer[:, :, 0] * weight, (lines.channels - answer[:, :, 1] * force) * weight
     size = np.linalg.norm(along, axis=1, keepdims=True)
     along /= size
+    part = (along.conj() * seen).sum(axis=1, keepdims=True)
+    left = (seen - along * part).ravel()
+    if not slopes:
+        return left, np.zeros((0, left.size), dtype=complex)
+    change = _changes(layout, system, slopes, lines, moved, answer)
+    d_along = change[..., 0] * weight
+    d_seen = -change[..., 1] * force * weight
     d_along -= along * (along.conj() * d_along).real.sum(axis=2, keepdims=True)
     d_along /= size
-    part = (along.conj() * seen).sum(axis=1, keepdims=True)
     d_part = (d_along.conj() * seen + along.conj() * d_seen).sum(axis=2, keepdims=True)
-    return np.asarray((d_seen - d_along * part - along * d_part).reshape(len(slopes), -1))
+    return left, (d_seen - d_along * part - along * d_part).reshape(len(slopes), -1)
 
 
 def system_of(layout: Layout, p: Array) -> System:
@@ -159,17 +160,6 @@ def _sensors(layout: Layout, p: Array) -> tuple[float, dict[str, float]]:
     return gain, {channel: float(p[layout.unknowns[key]][0]) for channel, key in DELAYS.items()}
 
 
-def _weight(lines: Lines, level: float) -> Array:
-    return np.asarray(1.0 / np.sqrt(lines.noise + level**2 * lines.level))
-
-
-def _weighted(layout: Layout, answer: Complex, lines: Lines, level: float) -> tuple[Complex, Complex]:
-    """What a force in the mesh does to the channels (K, C), and what they show beside the torque's part, weighted."""
-    weight = _weight(lines, level)
-    driven = lines.channels - answer[:, :, 1] * (lines.torque / layout.model.base_radius[0])[:, None]
-    return answer[:, :, 0] * weight, driven * weight
-
-
 def _stiffness(system: System, lines: Lines) -> Complex:
     omega = lines.omega[:, None, None]
     return np.asarray(system.springs + 1j * omega * system.dampers - omega**2 * system.mass)
@@ -203,7 +193,7 @@ def _changes(
     """Derivatives (slopes, K, C, 2) of the channels `answer` (K, C, 2)."""
     omega = lines.omega[:, None]
     out = np.zeros((len(slopes), *answer.shape), dtype=complex)
-    # Rows of the inverse stand for all unknowns: one solution for each channel, by the symmetry of Z.
+    # One solution of the transposed equations for each channel serves all unknowns.
     shown = np.stack([system.shown.get(name, np.zeros(len(system.free))) for name in lines.names], axis=1)
     stiffness = np.swapaxes(_stiffness(system, lines), 1, 2)
     adjoint = np.linalg.solve(stiffness, np.broadcast_to(shown + 0j, (len(omega), *shown.shape)))

@@ -23,8 +23,8 @@ from gearbench.diagnosis.output.answering import (
     REACTION,
     Lines,
     left_over,
+    left_over_moved,
     lines_of,
-    slopes_left_over,
     slopes_of,
     system_of,
 )
@@ -189,9 +189,9 @@ def _fitted(
             p = whole(trial)
             system = system_of(layout, p)
             slope = slopes_of(layout, p, system, at, sd)
-            left = real_parts(np.concatenate([left_over(layout, system, one, level) for one in lines]))
-            moved = [slopes_left_over(layout, system, slope, one, level) for one in lines]
-            by = real_parts(np.concatenate(moved, axis=1))
+            found = [left_over_moved(layout, system, slope, one, level) for one in lines]
+            left = real_parts(np.concatenate([one for one, _ in found]))
+            by = real_parts(np.concatenate([moved for _, moved in found], axis=1))
             size = np.maximum(np.abs(left), LEAST)
             by *= size / ((1.0 + size**2) * np.sqrt(np.log1p(size**2)))
             return np.concatenate([by.T, np.diag(1.0 / sd)])

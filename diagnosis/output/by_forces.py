@@ -48,12 +48,11 @@ def begun_by_forces(
     """
     if is_close(simulator, base):
         return base, {**starts}
+    unknowns, found = simulator.layout.unknowns, None
     listed = [starts[one.name] for one in hypotheses if one.name in starts]
     start = max(listed, key=lambda one: one.log_bayes_factor, default=None)
-    found = None
     if start is not None and start.log_bayes_factor >= SPEAKS:
         report(f"simulating: {start.hypothesis.name}, as the force residuals have it")
-        unknowns = simulator.layout.unknowns
         sd = start.hypothesis.widened(unknowns, base.sd)
         found = fit_afresh(simulator, np.where(sd > 0.0, start.p, 0.0), sd, renewals=RENEWALS)
     if start is None or found is None:

@@ -8,7 +8,7 @@ downhill to its minimum under a prior.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,8 +39,7 @@ class Quadratic:
     def moved(self, residual: Complex) -> Quadratic:
         """The same curvature about another residual (K,)."""
         parts = real_parts(residual[self.target.order])
-        slopes = _slopes(self.target, parts, self.derivatives)
-        return Quadratic(self.target, self.active, self.squares, slopes, parts, self.derivatives)
+        return replace(self, slopes=_slopes(self.target, parts, self.derivatives), residual=parts)
 
     @property
     def energy(self) -> Array:

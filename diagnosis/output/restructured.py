@@ -3,7 +3,7 @@ rig every way is uphill."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,6 @@ from gearbench.diagnosis.effects.encoder_runout import KEYS as ENCODERS
 from gearbench.diagnosis.effects.pitch_error import KEYS as PITCHES
 from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
 from gearbench.diagnosis.effects.torque_ripple import KEY as RIPPLE
-from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.output.beginning import Around, levelled, seen_by
 from gearbench.diagnosis.output.fit import SETTLED, Optimum, cost_of, fit, fit_afresh
 from gearbench.diagnosis.output.simulator import Simulator
@@ -68,9 +67,9 @@ def _from_around(simulator: Simulator, found: Optimum, around: Around | None, re
     """The fit begun with what the records show of the rig around its mesh, beside the effects that were widened."""
     unknowns = simulator.layout.unknowns
     widened = found.sd > unknowns.prior()
-    chosen = widened | ~_of(unknowns, ROTATION)
+    chosen = widened | ~unknowns.of(ROTATION)
     # Effects stay; what was fitted around the wrong structure goes.
-    held = np.where(widened | _of(unknowns, (SEAT,)), found.p, 0.0)
+    held = np.where(widened | unknowns.of((SEAT,)), found.p, 0.0)
     seen = seen_by(around, unknowns, held)
     if seen is None:
         return None
@@ -98,12 +97,3 @@ def _otherwise(simulator: Simulator, found: Optimum, report: Report) -> Optimum 
         report("simulating: another structure, further")
         again = fit(simulator, again.p, found.sd, again.sensitivity, renewals=RENEWALS) or again
     return again
-
-
-def _of(unknowns: Unknowns, keys: Sequence[str]) -> Flags:
-    """Which unknowns (size,) are of these groups."""
-    out = np.zeros(unknowns.size, dtype=bool)
-    for key in keys:
-        if key in unknowns.slices:
-            out[unknowns[key]] = True
-    return out

@@ -95,13 +95,12 @@ def simulated(
         return None
     ranked = _cracked_by_forces(problem, found, cracks) if cracks else []
     simulator = replace(simulator, layout=replace(layout, teeth=tuple(ranked)))
-    starts = _starts(layout, problem.unknowns, found, _weighed(listed, simulator.layout))
-    base, starts = begun_by_forces(simulator, base, listed, starts, seen, report)
+    starts = _starts(layout, problem.unknowns, found, listed)
+    base, starts = begun_by_forces(simulator, base, _weighed(listed, simulator.layout), starts, seen, report)
     if cracks:
         simulator, base = with_likely_teeth(simulator, base, ranked)
     layout = simulator.layout
     weighed = _weighed(listed, layout)
-    starts = {**_starts(layout, problem.unknowns, found, weighed), **starts}
     selection = select(simulator, base, weighed, starts, report, seen, apart=apart)
     std = selection.best.std
     rough = [number for number in range(len(measurements)) if number not in smooth]

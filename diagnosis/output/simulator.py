@@ -81,20 +81,11 @@ class Simulator:
             self._by_forces(out, p, chosen, others)
         except ValueError:
             return None
-        left = chosen & self._is_moved() & ~np.isin(np.arange(p.size), [one.number for one in others])
+        left = chosen & self.layout.unknowns.of(MOVED) & ~np.isin(np.arange(p.size), [one.number for one in others])
         if near is None:
             self._by_moves(out, p, sd, left)
         else:
             out[left] = near[left]
-        return out
-
-    def _is_moved(self) -> Flags:
-        """Which unknowns (size,) may have to be moved and simulated."""
-        unknowns = self.layout.unknowns
-        out = np.zeros(unknowns.size, dtype=bool)
-        for key in MOVED:
-            if key in unknowns.slices:
-                out[unknowns[key]] = True
         return out
 
     def _by_moves(self, out: Complex, p: Array, sd: Array, chosen: Flags) -> None:

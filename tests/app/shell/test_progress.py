@@ -8,11 +8,15 @@ from gearbench.shell import progress as module
 from gearbench.shell.progress import Progress
 
 
-def test_the_first_piece_is_no_measure_of_the_pace(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    now = [0.0]
-    monkeypatch.setattr(module.time, "monotonic", lambda: now[0])
+@pytest.fixture
+def now(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    """The time [s], which the test moves on."""
+    clock = [0.0]
+    monkeypatch.setattr(module.time, "monotonic", lambda: clock[0])
+    return clock
+
+
+def test_the_first_piece_is_no_measure_of_the_pace(now: list[float], capsys: pytest.CaptureFixture[str]) -> None:
     with Progress("job") as progress:
         progress.step("record")
         for at, fraction in ((90.0, 0.01), (96.0, 0.02), (108.0, 0.05), (112.0, 0.06), (120.0, 0.08)):
@@ -23,11 +27,7 @@ def test_the_first_piece_is_no_measure_of_the_pace(
     assert told == [", 7 min left", ", 7 min left", ", 7 min left"][: len(told)] and told
 
 
-def test_what_a_step_is_at_is_told_now_and_then(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    now = [0.0]
-    monkeypatch.setattr(module.time, "monotonic", lambda: now[0])
+def test_what_a_step_is_at_is_told_now_and_then(now: list[float], capsys: pytest.CaptureFixture[str]) -> None:
     with Progress("job") as progress:
         progress.step("cause")
         for at, what in ((1.0, "friction"), (6.0, "backlash"), (7.0, "ripple"), (12.0, "delay")):

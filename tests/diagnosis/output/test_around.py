@@ -13,7 +13,7 @@ from gearbench.cases import case_files
 from gearbench.diagnosis.evidence.problem import problem_of
 from gearbench.diagnosis.forces.condition import Condition
 from gearbench.diagnosis.intake.measurements import measurement
-from gearbench.diagnosis.output.answering import left_over, lines_of, slopes_left_over, slopes_of, system_of
+from gearbench.diagnosis.output.answering import left_over, left_over_moved, lines_of, slopes_of, system_of
 from gearbench.diagnosis.output.around import KEYS, MOVED, REACTION, around
 from gearbench.diagnosis.output.layout import Layout, layout_of
 from gearbench.diagnosis.output.structure import ACROSS, CROSS, HOUSED, HOUSING, MODE, SEAT, SHAPE
@@ -156,11 +156,10 @@ def test_derivatives_are_those_of_differences(rig: tuple[Layout, Condition], lev
     p = np.zeros(layout.size)
     for key, value in ((HOUSING, 0.02), (CROSS, 0.05), (ACROSS, 0.2), (SEAT, 0.5), ("delay-y_driver", 4e-6)):
         p[unknowns[key]] = value
-    at = np.concatenate([np.arange(*unknowns[key].indices(unknowns.size)) for key in (*KEYS, *HOUSED)])
-    at = at[unknowns.prior()[at] > 0.0]
+    at = np.flatnonzero(unknowns.of((*KEYS, *HOUSED)) & (unknowns.prior() > 0.0))
     sd = unknowns.prior()[at]
     system = system_of(layout, p)
-    found = slopes_left_over(layout, system, slopes_of(layout, p, system, at, sd), lines, level)
+    _, found = left_over_moved(layout, system, slopes_of(layout, p, system, at, sd), lines, level)
     assert (np.abs(found).max(axis=1) > 0.0).sum() > 20
     for index, width, slope in zip(at, sd, found, strict=True):
         step = 1e-5 * width * (np.arange(unknowns.size) == index)
