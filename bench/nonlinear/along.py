@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.bench.nonlinear.replay import Steady, resampled
+from gearbench.bench.nonlinear.replay import Steady, resampled, seen_at
 from gearbench.bench.record.sensors import change_shown
 from gearbench.lumped.nonlinear.coordinates import IN_MESH, NAMES
 from gearbench.lumped.nonlinear.law import MeshLaw
@@ -42,7 +42,7 @@ class Along:
     deflection [m/s], and the force that the teeth would have without an exponent over the one where that changes
     nothing. `places` (samples, n) of all coordinates [m], sampled at `sampling_rate`, and `turned` (samples,) what all
     that turns moves by besides, as the nominal rotation departs from a steady one. `early` steps let free vibrations
-    die out.
+    die out. Samples of forces are those of `instants`, or hold no more than half the sampling rate.
     """
 
     model: NonLinear
@@ -57,6 +57,7 @@ class Along:
     places: Array
     turned: Array
     sampling_rate: float
+    instants: bool
 
     @property
     def law(self) -> MeshLaw:
@@ -79,17 +80,21 @@ class Along:
         y1, y2 = (np.einsum("scn,c->ns", places, row.astype(places.dtype)) for row in self.model.displacements)
         twist = u2 - places[:, LOAD, :].T if self.model.rig.load.twists else None
         mesh = np.concatenate([two for _, two in found], axis=1).T
-        mesh *= -(self.tangent.mesh[U2] + self.tangent.rubbed[:: 2 * self.substeps, U2]).astype(mesh.dtype)
-        reaction = mesh if twist is None else self._twisted(twist)
+        mesh *= -(self.tangent.mesh[U2] + self.tangent.rubbed[::2, U2]).astype(mesh.dtype)
+        reaction = self._shown(mesh) if twist is None else self._twisted(twist)
         # What pushes at an end that is held is borne there.
         held = (on == LOAD) | ((on == U2) & (self.tangent.inverse[U2] == 0.0))
-        reaction[held] += forces[:: 2 * self.substeps, held].T
+        reaction[held] += self._shown(forces[::2, held].T)
         moved = {"angle_driver": u1, "angle_driven": u2, "y_driver": y1, "y_driven": y2, "torque_driven": reaction}
         sensors, rate = self.model.rig.sensors, self.sampling_rate
         seen = {name: change_shown(change, sensors, name, rate) for name, change in moved.items()}
         y = seen["y_driver"] - seen["y_driven"]
         seen["dte"] = seen["angle_driver"] - seen["angle_driven"] + self.model.factor * y
         return seen
+
+    def _shown(self, stepped: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+        """Forces (columns, samples) as the record's sensor has them, of forces (columns, steps)."""
+        return stepped[:, :: self.substeps] if self.instants else seen_at(stepped, len(self.places), axis=1)
 
     def _twisted(self, twist: Array) -> Array:
         """Force [N] of the load's shaft twisted by so much (columns, samples) [m]."""
@@ -201,6 +206,7 @@ def along(steady: Steady) -> Along:
         places=places,
         turned=setup.departures(samples) * model.law.base_pitch,
         sampling_rate=setup.sampling_rate,
+        instants=steady.given.instants,
     )
 
 

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
+from scipy.fft import irfft, rfft
 
 from gearbench.bench.errors import BenchError
 from gearbench.bench.nonlinear.followed import Followed, followed, follows
@@ -24,6 +25,7 @@ from gearbench.bench.record.sensors import check_delays, imposed, lag, repeated
 from gearbench.geometry import pair
 from gearbench.lumped.nonlinear.law import MeshLaw
 from gearbench.lumped.nonlinear.rest import mesh_direction
+from gearbench.lumped.nonlinear.step import columns
 from gearbench.records import make_record
 from gearbench.rig import Case, Experiment, Sensors
 
@@ -37,7 +39,9 @@ PERIODS_MAX = 6
 class Given(NamedTuple):
     """What a record imposes on a rig: the case, its experiment being the record's; the schedule; mean torque on the rig
     over one excitation period (samples,) [N m]; mesh frequency [Hz] and mesh phase [cycles] of the first sample; how
-    the driven gear turns, None where steadily; whether that phase is the nominal rotation's, else the driven gear's."""
+    the driven gear turns, None where steadily; whether that phase is the nominal rotation's, else the driven gear's;
+    whether its samples are those of instants, as of a simulation, not of sensors that hold no more than half the
+    sampling rate."""
 
     case: Case
     plan: Schedule
@@ -46,15 +50,18 @@ class Given(NamedTuple):
     phase: float
     turning: Followed | None
     nominal: bool
+    instants: bool
 
 
 class Steady(NamedTuple):
-    """A rig in the steady motion of a record: its setup, what drives it, one repetition of outputs (samples, n), how
-    steady that is, and what the record imposes."""
+    """A rig in the steady motion of a record: its setup, what drives it, one repetition of outputs (samples, n) and of
+    the force at the load's base circle (samples,) [N] as a sensor shows it, how steady that is, and what the record
+    imposes."""
 
     setup: Setup
     drive: Drive
     outputs: Array
+    load_force: Array
     residual: float
     given: Given
 
@@ -79,7 +86,8 @@ def given_by(case: Case, record: xr.Dataset, realisation: int = 0) -> Given:
     turning = None
     if follows(case.rig, record) and plan.repeat_periods == 1:
         turning = followed(case.rig, record, realisation, plan.cycles_per_sample, phase)
-    return Given(case, plan, torque, frequency, phase, turning, "mesh_phase" in record and turning is None)
+    nominal = "mesh_phase" in record and turning is None
+    return Given(case, plan, torque, frequency, phase, turning, nominal, "model" in record.attrs)
 
 
 def steady_motion(case: Case, record: xr.Dataset, law: MeshLaw | None = None, realisation: int = 0) -> Steady:
@@ -90,8 +98,10 @@ def steady_motion(case: Case, record: xr.Dataset, law: MeshLaw | None = None, re
     law = law or mesh_law(case.rig, case.simulation, HEADROOM * float(np.abs(torque).max()))
     setup = make_setup(case, given.plan, law, given.phase, given.turning, nominal=given.nominal)
     drive = Drive(torque, resampled(torque, 2 * setup.substeps * torque.size) / setup.meshing.driver.base_radius)
-    outputs, residual = _settled(setup, drive)
-    return Steady(setup, drive, outputs, residual, given)
+    load_forces = np.empty(setup.substeps * setup.block_samples)
+    outputs, residual = _settled(setup, drive, load_forces)
+    shown = columns(outputs).load_force if given.instants else seen_at(load_forces, len(outputs))
+    return Steady(setup, drive, outputs, np.asarray(shown, dtype=float), residual, given)
 
 
 def replay(case: Case, record: xr.Dataset, law: MeshLaw | None = None, realisation: int = 0) -> xr.Dataset:
@@ -114,6 +124,7 @@ def replay(case: Case, record: xr.Dataset, law: MeshLaw | None = None, realisati
     turned = 2 * np.pi * setup.departures(len(outputs))
     channels = channels._replace(
         torque_driver=applied,
+        torque_driven=steady.load_force * setup.meshing.driven.base_radius,
         angle_driver=channels.angle_driver + turned / case.rig.driver.teeth,
         angle_driven=channels.angle_driven + turned / case.rig.driven.teeth,
     )
@@ -167,6 +178,13 @@ def resampled(period: Array, points: int) -> Array:
     return np.asarray(np.fft.irfft(spectrum, n=points) * (points / samples))
 
 
+def seen_at(fine: NDArray[np.floating[Any]], samples: int, axis: int = -1) -> NDArray[np.floating[Any]]:
+    """What a sensor behind an anti-aliasing filter shows at `samples` instants of one period that is given at a
+    multiple of them along an axis: teeth that come into contact make the force in the mesh jump."""
+    lines = rfft(fine, axis=axis).take(range(samples // 2 + 1), axis=axis)
+    return np.asarray(irfft(lines, samples, axis=axis) * fine.dtype.type(samples / fine.shape[axis]))
+
+
 def _rotation(case: Case, record: xr.Dataset, realisation: int) -> tuple[float, float]:
     """Mesh frequency [Hz], such that the record holds whole cycles, and mesh phase of the first sample [cycles]."""
     rate = float(record.attrs["sampling_rate"])
@@ -201,15 +219,15 @@ def _experiment(
     return base.at_mesh_frequency(frequency).model_copy(update=values)
 
 
-def _settled(setup: Setup, drive: Drive) -> tuple[Array, float]:
-    """Outputs (samples, n) of one repetition after free vibrations have died out, and how steady it is; of a rig that
-    drifts, what is left of free vibrations."""
+def _settled(setup: Setup, drive: Drive, load_forces: Array) -> tuple[Array, float]:
+    """Outputs (samples, n) of one repetition after free vibrations have died out, with the `load_forces` (steps,) [N]
+    of its steps, and how steady it is; of a rig that drifts, what is left of free vibrations."""
     mean = float(drive.fine.mean())
     block = setup.block_samples
     decay = setup.model.slowest_decay(mean)
     early = min(ceil(log(1 / TRANSIENT) / max(decay, 1e-9) * setup.sampling_rate), block)
     begin, _ = setup.advance(drive, setup.at_rest(mean, -early), early)
-    end, outputs = setup.advance(drive, begin, block)
+    end, outputs = setup.advance(drive, begin, block, load_forces)
     if setup.model.rig.mesh.stiffness_drift:
         return outputs, TRANSIENT
     residual = _unsteady(setup, begin.values, end.values, outputs)
@@ -217,7 +235,7 @@ def _settled(setup: Setup, drive: Drive) -> tuple[Array, float]:
         if residual <= TOLERANCE:
             break
         before = outputs
-        end, outputs = setup.advance(drive, end, block)
+        end, outputs = setup.advance(drive, end, block, load_forces)
         residual = change(setup.dte(before), setup.dte(outputs))
     return outputs, residual
 

@@ -178,7 +178,10 @@ class Setup:
         """Force of the mesh (samples,) [N]."""
         return columns(outputs).mesh_force
 
-    def advance(self, drive: Drive, state: State, samples: int) -> tuple[State, Array]:
+    def advance(
+        self, drive: Drive, state: State, samples: int, load_forces: Array | None = None
+    ) -> tuple[State, Array]:
+        """As the protocol's; `load_forces` (steps,) takes the force at the load's base circle [N] at every step."""
         start, values = state.sample, state.values
         stop = start + samples
         if state.begins and self.model.rig.load.boundary == "inertia":
@@ -187,7 +190,7 @@ class Setup:
         # Whole repetitions are counted from 0 again, so that they all read the same table.
         after = stop if stop < 0 else stop % self.block_samples
         if self.table is not None and start == 0 and samples == self.block_samples:
-            values, outputs = self._integrate(self.table, drive.fine, values, 0)
+            values, outputs = self._integrate(self.table, drive.fine, values, 0, load_forces)
             return State(after, values), outputs
         if self.table is not None and -self.block_samples <= start < 0 and stop == 0:
             # What comes before sample 0 is the end of the repetition before.
@@ -197,12 +200,16 @@ class Setup:
         parts = []
         most = max(MOST_ENTRIES // (2 * self.substeps), 1)
         for at in range(start, stop, most):
-            table = self.table_for(at, min(most, stop - at))
-            values, out = self._integrate(table, drive.fine, values, 2 * self.substeps * at % drive.fine.size)
+            table, first = self.table_for(at, min(most, stop - at)), 2 * self.substeps * at % drive.fine.size
+            steps = slice((at - start) * self.substeps, (at - start + most) * self.substeps)
+            part = None if load_forces is None else load_forces[steps]
+            values, out = self._integrate(table, drive.fine, values, first, part)
             parts.append(out)
         return State(after, values), np.concatenate(parts)
 
-    def _integrate(self, table: Table, force: Array, state: Array, first_entry: int) -> tuple[Array, Array]:
+    def _integrate(
+        self, table: Table, force: Array, state: Array, first_entry: int, load_forces: Array | None = None
+    ) -> tuple[Array, Array]:
         return integrate(
             self.model,
             table,
@@ -212,6 +219,7 @@ class Setup:
             substeps=self.substeps,
             mesh_frequency=self.mesh_frequency,
             first_entry=first_entry,
+            load_forces=load_forces,
         )
 
     def dte(self, outputs: Array) -> Array:

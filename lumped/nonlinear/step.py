@@ -53,11 +53,13 @@ def integrate(
     substeps: int,
     mesh_frequency: float,
     first_entry: int = 0,
+    load_forces: Array | None = None,
 ) -> tuple[Array, Array]:
     """Run through the whole `table` of entries + 1 from `state` (2 size,): coordinates [m] and their rates.
 
     `force` (n,) [N] is T1/rb1 on the half-step grid; it repeats, and `first_entry` of it belongs to the table's first.
-    `mesh_frequency` [Hz]: that of the table, for the steady part of the sliding velocity.
+    `mesh_frequency` [Hz]: that of the table, for the steady part of the sliding velocity. `load_forces` (steps,) takes
+    the force at the load's base circle [N] at the start of every step.
     Returns the final state and the samples (samples, 7 or 12), named by `columns`. Raises LumpedError for tables
     that do not fit and for overflow.
     """
@@ -85,8 +87,9 @@ def integrate(
     place, further = parted(state[:size])
     rate, further_rate = parted(state[size:])
     end = _run(
-        place, rate, further, further_rate, table, force, first_entry, equations, step, substeps, columns(samples)
-    )
+        place, rate, further, further_rate, table, force, first_entry, equations, step, substeps, columns(samples),
+        np.empty(0) if load_forces is None else load_forces,
+    )  # fmt: skip
     final = np.array([*end[0], *end[2], *end[1], *end[3]])
     if not np.isfinite(final).all():
         raise LumpedError(f"the integration overflowed: steps of {step:.3g} s are too long")
@@ -164,9 +167,10 @@ def _tell_further(out: Outputs, sample: int, e: Any, one: Answer) -> None:
 @compiled(fastmath=ROUNDING)
 def _run(
     q: Coordinates, v: Coordinates, e: Any, r: Any, table: Table, force: Array, first: int, of: Equations, h: float,
-    substeps: int, out: Outputs,
+    substeps: int, out: Outputs, load_forces: Array,
 ) -> tuple[Coordinates, Coordinates, Any, Any]:  # fmt: skip
-    """Fill `out` from the coordinates q, e and rates v, r; returns those at the end."""
+    """Fill `out` and `load_forces`, if it holds any, from the coordinates q, e and rates v, r; returns those at the
+    end."""
     half, sixth = 0.5 * h, h / 6.0
     n = force.size
     i, j = 0, first % n
@@ -177,6 +181,8 @@ def _run(
             if sub == 0:
                 out.mesh_force[sample], out.load_force[sample] = one.mesh_force, one.load_force
                 _tell_further(out, sample, e, one)
+            if len(load_forces) > 0:
+                load_forces[i // 2] = one.load_force
             middle = entry(table, i + 1)
             v2, r2 = _moved(v, half, one.acceleration), _moved_further(r, half, one.further)
             two = answer(_moved(q, half, v), v2, _moved_further(e, half, r), r2, middle, force[j + 1], of)

@@ -57,14 +57,14 @@ class Tangent(NamedTuple):
 def departures(
     tangent: Tangent, forces: NDArray[np.floating[Any]], on: Integers, substeps: int, early: int
 ) -> tuple[Single, Single]:
-    """Departures (samples, n, columns) of the coordinates [m] and (samples, columns) of the mesh force [N] under forces
+    """Departures (samples, n, columns) of the coordinates [m] and (steps, columns) of the mesh force [N] under forces
     (entries, columns) [N], each in the mesh or on one coordinate, `on` (columns,): its number or `IN_MESH`; `early`
     steps before the first sample begin at rest.
     """
     entries, columns = forces.shape
     size = len(tangent.inverse)
     samples = entries // (2 * substeps)
-    places, pushes = np.empty((samples, size, columns), np.float32), np.empty((samples, columns), np.float32)
+    places, pushes = np.empty((samples, size, columns), np.float32), np.empty((entries // 2, columns), np.float32)
     inverse = tangent.inverse[:, None]
     in_mesh = on == IN_MESH
     direction = np.where(in_mesh, 0.0, inverse * (np.arange(size)[:, None] == on))
@@ -133,8 +133,9 @@ def _run(
             for c in range(size):
                 for p in range(columns):
                     places[sample, c, p] = q[c, p]
+        if number >= 0:
             for p in range(columns):
-                pushes[sample, p] = push[p]
+                pushes[number, p] = push[p]
         for c in range(size):
             for p in range(columns):
                 q2[c, p] = q[c, p] + HALF * h * v[c, p]

@@ -46,6 +46,30 @@ def test_an_error_of_one_tooth_does_what_two_simulations_differ_by(friction: flo
         assert np.linalg.norm(found[channel][0] - change) < 0.05 * np.linalg.norm(change), channel
 
 
+def test_a_measured_torque_changes_by_nothing_from_beyond_half_its_rate() -> None:
+    """Teeth's forces jump as they come into contact, on a grid that is coarser than the simulation's: a seventh."""
+    case = read_case(case_files()["gap_demo"])
+    record = simulate(case.under(case.conditions[0]))
+    law = mesh_law(case.rig, case.simulation, 200.0)
+    found, wanted = [], []
+    for measured in (False, True):
+        if measured:
+            del record.attrs["model"]
+        steady = []
+        for size in (SMALL, 0.0, -SMALL):
+            gear = case.rig.driver.model_copy(update={"pitch_error": (size, *[0.0] * (case.rig.driver.teeth - 1))})
+            moved = case.model_copy(update={"rig": case.rig.model_copy(update={"driver": gear})})
+            steady.append(steady_motion(moved, record, law))
+        tangent = along(steady[1])
+        numbers, _ = law.pairs(tangent.phase)
+        force = SMALL * (tangent.pairs.tangent * (numbers % 20 == 0)).sum(axis=1, keepdims=True)
+        found.append(tangent.answers(force, np.array([IN_MESH]))["torque_driven"][0])
+        wanted.append(0.5 * (steady[0].load_force - steady[2].load_force))
+    errors = [np.linalg.norm(one - two) for one, two in zip(found, wanted, strict=True)]
+    assert all(error < np.linalg.norm(change) / 7 for error, change in zip(errors, wanted, strict=True))
+    assert errors[1] < 0.5 * np.linalg.norm(found[0] - wanted[1])
+
+
 def test_torque_on_the_shaft_does_what_ripple_does() -> None:
     case = read_case(case_files()["gap_demo"])
     record = simulate(case.under(case.conditions[0]))

@@ -10,7 +10,7 @@ import xarray as xr
 
 from gearbench.bench import BenchError, simulate
 from gearbench.bench.nonlinear.law_table import mesh_law
-from gearbench.bench.nonlinear.replay import replay, resampled
+from gearbench.bench.nonlinear.replay import replay, resampled, seen_at
 from gearbench.records import make_record, validate_record
 from gearbench.rig import (
     Case,
@@ -139,6 +139,31 @@ def test_late_sensors_show_what_they_recorded() -> None:
 def test_noise_of_the_rig_is_not_replayed(case: Case, record: xr.Dataset) -> None:
     noisy = make_case(sensors=Sensors(noise_angle=1e-5, noise_displacement=1e-6, noise_torque=1.0))
     assert differs(replay(noisy, record), record) < 1e-5
+
+
+def test_a_sensor_shows_what_lies_below_half_its_rate() -> None:
+    fine, at = 2 * np.pi * np.arange(96) / 96, 2 * np.pi * np.arange(16) / 16
+    below, beyond = (lambda x: 2.0 + np.cos(3 * x) - np.sin(7 * x)), (lambda x: 5.0 * np.cos(13 * x) + np.sin(40 * x))
+    found = seen_at(np.stack([below(fine) + beyond(fine), beyond(fine)]), 16)
+    assert found == pytest.approx(np.stack([below(at), 0.0 * at]), abs=1e-12)
+
+
+def test_a_measured_torque_holds_nothing_from_beyond_half_its_rate(case: Case, record: xr.Dataset) -> None:
+    """Against the lines of a simulation that is sampled eight times as fast."""
+    faster = case.experiment.model_copy(update={"sampling_rate": 8 * RATE, "samples_per_period": 8 * SAMPLES})
+    fine = simulate(case.model_copy(update={"experiment": faster}))["torque_driven"].values[0]
+    measured = record.copy()
+    del measured.attrs["model"]
+
+    def lines(torque: np.ndarray) -> np.ndarray:
+        return np.asarray(np.fft.rfft(torque)[: SAMPLES // 4] / torque.size)
+
+    found = replay(case, measured)["torque_driven"].values[0]
+    wanted = lines(fine[-(8 * found.size) :])
+    instants = lines(replay(case, record)["torque_driven"].values[0])
+    folded = np.linalg.norm(instants - wanted)
+    assert folded > 1e-4 * np.abs(wanted[0])
+    assert np.linalg.norm(lines(found) - wanted) < 0.1 * folded
 
 
 def test_a_torque_is_resampled_as_its_trigonometric_sum() -> None:
