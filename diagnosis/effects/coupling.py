@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import pi
+from math import exp, pi
 
 import numpy as np
 
@@ -16,6 +16,8 @@ from gearbench.rig import Rig
 from gearbench.rig.drive import Coupling
 
 KEY = "coupling"
+# Logarithm of its loss factor over the one that the residuals assume, where unknowns have it: rubber and steel differ.
+LOSS = "coupling-loss"
 # Resonance of the rotor against the driver over that of the mesh: a stiff one lies far above, one worth a diagnosis
 # near or below it (truth rigs: 3.9 to 5.8, and 0.5 to 1.6).
 RIGID, ELASTIC = 3.1, 0.67
@@ -46,7 +48,7 @@ def starts(group: Group) -> tuple[float, ...]:
 
 
 def add(rig: Rig, hypothesis: Hypothesis, fitted: Fitted) -> Added:
-    """Gives the drive a coupling of the whole compliance and the loss factor that the residuals assume."""
+    """Gives the drive a coupling of the whole compliance, with the loss factor that the residuals assume or its own."""
     model = fitted.model
     total = model.compliance + float(fitted.of(KEY)[0])
     std = float(fitted.std_of(KEY)[0])
@@ -54,7 +56,8 @@ def add(rig: Rig, hypothesis: Hypothesis, fitted: Fitted) -> Added:
     reduced = 1 / (1 / rotor + 1 / (model.inertia[0] * (1 + fitted.of("inertia")[0])))
     stiffness = 1 / total
     resonance = np.sqrt(stiffness / reduced) / (2 * pi)
-    damping = LOSS_FACTOR * stiffness / (2 * pi * resonance)
+    loss = LOSS_FACTOR * (exp(float(fitted.of(LOSS)[0])) if LOSS in fitted.unknowns.slices else 1.0)
+    damping = loss * stiffness / (2 * pi * resonance)
     coupling = Coupling(inertia=float(rotor), stiffness=float(stiffness), damping=float(damping))
     return changed(rig, "drive", coupling=coupling), (
         Estimate("stiffness", stiffness, stiffness * std / total, "N m/rad"),

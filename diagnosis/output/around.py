@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from gearbench.diagnosis.effects.coupling import KEY as COMPLIANCE
+from gearbench.diagnosis.effects.coupling import LOSS
 from gearbench.diagnosis.effects.effect import SIDES
 from gearbench.diagnosis.effects.sensor_delay import KEYS as DELAYS
 from gearbench.diagnosis.forces.condition import Condition
@@ -47,7 +49,7 @@ from gearbench.diagnosis.output.structure import (
 Array = NDArray[np.float64]
 
 # What is found, beside whatever else is held.
-KEYS = ("stiffness", "damping", "mass", "inertia", ACROSS, CROSS, DAMPED, GAIN, *DELAYS.values())
+KEYS = ("stiffness", "damping", "mass", "inertia", COMPLIANCE, LOSS, ACROSS, CROSS, DAMPED, GAIN, *DELAYS.values())
 LINES, FEWEST = 200, 80  # of all records and of each, excited and operating, that are enough
 # Parts of the local level below which no model is right: wide first, so that distant resonances pull.
 LEVELS = (0.1, 0.01)
@@ -89,7 +91,15 @@ def around(layout: Layout, conditions: Sequence[Condition], held: Array) -> Arra
         rigs = [_found(layout, lines, cost, one) for one in begun]
     except ValueError:  # no rig there
         return None
-    return min(rigs, key=lambda p: _misfit(layout, lines, p) + prior_cost(p, unknowns.prior()))
+    return min(rigs, key=lambda p: _misfit(layout, lines, p) + prior_cost(p, prior(unknowns, p)))
+
+
+def prior(unknowns: Unknowns, p: Array) -> Array:
+    """Prior standard deviations (size,): those of the background, but of a coupling that `p` (size,) has, its own."""
+    out = unknowns.prior()
+    at = unknowns[COMPLIANCE]
+    out[at] = np.where(p[at] > 0.0, unknowns.group(COMPLIANCE).wide, out[at])
+    return out
 
 
 def _found(layout: Layout, lines: Sequence[Lines], cost: float, best: Array) -> Array:
@@ -162,11 +172,14 @@ def _fitted(
     """Misfit, and `begin` (size,) with the unknowns of these keys where it is least."""
     unknowns = layout.unknowns
     at = np.concatenate([np.arange(*unknowns[key].indices(unknowns.size)) for key in keys if key in unknowns.slices])
-    sd = unknowns.prior()[at]
+    sd = prior(unknowns, begin)[at]
     # Without cross-coupling nothing shows how a support yields across.
     unseen = np.zeros(unknowns.size, dtype=bool)
     for key in (ACROSS, CROSS, DAMPED):
         unseen[unknowns[key]] = begin[unknowns[CROSS]] == 0.0
+    # A coupling is an effect: it is found where it is held to be, and not looked for.
+    for key in (COMPLIANCE, LOSS):
+        unseen[unknowns[key]] = begin[unknowns[COMPLIANCE]] == 0.0
     kept = (sd > 0.0) & ~unseen[at]
     at, sd = at[kept], sd[kept]
     low, high = (bound[at] for bound in unknowns.bounds())

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.diagnosis.effects.effect import Hypothesis
-from gearbench.diagnosis.output.beginning import Around
-from gearbench.diagnosis.output.fit import Optimum, fit, fit_afresh
+from gearbench.diagnosis.output.beginning import Around, levelled, linear_cost, seen_by
+from gearbench.diagnosis.output.fit import SETTLED, Optimum, cost_of, fit, fit_afresh
 from gearbench.diagnosis.output.restructured import better, is_close, restructured
 from gearbench.diagnosis.output.simulator import Simulator
 
@@ -54,7 +54,9 @@ def begun_by_forces(
     if start is not None and start.log_bayes_factor >= SPEAKS:
         report(f"simulating: {start.hypothesis.name}, as the force residuals have it")
         sd = start.hypothesis.widened(unknowns, base.sd)
-        found = fit_afresh(simulator, np.where(sd > 0.0, start.p, 0.0), sd, renewals=RENEWALS)
+        found = fit_afresh(simulator, _beginning(simulator, start, sd, base.cost, around), sd, renewals=RENEWALS)
+        if found is not None and found.left > SETTLED:
+            found = fit(simulator, found.p, sd, found.sensitivity, renewals=RENEWALS)
     if start is None or found is None:
         return restructured(simulator, base, around, report), {**starts}
     p = found.p.copy()
@@ -64,3 +66,17 @@ def begun_by_forces(
         base = restructured(simulator, base, around, report)
     begun = Start(start.hypothesis, found.p, start.log_bayes_factor)
     return base, {**starts, start.hypothesis.name: begun}
+
+
+def _beginning(simulator: Simulator, start: Start, sd: Array, limit: float, around: Around | None) -> Array:
+    """Where a fit beside an effect begins (size,): the force residuals' own rig where that costs less than the `limit`,
+    else the better of it and of the effect alone with what the records show `around` the mesh beside it."""
+    unknowns, begin = simulator.layout.unknowns, np.where(sd > 0.0, start.p, 0.0)
+    if cost_of(simulator, begin, sd) < limit:
+        return begin
+    alone, at = np.zeros(unknowns.size), start.hypothesis.entries(unknowns)
+    alone[at] = start.p[at]
+    seen = seen_by(around, unknowns, alone)
+    if seen is None:
+        return begin
+    return min((begin, levelled(simulator, seen, alone, sd)), key=lambda p: linear_cost(simulator, p, sd))

@@ -15,6 +15,7 @@ from math import cos, exp, pi, sin, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from gearbench.diagnosis.effects.coupling import LOSS
 from gearbench.diagnosis.effects.effect import SIDES, changed
 from gearbench.diagnosis.forces.nominal import NominalModel
 from gearbench.diagnosis.forces.unknowns import Group, Unknowns, group
@@ -52,6 +53,8 @@ PHASE, PHASE_SD, PHASE_LARGEST = "phase", 0.01, 0.05
 # Time [s] by which the torque reaches the rotor after its channel shows it, in periods of the mesh's resonance: filters
 # and shafts are between both, a little more than between channels of one clock.
 LATE, LATE_SD = "drive-late", 0.015
+# Of a coupling's loss factor, whose logarithm is taken: steel discs have a fiftieth, rubber a tenth.
+LOSS_SD, LOSS_LARGEST = 0.6, 3.0
 # Softer than the former part a rig has it, and then at least the latter: steps stay long.
 FELT, STIFFEST = 0.01, 0.03
 # Moved from nothing by the least that a rig feels: a smaller step would show no derivative, and a fit that begins
@@ -59,7 +62,7 @@ FELT, STIFFEST = 0.01, 0.03
 LEAST_STEP: Mapping[str, float] = {ACROSS: STIFFEST, HOUSING: 0.05 * HOUSING_SD}
 NONE = 1e-4  # compliance of a housing below which there is none
 # What holds the gears beside the nominal rig's supports.
-STRUCTURE = (ACROSS, CROSS, DAMPED, HOUSING, MODE, SHAPE, OBLIQUE)
+STRUCTURE = (ACROSS, CROSS, DAMPED, HOUSING, MODE, SHAPE, OBLIQUE, LOSS)
 # The housing as a rig has it.
 HOUSED = (HOUSING, MODE, SHAPE, OBLIQUE, SEAT)
 # What is told of the structure that was found.
@@ -87,6 +90,7 @@ def structure_groups(rig: Rig, model: NominalModel) -> list[Group]:
         group(GAIN, "1", ("torque_driven",), GAIN_SD, slot="structure", first=2),
         group(PHASE, "1", ("mesh",), PHASE_SD, slot="structure", first=18, low=-PHASE_LARGEST, high=PHASE_LARGEST),
         group(LATE, "s", ("torque_driver",), LATE_SD / model.resonance, slot="structure", first=19),
+        group(LOSS, "1", ("coupling",), LOSS_SD, slot="structure", first=26, low=-LOSS_LARGEST, high=LOSS_LARGEST),
     ]
     if rig.housing is None:
         groups.append(group(HOUSING, "1", MOTIONS, HOUSING_SD, slot="structure", first=10, low=0.0,

@@ -10,8 +10,11 @@ from numpy.typing import NDArray
 
 from gearbench.bench import simulate
 from gearbench.cases import case_files
+from gearbench.diagnosis.effects.coupling import KEY as COMPLIANCE
+from gearbench.diagnosis.effects.coupling import LOSS
 from gearbench.diagnosis.evidence.problem import problem_of
 from gearbench.diagnosis.forces.condition import Condition
+from gearbench.diagnosis.forces.residuals import LOSS_FACTOR
 from gearbench.diagnosis.intake.measurements import measurement
 from gearbench.diagnosis.output.answering import left_over, left_over_moved, lines_of, slopes_of, system_of
 from gearbench.diagnosis.output.around import KEYS, MOVED, REACTION, around
@@ -39,10 +42,12 @@ def recorded(
     late: float = 0.0,
     seat: float = 0.0,
     parted: bool = False,
+    coupling: tuple[float, float] | None = None,
 ) -> Condition:
     """A condition whose rig has a housing of that logarithm of frequency (None: none), of which the supports make these
     shares, a late sensor of the driver's displacement [s], displacement sensors that make a part `seat` of the
-    supports' motion, and any force in the mesh, `parted` half of the time."""
+    supports' motion, and any force in the mesh, `parted` half of the time; `coupling`: stiffness [N m/rad] and
+    damping of what is between rotor and driver."""
     m = layout.model
     rng = np.random.default_rng(3)
     omega = like.omega[: like.bins]
@@ -57,6 +62,12 @@ def recorded(
     s = 1j * omega
     mass = heavier * (m.inertia[0] + m.rotor) / m.base_radius[0] ** 2
     turning = (torque / m.base_radius[0] - force) / (mass * s**2 + (omega == 0))
+    if coupling is not None:
+        driver, rotor = (one / m.base_radius[0] ** 2 for one in (m.inertia[0], m.rotor))
+        twisted = (coupling[0] + s * coupling[1]) / m.base_radius[0] ** 2
+        passed = twisted / (rotor * s**2 + twisted)
+        moving = driver * s**2 + passed * rotor * s**2 + (omega == 0)
+        turning = (passed * torque / m.base_radius[0] - force) / moving
     one, two = (k + s * c for k, c in zip((K1, K2), m.damping, strict=True))
     housing = big + s * damped + s**2 * heavy
     a, b = shares
@@ -132,6 +143,24 @@ def test_inertia_is_read_from_the_driver(rig: tuple[Layout, Condition]) -> None:
     layout, like = rig
     found = around(layout, [recorded(layout, like, -0.3, heavier=1.02)], np.zeros(layout.size))
     assert found is not None and turning(layout, found) == pytest.approx(1.02, abs=0.003)
+
+
+def test_a_coupling_is_found_where_there_is_one(rig: tuple[Layout, Condition]) -> None:
+    """Begun at a compliance of two thirds, with the loss factor that the residuals assume."""
+    layout, like = rig
+    reduced = 1 / (1 / layout.model.rotor + 1 / layout.model.inertia[0])
+    omega = 2 * np.pi * 1500.0
+    stiffness, loss = omega**2 * reduced, 0.09
+    true = recorded(layout, like, None, coupling=(stiffness, loss * stiffness / omega))
+    held = np.zeros(layout.size)
+    held[layout.unknowns[COMPLIANCE]] = 0.67 / stiffness
+    found = around(layout, (true,), held)
+    assert found is not None
+    assert found[layout.unknowns[COMPLIANCE]] == pytest.approx(1 / stiffness, rel=0.01)
+    assert LOSS_FACTOR * np.exp(found[layout.unknowns[LOSS]]) == pytest.approx(loss, rel=0.1)
+    assert turning(layout, found) == pytest.approx(1.0, abs=0.01)
+    stays = around(layout, (recorded(layout, like, None),), np.zeros(layout.size))
+    assert stays is not None and stays[layout.unknowns[COMPLIANCE]] == 0.0
 
 
 def test_no_housing_is_hardly_any(rig: tuple[Layout, Condition]) -> None:

@@ -71,3 +71,22 @@ def test_another_structure_is_sought_unless_an_effect_explains_the_records(
     base = background(simulator)
     begun_by_forces(simulator, base, (FRICTION,), starts)  # type: ignore[arg-type]
     assert len(sought) == (0 if there else 1)
+
+
+def test_where_the_forces_own_rig_is_none_the_effect_alone_is_begun_with_what_is_around(
+    simulator: FakeSimulator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A rig that leads astray or cannot be simulated says nothing against the effect that it has."""
+    base, asked = background(simulator), []
+    own = np.isin(np.arange(8), FRICTION.entries(unknowns()))  # type: ignore[arg-type]
+    start = Start(FRICTION, np.where(own, TRUE, 50.0), 2 * SPEAKS)
+
+    def around(held: np.ndarray) -> np.ndarray:
+        asked.append(held)
+        return np.where(np.arange(8) == 1, TRUE, held)
+
+    monkeypatch.setattr(by_forces, "seen_by", lambda around, unknowns, held: around(held))
+    monkeypatch.setattr(by_forces, "levelled", lambda simulator, seen, held, sd: seen)
+    better, begun = begun_by_forces(simulator, base, (FRICTION,), {"friction": start}, around)  # type: ignore[arg-type]
+    assert asked[0] == pytest.approx(np.where(own, TRUE, 0.0))
+    assert begun["friction"].p == pytest.approx(TRUE, abs=0.03) and better.evidence > base.evidence + 3.0
