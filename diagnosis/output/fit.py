@@ -7,7 +7,7 @@ step promises half a nat.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,6 +82,20 @@ def sensitivity_of(
         return None
     active = np.flatnonzero(np.abs(jacobian).max(axis=1) > 0.0)
     return Sensitivity(jacobian, quadratic_of(simulator.target, simulator.target.lines - lines, jacobian, active))
+
+
+def refreshed(simulator: Simulator, found: Optimum, chosen: Flags) -> Optimum:
+    """The optimum with derivatives by the chosen unknowns (size,), which have to be moved and simulated, taken anew
+    where it is: the others' are renewed as a fit goes on, those are not."""
+    renewed = simulator.moved(found.p, simulator.layout.unknowns.prior(), chosen)
+    if renewed is None:
+        return found
+    jacobian = np.where(chosen[:, None], renewed, found.sensitivity.jacobian)
+    active = np.flatnonzero(np.abs(jacobian).max(axis=1) > 0.0)
+    near = quadratic_of(simulator.target, simulator.target.lines - found.lines, jacobian, active)
+    _, promised, _ = near.best(found.p, found.sd, _standing(simulator.layout.unknowns, found.p))
+    evidence = near.evidence(found.cost, near.information(np.zeros(len(active))), found.sd)
+    return replace(found, evidence=evidence, left=found.cost - promised, sensitivity=Sensitivity(jacobian, near))
 
 
 def cost_of(simulator: Simulator, p: Array, sd: Array) -> float:

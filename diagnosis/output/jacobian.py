@@ -50,6 +50,8 @@ AROUND, APART = ("stiffness", "damping", "mass", "inertia", *BEARINGS.values(), 
 # coupling twists at frequencies that samples do not hold; the zero of the mesh phase turns friction round with it.
 FOLLOWED = DELAYS["angle_driven"]
 MOVED, STEP = (FRICTION, COMPLIANCE, *STRUCTURE, SEAT, LATE, FOLLOWED, PHASE), 0.05
+# Of those what hypotheses are weighed by, and what goes along with one: by a late angle the mesh is turned on as well.
+WEIGHED = (FRICTION, COMPLIANCE, FOLLOWED, PHASE)
 SMALLEST = 1e-4  # of the load at which an exponent changes nothing, below which its logarithm is cut
 
 

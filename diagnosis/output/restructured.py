@@ -13,10 +13,10 @@ from gearbench.diagnosis.effects.encoder_runout import KEYS as ENCODERS
 from gearbench.diagnosis.effects.pitch_error import KEYS as PITCHES
 from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
 from gearbench.diagnosis.effects.torque_ripple import KEY as RIPPLE
-from gearbench.diagnosis.output.beginning import Around, levelled, seen_by
+from gearbench.diagnosis.output.beginning import Around, levelled, linear_cost, seen_by
 from gearbench.diagnosis.output.fit import SETTLED, Optimum, cost_of, fit, fit_afresh
 from gearbench.diagnosis.output.simulator import Simulator
-from gearbench.diagnosis.output.structure import SEAT, otherwise
+from gearbench.diagnosis.output.structure import SEAT, housings_below, otherwise
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -25,6 +25,8 @@ Report = Callable[[str], None]
 RENEWALS = 3
 # Nats an independent line that are left, in the median block, below which no other structure is tried.
 CLOSE = 0.2
+# The same of a block that answers the excitation, above which it is nearly all unexplained.
+FAR = 5.0
 # Cost of the nominal rig over that of a fit up to which another fit is begun there: mesh, offsets and flanks trade
 # along long valleys, and a rig without any of that can lie below their floors.
 NEAR = 1.5
@@ -37,6 +39,8 @@ def restructured(simulator: Simulator, found: Optimum, around: Around | None, re
     a part of it (None: nothing does)."""
     if not is_close(simulator, found):
         found = better(found, _from_around(simulator, found, around, report))
+    if not is_close(simulator, found):
+        found = better(found, _on_a_housing(simulator, found, report))
     if not is_close(simulator, found):
         found = better(found, _otherwise(simulator, found, report))
     return found
@@ -57,10 +61,12 @@ def better(found: Optimum, other: Optimum | None) -> Optimum:
 
 
 def is_close(simulator: Simulator, found: Optimum) -> bool:
-    """Whether the median block is left with little beside its noise."""
+    """Whether the median block is left with little beside its noise, and no block that answers the excitation with
+    much: a structure that is not there shows in the transmission error before it shows anywhere else."""
     target = simulator.target
     left = target.nats(target.energies(target.lines - found.lines)) - target.nats(target.noise)
-    return bool(np.median(left) < CLOSE)
+    answers = np.array([one.kind == "excited" for one in target.blocks])
+    return bool(np.median(left) < CLOSE and not (answers & (left > FAR)).any())
 
 
 def _from_around(simulator: Simulator, found: Optimum, around: Around | None, report: Report) -> Optimum | None:
@@ -79,6 +85,21 @@ def _from_around(simulator: Simulator, found: Optimum, around: Around | None, re
     if best is None or best.cost > found.cost:
         return None
     return fit_afresh(simulator, best.p, found.sd, renewals=RENEWALS)
+
+
+def _on_a_housing(simulator: Simulator, found: Optimum, report: Report) -> Optimum | None:
+    """The fit begun with sensors on a housing that moves across, the one nearest to the excited lines; None where a rig
+    has none."""
+    alone = simulator.of_record(simulator.target.most_excited)
+    report("simulating: sensors on a housing")
+    trials = housings_below(simulator.layout.unknowns, found.p)
+    if not trials:
+        return None
+    begin = min(trials, key=lambda p: linear_cost(alone, p, found.sd))
+    again = fit_afresh(simulator, begin, found.sd, renewals=RENEWALS)
+    if again is not None and again.evidence > found.evidence and again.left > SETTLED:
+        again = fit(simulator, again.p, found.sd, again.sensitivity, renewals=RENEWALS) or again
+    return again
 
 
 def _otherwise(simulator: Simulator, found: Optimum, report: Report) -> Optimum | None:

@@ -20,8 +20,8 @@ from gearbench.diagnosis.output.background import prior_of
 from gearbench.diagnosis.output.beginning import Around
 from gearbench.diagnosis.output.by_forces import Start
 from gearbench.diagnosis.output.contrast import is_strange
-from gearbench.diagnosis.output.fit import SETTLED, Optimum, cost_of, fit, fit_afresh
-from gearbench.diagnosis.output.jacobian import FOLLOWED
+from gearbench.diagnosis.output.fit import SETTLED, Optimum, cost_of, fit, fit_afresh, refreshed
+from gearbench.diagnosis.output.jacobian import FOLLOWED, WEIGHED
 from gearbench.diagnosis.output.reshaped import has_shapes, reshaped
 from gearbench.diagnosis.output.restructured import begun_at_nominal, better, restructured
 from gearbench.diagnosis.output.rivals import compared, is_like, rivals_of, usual_of
@@ -49,6 +49,8 @@ WORTH = 2.0  # nats promised from which a hypothesis is simulated
 # Renewals of the Jacobian: of each promising hypothesis, and of what entered in the end, whose structure has been found
 # beside a gap that the effects now close.
 RENEWALS, RENEWALS_LAST = 1, 2
+# Of what all is weighed over, where derivatives that were not renewed on the way led its fit astray.
+RENEWALS_FRESH = 3
 
 
 @dataclass(frozen=True)
@@ -98,6 +100,9 @@ def select(
     best, weighed = base, None
     entered: list[Weighed] = []
     while len(entered) < MOST:
+        best = refreshed(simulator, best, unknowns.of(WEIGHED))
+        best = fit(simulator, best.p, best.sd, best.sensitivity, renewals=RENEWALS_FRESH) or best
+        base = base if entered else best
         taken = [one.hypothesis for one in entered]
         rest = [one for one in hypotheses if not any(is_like(one, other) for other in taken)]
         found = compared(simulator, best, weigh(simulator, best, rest, starts, report, reshape=not entered))

@@ -88,6 +88,16 @@ class Simulator:
             out[left] = near[left]
         return out
 
+    def moved(self, p: Array, sd: Array, chosen: Flags) -> Complex | None:
+        """Derivatives (size, K) of the lines by the chosen unknowns, each moved and simulated; zero for the others,
+        None where `p` is no rig."""
+        here = self.lines(p)
+        if here is None:
+            return None
+        out = np.zeros((self.layout.size, here.size), dtype=complex)
+        self._by_moves(out, p, sd, chosen & self.layout.unknowns.of(MOVED))
+        return out
+
     def _by_moves(self, out: Complex, p: Array, sd: Array, chosen: Flags) -> None:
         """Fill in what is moved and simulated."""
         unknowns, here = self.layout.unknowns, self.lines(p)

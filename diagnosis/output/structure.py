@@ -79,6 +79,7 @@ NAMES = (
 )
 # Where a fit begins with them: below some per cent a rig does not show them.
 ACROSS_BEGIN, HOUSING_BEGIN = 0.15, 0.04
+BELOW_AT = tuple(np.linspace(-2.2, 0.6, 8))  # logarithms of a housing's frequency over the supports'
 
 
 def structure_groups(rig: Rig, model: NominalModel) -> list[Group]:
@@ -132,6 +133,24 @@ def housings(unknowns: Unknowns, p: Array) -> list[Array]:
     for motion, frequency in product(range(len(MOTIONS)), (-1.0, -0.5, 0.0, 0.5)):
         if p[unknowns[HOUSING]][motion] <= NONE:
             out.append(with_motion(unknowns, p, motion, frequency, HOUSING_BEGIN))
+    return out
+
+
+def housings_below(unknowns: Unknowns, p: Array) -> list[Array]:
+    """`p` (size,) with one motion of a housing that moves across the supports as well and on which the displacement
+    sensors stand: they see none of it, so that nothing but the transmission error shows where it resonates."""
+    out: list[Array] = []
+    if HOUSING not in unknowns.slices:
+        return out
+    plain = p.copy()
+    plain[unknowns[HOUSING]], plain[unknowns[OBLIQUE]] = 0.0, 0.0
+    signs = product((1.0, -1.0), repeat=2)
+    for motion, frequency, across in product(range(len(MOTIONS)), BELOW_AT, signs):
+        trial = with_motion(unknowns, seated(unknowns, plain), motion, frequency, HOUSING_BEGIN)
+        trial[unknowns[ACROSS]] = np.where(p[unknowns[ACROSS]] > STIFFEST, p[unknowns[ACROSS]], ACROSS_BEGIN)
+        first = unknowns[OBLIQUE].start + len(SIDES) * motion
+        trial[first : first + len(SIDES)] = across
+        out.append(trial)
     return out
 
 

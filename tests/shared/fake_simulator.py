@@ -93,6 +93,10 @@ class FakeSimulator:
     def lines(self, p: np.ndarray) -> np.ndarray | None:
         return None if np.abs(p).max() > self.largest else self.of(p)
 
+    def moved(self, p: np.ndarray, sd: np.ndarray, chosen: np.ndarray) -> np.ndarray | None:
+        """As if everything had to be moved."""
+        return self.jacobian(p, sd, chosen)
+
     def jacobian(
         self, p: np.ndarray, sd: np.ndarray, chosen: np.ndarray, near: np.ndarray | None = None
     ) -> np.ndarray | None:

@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from shared.fake_simulator import LINES, FakeSimulator, sensitivities, target, unknowns
+from shared.simulated_lines import demonstration
 
+from gearbench.diagnosis.output.beginning import linear_cost
 from gearbench.diagnosis.output.fit import cost_of, fit, sensitivity_of
-from gearbench.diagnosis.output.restructured import begun_at_nominal
+from gearbench.diagnosis.output.restructured import begun_at_nominal, is_close
+from gearbench.diagnosis.output.simulator import Simulator
+from gearbench.diagnosis.output.structure import ACROSS, HOUSING, MODE, OBLIQUE, SEAT, housings_below
 
 MATRIX = sensitivities(3)
 
@@ -37,3 +44,31 @@ def test_a_fit_in_a_valley_beside_the_nominal_rig_is_begun_there_again() -> None
     # Where the nominal rig is far off nothing is begun.
     simulator.jacobians = 0
     assert begun_at_nominal(simulator, again, np.zeros(8, dtype=bool)) is again and simulator.jacobians == 0
+
+
+def test_a_housing_under_the_sensors_is_told_by_the_transmission_error() -> None:
+    """Of a rig on a housing that moves across, whose sensors go along with it, the trial that is alike is the best."""
+    simulator = demonstration()
+    layout = simulator.layout
+    keys, p = layout.unknowns, np.zeros(layout.size)
+    p[keys[ACROSS]], p[keys[SEAT]] = (0.2, 0.15), 1.0
+    p[keys[HOUSING]], p[keys[MODE]], p[keys[OBLIQUE]] = (0.0, 0.05), (0.0, 0.0, -1.1, 0.1), (0.0, 0.0, 1.1, -0.9)
+    lines = simulator.lines(p)
+    assert lines is not None
+    moving = Simulator(layout, replace(simulator.target, lines=lines), simulator.simulate)
+    sd = keys.prior()
+    best = min(housings_below(keys, np.zeros(layout.size)), key=lambda trial: linear_cost(moving, trial, sd))
+    assert best[keys[HOUSING]][0] == 0.0 < best[keys[HOUSING]][1] and best[keys[SEAT]] == 1.0
+    assert best[keys[MODE]][2] == pytest.approx(-1.1, abs=0.3)
+    assert (np.sign(best[keys[OBLIQUE]]) == (0.0, 0.0, 1.0, -1.0)).all()
+
+
+@pytest.mark.parametrize(("off", "close"), [(0.0, True), (3.0, True), (500.0, False)])
+def test_a_block_that_no_rig_answers_is_not_close(off: float, close: bool) -> None:
+    """Whatever the median block is left with; in multiples of the floor."""
+    lines = np.zeros(LINES, dtype=complex)
+    far = lines.copy()
+    simulator = FakeSimulator(lambda p: lines, target(far))
+    far[simulator.target.of_line == 2] = np.sqrt(off * simulator.target.floors[2])
+    found = SimpleNamespace(lines=lines)
+    assert is_close(simulator, found) is close  # type: ignore[arg-type]

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from shared.fake_simulator import LINES, FakeSimulator, sensitivities, target, unknowns
 
-from gearbench.diagnosis.output.fit import fit, prior_cost, sensitivity_of
+from gearbench.diagnosis.output.fit import Sensitivity, fit, prior_cost, refreshed, sensitivity_of
+from gearbench.diagnosis.output.quadratic import quadratic_of
 
 MATRIX = sensitivities()
 TRUE = np.array([0.12, -0.08, 0.05, 0.3, 0.0, 0.0, 0.0, 0.0])
@@ -114,3 +115,24 @@ def test_a_valley_that_bends_is_followed_to_its_end() -> None:
     best = fit(simulator, begin, wide, first, renewals=20)
     assert best is not None and best.left < 0.5
     assert best.p == pytest.approx(true, abs=5e-3)
+
+
+def test_derivatives_that_stayed_behind_are_taken_anew() -> None:
+    """A fit led astray by one that is wrong by a half stops short; with it taken anew it arrives."""
+    simulator = FakeSimulator(curved, target(curved(TRUE) + noise(1e-3)))
+    fresh = sensitivity_of(simulator, np.zeros(8), SD)
+    assert fresh is not None
+    stale = fresh.jacobian.copy()
+    stale[3] = 0.5 * stale[3] + MATRIX[5]
+    active = fresh.quadratic.active
+    wrong = quadratic_of(simulator.target, simulator.target.lines - curved(np.zeros(8)), stale, active)
+    stuck = fit(simulator, np.zeros(8), SD, Sensitivity(stale, wrong))
+    assert stuck is not None and abs(stuck.p[3] - TRUE[3]) > 0.02
+    here = refreshed(simulator, stuck, np.arange(8) == 3)
+    assert here.cost == stuck.cost and (here.p == stuck.p).all()
+    derivative = simulator.jacobian(stuck.p, SD, ALL)
+    assert derivative is not None
+    assert here.sensitivity.jacobian[3] == pytest.approx(derivative[3])
+    assert (here.sensitivity.jacobian[:3] == stale[:3]).all()
+    best = fit(simulator, here.p, SD, here.sensitivity, renewals=2)
+    assert best is not None and best.p == pytest.approx(TRUE, abs=2e-3)
