@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.identification.feedback.data import ClassData, class_data, fewer_classes, only_lines
-from gearbench.identification.feedback.folding import Folding, clear_lines, folded, folded_of, folding_of
+from gearbench.identification.feedback.folding import Folding, clear_lines, folded, folded_of, folding_of, without
 from gearbench.identification.feedback.functions import Fractions, Splines, common_pairs
 from gearbench.identification.feedback.loud import Loud, settled
 from gearbench.identification.feedback.model import Model
@@ -148,16 +148,8 @@ def search(best: Refined, part: ClassData, data: ClassData, *, zones: bool) -> F
     lines = folded_of(best, data)
     if lines is None:
         return found
-    least = (np.inf, best, part)
-    clear = fewer_classes(only_lines(data, clear_lines(lines, data, best.noise)), SEARCHED)
-    taken = refined(best.model, clear, COMPARED)
-    lines = folded(response(taken.model, data), data)
-    for _ in range(APPROACHED):
-        clean = fewer_classes(replace(data, dte=data.dte - lines), SEARCHED)
-        taken = refined(taken.model, clean, COMPARED)
-        lines = folded(response(taken.model, data), data)
-        least = min(least, (criterion(taken, clean), taken, clean), key=lambda each: each[0])
-    value, taken, clean = least
+    taken, clean = _approached(best, data, lines)
+    value = criterion(taken, clean)
     other = Found(taken, clean, in_zones(taken, clean, IN_ZONES) if zones else None)
     if min(value - criterion(best, part), other.value - found.value) >= 0.0:
         return replace(found, folding=folding_of(found.last, data, 0.0))
@@ -173,6 +165,19 @@ def search(best: Refined, part: ClassData, data: ClassData, *, zones: bool) -> F
         if other.folding is None or other.folding.like(before.folding, other.last.noise):
             break
     return other
+
+
+def _approached(best: Refined, data: ClassData, lines: Complexes) -> tuple[Refined, ClassData]:
+    """The fit to part of the data without folded lines, and that part, beginning with `best`, which may have taken in
+    the folded `lines` (C, S, E) that it foretells: it is fitted first to lines that next to nothing folds onto."""
+    clear = fewer_classes(only_lines(data, clear_lines(lines, data, best.noise)), SEARCHED)
+    taken, tried = refined(best.model, clear, COMPARED), []
+    # Lines that are subtracted as foretold are approached step by step, those that the model shows at once.
+    for _ in range(1 if data.folds_inside else APPROACHED):
+        clean = fewer_classes(without(data, folded(response(taken.model, data), data)), SEARCHED)
+        taken = refined(taken.model, clean, COMPARED)
+        tried.append((taken, clean))
+    return min(tried, key=lambda each: criterion(*each))
 
 
 def _last_rounds(best: Refined, data: ClassData, found: Found) -> Feedback:

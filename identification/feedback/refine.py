@@ -66,9 +66,10 @@ def _deflection(operator: Operator, data: ClassData) -> Complexes:
 
 def _shown(model: Model, data: ClassData, deflection: Complexes) -> Complexes:
     """What the records would show (C, S, E) of a deflection."""
-    if not model.torsional:
-        return deflection
-    return model.shown(data.omega[:, :, None], deflection, data.force) * data.modelled[:, :, None]
+    seen = deflection
+    if model.torsional:
+        seen = model.shown(data.omega[:, :, None], deflection, data.force) * data.modelled[:, :, None]
+    return seen if data.part == 0.0 else np.stack([data.sampled(one) for one in seen])
 
 
 def refined(model: Model, data: ClassData, settled: float = SETTLED, mesh: Mesh | None = None) -> Refined:
@@ -214,8 +215,9 @@ def derivatives(
             if shapes is not None:
                 columns = np.concatenate([columns[:, :free], shapes.columns(columns[:, free:])], axis=1)
             columns = operator.solve(index, columns * modelled[:, None])
-            columns = model.shown_columns(values, omega, columns, y, u) * weight[:, None]
-            yield index, columns, (measured - model.shown(omega, y, u)) * weight
+            columns = data.sampled(model.shown_columns(values, omega, columns, y, u)) * weight[:, None]
+            shown = data.sampled(model.shown(omega, y, u) * modelled)
+            yield index, columns, (measured - shown) * weight
 
 
 def _normal(
