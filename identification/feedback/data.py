@@ -29,7 +29,7 @@ OPERATING = 100
 
 @dataclass(frozen=True)
 class ClassData:
-    """Two-sided lines of the residue classes 0..d/2 (the others are their complex conjugates).
+    """Two-sided lines of the residue classes 0..d/2 (the others are their complex conjugates) that hold any dte.
 
     `lines` (C, S), 0 where `modelled` is False; `valid` (C, S) up to the line `top`: those of the record; `modelled`
     (C, S): up to `furthest`. `force` and `dte` (C, S, E) over `force_unit` [N] and `dte_unit` [m]; of lines that are
@@ -185,6 +185,9 @@ def class_data(spectra: Spectra, excited: int) -> ClassData:
     )
     valid &= ~np.isin(lines, folded_harmonics(spectra.samples, d))
     weight = np.where((2 * classes) % d == 0, np.sqrt(0.5), 1.0)
+    # Of a single realisation nothing is left of the operating response's class, which need not be solved.
+    there = np.abs(dte).max(axis=(1, 2)) > 0
+    lines, valid, modelled, force, dte, weight = (x[there] for x in (lines, valid, modelled, force, dte, weight))
     force_unit, dte_unit = (
         float(np.sqrt(np.sum(np.abs(x[valid]) ** 2) / max(np.count_nonzero(x[valid]), 1))) or 1.0 for x in (force, dte)
     )
