@@ -21,11 +21,15 @@ BEYOND = 24
 # fit. At 500 Hz, without those beyond twice that line the reference system's response errs by 0.3 %, without those
 # beyond three times by 0.09 %.
 PREDICTED = 3
+# Turns by which folded lines of two realisations may differ to be alike.
+ALIKE = 1e-9
+# Harmonics of the mesh whose operating response may fold back to be felt.
+OPERATING = 100
 
 
 @dataclass(frozen=True)
 class ClassData:
-    """Two-sided lines of the residue classes 0..d/2 (the others are their complex conjugates).
+    """Two-sided lines of the residue classes 0..d/2 (the others are their complex conjugates) that hold any dte.
 
     `lines` (C, S), 0 where `modelled` is False; `valid` (C, S) up to the line `top`: those of the record; `modelled`
     (C, S): up to `furthest`. `force` and `dte` (C, S, E) over `force_unit` [N] and `dte_unit` [m]; of lines that are
@@ -33,7 +37,8 @@ class ClassData:
     `weight` (C,): 1, or 1/sqrt(2) for classes that are their own mirror image and hold every equation twice.
     `omega` (C, S): angular frequency over `omega_unit` [rad/s]. `excited`: highest excited line. `equations`: complex
     ones, each counted once. `samples` of the joint period, 0 where nothing can have folded; `start_phase` (E,) [cycles]
-    by which records were delayed, and the `rotation` (E, E) of the realisations after that.
+    by which records were delayed, and the `rotation` (E, E) of the realisations after that. `part` of the model's lines
+    beyond half the sampling rate that a model of these data foretells in them.
     """
 
     lines: NDArray[np.int64]
@@ -52,11 +57,32 @@ class ClassData:
     samples: int = 0
     start_phase: Floats = field(default_factory=lambda: np.zeros(1))
     rotation: Floats = field(default_factory=lambda: np.eye(1))
+    part: float = 0.0
 
     @property
     def folds(self) -> bool:
         """Whether the model has lines beyond half the sampling rate."""
         return 0 < self.samples < 2 * self.furthest
+
+    @property
+    def folds_inside(self) -> bool:
+        """Whether lines fold onto lines of their own class, alike in all realisations: a mesh period is a whole number
+        of samples, of which records begin equally far from mesh phase 0."""
+        turns = np.exp(2j * np.pi * self.samples / self.mesh_lines * self.start_phase)
+        return self.samples % self.mesh_lines == 0 and bool(np.abs(turns - turns[0]).max() < ALIKE)
+
+    def sampled(self, values: Complexes) -> Complexes:
+        """What a record shows of a class's `values` (S, ...) on its lines: themselves, and `part` of those that fold
+        inside the class onto them, as in `folding.folded`."""
+        if self.part == 0.0:
+            return values
+        apart, size = self.samples // self.mesh_lines, values.shape[0]
+        turn = self.part * np.exp(2j * np.pi * ((apart * self.start_phase[0]) % 1.0))
+        found = values.copy()
+        if apart < size:
+            found[: size - apart] += turn * values[apart:]
+            found[apart:] += np.conj(turn) * values[: size - apart]
+        return found
 
     @property
     def omega_unit(self) -> float:
@@ -124,10 +150,23 @@ def only_lines(data: ClassData, kept: NDArray[np.bool_]) -> ClassData:
     return replace(data, valid=valid, equations=_equations(valid, data.dte, data.weight))
 
 
+def folded_harmonics(samples: int, mesh_lines: int) -> NDArray[np.int64]:
+    """Lines of a record of so many `samples`, 0 where nothing can have folded, onto which mesh harmonics beyond half
+    the sampling rate may have come back from the operating response. Where a mesh period is a whole number of samples
+    these are mesh harmonics again."""
+    harmonics = np.arange(1, OPERATING + 1) * mesh_lines
+    harmonics = harmonics[2 * harmonics > samples]
+    if samples == 0 or samples % mesh_lines == 0:
+        return np.empty(0, dtype=np.int64)
+    back = harmonics - samples * np.round(harmonics / samples).astype(np.int64)
+    return np.concatenate([back, -back])
+
+
 def class_data(spectra: Spectra, excited: int) -> ClassData:
     """Lines up to a little beyond the highest `excited` one, without the operating response (class 0 of its records).
 
-    Records are shifted to mesh phase 0 as in the local polynomial method.
+    Records are shifted to mesh phase 0 as in the local polynomial method. Without equations are also lines that the
+    operating response may have folded onto.
     """
     regression = prepare(spectra, transient=False, reach=0)
     d = spectra.mesh_lines
@@ -144,7 +183,11 @@ def class_data(spectra: Spectra, excited: int) -> ClassData:
         np.where(kept[:, :, None], source[classes][:, :, at].transpose(0, 2, 1), 0.0)
         for kept, source in ((valid, regression.force), (known, regression.dte))
     )
+    valid &= ~np.isin(lines, folded_harmonics(spectra.samples, d))
     weight = np.where((2 * classes) % d == 0, np.sqrt(0.5), 1.0)
+    # Of a single realisation nothing is left of the operating response's class, which need not be solved.
+    there = np.abs(dte).max(axis=(1, 2)) > 0
+    lines, valid, modelled, force, dte, weight = (x[there] for x in (lines, valid, modelled, force, dte, weight))
     force_unit, dte_unit = (
         float(np.sqrt(np.sum(np.abs(x[valid]) ** 2) / max(np.count_nonzero(x[valid]), 1))) or 1.0 for x in (force, dte)
     )

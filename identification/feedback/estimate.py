@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.identification.feedback.data import ClassData, class_data, fewer_classes, only_lines
-from gearbench.identification.feedback.folding import Folding, clear_lines, folded, folded_of, folding_of
+from gearbench.identification.feedback.folding import Folding, clear_lines, folded, folded_of, folding_of, without
 from gearbench.identification.feedback.functions import Fractions, Splines, common_pairs
+from gearbench.identification.feedback.loud import Loud, settled
 from gearbench.identification.feedback.model import Model
 from gearbench.identification.feedback.phase import InZones, in_zones
 from gearbench.identification.feedback.poles import linear_models
@@ -21,7 +22,6 @@ from gearbench.identification.feedback.refine import (
     output_error,
     refined,
     response,
-    settled_covariance,
 )
 from gearbench.identification.feedback.shapes import Shapes
 from gearbench.identification.feedback.start import first_model
@@ -68,13 +68,14 @@ FIRMNESS = 1e-9
 class Feedback:
     """The data, and the refined model of least criterion; `zones` of phase that its mesh is told by, if it is, and
     their `gain` in twice the log evidence over harmonics; `folding` beyond half the sampling rate that was taken out of
-    the data, where the model foretells any."""
+    the data, where the model foretells any; `loud` mesh phases, where the residual has any."""
 
     data: ClassData
     refined: Refined
     zones: Zones | None = None
     gain: float = 0.0
     folding: Folding | None = None
+    loud: Loud | None = None
 
     @property
     def model(self) -> Model:
@@ -147,16 +148,8 @@ def search(best: Refined, part: ClassData, data: ClassData, *, zones: bool) -> F
     lines = folded_of(best, data)
     if lines is None:
         return found
-    least = (np.inf, best, part)
-    clear = fewer_classes(only_lines(data, clear_lines(lines, data, best.noise)), SEARCHED)
-    taken = refined(best.model, clear, COMPARED)
-    lines = folded(response(taken.model, data), data)
-    for _ in range(APPROACHED):
-        clean = fewer_classes(replace(data, dte=data.dte - lines), SEARCHED)
-        taken = refined(taken.model, clean, COMPARED)
-        lines = folded(response(taken.model, data), data)
-        least = min(least, (criterion(taken, clean), taken, clean), key=lambda each: each[0])
-    value, taken, clean = least
+    taken, clean = _approached(best, data, lines)
+    value = criterion(taken, clean)
     other = Found(taken, clean, in_zones(taken, clean, IN_ZONES) if zones else None)
     if min(value - criterion(best, part), other.value - found.value) >= 0.0:
         return replace(found, folding=folding_of(found.last, data, 0.0))
@@ -174,22 +167,35 @@ def search(best: Refined, part: ClassData, data: ClassData, *, zones: bool) -> F
     return other
 
 
+def _approached(best: Refined, data: ClassData, lines: Complexes) -> tuple[Refined, ClassData]:
+    """The fit to part of the data without folded lines, and that part, beginning with `best`, which may have taken in
+    the folded `lines` (C, S, E) that it foretells: it is fitted first to lines that next to nothing folds onto."""
+    clear = fewer_classes(only_lines(data, clear_lines(lines, data, best.noise)), SEARCHED)
+    taken, tried = refined(best.model, clear, COMPARED), []
+    # Lines that are subtracted as foretold are approached step by step, those that the model shows at once.
+    for _ in range(1 if data.folds_inside else APPROACHED):
+        clean = fewer_classes(without(data, folded(response(taken.model, data), data)), SEARCHED)
+        taken = refined(taken.model, clean, COMPARED)
+        tried.append((taken, clean))
+    return min(tried, key=lambda each: criterion(*each))
+
+
 def _last_rounds(best: Refined, data: ClassData, found: Found) -> Feedback:
     """The fit refined on all `data`, with what folds back foretold by ever better models."""
     folding, told = found.folding, found.told
     clean = folding.removed(data) if folding is not None else data
-    settled, mesh = (SETTLED, None) if told is None else (IN_ZONES, best.mesh)
-    last = refined(best.model, clean, settled, mesh)
+    ends, mesh = (SETTLED, None) if told is None else (IN_ZONES, best.mesh)
+    last = refined(best.model, clean, ends, mesh)
     believed = float(folding.part > 0.5) if folding is not None else 0.0
     for _ in range(FORETOLD if folding is not None else 0):
         before, folding = folding, folding_of(last, data, believed)
         if folding is None or folding.like(before, last.noise):
             break
         clean = folding.removed(data)
-        last = refined(last.model, clean, settled, last.mesh if told is not None else None)
-    last = settled_covariance(last, clean)
+        last = refined(last.model, clean, ends, last.mesh if told is not None else None)
+    last, loud = settled(last, clean)
     last = folding.counted(last) if folding is not None else last
-    return Feedback(clean, last, told.zones if told else None, told.gain if told else 0.0, folding)
+    return Feedback(clean, last, told.zones if told else None, told.gain if told else 0.0, folding, loud)
 
 
 def _with_more_poles(best: Refined, part: ClassData) -> Refined:

@@ -6,6 +6,9 @@ filter, 0 behind an ideal one. The model's own lines beyond half the rate forete
 tells a beside all parameters of the model. What the parameters have taken in of it is in the same least squares:
 
     r = J p + a f        r residual, f folded lines, J derivatives.
+
+Where lines fold inside their residue class the model shows them with its response, derivatives and all
+(`ClassData.sampled`); elsewhere they are subtracted as foretold.
 """
 
 from __future__ import annotations
@@ -49,12 +52,18 @@ class Folding:
         return float(np.sum(np.abs(apart) ** 2)) < FELT * noise
 
     def removed(self, data: ClassData) -> ClassData:
-        """The data without them."""
-        return replace(data, dte=data.dte - self.part * self.lines)
+        """The data `without` them."""
+        return without(data, self.lines, self.part)
 
     def counted(self, fit: Refined) -> Refined:
         """The fit with what the part may be off by in its covariance."""
         return replace(fit, root=np.column_stack([fit.root, self.deviation * self.shift]))
+
+
+def without(data: ClassData, lines: Complexes, part: float = 1.0) -> ClassData:
+    """The data without a `part` of folded `lines` (C, S, E): those of a model that foretells them with its response and
+    its derivatives, where they fold inside the classes, else subtracted as they are."""
+    return replace(data, part=part) if data.folds_inside else replace(data, dte=data.dte - part * lines)
 
 
 def folding_of(fit: Refined, data: ClassData, believed: float) -> Folding | None:

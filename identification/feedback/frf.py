@@ -15,11 +15,13 @@ from gearbench.identification.feedback.draws import add_mesh_curves, response_va
 from gearbench.identification.feedback.estimate import Feedback, rational
 from gearbench.identification.feedback.functions import Splines
 from gearbench.identification.feedback.result import (
+    UNEXPLAINED,
     coherence,
     doubt_beyond,
     doubt_of,
     drawn_models,
     htf_on,
+    loud_power,
     unexplained,
 )
 from gearbench.identification.response.frf import make_frf
@@ -65,8 +67,10 @@ def feedback_frf(
     itf_variance += beyond[:, None]
     power = float(np.sum(np.abs(response) ** 2))
     variance, truncation = (float(np.sqrt(part.sum() / power)) for part in (htf_variance, beyond))
-    apart = unexplained(found, (int(lines[0]), int(lines[-1]))) * lines.size / (lines[-1] - lines[0] + 1)
-    apart = float(np.sqrt(max(apart, 0.0) / power))
+    whole, share = (int(lines[0]), int(lines[-1])), lines.size / float(lines[-1] - lines[0] + 1)
+    follows, loud = (float(np.sqrt(max(of(found, whole), 0.0) * share / power)) for of in (unexplained, loud_power))
+    # Both look at the same residual.
+    apart = max(follows, loud)
     natural = itf_modes(frequency, itf, itf_variance, modes=modes)
     frf = make_frf(
         "identified",
@@ -86,9 +90,10 @@ def feedback_frf(
             "variance_error": variance,
             "truncation_error": truncation,
             "unexplained_error": apart,
+            "loud_error": loud,
             "record_error": record,
             "expected_error": hypot(variance, truncation, apart, record),
-            "warnings": "\n".join([*notes, *_doubts(found, spectra, natural[0], variance, apart, ratio)]),
+            "warnings": "\n".join([*notes, *_doubts(found, spectra, natural[0], (variance, follows, loud), ratio)]),
         },
     )
     add_mesh_curves(frf, model, draws, data, angle_only=spectra.angle_only)
@@ -117,7 +122,8 @@ def _about_fit(found: Feedback, spectra: Spectra, ratio: float) -> dict[str, Any
     predicted = {} if ratio == 1.0 else {"mesh_frequency": own * ratio, "identified_at_mesh_frequency": own}
     folding = found.folding
     folded = {} if folding is None else {"folded_part": folding.part, "folded_part_sd": folding.deviation}
-    return predicted | folded | _about_basis(found) | {
+    loud = {} if found.loud is None else {"loud_phases": found.loud.phases.tolist()}
+    return predicted | folded | loud | _about_basis(found) | {
         "form": "centres from angles" if found.model.torsional else "dte",
         "mesh_harmonics": found.model.harmonics,
         "pole_pairs": found.model.basis.pairs.shape[0],
@@ -164,10 +170,24 @@ def _predicted(own: float, ratio: float) -> list[str]:
     ]
 
 
+def _loud(found: Feedback, error: float) -> list[str]:
+    """The warning of a residual that is large at few mesh phases."""
+    if found.loud is None or error < UNEXPLAINED:
+        return []
+    parts = ", ".join(f"{phase:.2f}" for phase in found.loud.phases)
+    return [
+        f"{error:.1%} of the response is in the residual around the mesh phases {parts}, beyond what others hold:"
+        " stiffness switches faster there than the record resolves, or with the load"
+    ]
+
+
 def _doubts(
-    found: Feedback, spectra: Spectra, natural: Floats, variance: float, apart: float, ratio: float
+    found: Feedback, spectra: Spectra, natural: Floats, errors: tuple[float, float, float], ratio: float
 ) -> list[str]:
+    """Warnings; `errors`: by variance, by what the residual shares with the force, and at loud phases."""
+    variance, apart, loud = errors
     notes = [*_predicted(found.data.mesh_lines * spectra.spacing, ratio), *doubt_of(apart, variance), *_folded(found)]
+    notes += _loud(found, loud)
     if not spectra.steady:
         notes.append("the steady state is not verified, and mesh-feedback assumes it")
     if found.model.torsional:

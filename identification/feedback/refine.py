@@ -10,6 +10,7 @@ phase bring a prior of their own (`shapes.py`).
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -65,9 +66,10 @@ def _deflection(operator: Operator, data: ClassData) -> Complexes:
 
 def _shown(model: Model, data: ClassData, deflection: Complexes) -> Complexes:
     """What the records would show (C, S, E) of a deflection."""
-    if not model.torsional:
-        return deflection
-    return model.shown(data.omega[:, :, None], deflection, data.force) * data.modelled[:, :, None]
+    seen = deflection
+    if model.torsional:
+        seen = model.shown(data.omega[:, :, None], deflection, data.force) * data.modelled[:, :, None]
+    return seen if data.part == 0.0 else np.stack([data.sampled(one) for one in seen])
 
 
 def refined(model: Model, data: ClassData, settled: float = SETTLED, mesh: Mesh | None = None) -> Refined:
@@ -76,10 +78,10 @@ def refined(model: Model, data: ClassData, settled: float = SETTLED, mesh: Mesh 
     `mesh`: what the model's mesh is made of, with the amplitudes that it has; of harmonics unless given.
     """
     mesh = mesh or Mesh.of_harmonics(model.vector()[model.free :])
-    now, damping = _State.of(model, mesh, data), 0.0
+    now, damping = State.of(model, mesh, data), 0.0
     for _ in range(ROUNDS):
         noise = now.cost / _freedom(data, now)
-        system = _system(now, data, noise)
+        system = normal_system(now, data, noise)
         root = system.root()
         trial, damping = _damped(now, system, data, noise, damping)
         if trial is None:
@@ -92,14 +94,6 @@ def refined(model: Model, data: ClassData, settled: float = SETTLED, mesh: Mesh 
     left = np.where(data.dte != 0, data.dte - _shown(now.model, data, now.deflection), 0.0)
     freedom = _freedom(data, now)
     return Refined(now.model, left, now.cost / freedom, now.mesh.of_model(root, model.free), freedom, now.mesh)
-
-
-def settled_covariance(fit: Refined, data: ClassData) -> Refined:
-    """The same with the covariance at the model itself; that of `refined` belongs to the model before its last step,
-    which is another one where a pole comes near zero frequency."""
-    assert fit.mesh is not None
-    root = _system(_State.of(fit.model, fit.mesh, data), data, fit.noise).root()
-    return replace(fit, root=fit.mesh.of_model(root, fit.model.free))
 
 
 def output_error(model: Model, data: ClassData) -> float:
@@ -119,8 +113,8 @@ def told_beside(fit: Refined, data: ClassData, change: Complexes) -> tuple[float
     the shift (P,) of the parameters that the whole change makes: least squares beside all parameters, whose Jacobian
     and prior are those of `refined` (separable least squares; Golub and Pereyra 1973)."""
     assert fit.mesh is not None
-    state, free = _State.of(fit.model, fit.mesh, data), fit.model.free
-    system = _system(state, data, fit.noise)
+    state, free = State.of(fit.model, fit.mesh, data), fit.model.free
+    system = normal_system(state, data, fit.noise)
     seen = _shown(fit.model, data, state.deflection)
     _, along = _normal(fit.model, replace(data, dte=seen + change), state.operator, state.deflection, fit.mesh.shapes)
     precision = 2.0 / fit.noise
@@ -138,8 +132,8 @@ def told_beside(fit: Refined, data: ClassData, change: Complexes) -> tuple[float
 
 
 @dataclass(frozen=True)
-class _State:
-    """A model, what its mesh is made of, and its response."""
+class State:
+    """A model, what its mesh is made of, and its response: that of the deflection (C, S, E), and what records show."""
 
     model: Model
     mesh: Mesh
@@ -148,37 +142,37 @@ class _State:
     cost: float
 
     @staticmethod
-    def of(model: Model, mesh: Mesh, data: ClassData) -> _State:
+    def of(model: Model, mesh: Mesh, data: ClassData) -> State:
         operator = Operator(model, data.omega, data.modelled)
         deflection = _deflection(operator, data)
-        return _State(model, mesh, operator, deflection, _cost(data, _shown(model, data, deflection)))
+        return State(model, mesh, operator, deflection, _cost(data, _shown(model, data, deflection)))
 
     def objective(self, noise: float) -> float:
         """What a step must lower: the error and, in its units, how unlikely amplitudes are under a prior that is held.
         One that follows the estimate does not hold a step back."""
         return self.cost + (0.5 * noise * self.mesh.unlikely if self.mesh.held else 0.0)
 
-    def moved(self, step: Floats, data: ClassData) -> _State:
+    def moved(self, step: Floats, data: ClassData) -> State:
         """The same with parameters moved by a step of D, N and the amplitudes, its common factor that of its own N."""
         free, mesh = self.model.free, self.mesh.moved(step[self.model.free :])
         model = self.model.moved(np.concatenate([self.model.vector()[:free] + step[:free], mesh.harmonics]))
         factor = gauge_factor(model, data)
-        return _State.of(model.scaled(factor), mesh.scaled(factor**model.gauge), data)
+        return State.of(model.scaled(factor), mesh.scaled(factor**model.gauge), data)
 
 
-def _system(now: _State, data: ClassData, noise: float) -> _System:
+def normal_system(now: State, data: ClassData, noise: float) -> System:
     """Normal equations at a state."""
     model, mesh, free = now.model, now.mesh, now.model.free
     gram, right = _normal(model, data, now.operator, now.deflection, mesh.shapes)
     vector = np.concatenate([model.vector()[:free], mesh.amplitudes])
     direction = np.concatenate([model.scale_direction()[:free], model.gauge * mesh.amplitudes])
     prior = np.concatenate([np.zeros(free), mesh.precision])
-    return _System(vector, direction, gram, right, noise, prior)
+    return System(vector, direction, gram, right, noise, prior)
 
 
 def _damped(
-    now: _State, system: _System, data: ClassData, noise: float, damping: float
-) -> tuple[_State | None, float]:
+    now: State, system: System, data: ClassData, noise: float, damping: float
+) -> tuple[State | None, float]:
     """The state after the step, or the first of ever more damped ones that lowers the objective (does not raise it by
     SETTLED of it, where the prior is renewed all the same), if any; the damping that the next step begins with."""
     least = now.objective(noise) * (1.0 if now.mesh.held else 1.0 + SETTLED)
@@ -197,21 +191,20 @@ def _cost(data: ClassData, predicted: Complexes) -> float:
     return value if np.isfinite(value) else np.inf
 
 
-def _freedom(data: ClassData, now: _State) -> float:
+def _freedom(data: ClassData, now: State) -> float:
     return max(data.equations - 0.5 * (now.model.free + now.mesh.determined), 1.0)
 
 
-def _normal(
+def derivatives(
     model: Model, data: ClassData, operator: Operator, deflection: Complexes, shapes: Shapes | None = None
-) -> tuple[Floats, Floats]:
-    """J^T J and J^T r of the stacked real equations, at the model's own `deflection` (C, S, E), with respect to its
-    parameters, or to those of D and N and the amplitudes of `shapes` of the mesh."""
+) -> Iterator[tuple[int, Complexes, Complexes]]:
+    """Class, weighted derivatives (S, P) of its response, 0 on lines that are not valid, and weighted residual (S,) of
+    each realisation, at the model's own `deflection` (C, S, E): with respect to its parameters, or to those of D and N
+    and the amplitudes of `shapes` of the mesh."""
     free = model.free
-    count = model.vector().size if shapes is None else free + shapes.weight.size
-    gram, right = np.zeros((count, count)), np.zeros(count)
     for index in range(data.lines.shape[0]):
-        omega, valid, modelled = data.omega[index], data.valid[index], data.modelled[index]
-        values = model.basis.at(omega)
+        omega, modelled = data.omega[index], data.modelled[index]
+        values, weight = model.basis.at(omega), data.weight[index] * data.valid[index]
         for experiment in range(data.dte.shape[2]):
             measured = data.dte[index, :, experiment]
             if not measured.any():
@@ -222,18 +215,31 @@ def _normal(
             if shapes is not None:
                 columns = np.concatenate([columns[:, :free], shapes.columns(columns[:, free:])], axis=1)
             columns = operator.solve(index, columns * modelled[:, None])
-            columns = model.shown_columns(values, omega, columns, y, u) * data.weight[index]
-            own = valid & (omega >= 0) if 2 * data.weight[index] ** 2 <= 1.01 else valid
-            columns, left = columns[own], ((measured - model.shown(omega, y, u)) * data.weight[index])[own]
-            if own is not valid:
-                columns, left = columns * np.sqrt(2.0), left * np.sqrt(2.0)
-            stacked = np.concatenate([columns.real, columns.imag])
-            gram += stacked.T @ stacked
-            right += stacked.T @ np.concatenate([left.real, left.imag])
+            columns = data.sampled(model.shown_columns(values, omega, columns, y, u)) * weight[:, None]
+            shown = data.sampled(model.shown(omega, y, u) * modelled)
+            yield index, columns, (measured - shown) * weight
+
+
+def _normal(
+    model: Model, data: ClassData, operator: Operator, deflection: Complexes, shapes: Shapes | None = None
+) -> tuple[Floats, Floats]:
+    """J^T J and J^T r of the stacked real equations of `derivatives`."""
+    count = model.vector().size if shapes is None else model.free + shapes.weight.size
+    gram, right = np.zeros((count, count)), np.zeros(count)
+    for index, columns, left in derivatives(model, data, operator, deflection, shapes):
+        own, mirrored = data.valid[index], 2 * data.weight[index] ** 2 <= 1.01
+        if mirrored:  # its own mirror image: one half says all
+            own = own & (data.lines[index] >= 0)
+        columns, left = columns[own], left[own]
+        if mirrored:
+            columns, left = columns * np.sqrt(2.0), left * np.sqrt(2.0)
+        stacked = np.concatenate([columns.real, columns.imag])
+        gram += stacked.T @ stacked
+        right += stacked.T @ np.concatenate([left.real, left.imag])
     return gram, right
 
 
-class _System:
+class System:
     """Normal equations of all real parameters `vector`, scaled to a diagonal of one; `direction`: along which all have
     a common factor; `noise`: variance of a complex equation."""
 
@@ -255,12 +261,17 @@ class _System:
         total = self.total + damping * np.eye(self.size.size)
         return np.asarray(cho_solve(cho_factor(total, lower=True), self.pull) / self.size)
 
-    def root(self) -> Floats:
-        """R of the covariance R R^T of all parameters.
+    def root(self, middle: Floats | None = None) -> Floats:
+        """R of the covariance R R^T of all parameters: the inverse, or that on both sides of a `middle` (P, P) of other
+        units than these equations' (White 1982, of errors that differ between equations).
 
         A factor's inverse, not the inverse's factor: where parameters stand in for each other the inverse loses what
         the lines know well, and draws from it leave the record by many deviations.
         """
-        lower = np.linalg.cholesky(self.total)
-        inverse = solve_triangular(lower, np.eye(self.size.size), lower=True, trans="T")
+        lower, own = np.linalg.cholesky(self.total), np.eye(self.size.size)
+        if middle is not None:
+            scaled = middle / self.size / self.size[:, None]
+            scaled[np.diag_indices_from(scaled)] += TINY
+            own = solve_triangular(lower, np.linalg.cholesky(scaled), lower=True)
+        inverse = solve_triangular(lower, own, lower=True, trans="T")
         return np.asarray(inverse / self.size[:, None])

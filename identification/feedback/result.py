@@ -195,6 +195,19 @@ def unexplained(found: Feedback, band: tuple[int, int]) -> float:
     return total / data.stiffness_unit**2
 
 
+def loud_power(found: Feedback, band: tuple[int, int]) -> float:
+    """Estimated sum over the lines k of the `band` and all branches of |error of G_l(k)|^2 [m^2/N^2]: what residuals
+    hold at loud phases beyond the level of the others. It may be distortion of flanks whose contact moves with the
+    load, which no response explains, or response that the model does not follow; a realisation does not tell."""
+    if found.loud is None:
+        return 0.0
+    data = found.data
+    own = data.valid & (np.abs(data.lines) >= band[0]) & (np.abs(data.lines) <= band[1])
+    counted = data.weight[:, None, None] ** 2 * (own[:, :, None] & (np.abs(data.dte) > 0))
+    left, force = (float(np.sum(counted * np.abs(x) ** 2)) for x in (found.refined.left, data.force))
+    return found.loud.excess * left / force * (band[1] - band[0] + 1) / data.stiffness_unit**2
+
+
 def doubt_of(apart: float, chance: float) -> list[str]:
     """The warning, if any, of a part of the response that no mesh force explains, beside what chance makes of it."""
     if apart <= max(UNEXPLAINED, 2 * chance):

@@ -16,6 +16,9 @@ FREQUENCY, CYCLES = 2e-3, 5e-3
 # Working pressure angles of involute gears [deg], base radii [m].
 WORKING_ANGLE_DEG = (5.0, 45.0)
 BASE_RADIUS = (1e-4, 20.0)
+# Inertia over the fourth power of the base radius [kg/m^2], at least: a disc of steel has 12000 times its width, 3 um
+# would be less than any gear.
+DISC = 0.05
 
 
 def angles_unwrapped(look: Look) -> list[Finding]:
@@ -142,3 +145,18 @@ def _slack(look: Look) -> float:
     if not slack or not max(cycles for _, cycles in slack) > 0:
         return CYCLES
     return max(wander for wander, _ in slack) / max(cycles for _, cycles in slack)
+
+
+def radii_fit_inertias(look: Look) -> list[Finding]:
+    """A gear is no thinner than any gear: its inertia is that of a disc of its base radius."""
+    for gear in GEARS:
+        radius, inertia = look.number(f"base_radius_{gear}"), look.number(f"inertia_{gear}")
+        if radius is None or inertia is None or not radius > 0 or not 0 < inertia < DISC * radius**4:
+            continue
+        return [
+            Finding(
+                f"attribute inertia_{gear} = {inertia:.4g} kg m^2 is too small for base_radius_{gear} = {radius:.4g} m"
+                f" (limit {DISC * radius**4:.3g} kg m^2): is the radius in inches or mm, the inertia in another unit?"
+            )
+        ]
+    return []

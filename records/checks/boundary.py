@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gearbench.records.checks.finding import Finding
 from gearbench.records.checks.look import GEARS, Complexes, Look
 from gearbench.records.checks.mesh_force import Accounts, accounts_of
+
+Array = NDArray[np.float64]
 
 # Both accounts of the force agree below AGREE; what explains a disagreement leaves EXPLAINED of it at most.
 AGREE, EXPLAINED = 0.25, 1 / 3
@@ -15,6 +18,17 @@ HELD = 1e-3
 # A balance that fits so well tells inertias, to OFF of themselves, where they do not stand for one another (smallest
 # singular value) and the force depends on them.
 EXACT, OFF, APART, MATTERS = 0.05, 0.1, 0.02, 0.02
+# Factors that torques have over accelerations when one of them is in another unit, or the rate off by two, and how well
+# such a factor must be met.
+GAINS = {
+    1e3: "torques in N mm",
+    8.850746: "torques in lbf in",
+    0.737562: "torques in lbf ft",
+    4.0: "a sampling_rate of half the true one",
+    0.25: "a sampling_rate of twice the true one",
+    180 / np.pi: "angles in another unit",
+}
+MET = 0.02
 
 
 def boundary_as_declared(look: Look) -> list[Finding]:
@@ -55,37 +69,42 @@ def boundary_as_declared(look: Look) -> list[Finding]:
     ]
 
 
+def accelerations_as_torques(look: Look) -> list[Finding]:
+    """Torques and accelerations of both gears balance as they are, not with all torques times one number: that number
+    is a unit of torque, inertias, or the square of a rate.
+
+    The response is that many times too small if the torques have it. Where the number is known it is refused.
+    """
+    balance = _balance(look)
+    if balance is None:
+        return []
+    found, before, after = balance
+    gain = float(found.mean())
+    alike = min(found) > 0 and float(np.abs(found / gain - 1).max()) < OFF
+    if not alike or abs(gain - 1) <= OFF or before < OFF or after > EXACT or after > EXPLAINED * before:
+        return []
+    known = next((words for factor, words in GAINS.items() if abs(gain / factor - 1) < MET), None)
+    hint = f": {known}?" if known else ": are the inertias or the unit of the torques right, and sampling_rate?"
+    return [
+        Finding(
+            f"the torques are {gain:.4g} times what accelerations and inertias of the gears make (limit {1 + OFF:g};"
+            f" the forces on the teeth disagree by {before:.2g} of their rms, without the factor by {after:.2g}){hint}",
+            refused=known is not None,
+            error=min(abs(1 / gain - 1), 1.0),
+        )
+    ]
+
+
 def inertias_as_declared(look: Look) -> list[Finding]:
     """Both inertias are those with which torques and accelerations balance; silent where nothing balances.
 
     Least squares for the factors a, b of both inertias in T1/rb1 - a J1 theta1''/rb1 = T2/rb2 + b J2 theta2''/rb2.
     Where the driven gear is held its inertia shows nowhere, and the force needs none.
     """
-    accounts = accounts_of(look)
-    if accounts is None or len(accounts.gears) < 2 or look.record.attrs.get("driven_boundary") != "torque":
+    balance = _balance(look)
+    if balance is None or look.record.attrs.get("driven_boundary") != "torque":
         return []
-    first, second = accounts.gears["driver"], accounts.gears["driven"]
-    before = float(accounts.misfit(GEARS)[0])
-    if not {"angle_driver", "torque_driver"} <= set(first) or not {"angle_driven", "torque_driven"} <= set(second):
-        return []
-    columns = np.stack([first["angle_driver"], -second["angle_driven"]], axis=1)
-    target = second["torque_driven"] - first["torque_driver"]
-    scale = np.linalg.norm(columns, axis=0)
-    if not (scale > 0).all():
-        return []
-    stacked = np.vstack([columns.real, columns.imag]) / scale
-    if np.linalg.svd(stacked, compute_uv=False)[-1] < APART:
-        return []
-    found = np.linalg.lstsq(stacked, np.concatenate([target.real, target.imag]), rcond=None)[0] / scale
-    fitted = Accounts(
-        {
-            "driver": {**first, "angle_driver": found[0] * first["angle_driver"]},
-            "driven": {**second, "angle_driven": found[1] * second["angle_driven"]},
-        },
-        {},
-        accounts.omega,
-    )
-    after = float(fitted.misfit(GEARS)[0])
+    found, before, after = balance
     off = {gear: float(factor) for gear, factor in zip(GEARS, found, strict=True) if abs(factor - 1) > OFF}
     if not off or min(found) <= 0 or after > EXACT or after > EXPLAINED * before:
         return []
@@ -105,6 +124,43 @@ def inertias_as_declared(look: Look) -> list[Finding]:
             error=min(error, 1.0),
         )
     ]
+
+
+def _balance(look: Look) -> tuple[Array, float, float] | None:
+    """Factors of the inertias, a alone or a, b, with which torques and accelerations balance (above), and by how much
+    the forces at both gears disagree without and with these; None where nothing tells them."""
+    accounts = accounts_of(look)
+    if accounts is None or len(accounts.gears) < 2:
+        return None
+    first, second = accounts.gears["driver"], accounts.gears["driven"]
+    moving = ["driver", "driven"] if look.record.attrs.get("driven_boundary") == "torque" else ["driver"]
+    if any(f"{kind}_{gear}" not in accounts.gears[gear] for gear in moving for kind in ("torque", "angle")):
+        return None
+    if "torque_driven" not in second:
+        return None
+    columns = np.stack([sign * accounts.gears[g][f"angle_{g}"] for g, sign in zip(moving, (1, -1), strict=False)], 1)
+    target = second["torque_driven"] - first["torque_driver"]
+    scale = np.linalg.norm(columns, axis=0)
+    if not (scale > 0).all():
+        return None
+    stacked = np.vstack([columns.real, columns.imag]) / scale
+    found = np.linalg.lstsq(stacked, np.concatenate([target.real, target.imag]), rcond=None)[0] / scale
+    if np.linalg.svd(stacked, compute_uv=False)[-1] < APART:
+        # They stand for one another: one factor for both, unless these gears swing one against the other.
+        whole = columns.sum(axis=1)
+        if np.linalg.norm(whole) < APART * scale.max():
+            return None
+        found = np.full(len(moving), float(np.vdot(whole, target).real / np.vdot(whole, whole).real))
+    fitted = {
+        gear: {**accounts.gears[gear], f"angle_{gear}": factor * accounts.gears[gear][f"angle_{gear}"]}
+        for gear, factor in zip(moving, found, strict=True)
+    }
+    if "driven" not in moving:
+        fitted["driven"] = {"torque_driven": second["torque_driven"]}
+    before, after = (
+        float(Accounts(gears, {}, accounts.omega).misfit(GEARS)[0]) for gears in (accounts.gears, fitted)
+    )
+    return np.asarray(found), before, after
 
 
 def _forces(look: Look, factors: tuple[float, float] = (1.0, 1.0)) -> dict[str, Complexes] | None:

@@ -16,8 +16,10 @@ Array = NDArray[np.float64]
 # Equal samples at an end of the range that make clipping, and how many times as many as the levels beside hold: a
 # signal that repeats itself meets its extreme in every period, a coarsely quantised one lingers there.
 FEWEST, CROWD = 6, 5.0
-# Levels closer than this part of the range are one.
-ROUNDING = 1e-9
+# Levels closer than this part of the range are one: rounding, or the noise that comes after what has clipped. A peak
+# crowds below its top as well, by less than CROWD: a parabola, and a sine, hold three times as much in the first level
+# as in the mean of the next three.
+WIDTHS = (1e-9, 1e-4, 1e-3)
 # A signal that spends this part of its time at its ends, such as a binary one, is made so and not clipped.
 MADE_SO = 0.95
 # A load torque that stands below this part of its largest value is the one of separated teeth.
@@ -79,7 +81,8 @@ def lost_by_clipping(values: Array) -> float:
     for share, end in zip(clipped_ends(values), (float(values.max()), float(values.min())), strict=True):
         if share == 0.0:
             continue
-        edges = np.flatnonzero(np.diff(np.concatenate(([False], values == end, [False])).astype(int)))
+        near = np.abs(values - end) <= _width(values, end) * np.ptp(values)
+        edges = np.flatnonzero(np.diff(np.concatenate(([False], near, [False])).astype(int)))
         first, last = edges[::2], edges[1::2]  # runs are first .. last - 1
         inner = (first > 1) & (last < values.size - 1)
         first, last = first[inner], last[inner]
@@ -107,10 +110,20 @@ def _share(look: Look, name: str) -> float:
 
 
 def _clipped_at(values: Array, end: float) -> float:
-    count = int((values == end).sum())
-    if count < FEWEST:
-        return 0.0
-    # Of a periodic signal the same sample comes back but for rounding.
-    levels, counts = np.unique(np.round((values - end) / (ROUNDING * np.ptp(values))), return_counts=True)
-    beside = counts[1:4] if levels[0] == 0 else counts[-4:-1]
-    return count / values.size if count >= CROWD * max(1.0, float(beside.mean())) else 0.0
+    width = _width(values, end)
+    return float(np.mean(np.abs(values - end) <= width * np.ptp(values))) if width else 0.0
+
+
+def _width(values: Array, end: float) -> float:
+    """Least of WIDTHS within which samples crowd at an end of the range; 0 where they do within none."""
+    for width in WIDTHS:
+        size = width * float(np.ptp(values))
+        if int(np.count_nonzero(np.abs(values - end) <= size)) < FEWEST:
+            continue
+        # Of a periodic signal the same sample comes back but for rounding. Levels that hold none are left out: those
+        # between the steps of a quantised signal.
+        levels, counts = np.unique(np.floor(np.abs(values - end) / size), return_counts=True)
+        beside = counts[1:4]
+        if levels[0] == 0 and counts[0] >= CROWD * max(1.0, float(beside.mean()) if beside.size else 0.0):
+            return width
+    return 0.0

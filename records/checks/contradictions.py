@@ -35,6 +35,9 @@ SUSPICIOUS = 0.03
 SUSPICIOUS_Y = 0.15
 # Mass of a gear from the motion of its centre, over J / rb^2 of its rotation: 0.2 to 4 for gears, less with flywheels.
 MASS = (1 / 200, 200.0)
+# The same beyond which a flywheel or a heavy housing is one explanation and inches for metres, or torques in lbf in,
+# are another.
+USUAL = (1 / 25, 25.0)
 # Parts of the force's rms by which stiffness, damping or mass must show to be taken at their word.
 SHOWS = 0.3
 
@@ -167,15 +170,31 @@ def displacements_fit(look: Look) -> list[Finding]:
         if radius is None or inertia is None or parts[2] < max(5 * left / np.sqrt(accounts.omega.size), 1e-3):
             continue
         ratio = float(values[2]) * radius**2 / inertia
-        if ratio > 0 and not MASS[0] <= ratio <= MASS[1]:
-            found.append(
-                Finding(
-                    f"y_{centre} moves under the force of the teeth like a gear of {values[2]:.3g} kg, but its inertia"
-                    f" is that of {inertia / radius**2:.3g} kg at the base radius (limit a factor {MASS[1]:g}): is"
-                    f" y_{centre} in mm or um, or are torques in N mm?"
-                )
+        if ratio <= 0 or USUAL[0] <= ratio <= USUAL[1]:
+            continue
+        possible = MASS[0] <= ratio <= MASS[1]
+        if possible and (left > EXACT or not accounts_agree(look)):  # a late or a dead channel fits as badly
+            continue
+        hint = "a flywheel, or is" if possible else "is"
+        units = "inches, are torques in lbf in?" if possible else "mm or um, or are torques in N mm?"
+        found.append(
+            Finding(
+                f"y_{centre} moves under the force of the teeth like a gear of {values[2]:.3g} kg, but its inertia is"
+                f" that of {inertia / radius**2:.3g} kg at the base radius (limit a factor"
+                f" {USUAL[1] if possible else MASS[1]:g}): {hint} y_{centre} in {units}",
+                refused=not possible,
+                error=_part_of_dte(look, centre) if possible else 0.0,
             )
+        )
     return found
+
+
+def _part_of_dte(look: Look, centre: str) -> float:
+    """Rms fluctuation of a y over that of the dte, 1 at most."""
+    y, whole = look.channel(f"y_{centre}"), look.dte
+    if y is None or whole is None or not whole.std() > 0:
+        return 1.0
+    return min(float(y.std() / whole.std()), 1.0)
 
 
 def load_torque_alive(look: Look) -> list[Finding]:

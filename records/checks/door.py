@@ -6,8 +6,18 @@ from collections.abc import Callable, Sequence
 
 import xarray as xr
 
-from gearbench.records.checks.angles import angles_keep_mesh_period, angles_roll, angles_unwrapped, radii_fit_teeth
-from gearbench.records.checks.boundary import boundary_as_declared, inertias_as_declared
+from gearbench.records.checks.angles import (
+    angles_keep_mesh_period,
+    angles_roll,
+    angles_unwrapped,
+    radii_fit_inertias,
+    radii_fit_teeth,
+)
+from gearbench.records.checks.boundary import (
+    accelerations_as_torques,
+    boundary_as_declared,
+    inertias_as_declared,
+)
 from gearbench.records.checks.clipping import not_clipped
 from gearbench.records.checks.contradictions import (
     clocks_agree,
@@ -26,12 +36,13 @@ from gearbench.records.checks.derived import (
     swings_fit_the_teeth,
 )
 from gearbench.records.checks.drift import clocks_keep_pace
+from gearbench.records.checks.dropouts import channels_do_not_stick
 from gearbench.records.checks.finding import Finding
 from gearbench.records.checks.lag import force_and_dte_in_step
 from gearbench.records.checks.look import Look
 from gearbench.records.checks.mesh_lines import mesh_lines_stand_out
 from gearbench.records.checks.passive import force_feeds_the_rig
-from gearbench.records.checks.periods import periods_repeat
+from gearbench.records.checks.periods import force_repeats_as_declared, periods_repeat
 from gearbench.records.checks.sampled import sampled_fast_enough
 from gearbench.records.checks.torques import load_balances, torque_as_declared
 from gearbench.records.errors import RecordError
@@ -42,9 +53,11 @@ Check = Callable[[Look], list[Finding]]
 CHECKS: tuple[Check, ...] = (
     realisations_differ,
     radii_fit_teeth,
+    radii_fit_inertias,
     angles_unwrapped,
     angles_roll,
     angles_keep_mesh_period,
+    force_repeats_as_declared,
     mesh_lines_stand_out,
     torque_as_declared,
     load_balances,
@@ -53,6 +66,7 @@ CHECKS: tuple[Check, ...] = (
     swings_fit_the_teeth,
     gears_not_swapped,
     torques_fit_inertias,
+    accelerations_as_torques,
     displacements_fit,
     force_feeds_the_rig,
     stored_as_channels_have_it,
@@ -62,6 +76,7 @@ CHECKS: tuple[Check, ...] = (
     boundary_as_declared,
     inertias_as_declared,
     not_clipped,
+    channels_do_not_stick,
     sampled_fast_enough,
     clocks_agree,
     force_and_dte_in_step,

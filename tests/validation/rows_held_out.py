@@ -7,6 +7,7 @@ At 2 Hz mesh it is the record of the case, one period of 1 s; at 200 Hz one mult
 from __future__ import annotations
 
 from functools import cache, partial
+from math import sqrt
 from typing import Literal
 
 import xarray as xr
@@ -56,10 +57,17 @@ def held_out(mesh: int, method: Method) -> Got:
         lines = output_lines(spectra, excited, excited, 1)
         alone = by_feedback(Task(spectra, lines, settings, excited, (), 0.0, lambda part, message: None))
         note += (
-            f"; mesh feedback alone {prediction_error(alone, second):.1%}, expects {alone.attrs['expected_error']:.1%},"
-            f" unexplained {alone.attrs['unexplained_error']:.1%}"
+            f"; mesh feedback alone {prediction_error(alone, second):.2%}, expects {alone.attrs['expected_error']:.2%},"
+            f" with what a realisation leaves at all phases {with_noise(alone):.2%}"
         )
     return Got(prediction_error(frf, second), note)
+
+
+def with_noise(frf: xr.Dataset) -> float:
+    """Error that mesh feedback expects of a prediction: that of the response, and what other realisations hold besides
+    it, noise and distortion, as far as the residual does and the response's error does not count it yet."""
+    expected, apart, left = (float(frf.attrs[name]) for name in ("expected_error", "unexplained_error", "residual"))
+    return sqrt(expected**2 + max(left**2 - apart**2, 0.0))
 
 
 CHECKS = [

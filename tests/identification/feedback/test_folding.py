@@ -12,9 +12,9 @@ from shared.reference_rig import ReferenceRig, reference_record
 from shared.rig_model import rig_model
 
 from gearbench.identification import IdentificationSettings, exact_itf, identify, itf
-from gearbench.identification.feedback.data import class_data
+from gearbench.identification.feedback.data import class_data, folded_harmonics
 from gearbench.identification.feedback.folding import folded, likely
-from gearbench.identification.feedback.refine import refined, response, told_beside
+from gearbench.identification.feedback.refine import linearised, output_error, refined, response, told_beside
 from gearbench.identification.spectra.records import record_spectra
 from gearbench.records.record import make_record
 
@@ -133,3 +133,67 @@ def test_expected_error_is_the_true_one_with_and_without_a_filter(fast: xr.Datas
     ratios = [expected / error for error, expected, _ in found]
     assert 0.8 < np.median(ratios) < 1.3
     assert min(ratios) > 0.6
+
+
+def test_what_folds_inside_classes_is_what_folds() -> None:
+    """A mesh period of 32 samples: class by class the same as line by line, two realisations that begin alike."""
+    d, samples, rng = 16, 512, np.random.default_rng(5)
+    lines = rng.standard_normal((2, 2, 257)) + 1j * rng.standard_normal((2, 2, 257))
+    lines[:, :, ::d] = 0.0
+    force, dte = np.fft.irfft(lines * (np.arange(257) < 220), axis=2)
+    spectra = spectra_of(force, dte, d, start=np.array([0.3, 0.3 + 5 / 32]))
+    data = class_data(replace(spectra, samples=samples), 219)
+    assert data.folds and data.folds_inside
+    seen = rng.standard_normal(data.dte.shape) + 1j * rng.standard_normal(data.dte.shape)
+    seen *= data.modelled[:, :, None]
+    # Classes that are their own mirror image are those of real signals.
+    for index in np.flatnonzero(2 * np.arange(d // 2 + 1) % d == 0):
+        position = {int(line): at for at, line in enumerate(data.lines[index]) if data.modelled[index, at]}
+        for line, at in position.items():
+            if line < 0:
+                seen[index, at] = seen[index, position[-line]].conj()
+            elif line == 0:
+                seen[index, at] = seen[index, at].real
+    inside = replace(data, part=0.4)
+    found = np.stack([inside.sampled(one) for one in seen]) - seen
+    assert np.abs(np.where(data.dte != 0, found, 0.0) - 0.4 * folded(seen, data)).max() < 1e-12
+    apart = spectra_of(force, dte, d, start=np.array([0.3, 0.31]))
+    assert not class_data(replace(apart, samples=samples), 219).folds_inside
+    assert not class_data(replace(spectra, samples=520), 219).folds_inside
+
+
+def test_derivatives_are_those_of_what_a_sampler_shows(fast: xr.Dataset) -> None:
+    """Of the residual of a model whose lines fold, by differences, for a number of D, of N, of k and of c."""
+    spectra, excited, _ = record_spectra([thinned(fast, filtered=False, noise=0.01, seed=0)], sidebands=40)
+    data = replace(class_data(spectra, round(excited[1] / spectra.spacing)), part=1.0)
+    model = rig_model(RIG, data)
+    gram, right = linearised(model, data)
+    error, vector = output_error(model, data), model.vector()
+    for number in (1, model.d.size + 2, model.free + 1, model.free + 2 * model.harmonics):
+        step = np.zeros(vector.size)
+        step[number] = np.sqrt(1e-8 * error / gram[number, number])
+        up, down = (output_error(model.moved(vector + sign * step), data) for sign in (1.0, -1.0))
+        wanted = -2 * right[number] * step[number]
+        assert (up - down) / 2 == pytest.approx(wanted, rel=1e-3, abs=1e-8 * error)
+
+
+def test_folded_harmonics_are_those_of_a_sampled_cosine() -> None:
+    """81 samples hold two mesh periods: harmonics from the 21st on come back, every second one between the others."""
+    samples, d = 810, 20
+    time = np.arange(samples) / samples
+    wanted = set()
+    for order in range(1, 101):
+        size = np.abs(np.fft.rfft(np.cos(2 * np.pi * order * d * time + 0.3)))
+        line = int(np.argmax(size))
+        wanted |= {line} if order * d > samples / 2 else set()
+    assert set(np.abs(folded_harmonics(samples, d))) == wanted
+    assert folded_harmonics(800, d).size == 0 and folded_harmonics(0, d).size == 0
+
+
+@pytest.mark.parametrize("noise", [1e-3, 10**-3.5])
+def test_a_record_of_little_noise_tells_what_folds(fast: xr.Dataset, noise: float) -> None:
+    """60 and 70 dB: before lines that fold had derivatives the harmonics took them in, and it erred by 1 %."""
+    error, expected, frf = result(thinned(fast, filtered=False, noise=noise, seed=0))
+    assert frf.attrs["folded_part"] == pytest.approx(1.0, abs=1e-6)
+    assert error < 3e-4
+    assert 0.5 < expected / error < 1.6
