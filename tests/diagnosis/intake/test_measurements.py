@@ -66,7 +66,7 @@ def test_phase_comes_from_the_channel_or_from_the_angles(start: float) -> None:
 
 
 def test_an_excitation_of_half_a_hunting_period_gives_rows_of_two() -> None:
-    made = taken(samples_per_period=SAMPLES // 2, periods=4)
+    made = taken(channels(samples=SAMPLES // 2, periods=4), samples_per_period=SAMPLES // 2, periods=4)
     assert (made.repetitions, made.mesh_cycles, made.phase.size) == (2, 60, SAMPLES)
     odd = channels(samples=SAMPLES // 2, periods=3)
     made = taken(odd, samples_per_period=SAMPLES // 2, periods=3)
