@@ -97,12 +97,12 @@ def select(
     hypothesis' name; `around`: the rig around its mesh, as the records show it; `apart`: a record that has no part in
     this judges what enters."""
     unknowns = simulator.layout.unknowns
+    base = refreshed(simulator, base, unknowns.of(WEIGHED))
+    if base.left > SETTLED:
+        base = fit(simulator, base.p, base.sd, base.sensitivity, renewals=RENEWALS_FRESH) or base
     best, weighed = base, None
     entered: list[Weighed] = []
     while len(entered) < MOST:
-        best = refreshed(simulator, best, unknowns.of(WEIGHED))
-        best = fit(simulator, best.p, best.sd, best.sensitivity, renewals=RENEWALS_FRESH) or best
-        base = base if entered else best
         taken = [one.hypothesis for one in entered]
         rest = [one for one in hypotheses if not any(is_like(one, other) for other in taken)]
         found = compared(simulator, best, weigh(simulator, best, rest, starts, report, reshape=not entered))

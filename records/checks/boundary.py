@@ -71,7 +71,8 @@ def boundary_as_declared(look: Look) -> list[Finding]:
 
 def accelerations_as_torques(look: Look) -> list[Finding]:
     """Torques and accelerations of both gears balance as they are, not with all torques times one number: that number
-    is a unit of torque, inertias, or the square of a rate.
+    is a unit of torque, inertias, or the square of a rate. Of a driver alone a number above 1 may as well be a
+    rotor beside it that is not in its inertia.
 
     The response is that many times too small if the torques have it. Where the number is known it is refused.
     """
@@ -80,7 +81,7 @@ def accelerations_as_torques(look: Look) -> list[Finding]:
         return []
     found, before, after = balance
     gain = float(found.mean())
-    alike = min(found) > 0 and float(np.abs(found / gain - 1).max()) < OFF
+    alike = min(found) > 0 and float(np.abs(found / gain - 1).max()) < OFF and (len(found) > 1 or gain < 1)
     if not alike or abs(gain - 1) <= OFF or before < OFF or after > EXACT or after > EXPLAINED * before:
         return []
     known = next((words for factor, words in GAINS.items() if abs(gain / factor - 1) < MET), None)

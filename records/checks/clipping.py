@@ -20,6 +20,8 @@ FEWEST, CROWD = 6, 5.0
 # crowds below its top as well, by less than CROWD: a parabola, and a sine, hold three times as much in the first level
 # as in the mean of the next three.
 WIDTHS = (1e-9, 1e-4, 1e-3)
+# Part of the samples under noise at an end that others there must follow.
+RUNS = 0.3
 # A signal that spends this part of its time at its ends, such as a binary one, is made so and not clipped.
 MADE_SO = 0.95
 # A load torque that stands below this part of its largest value is the one of separated teeth.
@@ -118,7 +120,11 @@ def _width(values: Array, end: float) -> float:
     """Least of WIDTHS within which samples crowd at an end of the range; 0 where they do within none."""
     for width in WIDTHS:
         size = width * float(np.ptp(values))
-        if int(np.count_nonzero(np.abs(values - end) <= size)) < FEWEST:
+        near = np.abs(values - end) <= size
+        if int(np.count_nonzero(near)) < FEWEST:
+            continue
+        # Clipped, a signal stands for samples in a row; a peak that comes back under noise is met once in a period.
+        if width > WIDTHS[0] and np.count_nonzero(near[1:] & near[:-1]) < RUNS * np.count_nonzero(near):
             continue
         # Of a periodic signal the same sample comes back but for rounding. Levels that hold none are left out: those
         # between the steps of a quantised signal.

@@ -33,6 +33,15 @@ def test_noise_after_a_clip_does_not_hide_it(noise: float) -> None:
     assert found[0] == pytest.approx(float(np.mean(values >= 0.8)), rel=0.1) and found[1] == 0.0
 
 
+@pytest.mark.parametrize("noise", [0.0, 1e-4, 3e-4])
+def test_a_peak_that_comes_back_under_noise_is_not_clipped(noise: float) -> None:
+    """Fourteen periods of a signal whose highest sample stands alone."""
+    rng = np.random.default_rng(6)
+    period = np.fft.irfft(np.fft.rfft(rng.standard_normal(585)) * (np.arange(293) < 60), 585)
+    values = np.tile(period / np.ptp(period), 14)
+    assert clipped_ends(values + noise * rng.standard_normal(values.size)) == (0.0, 0.0)
+
+
 def repeated(period: int, count: int, noise: float) -> xr.Dataset:
     """Force and dte that repeat every `period` samples, white noise on both."""
     rng = np.random.default_rng(4)
