@@ -25,6 +25,8 @@ KEY = "crack"  # of all teeth, the driver's first
 # by. Bounds keep the flexibility 1 / (1 - loss) positive and below ten times the sound one.
 SD, WIDE = 0.02, 0.35
 LOW, HIGH = -2.0, 0.9
+# Of those, in SD, the least that is a crack: the softest tooth of a sound pair of gears is off by two, and told to one.
+LEAST = 3.0
 LARGEST = 0.95  # loss of a rig's crack
 
 
@@ -71,6 +73,7 @@ TOOTH_CRACK = Effect(
     hypotheses_of=hypotheses,
     add=add,
     unknowns=unknowns,
+    least_size=LEAST,
     most_refits=2,  # the quadratic ranks teeth well: more would take the places of other effects
     model_error=0.30,  # rms on the calibration family (benchmarks/diagnosis.md)
 )
