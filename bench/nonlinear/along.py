@@ -79,9 +79,10 @@ class Along:
         u1, u2 = (np.ascontiguousarray(places[:, number, :].T) for number in (U1, U2))
         y1, y2 = (np.einsum("scn,c->ns", places, row.astype(places.dtype)) for row in self.model.displacements)
         twist = u2 - places[:, LOAD, :].T if self.model.rig.load.twists else None
-        mesh = np.concatenate([two for _, two in found], axis=1).T
-        mesh *= -(self.tangent.mesh[U2] + self.tangent.rubbed[::2, U2]).astype(mesh.dtype)
-        reaction = self._shown(mesh) if twist is None else self._twisted(twist)
+        borne = -(self.tangent.mesh[U2] + self.tangent.rubbed[::2, U2]).astype(found[0][1].dtype)
+        reaction = self._twisted(twist) if twist is not None else np.concatenate(
+            [self._shown((two * borne[:, None]).T) for _, two in found]
+        )
         # What pushes at an end that is held is borne there.
         held = (on == LOAD) | ((on == U2) & (self.tangent.inverse[U2] == 0.0))
         reaction[held] += self._shown(forces[::2, held].T)

@@ -23,7 +23,7 @@ from gearbench.diagnosis.output.contrast import is_strange
 from gearbench.diagnosis.output.fit import SETTLED, Optimum, cost_of, fit, fit_afresh, refreshed
 from gearbench.diagnosis.output.jacobian import FOLLOWED, WEIGHED
 from gearbench.diagnosis.output.reshaped import has_shapes, reshaped
-from gearbench.diagnosis.output.restructured import begun_at_nominal, better, restructured
+from gearbench.diagnosis.output.restructured import begun_at_nominal, better, is_close, restructured
 from gearbench.diagnosis.output.rivals import compared, is_like, rivals_of, usual_of
 from gearbench.diagnosis.output.simulator import Simulator
 
@@ -97,7 +97,8 @@ def select(
     hypothesis' name; `around`: the rig around its mesh, as the records show it; `apart`: a record that has no part in
     this judges what enters."""
     unknowns = simulator.layout.unknowns
-    base = refreshed(simulator, base, unknowns.of(WEIGHED))
+    if not is_close(simulator, base):
+        base = refreshed(simulator, base, unknowns.of(WEIGHED))
     if base.left > SETTLED:
         base = fit(simulator, base.p, base.sd, base.sensitivity, renewals=RENEWALS_FRESH) or base
     best, weighed = base, None
