@@ -91,10 +91,10 @@ def around(layout: Layout, conditions: Sequence[Condition], held: Array) -> Arra
         rigs = [_found(layout, lines, cost, one) for one in begun]
     except ValueError:  # no rig there
         return None
-    return min(rigs, key=lambda p: _misfit(layout, lines, p) + prior_cost(p, prior(unknowns, p)))
+    return min(rigs, key=lambda p: _misfit(layout, lines, p) + prior_cost(p, _prior(unknowns, p)))
 
 
-def prior(unknowns: Unknowns, p: Array) -> Array:
+def _prior(unknowns: Unknowns, p: Array) -> Array:
     """Prior standard deviations (size,): those of the background, but of a coupling that `p` (size,) has, its own."""
     out = unknowns.prior()
     at = unknowns[COMPLIANCE]
@@ -172,7 +172,7 @@ def _fitted(
     """Misfit, and `begin` (size,) with the unknowns of these keys where it is least."""
     unknowns = layout.unknowns
     at = np.concatenate([np.arange(*unknowns[key].indices(unknowns.size)) for key in keys if key in unknowns.slices])
-    sd = prior(unknowns, begin)[at]
+    sd = _prior(unknowns, begin)[at]
     # Without cross-coupling nothing shows how a support yields across.
     unseen = np.zeros(unknowns.size, dtype=bool)
     for key in (ACROSS, CROSS, DAMPED):

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gearbench.diagnosis.effects.effect import Hypothesis
 from gearbench.diagnosis.output.beginning import Around, levelled, linear_cost, seen_by
-from gearbench.diagnosis.output.fit import SETTLED, Optimum, cost_of, fit, fit_afresh
+from gearbench.diagnosis.output.fit import Optimum, cost_of, fit, fit_afresh, gone_on
 from gearbench.diagnosis.output.restructured import better, is_close, restructured
 from gearbench.diagnosis.output.simulator import Simulator
 
@@ -55,8 +55,7 @@ def begun_by_forces(
         report(f"simulating: {start.hypothesis.name}, as the force residuals have it")
         sd = start.hypothesis.widened(unknowns, base.sd)
         found = fit_afresh(simulator, _beginning(simulator, start, sd, base.cost, around), sd, renewals=RENEWALS)
-        if found is not None and found.left > SETTLED:
-            found = fit(simulator, found.p, sd, found.sensitivity, renewals=RENEWALS)
+        found = gone_on(simulator, found, RENEWALS) if found else None
     if start is None or found is None:
         return restructured(simulator, base, around, report), {**starts}
     p = found.p.copy()

@@ -7,7 +7,8 @@ step promises half a nat.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,6 +81,11 @@ def sensitivity_of(
     jacobian = simulator.jacobian(p, sd, chosen, near) if lines is not None else None
     if lines is None or jacobian is None:
         return None
+    return _about(simulator, lines, jacobian)
+
+
+def _about(simulator: Simulator, lines: Complex, jacobian: Complex) -> Sensitivity:
+    """Sensitivities (size, K) about simulated lines (K,)."""
     active = np.flatnonzero(np.abs(jacobian).max(axis=1) > 0.0)
     return Sensitivity(jacobian, quadratic_of(simulator.target, simulator.target.lines - lines, jacobian, active))
 
@@ -91,11 +97,17 @@ def refreshed(simulator: Simulator, found: Optimum, chosen: Flags) -> Optimum:
     if renewed is None:
         return found
     jacobian = np.where(chosen[:, None], renewed, found.sensitivity.jacobian)
-    active = np.flatnonzero(np.abs(jacobian).max(axis=1) > 0.0)
-    near = quadratic_of(simulator.target, simulator.target.lines - found.lines, jacobian, active)
-    _, promised, _ = near.best(found.p, found.sd, _standing(simulator.layout.unknowns, found.p))
-    evidence = near.evidence(found.cost, near.information(np.zeros(len(active))), found.sd)
-    return replace(found, evidence=evidence, left=found.cost - promised, sensitivity=Sensitivity(jacobian, near))
+    return _optimum(simulator, found.p, found.sd, found.cost, _about(simulator, found.lines, jacobian))
+
+
+def gone_on(
+    simulator: Simulator, found: Optimum, renewals: int, tell: Callable[[], None] = lambda: None
+) -> Optimum:
+    """The optimum, fitted on where another step still promises much, which is told."""
+    if found.left <= SETTLED:
+        return found
+    tell()
+    return fit(simulator, found.p, found.sd, found.sensitivity, renewals=renewals) or found
 
 
 def cost_of(simulator: Simulator, p: Array, sd: Array) -> float:
@@ -207,6 +219,13 @@ def fit(
     lines = simulator.lines(p)
     assert lines is not None
     near = sensitivity.quadratic.moved(target.lines - lines)
+    return _optimum(simulator, p, sd, cost, Sensitivity(sensitivity.jacobian, near))
+
+
+def _optimum(simulator: Simulator, p: Array, sd: Array, cost: float, sensitivity: Sensitivity) -> Optimum:
+    """Unknowns of a rig that cost so many nats under a prior, with the sensitivities about their own residual."""
+    lines, near = simulator.lines(p), sensitivity.quadratic
+    assert lines is not None
     _, promised, _ = near.best(p, sd, _standing(simulator.layout.unknowns, p))
     here = near.information(np.zeros(len(near.active)))
     return Optimum(
@@ -217,5 +236,5 @@ def fit(
         misfit=cost - prior_cost(p, sd),
         evidence=near.evidence(cost, here, sd),
         left=cost - promised,
-        sensitivity=Sensitivity(sensitivity.jacobian, near),
+        sensitivity=sensitivity,
     )

@@ -4,6 +4,7 @@ rig every way is uphill."""
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,7 @@ from gearbench.diagnosis.effects.pitch_error import KEYS as PITCHES
 from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
 from gearbench.diagnosis.effects.torque_ripple import KEY as RIPPLE
 from gearbench.diagnosis.output.beginning import Around, levelled, linear_cost, seen_by
-from gearbench.diagnosis.output.fit import SETTLED, Optimum, cost_of, fit, fit_afresh
+from gearbench.diagnosis.output.fit import Optimum, cost_of, fit, fit_afresh, gone_on
 from gearbench.diagnosis.output.simulator import Simulator
 from gearbench.diagnosis.output.structure import SEAT, housings_below, otherwise
 
@@ -97,9 +98,9 @@ def _on_a_housing(simulator: Simulator, found: Optimum, report: Report) -> Optim
         return None
     begin = min(trials, key=lambda p: linear_cost(alone, p, found.sd))
     again = fit_afresh(simulator, begin, found.sd, renewals=RENEWALS)
-    if again is not None and again.evidence > found.evidence and again.left > SETTLED:
-        again = fit(simulator, again.p, found.sd, again.sensitivity, renewals=RENEWALS) or again
-    return again
+    if again is None or again.evidence <= found.evidence:
+        return again
+    return gone_on(simulator, again, RENEWALS)
 
 
 def _otherwise(simulator: Simulator, found: Optimum, report: Report) -> Optimum | None:
@@ -114,7 +115,4 @@ def _otherwise(simulator: Simulator, found: Optimum, report: Report) -> Optimum 
     again = fit_afresh(simulator, p, found.sd, renewals=RENEWALS)
     if again is None or again.evidence <= found.evidence:
         return again
-    if again.left > SETTLED:
-        report("simulating: another structure, further")
-        again = fit(simulator, again.p, found.sd, again.sensitivity, renewals=RENEWALS) or again
-    return again
+    return gone_on(simulator, again, RENEWALS, partial(report, "simulating: another structure, further"))

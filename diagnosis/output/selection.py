@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,7 @@ from gearbench.diagnosis.output.background import prior_of
 from gearbench.diagnosis.output.beginning import Around
 from gearbench.diagnosis.output.by_forces import Start
 from gearbench.diagnosis.output.contrast import is_strange
-from gearbench.diagnosis.output.fit import SETTLED, Optimum, cost_of, fit, fit_afresh, refreshed
+from gearbench.diagnosis.output.fit import Optimum, cost_of, fit, fit_afresh, gone_on, refreshed
 from gearbench.diagnosis.output.jacobian import FOLLOWED, WEIGHED
 from gearbench.diagnosis.output.reshaped import has_shapes, reshaped
 from gearbench.diagnosis.output.restructured import begun_at_nominal, better, is_close, restructured
@@ -99,8 +100,7 @@ def select(
     unknowns = simulator.layout.unknowns
     if not is_close(simulator, base):
         base = refreshed(simulator, base, unknowns.of(WEIGHED))
-    if base.left > SETTLED:
-        base = fit(simulator, base.p, base.sd, base.sensitivity, renewals=RENEWALS_FRESH) or base
+    base = gone_on(simulator, base, RENEWALS_FRESH)
     best, weighed = base, None
     entered: list[Weighed] = []
     while len(entered) < MOST:
@@ -117,10 +117,8 @@ def select(
         best = winner.optimum
         best = fit_afresh(simulator, best.p, best.sd, renewals=0) or best
     best, kept = _needed(simulator, best, entered, apart)
-    if kept and best.left > SETTLED:
-        report("simulating: all together")
-        best = fit(simulator, best.p, best.sd, best.sensitivity, renewals=RENEWALS_LAST) or best
     if kept:
+        best = gone_on(simulator, best, RENEWALS_LAST, partial(report, "simulating: all together"))
         best = restructured(simulator, best, around, report)
         report("simulating: all together, from the nominal rig")
         best = begun_at_nominal(simulator, best, _entries(unknowns, kept))

@@ -142,12 +142,12 @@ def housings_below(unknowns: Unknowns, p: Array) -> list[Array]:
     out: list[Array] = []
     if HOUSING not in unknowns.slices:
         return out
-    plain = p.copy()
+    plain, soft = seated(unknowns, p), p[unknowns[ACROSS]]
     plain[unknowns[HOUSING]], plain[unknowns[OBLIQUE]] = 0.0, 0.0
+    plain[unknowns[ACROSS]] = np.where(soft > STIFFEST, soft, ACROSS_BEGIN)
     signs = product((1.0, -1.0), repeat=2)
     for motion, frequency, across in product(range(len(MOTIONS)), BELOW_AT, signs):
-        trial = with_motion(unknowns, seated(unknowns, plain), motion, frequency, HOUSING_BEGIN)
-        trial[unknowns[ACROSS]] = np.where(p[unknowns[ACROSS]] > STIFFEST, p[unknowns[ACROSS]], ACROSS_BEGIN)
+        trial = with_motion(unknowns, plain, motion, frequency, HOUSING_BEGIN)
         first = unknowns[OBLIQUE].start + len(SIDES) * motion
         trial[first : first + len(SIDES)] = across
         out.append(trial)

@@ -68,7 +68,7 @@ def clipped_ends(values: Array) -> tuple[float, float]:
     """Parts of the samples (n,) that stand clipped at the upper and the lower end of the range; 0 where none do."""
     if np.ptp(values) == 0.0:
         return 0.0, 0.0
-    high, low = (_clipped_at(values, end) for end in (float(values.max()), float(values.min())))
+    high, low = (float(np.mean(_standing(values, end))) for end in (float(values.max()), float(values.min())))
     return high, low
 
 
@@ -80,11 +80,8 @@ def lost_by_clipping(values: Array) -> float:
     those one step before the end, where a concave flank is steeper: an upper bound for runs of few samples.
     """
     lost = 0.0
-    for share, end in zip(clipped_ends(values), (float(values.max()), float(values.min())), strict=True):
-        if share == 0.0:
-            continue
-        near = np.abs(values - end) <= _width(values, end) * np.ptp(values)
-        edges = np.flatnonzero(np.diff(np.concatenate(([False], near, [False])).astype(int)))
+    for end in (float(values.max()), float(values.min())):
+        edges = np.flatnonzero(np.diff(np.concatenate(([False], _standing(values, end), [False])).astype(int)))
         first, last = edges[::2], edges[1::2]  # runs are first .. last - 1
         inner = (first > 1) & (last < values.size - 1)
         first, last = first[inner], last[inner]
@@ -98,26 +95,20 @@ def _share(look: Look, name: str) -> float:
     """Which part of force or DTE a channel makes: relative fluctuations."""
     if name in ("force", "dte"):
         return 1.0
-    values, whole = look.channel(name), look.dte
     if name.startswith("torque"):
+        values = look.channel(name)
         radius = look.number(f"base_radius_{name.removeprefix('torque_')}")
         if name == "torque_driven" and look.record.attrs.get("driven_boundary") == "speed":
             return 0.0
         if values is None or radius is None or look.force is None or not look.force.std() > 0:
             return 1.0
         return min(1.0, float(values.std()) / radius / float(look.force.std()))
-    if values is None or whole is None or not whole.std() > 0:
-        return 1.0
-    return float(values.std() / whole.std())
+    return look.part_of_dte(name)
 
 
-def _clipped_at(values: Array, end: float) -> float:
-    width = _width(values, end)
-    return float(np.mean(np.abs(values - end) <= width * np.ptp(values))) if width else 0.0
-
-
-def _width(values: Array, end: float) -> float:
-    """Least of WIDTHS within which samples crowd at an end of the range; 0 where they do within none."""
+def _standing(values: Array, end: float) -> NDArray[np.bool_]:
+    """Which samples (n,) stand clipped at an end of the range: those within the least of WIDTHS within which they crowd
+    there; none where they do within none."""
     for width in WIDTHS:
         size = width * float(np.ptp(values))
         near = np.abs(values - end) <= size
@@ -131,5 +122,5 @@ def _width(values: Array, end: float) -> float:
         levels, counts = np.unique(np.floor(np.abs(values - end) / size), return_counts=True)
         beside = counts[1:4]
         if levels[0] == 0 and counts[0] >= CROWD * max(1.0, float(beside.mean()) if beside.size else 0.0):
-            return width
-    return 0.0
+            return near
+    return np.zeros(values.size, dtype=bool)

@@ -183,18 +183,10 @@ def displacements_fit(look: Look) -> list[Finding]:
                 f" that of {inertia / radius**2:.3g} kg at the base radius (limit a factor"
                 f" {USUAL[1] if possible else MASS[1]:g}): {hint} y_{centre} in {units}",
                 refused=not possible,
-                error=_part_of_dte(look, centre) if possible else 0.0,
+                error=min(look.part_of_dte(f"y_{centre}"), 1.0) if possible else 0.0,
             )
         )
     return found
-
-
-def _part_of_dte(look: Look, centre: str) -> float:
-    """Rms fluctuation of a y over that of the dte, 1 at most."""
-    y, whole = look.channel(f"y_{centre}"), look.dte
-    if y is None or whole is None or not whole.std() > 0:
-        return 1.0
-    return min(float(y.std() / whole.std()), 1.0)
 
 
 def load_torque_alive(look: Look) -> list[Finding]:

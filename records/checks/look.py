@@ -132,6 +132,13 @@ class Look:
         except TransmissionError:
             return self.channel("dte")
 
+    def part_of_dte(self, name: str) -> float:
+        """Rms fluctuation of a channel [m] over the DTE's; 1 where either is not there or the DTE stands still."""
+        values, whole = self.channel(name), self.dte
+        if values is None or whole is None or not whole.std() > 0:
+            return 1.0
+        return float(values.std() / whole.std())
+
     @property
     def stored_or_own_dte(self) -> Array | None:
         """DTE (samples,) [m] as identification takes it: stored, else from the channels."""

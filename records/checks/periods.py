@@ -58,13 +58,14 @@ def force_repeats_as_declared(look: Look) -> list[Finding]:
     joint = _joint_samples(look)
     differs = differences(force - force.mean())
     own = float(differs[joint]) if joint is not None and joint < differs.size else None
-    other = _repeats(differs, REPEATS if own is not None and own > OTHER else ALONE)
+    limit = REPEATS if own is not None and own > OTHER else ALONE
+    other = _repeats(differs, limit)
     rate = f"{declared} ({declared / look.rate:.4g} s)"
     if other is not None and (own is None or own > OTHER) and not _whole(declared / other, other):
         return [
             Finding(
                 f"the force repeats every {other} samples ({other / look.rate:.4g} s; {differs[other]:.2g} of its rms"
-                f" differs, limit {REPEATS:g}), but samples_per_period = {rate} holds {declared / other:.4g} of these"
+                f" differs, limit {limit:g}), but samples_per_period = {rate} holds {declared / other:.4g} of these"
                 " and must hold a whole number: wrong samples_per_period, or a truncated record"
             )
         ]
