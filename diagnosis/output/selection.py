@@ -21,7 +21,7 @@ from gearbench.diagnosis.output.background import prior_of
 from gearbench.diagnosis.output.beginning import Around
 from gearbench.diagnosis.output.by_forces import Start
 from gearbench.diagnosis.output.contrast import is_strange
-from gearbench.diagnosis.output.fit import Optimum, cost_of, fit, fit_afresh, gone_on, refreshed
+from gearbench.diagnosis.output.fit import GAIN, Optimum, cost_of, fit, fit_afresh, gone_on, refreshed
 from gearbench.diagnosis.output.jacobian import FOLLOWED, WEIGHED
 from gearbench.diagnosis.output.reshaped import has_shapes, reshaped
 from gearbench.diagnosis.output.restructured import begun_at_nominal, better, is_close, restructured
@@ -231,13 +231,17 @@ def _refit(
     linear[active] += step
     entries = one.entries(unknowns)
     alone[entries] = linear[entries]
-    trials = [linear, alone, base.p]
+    trials, there = [linear, alone, base.p], None
     if start is not None:
         own = base.p.copy()
         own[entries] = start.p[entries]
-        trials += [own, np.where(sd > 0.0, start.p, 0.0)]
+        there = np.where(sd > 0.0, np.clip(start.p, *unknowns.bounds()), 0.0)
+        trials += [own, there]
     seen = np.isin(np.arange(unknowns.size), active)
     costs = [cost_of(simulator, np.where(seen, np.clip(p, *unknowns.bounds()), 0.0), sd) for p in trials]
+    # A rig that has what the background lacks feels unknowns that this does not: a coupling its loss.
+    if there is not None and cost_of(simulator, there, sd) < min(costs) - GAIN:
+        return fit_afresh(simulator, there, sd, renewals=renewals)
     begin = trials[int(np.argmin(costs))]
     return fit(simulator, begin, sd, base.sensitivity, renewals=renewals)
 

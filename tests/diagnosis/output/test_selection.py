@@ -146,6 +146,29 @@ def test_a_start_of_the_force_residuals_is_tried_even_if_the_quadratic_does_not_
     assert found.best.p[3] == pytest.approx(0.4, abs=0.02)
 
 
+def test_a_start_keeps_what_only_its_own_rig_feels() -> None:
+    """What the third unknown changes shows beside the effect alone, as the loss of a coupling does: without it the
+    effect's own rig is farther from the records than the background."""
+
+    def parts(p: np.ndarray) -> np.ndarray:
+        return np.array([p[0], p[1], 40 * p[3] * p[2], p[3], 0, 0, 0, 0])
+
+    def jacobian(p: np.ndarray, sd: object, chosen: object, near: object = None) -> np.ndarray:
+        return np.array([(parts(p + 1e-6 * one) - parts(p)) / 1e-6 for one in np.eye(8)]) @ MATRIX
+
+    true = np.array([0.05, 0, 0.15, 0.4, 0, 0, 0, 0])
+    simulator = FakeSimulator(lambda p: parts(p) @ MATRIX, target(parts(true) @ MATRIX))
+    simulator.jacobian = jacobian  # type: ignore[method-assign, assignment]
+    base = chosen(simulator, (), [np.zeros(8)], {})
+    assert base is not None
+    at_rest = replace(base.base, p=base.base.p * (np.arange(8) < 2))
+    near = module.fit_afresh(simulator, at_rest.p, at_rest.sd, renewals=0)
+    assert near is not None and 2 not in near.sensitivity.quadratic.active
+    start = Start(FRICTION, np.array([0, 0, 0.14, 0.37, 0, 0, 0, 0.0]), 30.0)
+    found = module._refit(simulator, near, FRICTION, np.zeros(len(near.sensitivity.quadratic.active)), start, 0)
+    assert found is not None and found.p[2:4] == pytest.approx([0.15, 0.4], abs=0.03)
+
+
 def test_structure_beyond_a_hill_is_found_by_beginning_again() -> None:
     """A little yielding across makes it worse, what the rig has makes it right: no fit gets there from rigid."""
     unknowns = unknowns_of(
