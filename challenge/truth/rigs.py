@@ -22,6 +22,9 @@ from gearbench.rig import Case, Condition, Experiment, effects_in
 Array = NDArray[np.float64]
 
 REFERENCE = 10e-6  # [m] deflection at which the pairs' stiffness is given
+# Over the deflection of the mesh under the mean torque: one pair alone yields some 1.5 times as much, and torque swings
+# and heavier conditions press it three times as deep.
+DEEPEST = 4.5
 RATE = 0.03  # [m/s] at which quadratic damping is compared with the linear one: about its rms
 SLIP_TIME = 50e-6  # [s] in which the slipping coupling lets go of what exceeds its limit
 # Effects that a nominal rig may have: what the truth rig has as well.
@@ -148,9 +151,10 @@ def _teeth(bench: Bench, rig: Structure, levels: Levels) -> Teeth:
     meshing, nominal = bench.meshing, bench.nominal.rig
     first = conditions_of(bench.nominal)[0].experiment
     wanted = bench.stiffness * rig.stiffness_factor
-    law = pair_law(nominal, meshing, rig.shape, rig.bow)
+    load = first.torque_mean / meshing.driver.base_radius
+    law = pair_law(nominal, meshing, rig.shape, rig.bow, DEEPEST * load / wanted)
     reference = REFERENCE * bench.scale.length
-    law = scaled(law, rig.exponent, reference, first.torque_mean / meshing.driver.base_radius, wanted)
+    law = scaled(law, rig.exponent, reference, load, wanted)
     low, high = law.inside
     away = np.clip((law.place - 0.5 * (low + high)) / (0.5 * (high - low)), -1.0, 1.0)
     slope, bow, wave_cos, wave_sin = rig.profile

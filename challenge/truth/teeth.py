@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 Shape = Literal["energy", "parabola", "cosine"]
 
 NODES = 1025
-BEYOND = 0.12  # base pitches that tip corners are followed past both ends of the path of contact
+BEYOND = 0.12  # base pitches that tip corners are followed past both ends of the path of contact, at least
 # Compliances of a pair in the parabola's picture: both teeth bend alike, the rest is contact.
 BENDING_SHARE = 0.4
 CYCLE = 240  # phases at which the mean stiffness is taken
@@ -84,17 +84,20 @@ def corner_clearance(meshing: Pair, one: Profile, two: Profile, rho: float, dist
     return np.asarray(one.base_radius * (np.arctan2(at_y, at_x) - flank))
 
 
-def pair_law(rig: Rig, meshing: Pair, shape: Shape, bow: float) -> PairLaw:
+def pair_law(rig: Rig, meshing: Pair, shape: Shape, bow: float, open_at: float = 0.0) -> PairLaw:
     """The pair's tables in their natural scale (multiply the stiffness as wanted).
 
-    `bow` is the relative loss of stiffness at the ends of the path; the energy method needs none.
+    `bow` is the relative loss of stiffness at the ends of the path; the energy method needs none. The tables end where
+    the gap beyond the path is `open_at` [m] at least: a pair that still carried there would let go at a blow.
     """
     low, high = path_ends(meshing)
-    first = low - BEYOND
-    pitch = (high + BEYOND - first) / (NODES - 1)
+    coefficients = corner_gap(meshing)
+    reach = max(BEYOND, float(np.sqrt(open_at / min(coefficients))) / meshing.base_pitch)
+    first = low - reach
+    pitch = (high + reach - first) / (NODES - 1)
     place = first + pitch * np.arange(NODES)
     gap = np.zeros(NODES)
-    for beyond, coefficient in zip((low - place, place - high), corner_gap(meshing), strict=True):
+    for beyond, coefficient in zip((low - place, place - high), coefficients, strict=True):
         gap += coefficient * (np.maximum(beyond, 0.0) * meshing.base_pitch) ** 2
     inside = np.clip(place, low, high)
     if shape == "energy":

@@ -65,6 +65,13 @@ def test_gap_grows_as_the_square_beyond_the_ends() -> None:
     assert (law.gap[(law.place > low) & (law.place < high)] == 0).all()
 
 
+def test_a_pair_is_followed_until_it_lets_go() -> None:
+    """Both ends of the table stand farther apart than a pair is pressed in, so that no contact ends at a blow."""
+    short, long = pair_law(RIG, MESHING, "energy", 0.0), pair_law(RIG, MESHING, "energy", 0.0, 90e-6)
+    assert short.gap[[0, -1]].min() < 90e-6 <= long.gap[[0, -1]].min() * (1 + 1e-9)
+    assert pair_law(RIG, MESHING, "energy", 0.0, 0.5 * short.gap[[0, -1]].min()).first == short.first
+
+
 @pytest.mark.parametrize("shape", ["parabola", "cosine"])
 def test_shapes_lose_the_bow_at_both_ends(shape: str) -> None:
     law = pair_law(RIG, MESHING, shape, 0.3)  # type: ignore[arg-type]
