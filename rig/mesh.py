@@ -10,6 +10,7 @@ from gearbench.rig.checks import equally_long, items_within
 from gearbench.rig.value import Value, quantity
 
 _LARGEST_ERROR = 1e-3  # m
+_LARGEST_COMPLIANCE = 1e-6  # m/N
 
 
 class Friction(Value):
@@ -35,6 +36,13 @@ class MeshCorrection(Value):
     )
     stiffness_cos: tuple[float, ...] = quantity((), doc="relative cosine amplitudes at mesh orders 1, 2, ..")
     stiffness_sin: tuple[float, ...] = quantity((), doc="relative sine amplitudes at mesh orders 1, 2, ..")
+    shared_compliance: float = quantity(
+        0.0,
+        "um_per_kn",
+        ge=-_LARGEST_COMPLIANCE,
+        le=_LARGEST_COMPLIANCE,
+        doc="what bodies, rims and webs yield under all pairs together, beyond the teeth's own law; negative: less",
+    )
     exponent: float = quantity(
         0.0, gt=-0.5, le=1.0, doc="e of the force F (F / reference_force)^e, F being that of the teeth; 0: F"
     )

@@ -147,7 +147,7 @@ def nominal_model(nominal: Case, load: float, mean: float) -> NominalModel:
         error_sin=rig.mesh.error_sin,
         friction=rig.friction.coefficient,
         transition=rig.friction.transition_speed,
-        law=with_flanks(sound, flank_excess(sound, rig, nominal.simulation)),
+        law=with_flanks(sound, flank_excess(sound, rig, nominal.simulation), rig.mesh.shared_compliance),
         sound=sound,
         path=meshing.path,
         sd_stiffness=known.both("rig.support.{}.stiffness", [one.stiffness for one in held], "support_stiffness"),

@@ -24,15 +24,17 @@ def law_of(sound: MeshLaw, case: Case) -> MeshLaw:
     from gearbench.bench.nonlinear.law_table import flank_excess
 
     law = _with_backlash(sound, max(pair(case.rig).backlash_normal, 0.0))
-    excess = flank_excess(sound, case.rig, case.simulation)
-    return law if excess is None else _with_flanks(law, excess.tobytes())
+    excess, more = flank_excess(sound, case.rig, case.simulation), case.rig.mesh.shared_compliance
+    if excess is None and more == 0.0:
+        return law
+    return _with_flanks(law, None if excess is None else excess.tobytes(), more)
 
 
 @lru_cache(maxsize=LAWS)
-def _with_flanks(law: MeshLaw, excess: bytes) -> MeshLaw:
+def _with_flanks(law: MeshLaw, excess: bytes | None, more: float) -> MeshLaw:
     from gearbench.lumped.nonlinear.forms import formed
 
-    return formed(law, np.frombuffer(excess).reshape(law.share.shape))
+    return formed(law, None if excess is None else np.frombuffer(excess).reshape(law.share.shape), more)
 
 
 @lru_cache(maxsize=LAWS)

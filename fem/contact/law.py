@@ -63,6 +63,7 @@ class Law(NamedTuple):
     flanks1: Flanks
     flanks2: Flanks
     play: float
+    shared: float  # compliance [m/N] that all pairs share beside the gears' own
 
 
 def make_law(
@@ -89,7 +90,7 @@ def make_law(
         curves = (tabulate(t1, t2, k1, k2, half_plane, a, reach1), tabulate(t2, t1, k2, k1, half_plane, a, reach2))
     f1, f2 = _deviations(meshing, gears, reach1, reach2)
     every = Curves(*curves, t1.rho_end, t2.rho_end)
-    return Law(t1, t2, k1, k2, a, half_plane, every, reach1, reach2, f1, f2, f1.largest + f2.largest)
+    return Law(t1, t2, k1, k2, a, half_plane, every, reach1, reach2, f1, f2, f1.largest + f2.largest, 0.0)
 
 
 def _deviations(meshing: Pair, gears: tuple[Gear, Gear] | None, reach1: float, reach2: float) -> tuple[Flanks, Flanks]:

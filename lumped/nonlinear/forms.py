@@ -1,12 +1,13 @@
-"""The mesh law of teeth whose flanks depart from those that it was made for, all teeth of a gear alike.
+"""The mesh law of teeth whose flanks depart from those that it was made for, all teeth of a gear alike, or whose bodies
+yield otherwise.
 
 A pair n whose flanks have the excess e_n where they touch carries its part g_n of the force as if it were pressed
 further by e_n. What bends beside it, the gears' bodies, yields under the force of all pairs together:
 
-    F = sum over pairs of g_n(u + e_n),   delta = u + c F,   g_n(delta - c F_0(delta)) = F_n(delta)
+    F = sum over pairs of g_n(u + e_n),   delta = u + (c + d) F,   g_n(delta - c F_0(delta)) = F_n(delta)
 
-delta is the deflection, u what is left of it for the pairs, c the compliance that the pairs share, F_0 the force of the
-law's own flanks and F_n what pair n carries of it.
+delta is the deflection, u what is left of it for the pairs, c the compliance that the pairs share, d what they share
+beyond it, F_0 the force of the law's own flanks and F_n what pair n carries of it.
 """
 
 from __future__ import annotations
@@ -25,15 +26,19 @@ Array = NDArray[np.float64]
 NODES = 97  # deflections of the table: flanks that come into contact one after another bend it more often
 FINE = 4  # steps between two nodes, where forces are found before the table is read off
 NOTHING = 1e-12  # m, by which flanks may differ that are alike
+LEAST_LEFT = 0.9  # part of the mesh's compliance at its stiffest that less of the bodies' may take away, at most
 REFERENCE = 0.3  # of the largest force, where the shares of the pairs are taken
 
 
-def formed(law: MeshLaw, excess: Array) -> MeshLaw:
-    """The law with the excess (n_p, n_o) [m] on each pair's working flanks beside what it has already.
+def formed(law: MeshLaw, excess: Array | None, more: float = 0.0) -> MeshLaw:
+    """The law with the excess (n_p, n_o) [m] on each pair's working flanks beside what it has already (None: none), and
+    pairs that share `more` compliance [m/N], or less.
 
     Deflections count from the first touch, `lead` says where that is. Back flanks are taken to be formed as the working
-    ones. Raises LumpedError for excess of another shape, or beyond reason.
+    ones. Raises LumpedError for excess of another shape, or beyond reason, and for bodies that would push back.
     """
+    if excess is None:
+        excess = np.zeros(law.share.shape)
     if excess.shape != law.share.shape:
         raise LumpedError(f"the excess on a mesh law's flanks has shape {excess.shape}, not {law.share.shape}")
     touching = law.parts[:, -1] > 0.0
@@ -41,13 +46,15 @@ def formed(law: MeshLaw, excess: Array) -> MeshLaw:
         raise LumpedError("the excess on a mesh law's flanks must be finite, and some pair must touch at any phase")
     lead = float(excess[touching].max())
     lower = excess - lead
-    if lower[touching].min() > -NOTHING:
+    if more == 0.0 and lower[touching].min() > -NOTHING:
         return replace(law, lead=law.lead + lead)
-    deepest = law.approach[-1] - float(np.where(touching, lower, -np.inf).max(axis=1).min())
+    _check_yielding(law, more)
+    left = law.approach[-1] - float(np.where(touching, lower, -np.inf).max(axis=1).min())
+    deepest = left + more * float(law.force[:, -1].max() if more < 0.0 else law.force[:, -1].min())
     approach = approach_grid(deepest, NODES)
-    trial = approach_grid(deepest, FINE * (NODES - 1) + 1)
+    trial = approach_grid(left, FINE * (NODES - 1) + 1)
     parts = np.zeros((law.phases, NODES, len(law.offsets)))
-    _press(law.approach, law.parts, lower, law.shared, trial, approach, parts)
+    _press(law.approach, law.parts, lower, law.shared, law.shared + more, trial, approach, parts)
     force = parts.sum(axis=2)
     return replace(
         law,
@@ -55,8 +62,19 @@ def formed(law: MeshLaw, excess: Array) -> MeshLaw:
         force=force,
         parts=parts,
         share=_shares(force, parts),
+        shared=law.shared + more,
         lead=law.lead + lead,
     )
+
+
+def _check_yielding(law: MeshLaw, more: float) -> None:
+    """Refuse bodies that yield so much less that deflections do not grow with the force."""
+    stiffest = float((np.diff(law.force, axis=1) / np.diff(law.approach)).max())
+    if more * stiffest <= -LEAST_LEFT:
+        raise LumpedError(
+            f"rig.mesh.shared_compliance_um_per_kn = {1e9 * more:g} takes more than the mesh yields: it must lie above"
+            f" {-1e9 * LEAST_LEFT / stiffest:.4g}"
+        )
 
 
 @compiled(**INNER)
@@ -74,10 +92,11 @@ def _carried(places: Array, parts: Array, o: int, lower: float, trial: Array, fo
 
 @compiled
 def _press(
-    approach: Array, parts: Array, excess: Array, shared: float, trial: Array, wanted: Array, out: Array
+    approach: Array, parts: Array, excess: Array, shared: float, sharing: float, trial: Array, wanted: Array, out: Array
 ) -> None:
     """Fill `out` (phases, wanted, n_o) with what each pair carries at the `wanted` deflections, from forces `parts`
-    at `approach`; excess (phases, n_o) <= 0; trial: deflections of the pairs, beside what they share, to begin with."""
+    at `approach`; excess (phases, n_o) <= 0; compliances [m/N] that pairs `shared` there and are `sharing`; trial:
+    deflections of the pairs, beside what they share, to begin with."""
     count = parts.shape[2]
     found = np.zeros((len(trial), count))
     depth, places = np.zeros(len(trial)), np.zeros(len(approach))
@@ -91,7 +110,7 @@ def _press(
         for n in range(len(trial)):
             depth[n] = trial[n]
             for o in range(count):
-                depth[n] += shared * found[n, o]
+                depth[n] += sharing * found[n, o]
         n = 1
         for j in range(len(wanted)):
             while n < len(trial) - 1 and depth[n] < wanted[j]:

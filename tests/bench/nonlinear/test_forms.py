@@ -160,3 +160,39 @@ def test_excess_of_another_shape_or_beyond_numbers_is_refused() -> None:
         formed(springs(), np.zeros((8, 3)))
     with pytest.raises(LumpedError, match="finite"):
         formed(springs(), np.full((8, 2), np.nan))
+
+
+@pytest.mark.parametrize("more", [2e-9, -8e-10])
+def test_bodies_that_yield_otherwise_add_what_they_do_to_the_deflection(more: float) -> None:
+    """Two equal springs and the compliance c + d in series with both: delta = F/(2 k) + (c + d) F."""
+    law = formed(springs(1e-9), None, more)
+    assert law.shared == 1e-9 + more
+    force = np.linspace(50.0, 6000.0, 40)
+    deflection = force / 4e8 + (1e-9 + more) * force
+    found, tangent = law.evaluate(deflection, 0.3)
+    np.testing.assert_allclose(found, force, rtol=1e-6)
+    np.testing.assert_allclose(tangent, 1.0 / (1.0 / 4e8 + 1e-9 + more), rtol=1e-6)
+    np.testing.assert_allclose(law.parts.sum(axis=2), law.force, rtol=1e-12)
+
+
+def test_bodies_and_flanks_together_are_bodies_after_flanks() -> None:
+    excess = np.tile([0.0, -5e-6], (8, 1))
+    both, after = formed(springs(1e-9), excess, 1e-9), formed(formed(springs(1e-9), excess), None, 1e-9)
+    deflection = np.linspace(1e-6, 25e-6, 30)
+    one, two = (law.evaluate(deflection, 0.2)[0] for law in (both, after))
+    np.testing.assert_allclose(one, two, atol=4e-3 * one.max())
+
+
+def test_bodies_cannot_give_back_more_than_the_mesh_yields() -> None:
+    with pytest.raises(LumpedError, match=r"shared_compliance_um_per_kn = -2\.4 .* must lie above -2\.25"):
+        formed(springs(), None, -2.4e-9)
+
+
+def test_the_law_of_a_rig_has_its_shared_compliance() -> None:
+    rig = make_rig({})
+    softer = rig.model_copy(update={"mesh": rig.mesh.model_copy(update={"shared_compliance": 1e-9})})
+    plain, found = (mesh_law(one, SIMULATION, 150.0) for one in (rig, softer))
+    force = 0.4 * float(plain.force[:, -1].min())
+    for phase in (0.1, 0.45, 0.8):
+        before, after = (np.interp(force, one.evaluate(one.approach, phase)[0], one.approach) for one in (plain, found))
+        assert after - before == pytest.approx(1e-9 * force, rel=5e-3)

@@ -13,6 +13,7 @@ from gearbench.fem.contact.kinematics import EDGE1, EDGE2, ON_LINE, pair_contact
 from gearbench.fem.contact.law import contact_in, find_pairs, make_law, overlaps
 from gearbench.fem.contact.line import line_contact
 from gearbench.fem.contact.sharing import share_load
+from gearbench.fem.contact.static import solve_torque
 
 
 @pytest.mark.parametrize("swap", [False, True])
@@ -133,3 +134,12 @@ def test_no_pair_is_overlooked(unequal: Any, margin: float) -> None:
                     expected.add((side, j))
         pairs = find_pairs(law, theta1, theta2, dx, dy, margin)
         assert set(zip(pairs["side"], pairs["tooth"], strict=True)) == expected
+
+
+@pytest.mark.parametrize("more", [1e-9, -4e-10])
+@pytest.mark.parametrize("phase", [0.1, 0.5, 0.9])
+def test_what_all_pairs_share_is_added_to_the_transmission_error(unequal: Any, more: float, phase: float) -> None:
+    """At the same torque every pair carries what it did, and the driver turns on by c F."""
+    law, torque = unequal.law, 90.0
+    plain, found = (solve_torque(one, phase, torque) for one in (law, law._replace(shared=more)))
+    assert found - plain == pytest.approx(more * torque / law.driver.rb, rel=2e-3)
