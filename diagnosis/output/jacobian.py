@@ -27,7 +27,7 @@ from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
 from gearbench.diagnosis.effects.torque_ripple import KEY as RIPPLE
 from gearbench.diagnosis.effects.torque_ripple import ORDERS
 from gearbench.diagnosis.forces.basis import on_path, waves
-from gearbench.diagnosis.output.contrast import CONTRAST, series_at
+from gearbench.diagnosis.output.contrast import CONTRAST, contrast_slope
 from gearbench.diagnosis.output.layout import Layout
 from gearbench.diagnosis.output.structure import GAIN, LATE, LEAST_STEP, PHASE, SEAT, STRUCTURE
 from gearbench.diagnosis.output.target import Target
@@ -72,10 +72,12 @@ class Forces(NamedTuple):
     on: Integers
 
 
-def forces_of(layout: Layout, along: Along, condition: str, chosen: Flags, others: Sequence[Other]) -> Forces:
-    """All forces that stand for the chosen unknowns (size,) along a motion of a record; what holds the gears by
-    `others`."""
-    parts, in_mesh = mesh_forces(layout, along, chosen)
+def forces_of(
+    layout: Layout, p: Array, along: Along, condition: str, chosen: Flags, others: Sequence[Other]
+) -> Forces:
+    """All forces that stand for the chosen unknowns (size,) along a motion of a record, of the rig of `p` (size,); what
+    holds the gears by `others`."""
+    parts, in_mesh = mesh_forces(layout, p, along, chosen)
     drive, on_drive = drive_forces(layout, along, condition)
     held = around_forces(along, others)
     used = chosen[on_drive]
@@ -88,7 +90,7 @@ def forces_of(layout: Layout, along: Along, condition: str, chosen: Flags, other
     )
 
 
-def mesh_forces(layout: Layout, along: Along, chosen: Flags) -> tuple[list[Array], Integers]:
+def mesh_forces(layout: Layout, p: Array, along: Along, chosen: Flags) -> tuple[list[Array], Integers]:
     """Forces (entries, n) [N] per unit of the chosen unknowns (size,) that act in the mesh, group by group, and the
     unknowns' indices."""
     unknowns, law, phase = layout.unknowns, along.law, along.phase
@@ -110,14 +112,16 @@ def mesh_forces(layout: Layout, along: Along, chosen: Flags) -> tuple[list[Array
     put("scale", stiffer)
     if LOADED in unknowns.slices:
         about = damping_reference(loaded, layout.model)
-        level = np.maximum(np.abs(along.elastic) / about, SMALLEST)
-        put(LOADED, damped * np.log(level)[:, None])
+        pressed = np.maximum(np.abs(along.elastic) / about, SMALLEST)
+        put(LOADED, damped * np.log(pressed)[:, None])
     put("mesh-ratio", damped)
     put("curvature", (along.elastic * np.log(np.maximum(along.level, SMALLEST)))[:, None])
     mesh = along.model.rig.mesh
-    departure, _ = series_at(mesh.stiffness_cos, mesh.stiffness_sin, phase)
-    series = 1.0 + departure
-    put(CONTRAST, stiffer * (series_at(layout.modulation[0], layout.modulation[1], phase)[0] / series)[:, None])
+    series = 1.0 + _series_at(mesh.stiffness_cos, mesh.stiffness_sin, phase)
+    # Of the teeth's own law, before its exponent and what multiplies the force.
+    level = np.maximum(along.level, SMALLEST) ** mesh.exponent
+    own = along.pairs.tangent.sum(axis=1) / (mesh.stiffness_scale * series * level)
+    put(CONTRAST, stiffer * contrast_slope(layout.tangents, float(p[unknowns[CONTRAST]][0]), own)[:, None])
     put("shape", stiffer * (wave / series[:, None]))
     put("offset", along.of_excess(np.ones((len(phase), 1))))
     put("profile", along.of_excess(wave))
@@ -141,6 +145,12 @@ def mesh_forces(layout: Layout, along: Along, chosen: Flags) -> tuple[list[Array
         parts.append(np.stack(soft, axis=1)[:, keep])
         at.extend(indices[keep])
     return parts, np.array(at)
+
+
+def _series_at(cosine: Sequence[float], sine: Sequence[float], phase: Array) -> Array:
+    """A series in the mesh phase, of amplitudes at the orders 1, 2, .., at phases (n,) [cycles]."""
+    turns = 2 * np.pi * np.arange(1, len(cosine) + 1)[:, None] * phase
+    return np.asarray(np.asarray(cosine) @ np.cos(turns) + np.asarray(sine) @ np.sin(turns))
 
 
 def _of_flanks(along: Along, numbers: NDArray[np.int64], path: tuple[float, float]) -> Array:

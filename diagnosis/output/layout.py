@@ -26,7 +26,7 @@ from gearbench.diagnosis.effects.torque_ripple import KEY as RIPPLE
 from gearbench.diagnosis.forces.condition import Condition
 from gearbench.diagnosis.forces.nominal import NominalModel
 from gearbench.diagnosis.forces.unknowns import Group, Unknowns, unknowns_of
-from gearbench.diagnosis.output.contrast import contrast_groups, contrasted, modulation_of
+from gearbench.diagnosis.output.contrast import contrast_groups, contrasted, tangents_of
 from gearbench.diagnosis.output.structure import held, sensed, structure_groups
 from gearbench.diagnosis.output.viscous import viscous, viscous_groups
 from gearbench.geometry import Pair, pair
@@ -70,9 +70,9 @@ class Layout:
         return pair(self.nominal.rig)
 
     @cached_property
-    def modulation(self) -> Array:
-        """Amplitudes (2, orders) of the nominal mesh's stiffness over its phase."""
-        return modulation_of(self.model)
+    def tangents(self) -> Array:
+        """Stiffness (phases,) [N/m] of the nominal mesh over its phase, without its scale."""
+        return tangents_of(self.model)
 
     def case(self, p: Array, condition: str | None = None) -> Case:
         """The rig of these unknowns (size,), with the ripple of one condition, or the mean of all. Raises ValueError
@@ -85,7 +85,7 @@ class Layout:
                 rig = effect.add(rig, _all_of(effect.name), fitted)[0]
         rig = _cracked(rig, self, p)
         rig = held(_supports(rig, self, p), self.model, self.unknowns, p)
-        rig = contrasted(rig, self.modulation, self.unknowns, p)
+        rig = contrasted(rig, self.tangents, self.unknowns, p)
         rig = viscous(rig, self.model, self.unknowns, p)
         rig = sensed(rig, self.model, self.unknowns, p, DELAYS)
         rig = _drive(rig, self, fitted, condition)

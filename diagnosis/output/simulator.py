@@ -134,7 +134,7 @@ class Simulator:
             number, measured = item
             case = self.layout.case(p, measured.name)
             tangent = along(steady_motion(case, measured.record, law_of(self.layout.model.sound, case)))
-            forces = forces_of(self.layout, tangent, measured.name, chosen, others)
+            forces = forces_of(self.layout, p, tangent, measured.name, chosen, others)
             answers = tangent.answers(forces.values, forces.on)
             answers["torque_driven"] *= self.layout.model.base_radius[1]
             sensed = sensor_columns(self.layout, self.target, number, self.channels(p, measured))

@@ -10,7 +10,7 @@ from shared.simulated_lines import demonstration
 
 from gearbench.diagnosis.effects.profile_error import FLANKS, PROFILE_ERROR
 from gearbench.diagnosis.forces.basis import PLACES_ON_PATH
-from gearbench.diagnosis.output.contrast import CONTRAST, CONTRAST_SD, is_strange
+from gearbench.diagnosis.output.contrast import BEYOND, CONTRAST, CONTRAST_SD, is_strange
 from gearbench.diagnosis.output.reshaped import has_shapes, reshaped
 from gearbench.diagnosis.output.selection import prior_of
 
@@ -27,7 +27,7 @@ def test_shapes_belong_to_the_form_of_flanks_alone() -> None:
     assert shapes.min() == pytest.approx(-4.5 * model.deflection) and (shapes[:, 3] == 0.0).all()
     p = np.zeros(unknowns.size)
     assert not is_strange(unknowns, p)
-    p[unknowns[CONTRAST]] = -2.5 * CONTRAST_SD
+    p[unknowns[CONTRAST]] = -1.01 * BEYOND * CONTRAST_SD
     assert is_strange(unknowns, p)
 
 
