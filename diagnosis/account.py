@@ -25,6 +25,7 @@ LINES = {
     "excited": "at the excited lines",
     "driver-shaft": "at the orders of the driver's shaft",
     "driven-shaft": "at the orders of the driven gear's shaft",
+    "distorted": "at sums and differences of the excited lines",
     "other": "between the excited lines",
 }
 # Multiples of the noise floor below which nothing counts as left.

@@ -1,6 +1,7 @@
 """What a simulation is held against: the lines of all channels, in blocks whose misfit has a size of its own.
 
-A block is one record, channel, kind of line (operating, excited, sideband of either shaft, other) and band. With s^2
+A block is one record, channel, kind of line (operating, excited, distorted, sideband of either shaft, other) and band.
+What the excitation makes with itself where the mesh bends is told from what errors of teeth do: it is far larger. With s^2
 the noise of measured minus simulated (`passed_noise`) and the square of a hundredth of the level, below which no model
 is right, and C the mean square of measured minus simulated, the block costs n log((s^2 + C) / s^2) nats: what the
 discrepancy between rig and model is there is not known and has been maximised out. Neighbouring lines err alike: n is
@@ -31,6 +32,9 @@ INDEPENDENT = 8  # lines that a block counts as, at most
 # Over the number of teeth: those that a block of a shaft's lines counts as, where that is more. Errors of teeth have as
 # many numbers as there are teeth, and show in lines that are as independent as these.
 BY_TEETH = 0.5
+# Orders of the excitation whose products are lines of their own, as long as they are no more than this part of all.
+PRODUCTS, FEW = (2, 3, 4, 5), 0.25
+DISTORTED = "distorted"
 LEVEL = 1e-2  # part of the measured level below which no model is right
 REACH = 1e-4  # part of the channel's whole fluctuation that leaks into any line
 TINY = 1e-60
@@ -139,7 +143,7 @@ def target_of(
     noises: list[float] = []
     counts: list[int] = []
     for number, (one, condition) in enumerate(zip(measurements, conditions, strict=True)):
-        kinds, frequency = kinds_of(condition), frequencies(one)[: condition.bins]
+        kinds, frequency = with_products(condition), frequencies(one)[: condition.bins]
         parts = residual[number] if residual is not None else {}
         for channel, repetitions in measured_channels(one).items():
             if channel not in FITTED:
@@ -176,6 +180,27 @@ def target_of(
     )
 
 
+def with_products(condition: Condition) -> Integers:
+    """Kind of every bin (K,), by its number among the `covariance.KINDS`, one past them for DISTORTED.
+
+    A mesh that bends makes sums and differences of excited lines, and of these and its own orders: all are alike modulo
+    the cycles of a repetition.
+    """
+    kinds, cycles = kinds_of(condition), condition.cycles
+    excited = np.unique(np.flatnonzero(kinds == KINDS.index("excited")) % cycles)
+    signed = np.unique(np.concatenate([excited, -excited]) % cycles)
+    found, order = np.zeros(cycles, dtype=bool), signed
+    for _ in PRODUCTS:
+        order = np.unique((order[:, None] + signed) % cycles)
+        wider = found.copy()
+        wider[order] = True
+        if wider.sum() > FEW * cycles:
+            break
+        found = wider
+    strong = np.isin(kinds, [KINDS.index("operating"), KINDS.index("excited")])
+    return np.where(found[np.arange(len(kinds)) % cycles] & ~strong, len(KINDS), kinds)
+
+
 def _independent(kind: str, teeth: Sequence[int]) -> int:
     """How many lines of a kind a block counts as at most."""
     if kind not in SHAFTS:
@@ -187,7 +212,7 @@ def _parts(
     kinds: Integers, frequency: Array, one: Measurement
 ) -> Iterator[tuple[str, tuple[float, float], Flags]]:
     """Kind, band and flags of every block of a record; the mean is in none."""
-    for number, kind in enumerate(KINDS):
+    for number, kind in enumerate((*KINDS, DISTORTED)):
         for low, high in bands(one):
             inside = (kinds == number) & (frequency > low * (1 + 1e-12)) & (frequency <= high * (1 + 1e-12))
             if inside.any():
