@@ -21,7 +21,7 @@ from gearbench.diagnosis.output.around import around
 from gearbench.diagnosis.output.background import background
 from gearbench.diagnosis.output.by_forces import Start, begun_by_forces
 from gearbench.diagnosis.output.layout import Layout, layout_of
-from gearbench.diagnosis.output.likely_teeth import with_likely_teeth
+from gearbench.diagnosis.output.likely_teeth import with_likely_teeth, with_small_cracks
 from gearbench.diagnosis.output.passed_noise import noise_left
 from gearbench.diagnosis.output.selection import WORTH, Selection, Weighed, entering, select
 from gearbench.diagnosis.output.simulator import Simulate, Simulator
@@ -96,9 +96,15 @@ def simulated(
     ranked = _cracked_by_forces(problem, found, cracks) if cracks else []
     simulator = replace(simulator, layout=replace(layout, teeth=tuple(ranked)))
     starts = _starts(layout, problem.unknowns, found, listed)
-    base, starts = begun_by_forces(simulator, base, _weighed(listed, simulator.layout), starts, seen, report)
-    if cracks:
-        simulator, base = with_likely_teeth(simulator, base, ranked)
+    for teeth_first in (True, False):
+        if cracks:
+            simulator, base = with_likely_teeth(simulator, base, ranked)
+            base = with_small_cracks(simulator, base)
+        if teeth_first:
+            here = base
+            base, starts = begun_by_forces(simulator, base, _weighed(listed, simulator.layout), starts, seen, report)
+            if base is here:
+                break
     layout = simulator.layout
     weighed = _weighed(listed, layout)
     selection = select(simulator, base, weighed, starts, report, seen, apart=apart)

@@ -11,7 +11,7 @@ from shared.simulated_lines import demonstration
 
 from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
 from gearbench.diagnosis.output.fit import fit, sensitivity_of
-from gearbench.diagnosis.output.likely_teeth import LIKELY, gains_of, with_likely_teeth
+from gearbench.diagnosis.output.likely_teeth import LIKELY, gains_of, with_likely_teeth, with_small_cracks
 
 SD = np.array([0.1, 0.1, 0.1, 0.01, 0.01, 0.01, 0.0, 0.0])
 CRACKED = 7  # of the driven gear: its number among all teeth is 27
@@ -70,3 +70,34 @@ def test_the_cracked_tooth_of_a_rig_is_among_them_though_nobody_ranked_it() -> N
     column = again.sensitivity.jacobian[unknowns[CRACK].start + number]
     assert np.abs(column).max() > 0.0 and unknowns[CRACK].start + number in again.sensitivity.quadratic.active
     assert again.p is base.p and again.cost == base.cost
+
+
+def test_a_tooth_that_is_a_little_softer_belongs_to_the_background_as_its_records_show() -> None:
+    """Three per cent of one tooth, less than a crack: fitted beside everything else, under a sound gear's prior."""
+    simulator = demonstration()
+    unknowns, z1 = simulator.layout.unknowns, simulator.layout.model.teeth[0]
+    number = z1 + CRACKED
+    at = unknowns[CRACK].start + number
+    soft = replace(simulator, layout=replace(simulator.layout, teeth=(number,)))
+    p = np.zeros(simulator.layout.size)
+    p[at] = 0.03
+    lines = soft.lines(p)
+    assert lines is not None
+    made = replace(simulator, target=replace(simulator.target, lines=lines), _kept={})
+    sd = unknowns.prior()
+    sd[unknowns[CRACK]] = 0.0
+    first = sensitivity_of(made, np.zeros(unknowns.size), unknowns.prior())
+    assert first is not None
+    base = fit(made, np.zeros(unknowns.size), sd, first)
+    assert base is not None
+    teeth, again = with_likely_teeth(made, base, (3,))
+    found = with_small_cracks(teeth, again)
+    assert found.sd[at] == unknowns.prior()[at] and np.count_nonzero(found.sd[unknowns[CRACK]]) <= 2
+    assert found.p[at] == pytest.approx(0.03, abs=0.004)
+    assert found.evidence > again.evidence + 3.0
+    # A rig without a softer tooth stays as it is.
+    sound = replace(simulator, target=replace(simulator.target, lines=simulator.lines(np.zeros(p.size))), _kept={})
+    whole = fit(sound, np.zeros(p.size), sd, first)
+    assert whole is not None
+    plain, kept = with_likely_teeth(sound, whole, ())
+    assert with_small_cracks(plain, kept) is kept
