@@ -1,11 +1,11 @@
 """What a simulation is held against: the lines of all channels, in blocks whose misfit has a size of its own.
 
 A block is one record, channel, kind of line (operating, excited, distorted, sideband of either shaft, other) and band.
-What the excitation makes with itself where the mesh bends is told from what errors of teeth do: it is far larger. With s^2
-the noise of measured minus simulated (`passed_noise`) and the square of a hundredth of the level, below which no model
-is right, and C the mean square of measured minus simulated, the block costs n log((s^2 + C) / s^2) nats: what the
-discrepancy between rig and model is there is not known and has been maximised out. Neighbouring lines err alike: n is
-at most 8, and of a shaft with many teeth half of these.
+What the excitation makes with itself where the mesh bends is told from what errors of teeth do: it is far larger.
+With s^2 the noise of measured minus simulated (`passed_noise`) and the square of a hundredth of the level, below which
+no model is right, and C the mean square of measured minus simulated, the block costs n log((s^2 + C) / s^2) nats: what
+the discrepancy between rig and model is there is not known and has been maximised out. Neighbouring lines err alike: n
+is at most 8, and of a shaft with many teeth half of these.
 """
 
 from __future__ import annotations

@@ -52,5 +52,5 @@ def test_the_slope_is_that_of_the_force_at_an_unchanged_deflection() -> None:
 
 
 def test_pairs_cannot_share_less_than_nothing_leaves() -> None:
-    with pytest.raises(ValueError, match="cannot share -0.9"):
+    with pytest.raises(ValueError, match=r"cannot share -0\.9"):
         kept_mean(TANGENTS, -0.9)
