@@ -20,6 +20,8 @@ from gearbench.identification.spectra.joint import Floats
 FEWEST = 160
 NEGLIGIBLE = 2e-4
 ROOM = 6_000_000
+# Sidebands by so much further tell what a model misses that ends with its own.
+WIDER = 1.5
 
 
 def enough_branches(
@@ -37,3 +39,11 @@ def enough_branches(
     room = (ROOM // lines.size - 1) // 2
     kept = min(most, max(FEWEST, min(enough, room)))
     return kept, np.asarray(np.interp(lines, chosen, power[order > kept].sum(axis=0)))
+
+
+def left_out(model: Model, data: ClassData, lines: NDArray[np.int64], branches: int, ratio: float = 1.0) -> Floats:
+    """Power [m^2/N^2] (F,) by which the response on the output `lines` would change if the model had sidebands half as
+    far again: what it may err by because it ends. A resonance beyond its end, from which sidebands act back, shows."""
+    chosen, furthest = followed(lines), data.furthest_at(ratio)
+    now, wider = (htf_on(model, data, chosen, branches, ratio, end) for end in (furthest, int(WIDER * furthest)))
+    return np.asarray(np.interp(lines, chosen, np.sum(np.abs(wider - now) ** 2, axis=0)))

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from gearbench.identification.feedback.branches import enough_branches
+from gearbench.identification.feedback.branches import enough_branches, left_out
 from gearbench.identification.feedback.draws import add_mesh_curves, response_variances
 from gearbench.identification.feedback.estimate import Feedback, rational
 from gearbench.identification.feedback.functions import Splines
@@ -57,6 +57,7 @@ def feedback_frf(
     frequency = np.asarray(lines * spectra.spacing, dtype=float)
     ratio = 1.0 if mesh_frequency is None else mesh_frequency / (data.mesh_lines * spectra.spacing)
     branches, beyond = enough_branches(model, data, lines, ratio)
+    beyond += left_out(model, data, lines, branches, ratio)
     response = htf_on(model, data, lines, branches, ratio)
     itf = itf_from_htf(response, phases)
     draws = drawn_models(found)

@@ -29,14 +29,21 @@ QUIET, LEAST_OF_WINDOWS = 0.25, 1.5
 UNEXPLAINED = 0.03
 
 
-def htf_on(model: Model, data: ClassData, lines: NDArray[np.int64], harmonics: int, ratio: float = 1.0) -> Complexes:
-    """HTF (2H+1, F) [m/N], l = -H..H, on lines of the record by harmonic balance; 0 beyond
-    `data.furthest_at(ratio)`.
+def htf_on(
+    model: Model,
+    data: ClassData,
+    lines: NDArray[np.int64],
+    harmonics: int,
+    ratio: float = 1.0,
+    furthest: int | None = None,
+) -> Complexes:
+    """HTF (2H+1, F) [m/N], l = -H..H, on lines of the record by harmonic balance; 0 beyond the line `furthest`, which
+    is `data.furthest_at(ratio)` unless given.
 
     `ratio`: mesh frequency over that of the record, which D, N, k and c do not depend on.
     """
     result = np.zeros((2 * harmonics + 1, lines.size), dtype=complex)
-    step, furthest = data.mesh_lines * ratio, data.furthest_at(ratio)
+    step, furthest = data.mesh_lines * ratio, furthest or data.furthest_at(ratio)
     for residue in np.unique(np.round(lines % step, 9)):
         chosen = np.flatnonzero(np.abs(np.round(lines % step, 9) - residue) < 1e-8)
         first = int(np.ceil((-furthest - residue) / step))

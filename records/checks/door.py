@@ -44,6 +44,7 @@ from gearbench.records.checks.mesh_lines import mesh_lines_stand_out
 from gearbench.records.checks.passive import force_feeds_the_rig
 from gearbench.records.checks.periods import force_repeats_as_declared, periods_repeat
 from gearbench.records.checks.sampled import sampled_fast_enough
+from gearbench.records.checks.slips import angles_do_not_slip, gears_pass_the_same_teeth
 from gearbench.records.checks.torques import load_balances, torque_as_declared
 from gearbench.records.errors import RecordError
 
@@ -55,8 +56,10 @@ CHECKS: tuple[Check, ...] = (
     radii_fit_teeth,
     radii_fit_inertias,
     angles_unwrapped,
+    angles_do_not_slip,
     angles_roll,
     angles_keep_mesh_period,
+    gears_pass_the_same_teeth,
     force_repeats_as_declared,
     mesh_lines_stand_out,
     torque_as_declared,

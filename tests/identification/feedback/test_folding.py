@@ -66,9 +66,9 @@ def test_lines_come_back_as_a_sampler_makes_them() -> None:
     lines[:, :, ::d] = 0.0
     force, dte = np.fft.irfft(lines, axis=2)
     start = np.array([0.1, 0.47, 0.815])
-    whole = class_data(spectra_of(force, dte, d, start=start), 199)
+    whole = class_data(spectra_of(force, dte, d, start=start), 105)
     sampled = class_data(
-        replace(spectra_of(force[:, ::2], dte[:, ::2], d, start=start), samples=512, spacing=1 / 1024), 199
+        replace(spectra_of(force[:, ::2], dte[:, ::2], d, start=start), samples=512, spacing=1 / 1024), 105
     )
     assert sampled.furthest == whole.furthest > 390 and sampled.folds and not whole.folds
     seen = whole.dte * whole.dte_unit / sampled.dte_unit
