@@ -51,9 +51,11 @@ def formed(law: MeshLaw, excess: Array | None, more: float = 0.0) -> MeshLaw:
     _check_yielding(law, more)
     left = law.approach[-1] - float(np.where(touching, lower, -np.inf).max(axis=1).min())
     deepest = left + more * float(law.force[:, -1].max() if more < 0.0 else law.force[:, -1].min())
-    approach = approach_grid(deepest, NODES)
-    trial = approach_grid(left, FINE * (NODES - 1) + 1)
-    parts = np.zeros((law.phases, NODES, len(law.offsets)))
+    # Bodies that yield otherwise bend nothing.
+    nodes = len(law.approach) if lower[touching].min() > -NOTHING else NODES
+    approach = approach_grid(deepest, nodes)
+    trial = approach_grid(left, FINE * (nodes - 1) + 1)
+    parts = np.zeros((law.phases, nodes, len(law.offsets)))
     _press(law.approach, law.parts, lower, law.shared, law.shared + more, trial, approach, parts)
     force = parts.sum(axis=2)
     return replace(
