@@ -161,8 +161,8 @@ def test_a_mesh_that_changes_more_over_its_phase_is_moved_along_it(key: str, ent
     found = off(simulator, jacobian_at(simulator, p)[at], p, at, part * unknowns.prior()[at])
     for channel, (error, size) in found.items():
         close = 0.06 if channel == "torque_driven" else 0.01
-        # What the pairs share moves the edges of their contact as well, which the derivative leaves out.
-        close *= 1.5 if key == CONTRAST else 1.0
+        # What the pairs share moves the edges of their contact, where damping jumps: the derivative leaves that out.
+        close *= 2.0 if key == CONTRAST else 1.0
         # Edges of contact zones jump between steps of the grid, which excites what lies beyond the band.
         edges = 0.25 if channel == "torque_driven" else 0.08
         assert 0.0 < error < (edges if key == PHASE else close) * size, channel
