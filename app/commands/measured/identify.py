@@ -42,6 +42,10 @@ def identify(
         float | None,
         typer.Option("--at-mesh-hz", help="of mesh-feedback: predict the response at this mesh frequency"),
     ] = None,
+    accept_doubts: Annotated[
+        bool,
+        typer.Option("--accept-doubts", help="go on with a doubtful channel, or to a result that says nothing"),
+    ] = False,
     export: Annotated[
         list[Path] | None, typer.Option("--export", metavar="FILE", help="write it as .uff or .mat too; repeatable")
     ] = None,
@@ -57,7 +61,7 @@ def identify(
     _check_files(records, out, export or [], pictures)
     settings = gb.IdentificationSettings(
         method=method, harmonics=harmonics, order=order, window=window, band=band_hz, branches=branches,
-        mesh_frequency=at_mesh_hz,
+        mesh_frequency=at_mesh_hz, accept_doubts=accept_doubts,
     )  # fmt: skip
     with Progress("identify") as progress:
         progress.step("reading")
