@@ -11,12 +11,12 @@ from gearbench.identification.lpm.regression import prepare, rotated
 from gearbench.identification.spectra.joint import Complexes, Floats, Spectra
 
 # Lines beyond the excited ones that are kept, as part of the highest and in mesh harmonics: sidebands act back on the
-# excited lines, and tell the mesh's higher harmonics. A resonance above the excited band shows in them alone.
+# excited lines, and tell the mesh's higher harmonics.
 MARGIN = 0.05
-SIDEBANDS = 24
-# Of angles alone, whose form with E has more to be found from the same lines, fits that take in more sidebands end in
-# poorer minima (an error of 2.7 % on supports softer than the mesh).
-FROM_ANGLES = 8
+SIDEBANDS = 8
+# The same where a resonance above the excited band acts back, which shows in them alone. Elsewhere they cost twice the
+# time, and a mesh force that is linear in the band only is asked for what lies far above it.
+FURTHER = 24
 # Sidebands beyond those lines, in mesh harmonics, that a model has all the same: they too act back. A model that ends
 # where the record does puts their effect on the mesh's higher harmonics, and one that ends within a resonance on
 # everything; what is still left out is counted (`branches.left_out`).
@@ -166,16 +166,20 @@ def folded_harmonics(samples: int, mesh_lines: int) -> NDArray[np.int64]:
     return np.concatenate([back, -back])
 
 
-def class_data(spectra: Spectra, excited: int) -> ClassData:
-    """Lines up to a little beyond the highest `excited` one, without the operating response (class 0 of its records).
+def top_line(spectra: Spectra, excited: int, sidebands: int) -> int:
+    """Highest line that is fitted: so many `sidebands` beyond the highest `excited` one, or MARGIN of it."""
+    return min(spectra.highest, max(int((1.0 + MARGIN) * excited), excited + sidebands * spectra.mesh_lines))
+
+
+def class_data(spectra: Spectra, excited: int, sidebands: int = SIDEBANDS) -> ClassData:
+    """Lines up to `top_line`, without the operating response (class 0 of its records).
 
     Records are shifted to mesh phase 0 as in the local polynomial method. Without equations are also lines that the
     operating response may have folded onto.
     """
     regression = prepare(spectra, transient=False, reach=0)
     d = spectra.mesh_lines
-    sidebands = FROM_ANGLES if spectra.angle_only else SIDEBANDS
-    top = min(spectra.highest, max(int((1.0 + MARGIN) * excited), excited + sidebands * d))
+    top = top_line(spectra, excited, sidebands)
     classes = np.arange(d // 2 + 1)
     furthest = furthest_line(top, d)
     reach = furthest // d + 1
