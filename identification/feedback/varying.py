@@ -29,8 +29,9 @@ from gearbench.identification.spectra.joint import Complexes, Floats
 HARMONICS = 40
 SUPPORT = 60
 INTERVALS = (20, 120)
-# Lines beyond the excited ones, as part of them, on which the response is followed.
-MARGIN = 0.05
+# Lines beyond the excited ones, as part of them and in mesh harmonics, on which the response is followed: sidebands act
+# back on the excited lines.
+MARGIN, SIDEBANDS = 0.05, 24
 ROUNDS = 3
 # Rows whose splines are written down at a time.
 CHUNK = 800
@@ -63,7 +64,9 @@ class Signals:
     @property
     def top(self) -> int:
         """Last line that is followed."""
-        return min(int((1 + MARGIN) * self.excited), self.dte.shape[1] // 2 - 1)
+        speed = float(np.mean(self.cycles[:, -1] - self.cycles[:, 0]))
+        wanted = max(int((1 + MARGIN) * self.excited), self.excited + int(SIDEBANDS * speed))
+        return min(wanted, self.dte.shape[1] // 2 - 1)
 
     @property
     def omega(self) -> Floats:
