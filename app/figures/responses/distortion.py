@@ -42,7 +42,8 @@ def draw_distortion(path: Path, split: xr.Dataset) -> None:
         axes.set_ylabel("DTE of a line, rms [nm]")
         axes.set_title(_title(split))
         # Below: lines lie everywhere, and none may be hidden.
-        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=2, frameon=False, markerscale=2.0, fontsize=9)
+        below = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.12), "ncols": 2, "frameon": False}
+        axes.legend(**below, markerscale=2.0, fontsize=9)
         save(drawing, path)
 
 
