@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -185,18 +185,23 @@ def sorted_lines(
     count = (highest + reach) // mesh_lines + 1 + origin
     # Class c holds the lines c + d i: columns of the lines from -origin d on, written d to a row.
     begin = origin * mesh_lines - highest
-    padded = np.zeros((2 * force.shape[0] + 1, count * mesh_lines), dtype=complex)
-    padded[:, begin : begin + 2 * highest + 1] = np.concatenate([force, dte, excited[None]])
-    by_class = padded.reshape(-1, count, mesh_lines).transpose(2, 0, 1)
-    arrays = [np.ascontiguousarray(part) for part in np.split(by_class[:, :-1], 2, axis=1)]
-    return arrays[0], arrays[1], np.ascontiguousarray(by_class[:, -1].real > 0), origin
+
+    def by_class(lines: NDArray[Any]) -> NDArray[Any]:
+        padded = np.zeros((lines.shape[0], count * mesh_lines), dtype=lines.dtype)
+        padded[:, begin : begin + 2 * highest + 1] = lines
+        return np.ascontiguousarray(padded.reshape(-1, count, mesh_lines).transpose(2, 0, 1))
+
+    return by_class(force), by_class(dte), by_class(excited[None])[:, 0], origin
 
 
 def _two_sided(one_sided: Complexes, phase: Floats, mesh_lines: int) -> Complexes:
     """Lines -K..K (E, 2K+1), delayed so that the record begins at mesh phase 0."""
     full = np.concatenate([one_sided[:, :0:-1].conj(), one_sided], axis=1)
     lines = np.arange(full.shape[1]) - (one_sided.shape[1] - 1)
-    return full * np.exp(-2j * np.pi * np.outer(phase, lines) / mesh_lines)
+    # Row by row: of a hundred long records the factors of all are as large as the spectra.
+    for row, start in zip(full, phase, strict=True):
+        row *= np.exp(-2j * np.pi * (start * lines) / mesh_lines)
+    return np.asarray(full)
 
 
 def rotated(values: Values) -> Values:
