@@ -182,10 +182,9 @@ def loud_at(signals: Signals, left: Complexes, band: tuple[int, int]) -> float:
         return 0.0
     kept = np.zeros_like(left)
     kept[:, own] = left[:, own]
-    power = sum(
-        np.bincount((cycles % 1.0 * parts).astype(int) % parts, signals.along_time(lines) ** 2, parts)
-        for cycles, lines in zip(signals.cycles, kept, strict=True)
-    )
+    power = np.zeros(parts)
+    for cycles, lines in zip(signals.cycles, kept, strict=True):
+        power += np.bincount((cycles % 1.0 * parts).astype(int) % parts, signals.along_time(lines) ** 2, parts)
     loud = loud_parts(count / parts, power)
     excess = float(np.sum((power - np.median(power))[loud]) / np.sum(power))
     force = np.array([signals.lines(row)[own] for row in signals.force])
