@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil, log
@@ -10,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.bench.nonlinear.replay import Steady, resampled, seen_at
-from gearbench.bench.record.sensors import change_shown
+from gearbench.bench.nonlinear.replay import Steady, resampled
+from gearbench.bench.record.sensors import shown_by
 from gearbench.lumped.nonlinear.coordinates import IN_MESH, NAMES
 from gearbench.lumped.nonlinear.law import MeshLaw
 from gearbench.lumped.nonlinear.model import NonLinear
@@ -25,6 +26,8 @@ from gearbench.lumped.nonlinear.tangent import Tangent, departures
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Integers = NDArray[np.int64]
+# Places (samples, n, columns) and forces (steps, columns) of `departures`, of one part of the columns after another.
+Departures = Sequence[tuple[NDArray[np.float32], NDArray[np.float32]]]
 
 MOST = 3  # steps per sample that suffice: the frequency of a mode at 0.2 of the sampling rate is then right to 3e-4
 STABLE = 1.8  # largest rate of a mode times the step: Runge-Kutta bears 2.8
@@ -69,42 +72,50 @@ class Along:
         """The coordinate that the driver's torque acts on."""
         return W if self.model.elastic_shaft else U1
 
-    def answers(self, forces: NDArray[np.floating[Any]], on: Integers) -> dict[str, Array]:
-        """Changes (columns, samples) of the channels, as the rig's sensors show them, under forces (entries, columns)
-        [N], each added in the mesh or on a coordinate, `on` (columns,): dte [m], rb times angles [m], y [m], and the
-        load's torque over the driven gear's base radius [N]."""
+    def answers(self, forces: NDArray[np.floating[Any]], on: Integers) -> dict[str, Complex]:
+        """Half-spectra (columns, K), as of numpy's `rfft`, of what the channels change by, as the rig's sensors show
+        it, under forces (entries, columns) [N], each added in the mesh or on a coordinate, `on` (columns,): dte [m], rb
+        times angles [m], y [m], and the load's torque over the driven gear's base radius [N]."""
         parts = np.array_split(np.arange(len(on)), max(ceil(len(on) / AT_ONCE), 1))
         found = [departures(self.tangent, forces[:, one], on[one], self.substeps, self.early) for one in parts]
-        places = np.concatenate([one for one, _ in found], axis=2)
-        u1, u2 = (np.ascontiguousarray(places[:, number, :].T) for number in (U1, U2))
-        y1, y2 = (np.einsum("scn,c->ns", places, row.astype(places.dtype)) for row in self.model.displacements)
-        twist = u2 - places[:, LOAD, :].T if self.model.rig.load.twists else None
-        borne = -(self.tangent.mesh[U2] + self.tangent.rubbed[::2, U2]).astype(found[0][1].dtype)
-        reaction = self._twisted(twist) if twist is not None else np.concatenate(
-            [self._shown((two * borne[:, None]).T) for _, two in found]
-        )
-        # What pushes at an end that is held is borne there.
-        held = (on == LOAD) | ((on == U2) & (self.tangent.inverse[U2] == 0.0))
-        reaction[held] += self._shown(forces[::2, held].T)
-        moved = {"angle_driver": u1, "angle_driven": u2, "y_driver": y1, "y_driven": y2, "torque_driven": reaction}
-        sensors, rate = self.model.rig.sensors, self.sampling_rate
-        seen = {name: change_shown(change, sensors, name, rate) for name, change in moved.items()}
+        moved = {"angle_driver": self._moved(found, {U1: 1.0}), "angle_driven": self._moved(found, {U2: 1.0})}
+        for name, row in zip(("y_driver", "y_driven"), self.model.displacements, strict=True):
+            moved[name] = self._moved(found, {int(one): float(row[one]) for one in np.flatnonzero(row)})
+        moved["torque_driven"] = self._borne(found, forces, on)
+        sensors, frequency = self.model.rig.sensors, self._omega / (2 * np.pi)
+        response = {name: shown_by(sensors, name, frequency).astype(np.complex64) for name in moved}
+        seen = {name: change * response[name] for name, change in moved.items()}
         y = seen["y_driver"] - seen["y_driven"]
         seen["dte"] = seen["angle_driver"] - seen["angle_driven"] + self.model.factor * y
         return seen
 
-    def _shown(self, stepped: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
-        """Forces (columns, samples) as the record's sensor has them, of forces (columns, steps)."""
-        return stepped[:, :: self.substeps] if self.instants else seen_at(stepped, len(self.places), axis=1)
+    def _moved(self, found: Departures, by: Mapping[int, float]) -> Complex:
+        """Half-spectra (columns, K) of coordinates, so much of each."""
+        return np.concatenate(
+            [sum(part * _spectrum(places[:, number, :].T) for number, part in by.items()) for places, _ in found]
+        )
 
-    def _twisted(self, twist: Array) -> Array:
-        """Force [N] of the load's shaft twisted by so much (columns, samples) [m]."""
-        shaft = self.model.structure
-        assert shaft is not None  # who twists has one
-        lines = np.fft.rfft(twist, axis=1)
-        stiffness = shaft.load_stiffness + 1j * self._omega * shaft.load_damping
-        out: Array = np.fft.irfft(stiffness * lines, twist.shape[1], axis=1)
-        return out
+    def _borne(self, found: Departures, forces: NDArray[np.floating[Any]], on: Integers) -> Complex:
+        """Half-spectra (columns, K) of the force [N] that the load bears at its base circle."""
+        if self.model.rig.load.twists:
+            shaft = self.model.structure
+            assert shaft is not None  # who twists has one
+            stiffness = shaft.load_stiffness + 1j * self._omega * shaft.load_damping
+            reaction = stiffness.astype(np.complex64) * self._moved(found, {U2: 1.0, LOAD: -1.0})
+        else:
+            borne = -(self.tangent.mesh[U2] + self.tangent.rubbed[::2, U2]).astype(found[0][1].dtype)
+            reaction = np.concatenate([self._shown((two * borne[:, None]).T) for _, two in found])
+        # What pushes at an end that is held is borne there.
+        held = (on == LOAD) | ((on == U2) & (self.tangent.inverse[U2] == 0.0))
+        if held.any():
+            reaction[held] += self._shown(forces[::2, held].T)
+        return reaction
+
+    def _shown(self, stepped: NDArray[np.floating[Any]]) -> Complex:
+        """Half-spectra (columns, K) of forces (columns, steps) as the record's sensor has them."""
+        if self.instants:
+            return _spectrum(stepped[:, :: self.substeps])
+        return _spectrum(stepped)[:, : len(self._omega)] / np.float32(self.substeps)
 
     @cached_property
     def _omega(self) -> Array:
@@ -150,6 +161,11 @@ class Along:
         """Force (entries, columns) [N] that more material (entries, columns) [m] adds in the mesh."""
         k, c = self.tangent.stiffness[:, None], self.tangent.damping[:, None]
         return np.asarray(k * excess + c * self.rate_of(excess))
+
+
+def _spectrum(signal: NDArray[np.floating[Any]]) -> Complex:
+    """Half-spectra (columns, K) of signals (columns, samples)."""
+    return np.asarray(np.fft.rfft(np.ascontiguousarray(signal, dtype=np.float32), axis=1))
 
 
 def along(steady: Steady) -> Along:

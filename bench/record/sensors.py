@@ -100,12 +100,11 @@ def imposed(recorded: Array, sensors: Sensors, sampling_rate: float) -> Array:
     return taken_back(torque, sensors, sensors.delay_torque_driver, sampling_rate)
 
 
-def change_shown(change: Array, sensors: Sensors, channel: str, sampling_rate: float) -> Array:
-    """What a channel's sensor shows of a change (..., n) that repeats: late, behind the filter, by its gain."""
-    late = delayed(Signal(change), getattr(sensors, f"delay_{channel}"), sampling_rate)
-    seen = filtered(late, sensors.filter, sampling_rate).swing
-    gain = getattr(sensors, f"gain_{channel}", 1.0)
-    return seen if gain == 1.0 else gain * seen
+def shown_by(sensors: Sensors, channel: str, frequency: Array) -> NDArray[np.complex128]:
+    """What a channel's sensor multiplies changes of frequencies (n,) [Hz] by: late, behind the filter, by its gain."""
+    gain, delay = getattr(sensors, f"gain_{channel}", 1.0), getattr(sensors, f"delay_{channel}")
+    response = gain * np.exp(-2j * np.pi * frequency * delay)
+    return response if sensors.filter is None else response * filter_response(frequency, sensors.filter)
 
 
 def taken_back(recorded: Array, sensors: Sensors, delay: float, sampling_rate: float) -> Array:

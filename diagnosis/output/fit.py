@@ -26,6 +26,7 @@ Flags = NDArray[np.bool_]
 GAIN = 0.5  # nats that are worth a step
 POOR = 0.25  # part of what a step promised, below which the Jacobian is renewed
 LITTLE = 0.01  # the same, below which another renewal is of no use
+ANEW = 3.0  # nats that a renewal must have brought for another one
 HALVINGS = 3
 STEPS = 25
 # Standard deviations that a step may move any unknown by where no part of a longer one is of use: a kink in one of them
@@ -208,7 +209,7 @@ def fit(
         gain, hoped = before - cost, before - promised
         if gain < max(GAIN, POOR * hoped):
             # A rig that bends gives little of what is promised, but does so again from there.
-            if renewals == 0 or (fresh and gain < max(GAIN, LITTLE * hoped)):
+            if renewals == 0 or (fresh and gain < max(ANEW, LITTLE * hoped)):
                 break
             renewed = sensitivity_of(simulator, p, np.where(sd > 0, sd, 1.0), chosen, sensitivity.jacobian)
             if renewed is None:

@@ -216,8 +216,9 @@ def drive_forces(layout: Layout, along: Along, condition: str) -> tuple[Array, I
 
 def sensor_columns(
     layout: Layout, target: Target, number: int, channels: Mapping[str, Array]
-) -> dict[int, dict[str, Array]]:
-    """Changes of the channels (N,) of a record per unit of the unknowns of its sensors, by their index.
+) -> dict[int, dict[str, Complex]]:
+    """Half-spectra (K,) of the changes of the channels (N,) of a record per unit of the unknowns of its sensors, by
+    their index.
 
     That the gear turns otherwise where the driven angle's run-out is another shakes the rig a hundred times less.
     """
@@ -226,17 +227,18 @@ def sensor_columns(
     omega = 2 * np.pi * np.fft.rfftfreq(samples, 1 / one.sampling_rate)
     g = layout.model.support_factor
     into = {"angle_driver": 1.0, "y_driver": g, "y_driven": -g}
-    zero = np.zeros(samples)
-    found: dict[int, dict[str, Array]] = {}
+    zero = np.zeros(omega.size, dtype=complex)
+    found: dict[int, dict[str, Complex]] = {}
     for channel, key in DELAYS.items():
         if channel not in channels or key == FOLLOWED:
             continue
-        late = np.fft.irfft(-1j * omega * np.fft.rfft(channels[channel]), samples)
+        late = -1j * omega * np.fft.rfft(channels[channel])
         found[unknowns[key].start] = {channel: late, "dte": into[channel] * late}
     if "torque_driven" in channels:
-        found[unknowns[GAIN].start] = {"torque_driven": channels["torque_driven"]}
+        found[unknowns[GAIN].start] = {"torque_driven": np.fft.rfft(channels["torque_driven"])}
     for (side, key), teeth in zip(ENCODERS.items(), layout.model.teeth, strict=True):
         turn = 2 * np.pi * one.phase / teeth
         for part, wave in enumerate((np.cos, np.sin)):
-            found[unknowns[key].start + part] = {f"angle_{side}": wave(turn), "dte": ADDS[side] * wave(turn)}
+            lines = np.fft.rfft(wave(turn))
+            found[unknowns[key].start + part] = {f"angle_{side}": lines, "dte": ADDS[side] * lines}
     return {index: {name: parts.get(name, zero) for name in channels} for index, parts in found.items()}

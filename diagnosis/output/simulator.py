@@ -130,7 +130,7 @@ class Simulator:
         from gearbench.bench.nonlinear.along import along
         from gearbench.bench.nonlinear.replay import steady_motion
 
-        def one(item: tuple[int, Measurement]) -> tuple[Integers, dict[str, Array], dict[int, dict[str, Array]]]:
+        def one(item: tuple[int, Measurement]) -> tuple[Integers, dict[str, Complex], dict[int, dict[str, Complex]]]:
             number, measured = item
             case = self.layout.case(p, measured.name)
             tangent = along(steady_motion(case, measured.record, law_of(self.layout.model.sound, case)))
@@ -146,12 +146,13 @@ class Simulator:
                 if chosen[index]:
                     self._put(out, number, np.array([index]), {name: values[None] for name, values in parts.items()})
 
-    def _put(self, out: Complex, number: int, at: Integers, answers: dict[str, Array]) -> None:
-        """Add the lines of what a record answers; unknowns may have several answers."""
-        start = 0
+    def _put(self, out: Complex, number: int, at: Integers, spectra: dict[str, Complex]) -> None:
+        """Add the lines of half-spectra (n, K) of what a record answers to unknowns `at` (n,), one of which may have
+        several answers."""
+        samples, start = self.target.measurements[number].phase.size, 0
         for record, channel, bins in self.target.plan:
             stop = start + len(bins)
             if record == number:
-                spectrum = np.fft.rfft(answers[channel], axis=-1)[:, bins] / answers[channel].shape[-1]
-                np.add.at(out[:, start:stop], at, spectrum)
+                for row, lines in zip(at, spectra[channel][:, bins], strict=True):
+                    out[row, start:stop] += lines / samples
             start = stop

@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from gearbench.bench import simulate
-from gearbench.bench.nonlinear.along import along
+from gearbench.bench.nonlinear.along import Along, along
 from gearbench.bench.nonlinear.law_table import mesh_law
 from gearbench.bench.nonlinear.replay import steady_motion
 from gearbench.cases import case_files
@@ -18,6 +18,12 @@ from gearbench.rig import read_case
 Array = NDArray[np.float64]
 
 SMALL = 1e-7  # [m]
+
+
+def signals(tangent: Along, force: Array, on: int) -> dict[str, Array]:
+    """The tangent's answers as signals (1, samples)."""
+    lines = tangent.answers(force, np.array([on]))
+    return {name: np.fft.irfft(one, len(tangent.places), axis=1) for name, one in lines.items()}
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.1])
@@ -39,7 +45,7 @@ def test_an_error_of_one_tooth_does_what_two_simulations_differ_by(friction: flo
     tangent = along(steady_motion(case, record, law))
     numbers, _ = law.pairs(tangent.phase)
     force = SMALL * (tangent.pairs.tangent * (numbers % 20 == 3)).sum(axis=1, keepdims=True)
-    found = tangent.answers(force, np.array([IN_MESH]))
+    found = signals(tangent, force, IN_MESH)
     more, less = uneven(SMALL), uneven(-SMALL)
     wanted = {channel: 0.5 * (more[channel] - less[channel]) for channel in more}
     for channel, change in wanted.items():
@@ -63,7 +69,7 @@ def test_a_measured_torque_changes_by_nothing_from_beyond_half_its_rate() -> Non
         tangent = along(steady[1])
         numbers, _ = law.pairs(tangent.phase)
         force = SMALL * (tangent.pairs.tangent * (numbers % 20 == 0)).sum(axis=1, keepdims=True)
-        found.append(tangent.answers(force, np.array([IN_MESH]))["torque_driven"][0])
+        found.append(signals(tangent, force, IN_MESH)["torque_driven"][0])
         wanted.append(0.5 * (steady[0].load_force - steady[2].load_force))
     errors = [np.linalg.norm(one - two) for one, two in zip(found, wanted, strict=True)]
     assert all(error < np.linalg.norm(change) / 7 for error, change in zip(errors, wanted, strict=True))
@@ -81,7 +87,7 @@ def test_torque_on_the_shaft_does_what_ripple_does() -> None:
     plain, other = steady_motion(case, record, law), steady_motion(rippled, record, law)
     tangent = along(plain)
     force = 0.2 * np.cos(6 * 2 * np.pi * tangent.phase / 20)[:, None] / plain.setup.meshing.driver.base_radius
-    found = tangent.answers(force, np.array([tangent.drive]))["dte"][0]
+    found = signals(tangent, force, tangent.drive)["dte"][0]
     change = other.setup.dte(other.outputs) - plain.setup.dte(plain.outputs)
     assert np.linalg.norm(found - change) < 0.05 * np.linalg.norm(change)
 
@@ -95,6 +101,6 @@ def test_a_rig_with_stiff_supports_across_keeps_its_tangent_stable() -> None:
     moved = case.model_copy(update={"rig": case.rig.model_copy(update={"mesh": softer})})
     plain, other = steady_motion(case, record, law), steady_motion(moved, record, law)
     tangent = along(plain)
-    found = tangent.answers(tangent.of_excess(np.full((len(tangent.phase), 1), SMALL)), np.array([IN_MESH]))["dte"][0]
+    found = signals(tangent, tangent.of_excess(np.full((len(tangent.phase), 1), SMALL)), IN_MESH)["dte"][0]
     change = other.setup.dte(other.outputs) - plain.setup.dte(plain.outputs)
     assert found == pytest.approx(change, abs=0.05 * SMALL)
