@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.identification.lpm.regression import prepare, rotated
+from gearbench.identification.spectra.folded import folded_harmonics
 from gearbench.identification.spectra.joint import Complexes, Floats, Spectra
 
 # Lines beyond the excited ones that are kept, as part of the highest and in mesh harmonics: sidebands act back on the
@@ -27,8 +28,6 @@ BEYOND = 24
 PREDICTED = 3
 # Turns by which folded lines of two realisations may differ to be alike.
 ALIKE = 1e-9
-# Harmonics of the mesh whose operating response may fold back to be felt.
-OPERATING = 100
 
 
 @dataclass(frozen=True)
@@ -152,18 +151,6 @@ def only_lines(data: ClassData, kept: NDArray[np.bool_]) -> ClassData:
     """The same with equations of `kept` lines (C, S) only."""
     valid = data.valid & kept
     return replace(data, valid=valid, equations=_equations(valid, data.dte, data.weight))
-
-
-def folded_harmonics(samples: int, mesh_lines: int) -> NDArray[np.int64]:
-    """Lines of a record of so many `samples`, 0 where nothing can have folded, onto which mesh harmonics beyond half
-    the sampling rate may have come back from the operating response. Where a mesh period is a whole number of samples
-    these are mesh harmonics again."""
-    harmonics = np.arange(1, OPERATING + 1) * mesh_lines
-    harmonics = harmonics[2 * harmonics > samples]
-    if samples == 0 or samples % mesh_lines == 0:
-        return np.empty(0, dtype=np.int64)
-    back = harmonics - samples * np.round(harmonics / samples).astype(np.int64)
-    return np.concatenate([back, -back])
 
 
 def top_line(spectra: Spectra, excited: int, sidebands: int) -> int:

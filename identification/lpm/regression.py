@@ -19,6 +19,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
+from gearbench.identification.spectra.folded import folded_harmonics
 from gearbench.identification.spectra.joint import Complexes, Floats, Spectra
 
 Values = TypeVar("Values", Floats, Complexes)
@@ -71,7 +72,7 @@ class Regression:
     `force`, `dte` (d, E, Q): line k is at [k mod d, :, k // d + origin]; `excited` (d, Q). `same_phase`:
     all records begin at the same mesh phase, so the operating response has been rotated into experiment 0;
     otherwise, where transients are estimated, class 0 is left out of every experiment. `start_phase` (E,)
-    [cycles] of the records before they were shifted.
+    [cycles] of the records before they were shifted. `folded`: lines onto which the operating response may have folded.
     """
 
     force: Complexes
@@ -81,6 +82,7 @@ class Regression:
     highest: int
     same_phase: bool
     start_phase: Floats
+    folded: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, dtype=np.int64), kw_only=True)
     _transients: dict[tuple[int, Window], Complexes] = field(default_factory=dict, repr=False)
     _views: dict[int, tuple[Complexes, NDArray[np.bool_]]] = field(default_factory=dict, repr=False)
 
@@ -173,7 +175,9 @@ def prepare(spectra: Spectra, *, transient: bool, reach: int) -> Regression:
     excited = strength > EXCITATION_FLOOR * np.delete(strength, highest).max()
     force[:, ~excited] = 0.0
     force, dte, mask, origin = sorted_lines(force, dte, excited, d, reach)
-    return Regression(force, dte, mask, origin, highest, same, phase)
+    return Regression(
+        force, dte, mask, origin, highest, same, phase, folded=folded_harmonics(spectra.samples, d)
+    )
 
 
 def sorted_lines(

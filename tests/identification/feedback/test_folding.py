@@ -12,9 +12,10 @@ from shared.reference_rig import ReferenceRig, reference_record
 from shared.rig_model import rig_model
 
 from gearbench.identification import IdentificationSettings, exact_itf, identify, itf
-from gearbench.identification.feedback.data import FURTHER, class_data, folded_harmonics
+from gearbench.identification.feedback.data import FURTHER, class_data
 from gearbench.identification.feedback.folding import folded, likely
 from gearbench.identification.feedback.refine import linearised, output_error, refined, response, told_beside
+from gearbench.identification.spectra.folded import folded_harmonics
 from gearbench.identification.spectra.records import record_spectra
 from gearbench.records.record import make_record
 
