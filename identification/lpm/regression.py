@@ -72,7 +72,8 @@ class Regression:
     `force`, `dte` (d, E, Q): line k is at [k mod d, :, k // d + origin]; `excited` (d, Q). `same_phase`:
     all records begin at the same mesh phase, so the operating response has been rotated into experiment 0;
     otherwise, where transients are estimated, class 0 is left out of every experiment. `start_phase` (E,)
-    [cycles] of the records before they were shifted. `folded`: lines onto which the operating response may have folded.
+    [cycles] of the records before they were shifted. `folded`: lines beside class 0 onto which the operating
+    response may have folded.
     """
 
     force: Complexes
@@ -175,9 +176,8 @@ def prepare(spectra: Spectra, *, transient: bool, reach: int) -> Regression:
     excited = strength > EXCITATION_FLOOR * np.delete(strength, highest).max()
     force[:, ~excited] = 0.0
     force, dte, mask, origin = sorted_lines(force, dte, excited, d, reach)
-    return Regression(
-        force, dte, mask, origin, highest, same, phase, folded=folded_harmonics(spectra.samples, d)
-    )
+    folded = folded_harmonics(spectra.samples, d)
+    return Regression(force, dte, mask, origin, highest, same, phase, folded=folded[folded % d != 0])
 
 
 def sorted_lines(
