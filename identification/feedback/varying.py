@@ -267,14 +267,15 @@ class _Fit:
         return found
 
     def prior(self, measured: list[_Regressors], vector: Floats, weights: Floats) -> Floats:
-        """What the prior variances of k and c add to the diagonal (P,) of weighted equations."""
+        """What the prior variances of k and c add to the diagonal (P,) of weighted equations. The FIRST harmonics have
+        none: shrunk before the rounds settle, they make poor instruments."""
         found = np.zeros(self.size)
         order, noise = np.arange(1, self.harmonics + 1), self._noise(measured, vector, weights)
         for one, two in ((0, 1), (2, 3)):
             parts = [self.mesh + part * self.harmonics + order - 1 for part in (one, two)]
             size = np.mean([(order * vector[part])[:TOLD] ** 2 for part in parts])
             for part in parts:
-                found[part] = noise * order**2 / size
+                found[part] = np.where(order > FIRST, noise * order**2 / size, 0.0)
         return found
 
     def solve(
