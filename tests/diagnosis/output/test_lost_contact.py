@@ -37,7 +37,12 @@ def test_records_whose_flanks_stay_together_are_followed_or_those_that_part_leas
 
 @pytest.mark.parametrize(
     ("nominal", "other", "smooth"),
-    [([300, 400], [60, 400], [0]), ([300, 5], [0, 0], [1]), ([300, 400], [300, 400], []), ([300, None], [0, 5], [0, 1])],
+    [
+        ([300, 400], [60, 400], [0]),
+        ([300, 5], [0, 0], [1]),
+        ([300, 400], [300, 400], []),
+        ([300, None], [0, 5], [0, 1]),
+    ],
 )
 def test_another_rig_is_asked_where_flanks_part_in_all_records_of_the_first(
     nominal: list[int | None], other: list[int | None], smooth: list[int]
