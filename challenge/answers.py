@@ -1,7 +1,8 @@
 """The answers of a challenge: what was withheld from each case. They alone hold the seed.
 
 File: `{"ID": {"kind": "effect" | "none" | "foreign", "effects": [names], "place": name, "parameters": {effect: {name:
-{"value", "unit"}}}, "severity": {effect: number}, "family", "seed", "number", "places": [name of each effect]}}`.
+{"value", "unit"}}}, "severity": {effect: number}, "family", "seed", "number", "places": [name of each effect],
+"traces": {effect: number}}}`.
 """
 
 from __future__ import annotations
@@ -32,6 +33,8 @@ class Answer:
     seed: int = 0
     number: int = 0
     places: tuple[str, ...] = ()  # of every effect, in their order
+    # By how much the held-out transmission error changes without each effect, over its noise (`making.traces`).
+    traces: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def everywhere(self) -> tuple[str, ...]:
@@ -73,8 +76,8 @@ def _answer(entry: Any, where: str) -> Answer:
         raise ChallengeError(f"{where}: effects = {effects} do not go with kind = {entry['kind']}")
     if entry["place"] not in PLACES:
         raise ChallengeError(f"{where}: place = {entry['place']!r} must be one of {', '.join(PLACES)}")
-    if not isinstance(entry["parameters"], dict) or not isinstance(entry.get("severity", {}), dict):
-        raise ChallengeError(f"{where}: parameters and severity must be objects")
+    if not all(isinstance(entry.get(key, {}), dict) for key in ("parameters", "severity", "traces")):
+        raise ChallengeError(f"{where}: parameters, severity and traces must be objects")
     return Answer(
         kind=entry["kind"],
         effects=tuple(effects),
@@ -85,4 +88,5 @@ def _answer(entry: Any, where: str) -> Answer:
         seed=int(entry.get("seed", 0)),
         number=int(entry.get("number", 0)),
         places=tuple(str(one) for one in entry.get("places", ())),
+        traces={str(name): float(size) for name, size in entry.get("traces", {}).items()},
     )

@@ -10,7 +10,7 @@ import os
 import secrets
 import shutil
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -27,6 +27,7 @@ from gearbench.challenge.errors import ChallengeError
 from gearbench.challenge.making.drawn import drawn_nominal
 from gearbench.challenge.making.nominal import nominal_text
 from gearbench.challenge.making.plan import MOST_CASES, Mix, Plan, make_plan
+from gearbench.challenge.making.traces import traces_of
 from gearbench.challenge.truth.effects import EFFECTS, FOREIGN, Drawn
 from gearbench.challenge.truth.elastic import measure_elastic, within_uncertainty
 from gearbench.challenge.truth.levels import background
@@ -59,10 +60,11 @@ class Truth:
 
 
 def draw_truth(
-    nominal: Case, family: str, seed: int, number: int, plan: Plan, scale: Scale | None = None
+    nominal: Case, family: str, seed: int, number: int, plan: Plan, scale: Scale | None = None, left_out: str = ""
 ) -> tuple[Truth, np.random.Generator]:
     """The truth rig of case `number` of a challenge, and the stream that its noise comes from; `scale`: of a rig that
-    is not of the demonstration's size, whose housing then is as soft as housings are."""
+    is not of the demonstration's size, whose housing then is as soft as housings are. `left_out`: an effect of the plan
+    that the rig lacks, all else being drawn as with it."""
     stream = np.random.SeedSequence([seed, list(FAMILIES).index(family), number])
     rngs = [np.random.default_rng(child) for child in stream.spawn(6)]
     structure = draw_structure(nominal, family, rngs[0])
@@ -72,10 +74,13 @@ def draw_truth(
     drawn = Drawn(background((nominal.rig.driver.teeth, nominal.rig.driven.teeth), rngs[1]), "none", 0.0, {})
     places, parameters, severity = [], {}, {}
     for name, size in zip(plan.effects, plan.severity, strict=True):
-        drawn = (EFFECTS.get(name) or FOREIGN[name])(drawn.levels, size, rngs[2])
+        before = drawn.levels
+        drawn = (EFFECTS.get(name) or FOREIGN[name])(before, size, rngs[2])
         places.append(drawn.place)
         parameters[name] = drawn.parameters
         severity[name] = drawn.severity
+        if name == left_out:
+            drawn = replace(drawn, levels=before)
     if scale is not None:
         structure, drawn = scale.structure(structure), replace(drawn, levels=scale.levels(drawn.levels))
         parameters = scale.parameters(parameters)
@@ -147,22 +152,32 @@ def make_challenge(
     if not drawn:
         scale = scale_of(nominal) if torques else None
         shared = make_bench(nominal, nominal_stiffness(nominal), scale, torques), nominal_text(nominal)
-    missing = [name for name in sorted(answers) if not (out / name).is_dir()]
+    missing = [name for name in sorted(answers) if not (out / name).is_dir() or _untraced(answers[name], plans)]
     stop = threading.Event()
 
-    def run(name: str) -> None:
-        if not stop.is_set():
-            number = answers[name].number
-            rig, scale = rigs[number]
-            truth, rng = draw_truth(rig, family, seed, number, plans[number], scale)
-            bench, text = shared or (make_bench(rig, nominal_stiffness(rig), scale), nominal_text(rig))
+    def run(name: str) -> tuple[str, dict[str, float]]:
+        if stop.is_set():
+            return name, {}
+        number = answers[name].number
+        rig, scale = rigs[number]
+        plan = plans[number]
+        truth, rng = draw_truth(rig, family, seed, number, plan, scale)
+        bench, text = shared or (make_bench(rig, nominal_stiffness(rig), scale), nominal_text(rig))
+        if not (out / name).is_dir():
             _write_case(bench, truth, name, text, out, rng)
+        if plan.elastic:
+            return name, {}
+        fewer = {one: draw_truth(rig, family, seed, number, plan, scale, one)[0] for one in plan.effects}
+        without = {one: rest.drawn.levels for one, rest in fewer.items()}
+        return name, traces_of(bench, truth.structure, truth.drawn.levels, without)
 
     with ThreadPoolExecutor(processors()) as pool:
         futures = [pool.submit(run, name) for name in missing]
         try:
             for done, future in enumerate(as_completed(futures), start=1):
-                future.result()
+                name, traces = future.result()
+                answers[name] = replace(answers[name], traces=traces)
+                write_answers(answers, answers_file)
                 if progress:
                     progress(done / len(missing), f"case {done} of {len(missing)}")
         finally:
@@ -188,7 +203,12 @@ def check_apart(out: Path, answers_file: Path) -> None:
         raise ChallengeError(f"--answers {answers_file} lies inside --out {out}: answers must lie somewhere else")
 
 
-def _claim(out: Path, answers_file: Path, truths: list[Answer]) -> Mapping[str, Answer]:
+def _untraced(answer: Answer, plans: Sequence[Plan]) -> bool:
+    """Whether it is not known yet how far the effects of a case show."""
+    return bool(answer.effects) and not answer.traces and not plans[answer.number].elastic
+
+
+def _claim(out: Path, answers_file: Path, truths: list[Answer]) -> dict[str, Answer]:
     """Names for the cases: those of an earlier run of the same challenge, or new random ones, written down first."""
     present = sorted(path.name for path in out.iterdir()) if out.is_dir() else []
     if answers_file.exists():
@@ -208,7 +228,8 @@ def _claim(out: Path, answers_file: Path, truths: list[Answer]) -> Mapping[str, 
         elif name not in answers:
             raise ChallengeError(f"--out {out} holds {name}, which is no case of this challenge: choose another folder")
     out.mkdir(parents=True, exist_ok=True)
-    write_answers(dict(sorted(answers.items())), answers_file)
+    answers = dict(sorted(answers.items()))
+    write_answers(answers, answers_file)
     return answers
 
 

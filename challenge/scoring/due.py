@@ -1,13 +1,17 @@
 """Which effects a diagnosis owes: those without which the oracle's held-out gap is at least a tenth larger.
 
 The oracle is the same fit with the true effects: a verdict lists it among its candidates where it was simulated. An
-effect of which the candidates tell nothing counts as due, so that a search cannot excuse itself by not looking.
+effect of which the candidates tell nothing counts as due, so that a search cannot excuse itself by not looking, unless
+the truth rig itself hardly shows it: no oracle's gap lies below the noise, and none grows by more than the record does
+when the effect is taken out of the rig.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import inf, sqrt
 
+from gearbench.challenge.answers import Answer
 from gearbench.challenge.scoring.intervals import Rate
 from gearbench.challenge.scoring.outcomes import Outcome, named_effects
 
@@ -18,14 +22,21 @@ def owed(outcome: Outcome) -> tuple[str, ...]:
     """The true effects of a case of the library that are due."""
     if outcome.answer.kind != "effect":
         return ()
+    shown = shown_of(outcome.answer)
     true = frozenset(outcome.answer.effects)
     candidates = (outcome.verdict or {}).get("candidates", ())
     gaps = {frozenset(candidate["effects"]): candidate.get("held_out") for candidate in candidates}
     oracle = gaps.get(true)
     left = {name: gaps.get(true - {name}) for name in true}
     return tuple(
-        name for name, gap in sorted(left.items()) if oracle is None or gap is None or gap >= DUE * oracle
-    )
+        name for name in sorted(shown)
+        if oracle is None or (gap := left[name]) is None or gap >= DUE * oracle
+    )  # fmt: skip
+
+
+def shown_of(answer: Answer) -> frozenset[str]:
+    """The effects at work that the truth rig's held-out record shows, those of which that is not known included."""
+    return frozenset(name for name in answer.effects if sqrt(1.0 + answer.traces.get(name, inf) ** 2) >= DUE)
 
 
 def found_of_due(outcomes: Sequence[Outcome]) -> Rate:

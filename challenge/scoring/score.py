@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from gearbench.challenge.scoring.due import found_of_due, true_of_named, within_intervals
+from gearbench.challenge.scoring.due import found_of_due, shown_of, true_of_named, within_intervals
 from gearbench.challenge.scoring.intervals import COVERAGE, Rate, brier, calibration_error, middle, reliability
 from gearbench.challenge.scoring.outcomes import TRUE_VERDICT, VERDICTS, Outcome, named_effects, said
 from gearbench.challenge.scoring.reach import reach_table
@@ -37,7 +37,9 @@ def score(outcomes: Sequence[Outcome]) -> Table:
         "foreign": {
             **_rates(foreign, FOREIGN_RESULTS),
             "place_right": _place(foreign).plain(),
-            "refused_at_right_place": _rate(foreign, lambda o: o.result == "refused" and o.place_right).plain(),
+            "refused_at_right_place": _rate(
+                [o for o in foreign if shown_of(o.answer)], lambda o: o.result == "refused" and o.place_right
+            ).plain(),
         },
         "by_effect": {name: _effect_rows(name, group) for name, group in grouped([*effects, *foreign]).items()},
         "by_severity": _by_third([o for o in effects if len(o.answer.effects) == 1]),

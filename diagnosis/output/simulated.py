@@ -73,13 +73,15 @@ def simulated(
     apart: bool = False,
 ) -> Simulated | None:
     """Which effects the records call for, by simulation; None where the nominal rig cannot be simulated at all, records
-    do not tell the mesh phase, or flanks part in all of them. `apart`: another record judges what enters."""
-    smooth = smooth_records(nominal, measurements, simulate)
+    do not tell the mesh phase, or flanks part in all of them, on the nominal rig and on that of the force residuals.
+    `apart`: another record judges what enters."""
+    layout = layout_of(nominal, problem.model, problem.conditions, ())
+    by_forces = carried_over(layout, problem.unknowns, found.base.p)
+    smooth = smooth_records((nominal, layout.case(by_forces)), measurements, simulate)
     if not smooth:
         return None
     listed = library(problem.model, without)
     cracks = [one for one in listed if one.wide[0].key == CRACK]
-    layout = layout_of(nominal, problem.model, problem.conditions, ())
     chosen = [measurements[number] for number in smooth]
     conditions = [problem.conditions[number] for number in smooth]
     noises = [noise_left(layout.case(np.zeros(layout.size), one.name), one, simulate) for one in chosen]
@@ -89,7 +91,6 @@ def simulated(
         # What acts in the mesh may be anything, an impact too.
         return around(layout, problem.conditions, held)
 
-    by_forces = carried_over(layout, problem.unknowns, found.base.p)
     base = background(simulator, _beginnings(layout, by_forces), seen, report)
     if base is None:
         return None
@@ -164,26 +165,28 @@ def _opened(simulator: Simulator, selection: Selection, start: Start, apart: boo
     return replace(selection, best=optimum, entered=entered, weighed=weighed)
 
 
-def smooth_records(nominal: Case, measurements: Sequence[Measurement], simulate: Simulate) -> list[int]:
-    """Numbers of the records whose flanks stay together on the nominal rig, and where there is none, of those that part
-    for little of their time: elsewhere small changes make jumps, so that no fit can follow them."""
-    lost = lost_contact(nominal, measurements, simulate)
-    for limit in (LOSING, LOSING_MORE):
-        smooth = [number for number, part in enumerate(lost) if part < limit]
-        if smooth:
-            return smooth
+def smooth_records(rigs: Sequence[Case], measurements: Sequence[Measurement], simulate: Simulate) -> list[int]:
+    """Numbers of the records whose flanks stay together on the first of the rigs, and where there is none, of those
+    that part for little of their time: elsewhere small changes make jumps, so that no fit can follow them. Where there
+    is none of these either the next rig is asked: a resonance of the first need not be the records'."""
+    for rig in rigs:
+        lost = lost_contact(rig, measurements, simulate)
+        for limit in (LOSING, LOSING_MORE):
+            smooth = [number for number, part in enumerate(lost) if part < limit]
+            if smooth:
+                return smooth
     return []
 
 
-def lost_contact(nominal: Case, measurements: Sequence[Measurement], simulate: Simulate) -> list[float]:
-    """Part of the time that the flanks of the nominal rig are apart in each record; empty where it cannot be simulated
-    in one of them, or one does not tell the mesh phase."""
+def lost_contact(rig: Case, measurements: Sequence[Measurement], simulate: Simulate) -> list[float]:
+    """Part of the time that the flanks of a rig are apart in each record; empty where it cannot be simulated in one of
+    them, or one does not tell the mesh phase."""
     if not all(one.phase_known for one in measurements):
         return []
     lost = []
     for one in measurements:
         try:
-            steady = simulate(nominal, one.record)
+            steady = simulate(rig, one.record)
         except ValueError:
             return []
         samples = max(int(np.prod(steady["time"].shape)), 1)

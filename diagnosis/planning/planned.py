@@ -67,7 +67,7 @@ def planned(case: Case, report: Report = lambda step: None, held_out: str | None
     report("taking them in")
     problem = problem_of(inputs.measurements, inputs.nominal)
     simulate = replays_of(inputs.nominal, inputs.all)
-    smooth = smooth_records(inputs.nominal, inputs.measurements, simulate)
+    smooth = smooth_records([inputs.nominal], inputs.measurements, simulate)
     if not smooth:
         raise DiagnosisError(
             f"{nominal.name}: flanks part in all {len(inputs.measurements)} records to search from, where nothing can"

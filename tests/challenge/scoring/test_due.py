@@ -35,6 +35,19 @@ def test_one_effect_is_due_from_a_tenth_on(gap_without: float | None, gap_with: 
     assert owed(outcome) == (("friction",) if due else ())
 
 
+@pytest.mark.parametrize(("trace", "due"), [(0.45, False), (0.47, True)])
+def test_what_the_truth_hardly_shows_is_not_due_whatever_was_simulated(trace: float, due: bool) -> None:
+    outcome = judged(replace(FRICTION, traces={"friction": trace}), (), {})
+    assert owed(outcome) == (("friction",) if due else ())
+
+
+def test_the_place_of_a_foreign_effect_that_does_not_show_is_not_asked_for() -> None:
+    answers = [Answer("foreign", ("temperature-drift",), "mesh", {}, traces={"temperature-drift": size})
+               for size in (0.1, 9.0)]  # fmt: skip
+    table = score([judge("x", one, verdict("unknown") | {"place": "mesh"}) for one in answers])
+    assert table["foreign"]["refused_at_right_place"]["total"] == 1
+
+
 def test_of_two_effects_each_is_held_against_the_other_alone() -> None:
     gaps = {(): 1.0, ("friction",): 0.9, ("coupling",): 0.205, ("coupling", "friction"): 0.2}
     outcome = judged(TWO, ("coupling",), gaps)

@@ -1,4 +1,4 @@
-"""Which records a fit can follow: those whose flanks stay together on the nominal rig."""
+"""Which records a fit can follow: those whose flanks stay together on the nominal rig, or on another."""
 
 from __future__ import annotations
 
@@ -28,11 +28,32 @@ def test_records_whose_flanks_stay_together_are_followed_or_those_that_part_leas
 ) -> None:
     records: Any = [SimpleNamespace(phase_known=True, record=one) for one in lost]
     nominal: Any = None
-    assert smooth_records(nominal, records, answer) == smooth  # type: ignore[arg-type]
+    assert smooth_records([nominal], records, answer) == smooth  # type: ignore[arg-type]
     parts = lost_contact(nominal, records, answer)  # type: ignore[arg-type]
     assert parts == ([] if None in lost else [one / 1000 for one in lost if one is not None])
     limit = LOSING if any(part < LOSING for part in parts) else LOSING_MORE
     assert all(parts[number] < limit for number in smooth)
+
+
+@pytest.mark.parametrize(
+    ("nominal", "other", "smooth"),
+    [
+        ([300, 400], [60, 400], [0]),
+        ([300, 5], [0, 0], [1]),
+        ([300, 400], [300, 400], []),
+        ([300, None], [0, 5], [0, 1]),
+    ],
+)
+def test_another_rig_is_asked_where_flanks_part_in_all_records_of_the_first(
+    nominal: list[int | None], other: list[int | None], smooth: list[int]
+) -> None:
+    records: Any = [SimpleNamespace(phase_known=True, record=number) for number in range(2)]
+
+    def of_rig(rig: Any, record: Any) -> xr.Dataset:
+        return answer(rig, rig[record])
+
+    rigs: Any = [nominal, other]
+    assert smooth_records(rigs, records, of_rig) == smooth
 
 
 def test_records_without_a_mesh_phase_are_not_simulated() -> None:
