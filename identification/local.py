@@ -276,9 +276,9 @@ def _warnings(fitted: Fitted, accuracy: Accuracy, limits: Limits, rule: RecordRu
         )
     if accuracy.expected >= 1.0:
         period = 1.0 / (spectra.mesh_lines * spectra.spacing)
-        help_ = "more realisations help" if task.simulated else f"is the mesh period of {period:g} s right?"
         notes.append(
-            f"the expected error of {accuracy.expected:.0%} exceeds the response: this result says nothing; {help_}"
+            f"the expected error of {accuracy.expected:.0%} exceeds the response: this result says nothing; more"
+            f" realisations help if the mesh period of {period:g} s is right"
         )
     if accuracy.expected > DOUBTFUL:
         doubtful = f", doubtful channels {accuracy.record:.0%}" if accuracy.record else ""

@@ -31,7 +31,8 @@ class IdentificationSettings:
     `transient`: "estimate" polynomials for it, "none", or "auto": only where the record does not prove its
     steady state; `modes`: at most that many; `branches` of the local method "lpm": "polynomials" in each window,
     "smooth" random functions, or "auto": whichever predicts the lesser error (polynomials where any of L, R, n is
-    given); `mesh_frequency` [Hz] of "mesh-feedback": predict the response there (default: at the record's).
+    given); `mesh_frequency` [Hz] of "mesh-feedback": predict the response there (default: at the record's);
+    `accept_doubts`: a doubtful channel, or a result that is expected to say nothing, is warned of and not refused.
     """
 
     method: Literal["lpm", "mesh-feedback"] = "lpm"
@@ -45,6 +46,7 @@ class IdentificationSettings:
     modes: int | None = None
     branches: Literal["auto", "polynomials", "smooth"] = "auto"
     mesh_frequency: float | None = None
+    accept_doubts: bool = False
 
     def __post_init__(self) -> None:
         if self.method not in METHODS:
@@ -82,8 +84,7 @@ class IdentificationSettings:
 @dataclass(frozen=True)
 class Task:
     """`spectra` of the records, whose force covers the band `excited` [Hz]; the output `lines`; `settings`; `notes`
-    that become warnings; `record_error`: what doubtful channels may cost; `report(fraction, message)`; `simulated`:
-    whether the records are simulated ones, whose attributes are not in doubt."""
+    that become warnings; `record_error`: what doubtful channels may cost; `report(fraction, message)`."""
 
     spectra: Spectra
     lines: NDArray[np.int64]
@@ -92,7 +93,6 @@ class Task:
     notes: tuple[str, ...]
     record_error: float
     report: Progress
-    simulated: bool = False
 
     def part(self, first: float, share: float) -> Progress:
         """Reports of a step that begins at the fraction `first` and takes a `share`."""

@@ -8,15 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.identification.lpm.regression import prepare, rotated
+from gearbench.identification.spectra.folded import folded_harmonics
 from gearbench.identification.spectra.joint import Complexes, Floats, Spectra
 
 # Lines beyond the excited ones that are kept, as part of the highest and in mesh harmonics: sidebands act back on the
-# excited lines, and tell the mesh's higher harmonics. A resonance above the excited band shows in them alone.
+# excited lines, and tell the mesh's higher harmonics.
 MARGIN = 0.05
-SIDEBANDS = 24
-# Of angles alone, whose form with E has more to be found from the same lines, fits that take in more sidebands end in
-# poorer minima (an error of 2.7 % on supports softer than the mesh).
-FROM_ANGLES = 8
+SIDEBANDS = 8
+# The same where a resonance above the excited band acts back, which shows in them alone. Elsewhere they cost twice the
+# time, and a mesh force that is linear in the band only is asked for what lies far above it.
+FURTHER = 24
 # Sidebands beyond those lines, in mesh harmonics, that a model has all the same: they too act back. A model that ends
 # where the record does puts their effect on the mesh's higher harmonics, and one that ends within a resonance on
 # everything; what is still left out is counted (`branches.left_out`).
@@ -27,8 +28,6 @@ BEYOND = 24
 PREDICTED = 3
 # Turns by which folded lines of two realisations may differ to be alike.
 ALIKE = 1e-9
-# Harmonics of the mesh whose operating response may fold back to be felt.
-OPERATING = 100
 
 
 @dataclass(frozen=True)
@@ -154,28 +153,20 @@ def only_lines(data: ClassData, kept: NDArray[np.bool_]) -> ClassData:
     return replace(data, valid=valid, equations=_equations(valid, data.dte, data.weight))
 
 
-def folded_harmonics(samples: int, mesh_lines: int) -> NDArray[np.int64]:
-    """Lines of a record of so many `samples`, 0 where nothing can have folded, onto which mesh harmonics beyond half
-    the sampling rate may have come back from the operating response. Where a mesh period is a whole number of samples
-    these are mesh harmonics again."""
-    harmonics = np.arange(1, OPERATING + 1) * mesh_lines
-    harmonics = harmonics[2 * harmonics > samples]
-    if samples == 0 or samples % mesh_lines == 0:
-        return np.empty(0, dtype=np.int64)
-    back = harmonics - samples * np.round(harmonics / samples).astype(np.int64)
-    return np.concatenate([back, -back])
+def top_line(spectra: Spectra, excited: int, sidebands: int) -> int:
+    """Highest line that is fitted: so many `sidebands` beyond the highest `excited` one, or MARGIN of it."""
+    return min(spectra.highest, max(int((1.0 + MARGIN) * excited), excited + sidebands * spectra.mesh_lines))
 
 
-def class_data(spectra: Spectra, excited: int) -> ClassData:
-    """Lines up to a little beyond the highest `excited` one, without the operating response (class 0 of its records).
+def class_data(spectra: Spectra, excited: int, sidebands: int = SIDEBANDS) -> ClassData:
+    """Lines up to `top_line`, without the operating response (class 0 of its records).
 
     Records are shifted to mesh phase 0 as in the local polynomial method. Without equations are also lines that the
     operating response may have folded onto.
     """
     regression = prepare(spectra, transient=False, reach=0)
     d = spectra.mesh_lines
-    sidebands = FROM_ANGLES if spectra.angle_only else SIDEBANDS
-    top = min(spectra.highest, max(int((1.0 + MARGIN) * excited), excited + sidebands * d))
+    top = top_line(spectra, excited, sidebands)
     classes = np.arange(d // 2 + 1)
     furthest = furthest_line(top, d)
     reach = furthest // d + 1

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.identification.feedback.data import ClassData, class_data, fewer_classes, only_lines
+from gearbench.identification.feedback.data import SIDEBANDS, ClassData, class_data, fewer_classes, only_lines
 from gearbench.identification.feedback.folding import Folding, clear_lines, folded, folded_of, folding_of, without
 from gearbench.identification.feedback.functions import Fractions, Splines, common_pairs
 from gearbench.identification.feedback.loud import Loud, settled
@@ -84,16 +84,21 @@ class Feedback:
 
 
 def mesh_feedback(
-    spectra: Spectra, excited: int, *, harmonics: int | None = None, progress: Progress | None = None
+    spectra: Spectra,
+    excited: int,
+    *,
+    harmonics: int | None = None,
+    sidebands: int = SIDEBANDS,
+    progress: Progress | None = None,
 ) -> Feedback:
-    """Identify the mesh-feedback model from all lines up to the highest `excited` one.
+    """Identify the mesh-feedback model from all lines up to so many `sidebands` beyond the highest `excited` one.
 
     `harmonics` L of the mesh, and nothing but these; absent: zones of phase and a remainder of harmonics where they are
     more evident. Of dte from angles alone the form that also tells the centres' motion is found besides, and the one of
     least criterion returned. Raises LpmError where the record holds fewer equations than unknowns.
     """
     report = progress or (lambda part, message: None)
-    data = class_data(spectra, excited)
+    data = class_data(spectra, excited, sidebands)
     count = min(harmonics if harmonics is not None else HARMONICS, data.valid.sum(axis=1).max() - 1)
     intervals = int(np.clip(data.equations / SUPPORT, FEWEST_INTERVALS, INTERVALS))
     unknowns = 4 * (intervals + 3) + 4 * count

@@ -68,6 +68,7 @@ def feedback_frf(
     itf_variance += beyond[:, None]
     power = float(np.sum(np.abs(response) ** 2))
     variance, truncation = (float(np.sqrt(part.sum() / power)) for part in (htf_variance, beyond))
+    unfitted = float(np.sqrt((extrapolated.sum() + beyond.sum()) / power))
     whole, share = (int(lines[0]), int(lines[-1])), lines.size / float(lines[-1] - lines[0] + 1)
     follows, loud = (float(np.sqrt(max(of(found, whole), 0.0) * share / power)) for of in (unexplained, loud_power))
     # Both look at the same residual.
@@ -90,6 +91,7 @@ def feedback_frf(
             "harmonics": branches,
             "variance_error": variance,
             "truncation_error": truncation,
+            "sidebands_error": unfitted,
             "unexplained_error": apart,
             "loud_error": loud,
             "record_error": record,

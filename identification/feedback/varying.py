@@ -21,12 +21,18 @@ from scipy.ndimage import uniform_filter1d
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from gearbench.identification.feedback.functions import Splines
+from gearbench.identification.feedback.loud import FEWEST_PARTS, LEAST_EQUATIONS, PARTS, loud_parts
 from gearbench.identification.feedback.model import Model
 from gearbench.identification.lpm.local_solve import LpmError
 from gearbench.identification.spectra.joint import Complexes, Floats
 
-# Harmonics of the mesh unless given; lines for each interval of the splines, and fewest and most intervals.
-HARMONICS = 40
+# Harmonics of the mesh unless given; their prior keeps those that the record does not show small. It falls like that of
+# a mesh that switches, 1/l, from the size of the first ones, which every record tells.
+HARMONICS = 100
+TOLD = 8
+# Of a first solution, which nothing has told yet how large they are; what holds the others, of a scaled diagonal of 1.
+FIRST, HELD = 40, 1e9
+# Lines for each interval of the splines, and fewest and most intervals.
 SUPPORT = 60
 INTERVALS = (20, 120)
 # Lines beyond the excited ones, as part of them, on which the response is followed.
@@ -117,7 +123,8 @@ def varying_feedback(
             " equations; record longer or more realisations, or give fewer harmonics"
         )
     measured = [fit.regressors(row, signals.dte[row]) for row in range(signals.dte.shape[0])]
-    vector, covariance = fit.solve(measured, measured, fit.first_weights())
+    weights = fit.first_weights()
+    vector, covariance = fit.solve(measured, measured, weights, fit.few())
     residual, left = np.inf, np.zeros((signals.dte.shape[0], signals.top), dtype=complex)
     for turn in range(ROUNDS):
         report((turn + 0.5) / ROUNDS, f"mesh feedback at varying speed: round {turn + 1}")
@@ -126,7 +133,8 @@ def varying_feedback(
         residual = float(np.sqrt(sum(np.mean((a - b) ** 2) for a, b in zip(own, signals.dte, strict=True))) / swing)
         left = np.array([signals.lines(b - a) for a, b in zip(own, signals.dte, strict=True)])
         instruments = [fit.regressors(row, values) for row, values in enumerate(own)]
-        vector, covariance = fit.solve(measured, instruments, 1.0 / np.abs(fit.spline @ vector[: fit.width]))
+        weights = 1.0 / np.abs(fit.spline @ vector[: fit.width])
+        vector, covariance = fit.solve(measured, instruments, weights, fit.prior(measured, vector, weights))
     kept = np.concatenate([np.arange(2 * fit.width), np.arange(fit.mesh, fit.mesh + 4 * count)])
     return Varying(fit.model(vector), covariance[np.ix_(kept, kept)], left, residual, equations, fit.size)
 
@@ -162,6 +170,25 @@ def unexplained_at(
         total += width * float(np.sum((np.abs(product[read]) ** 2 / power[read] - noise[read]) / power[read]))
         scatter += float(np.sum((width * noise[read] / power[read]) ** 2))
     return total, float(np.sqrt(scatter))
+
+
+def loud_at(signals: Signals, left: Complexes, band: tuple[int, int]) -> float:
+    """As the first number of `unexplained_at`, of what `left` (E, S) holds at loud mesh phases beyond the level of the
+    others (`loud.py`)."""
+    runs, own = left.shape[0], slice(max(band[0], 1) - 1, band[1])
+    count = left[:, own].size
+    parts = int(min(PARTS, count / LEAST_EQUATIONS))
+    if parts < FEWEST_PARTS:
+        return 0.0
+    kept = np.zeros_like(left)
+    kept[:, own] = left[:, own]
+    power = np.zeros(parts)
+    for cycles, lines in zip(signals.cycles, kept, strict=True):
+        power += np.bincount((cycles % 1.0 * parts).astype(int) % parts, signals.along_time(lines) ** 2, parts)
+    loud = loud_parts(count / parts, power)
+    excess = float(np.sum((power - np.median(power))[loud]) / np.sum(power))
+    force = np.array([signals.lines(row)[own] for row in signals.force])
+    return excess * float(np.sum(np.abs(kept) ** 2) / np.sum(np.abs(force) ** 2)) * count / runs
 
 
 @dataclass(frozen=True)
@@ -232,11 +259,30 @@ class _Fit:
         matrix[:, self.mesh :] = found.mesh[part]
         return matrix
 
+    def few(self) -> Floats:
+        """The prior (P,) of a first solution: its first harmonics are free, the others held at 0."""
+        found = np.zeros(self.size)
+        for part in range(4):
+            found[self.mesh + part * self.harmonics + FIRST : self.mesh + (part + 1) * self.harmonics] = np.inf
+        return found
+
+    def prior(self, measured: list[_Regressors], vector: Floats, weights: Floats) -> Floats:
+        """What the prior variances of k and c add to the diagonal (P,) of weighted equations. The FIRST harmonics have
+        none: shrunk before the rounds settle, they make poor instruments."""
+        found = np.zeros(self.size)
+        order, noise = np.arange(1, self.harmonics + 1), self._noise(measured, vector, weights)
+        for one, two in ((0, 1), (2, 3)):
+            parts = [self.mesh + part * self.harmonics + order - 1 for part in (one, two)]
+            size = np.mean([(order * vector[part])[:TOLD] ** 2 for part in parts])
+            for part in parts:
+                found[part] = np.where(order > FIRST, noise * order**2 / size, 0.0)
+        return found
+
     def solve(
-        self, measured: list[_Regressors], instruments: list[_Regressors], weights: Floats
+        self, measured: list[_Regressors], instruments: list[_Regressors], weights: Floats, prior: Floats
     ) -> tuple[Floats, Floats]:
-        """Parameters with N = 1 at the lowest lines that make the instruments orthogonal to the equations' errors, and
-        their covariance from these errors."""
+        """Parameters with N = 1 at the lowest lines that make the instruments orthogonal to the equations' errors, as
+        far as the `prior` (P,) on the diagonal lets them, and their covariance from these errors."""
         gram, own = np.zeros((self.size, self.size)), np.zeros((self.size, self.size))
         for row, (one, two) in enumerate(zip(measured, instruments, strict=True)):
             for first in range(0, self.signals.top, CHUNK):
@@ -248,13 +294,14 @@ class _Fit:
                 own[np.ix_(active, active)] += left.T @ left
         scale = np.sqrt(np.maximum(np.diagonal(own), 1e-14 * np.diagonal(own).max()))
         system = np.zeros((self.size + 1, self.size + 1))
-        system[:-1, :-1] = gram / scale / scale[:, None] + RIDGE * np.eye(self.size)
+        held = np.diag(np.minimum(prior / scale**2, HELD))
+        system[:-1, :-1] = gram / scale / scale[:, None] + held + RIDGE * np.eye(self.size)
         system[-1, :-1] = system[:-1, -1] = self.gauge / scale
         inverse = np.linalg.inv(system)
         vector = inverse[:-1, -1] / scale
         spread = inverse[:-1, :-1] / scale[:, None]
         noise = self._noise(measured, vector, weights)
-        return vector, noise * (spread @ (own / scale / scale[:, None]) @ spread.T)
+        return vector, noise * (spread @ (own / scale / scale[:, None] + held) @ spread.T)
 
     def _noise(self, measured: list[_Regressors], vector: Floats, weights: Floats) -> float:
         """Variance of the weighted real equations."""

@@ -16,7 +16,7 @@ from gearbench.identification.feedback.draws import add_mesh_curves, response_va
 from gearbench.identification.feedback.model import Model
 from gearbench.identification.feedback.result import doubt_of, drawn_steps, htf_on
 from gearbench.identification.feedback.start import gauged
-from gearbench.identification.feedback.varying import Signals, Varying, unexplained_at, varying_feedback
+from gearbench.identification.feedback.varying import Signals, Varying, loud_at, unexplained_at, varying_feedback
 from gearbench.identification.response.frf import make_frf
 from gearbench.identification.response.modes import itf_modes
 from gearbench.identification.spectra.course import excited_rows
@@ -72,8 +72,11 @@ def varying_frf(
     power = float(np.sum(np.abs(response) ** 2))
     variance, truncation = (float(np.sqrt(part.sum() / power)) for part in (htf_variance, beyond))
     density = lines.size / (lines[-1] - lines[0] + 1) / about.stiffness_unit**2
-    shared = unexplained_at(signals, found.left, spectra.mesh_lines, (int(lines[0]), int(lines[-1])))
-    apart, chance = (float(np.sqrt(max(density * value, 0.0) / power)) for value in shared)
+    whole = (int(lines[0]), int(lines[-1]))
+    shared = *unexplained_at(signals, found.left, spectra.mesh_lines, whole), loud_at(signals, found.left, whole)
+    follows, chance, loud = (float(np.sqrt(max(density * value, 0.0) / power)) for value in shared)
+    # Both look at the same residual.
+    apart = max(follows, loud)
     frf = make_frf(
         "identified",
         frequency=frequency,
@@ -93,9 +96,10 @@ def varying_frf(
             "variance_error": variance,
             "truncation_error": truncation,
             "unexplained_error": apart,
+            "loud_error": loud,
             "record_error": record,
             "expected_error": hypot(variance, truncation, apart, record),
-            "warnings": "\n".join([*notes, *doubt_of(apart, chance)]),
+            "warnings": "\n".join([*notes, *doubt_of(follows, chance)]),
         },
     )
     add_mesh_curves(frf, model, draws, about)

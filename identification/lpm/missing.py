@@ -79,6 +79,7 @@ class MissingPower:
         self.excited = np.concatenate([[False], regression.excited[residue, position]])
         data = np.mean(np.abs(regression.dte[residue, :, position]) ** 2, axis=1)
         self.operating = residue == 0 if d > 1 else np.zeros(self.rows.size, dtype=bool)
+        self.operating = self.operating | np.isin(self.rows, regression.folded)
         width = max(3, round(AVERAGED * self.rows.size))
         self.power: Floats = np.concatenate([[0.0], data])
         self.response = np.concatenate([[0.0], uniform_filter1d(np.where(self.operating, 0.0, data), width)])

@@ -12,13 +12,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
+from gearbench.identification.spectra.folded import folded_harmonics
 from gearbench.identification.spectra.joint import Complexes, Floats, Spectra
 
 Values = TypeVar("Values", Floats, Complexes)
@@ -71,7 +72,8 @@ class Regression:
     `force`, `dte` (d, E, Q): line k is at [k mod d, :, k // d + origin]; `excited` (d, Q). `same_phase`:
     all records begin at the same mesh phase, so the operating response has been rotated into experiment 0;
     otherwise, where transients are estimated, class 0 is left out of every experiment. `start_phase` (E,)
-    [cycles] of the records before they were shifted.
+    [cycles] of the records before they were shifted. `folded`: lines beside class 0 onto which the operating
+    response may have folded.
     """
 
     force: Complexes
@@ -81,6 +83,7 @@ class Regression:
     highest: int
     same_phase: bool
     start_phase: Floats
+    folded: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, dtype=np.int64), kw_only=True)
     _transients: dict[tuple[int, Window], Complexes] = field(default_factory=dict, repr=False)
     _views: dict[int, tuple[Complexes, NDArray[np.bool_]]] = field(default_factory=dict, repr=False)
 
@@ -173,7 +176,8 @@ def prepare(spectra: Spectra, *, transient: bool, reach: int) -> Regression:
     excited = strength > EXCITATION_FLOOR * np.delete(strength, highest).max()
     force[:, ~excited] = 0.0
     force, dte, mask, origin = sorted_lines(force, dte, excited, d, reach)
-    return Regression(force, dte, mask, origin, highest, same, phase)
+    folded = folded_harmonics(spectra.samples, d)
+    return Regression(force, dte, mask, origin, highest, same, phase, folded=folded[folded % d != 0])
 
 
 def sorted_lines(
@@ -185,18 +189,23 @@ def sorted_lines(
     count = (highest + reach) // mesh_lines + 1 + origin
     # Class c holds the lines c + d i: columns of the lines from -origin d on, written d to a row.
     begin = origin * mesh_lines - highest
-    padded = np.zeros((2 * force.shape[0] + 1, count * mesh_lines), dtype=complex)
-    padded[:, begin : begin + 2 * highest + 1] = np.concatenate([force, dte, excited[None]])
-    by_class = padded.reshape(-1, count, mesh_lines).transpose(2, 0, 1)
-    arrays = [np.ascontiguousarray(part) for part in np.split(by_class[:, :-1], 2, axis=1)]
-    return arrays[0], arrays[1], np.ascontiguousarray(by_class[:, -1].real > 0), origin
+
+    def by_class(lines: NDArray[Any]) -> NDArray[Any]:
+        padded = np.zeros((lines.shape[0], count * mesh_lines), dtype=lines.dtype)
+        padded[:, begin : begin + 2 * highest + 1] = lines
+        return np.ascontiguousarray(padded.reshape(-1, count, mesh_lines).transpose(2, 0, 1))
+
+    return by_class(force), by_class(dte), by_class(excited[None])[:, 0], origin
 
 
 def _two_sided(one_sided: Complexes, phase: Floats, mesh_lines: int) -> Complexes:
     """Lines -K..K (E, 2K+1), delayed so that the record begins at mesh phase 0."""
     full = np.concatenate([one_sided[:, :0:-1].conj(), one_sided], axis=1)
     lines = np.arange(full.shape[1]) - (one_sided.shape[1] - 1)
-    return full * np.exp(-2j * np.pi * np.outer(phase, lines) / mesh_lines)
+    # Row by row: of a hundred long records the factors of all are as large as the spectra.
+    for row, start in zip(full, phase, strict=True):
+        row *= np.exp(-2j * np.pi * (start * lines) / mesh_lines)
+    return np.asarray(full)
 
 
 def rotated(values: Values) -> Values:

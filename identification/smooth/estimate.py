@@ -64,6 +64,7 @@ def window_equations(regression: Regression, centre: int, model: SmoothModel) ->
     count = regression.experiments
     kept = np.ones((offset.size, count), dtype=bool)
     kept[(centre + offset) % regression.mesh_lines == 0, : regression.operating_rows_lost] = False
+    kept[np.isin(centre + offset, regression.folded)] = False
     if not model.transient:
         kept &= rows.excited[0].any(axis=1)[:, None]
     if np.count_nonzero(kept) < FEWEST or not rows.excited.any():

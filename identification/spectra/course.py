@@ -80,9 +80,10 @@ def excited_rows(records: Sequence[xr.Dataset]) -> tuple[list[tuple[Floats, Floa
     return rows, rate, max(int(excited[0]), 1), int(excited[-1])
 
 
-def course_spectra(records: Sequence[xr.Dataset], sidebands: int = SIDEBANDS) -> tuple[Spectra, Course]:
+def course_spectra(records: Sequence[xr.Dataset], sidebands: int | None = None) -> tuple[Spectra, Course]:
     """Spectra of whole records, without periods, and the course of their speed; lines up to the excited band's end, a
-    quarter more, and `sidebands` mesh harmonics. Raises SpectraError as `excited_rows`."""
+    quarter more, and `sidebands` mesh harmonics (None: SIDEBANDS). Raises SpectraError as `excited_rows`."""
+    sidebands = SIDEBANDS if sidebands is None else sidebands
     rows, rate, lowest, excited = excited_rows(records)
     response, driving, cycles = (np.stack(part) for part in zip(*rows, strict=True))
     size = response.shape[1]

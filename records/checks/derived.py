@@ -214,6 +214,7 @@ def spring_is_a_mesh(look: Look) -> list[Finding]:
                 f"at the lowest excited lines the dte follows the force like a spring of {stiffness:.2g} N/m, softer"
                 f" than meshes of metal on their supports ({SOFT:g} N/m): is the dte in mm, or the force in kN?",
                 refused=False,
+                error=1.0,  # a unit; gears of plastic may be so soft
             )
         ]
     return []

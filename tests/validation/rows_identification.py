@@ -217,6 +217,14 @@ def peer() -> Got:
     return Got(theirs / ours, f"errors {error:.2%} and {other:.2%}")
 
 
+def peak_memory() -> Got:
+    """Peak resident memory [GiB] of L = 150, 100 realisations, 2^17 lines, in a process of its own."""
+    script = Path(__file__).resolve().parents[2] / "benchmarks" / "lpm_memory.py"
+    done = subprocess.run([sys.executable, "-P", str(script), "--json"], stdout=subprocess.PIPE, text=True, check=True)
+    told = json.loads(done.stdout)
+    return Got(told["peak_gib"], f"{told['processor_s']:.0f} s of processor time")
+
+
 CHECKS = [
     Check("lpm-100", "LPM, reference system, 100 x 1 s, noise-free: L = 100", 0.04, "", lambda: lpm_error(100)),
     Check("lpm-150", "LPM, reference system, 100 x 1 s, noise-free: L = 150", 0.006, "", lambda: lpm_error(150)),
@@ -269,5 +277,6 @@ CHECKS = [
     ),
     Check("exact-itf", "exact ITF: monodromy against harmonic balance", 1e-8, "", formulations),
     Check("frozen-itf", "frozen against exact ITF: distance from the stated 16 %", 0.01, "", frozen),
+    Check("lpm-memory", "LPM, L = 150, 100 realisations, 2^17 lines: peak memory", 4.0, "GiB", peak_memory),
     Check("lpm-peer", "PTV-LPM against sdynpy's LPM fed with shifted spectra", 10.0, "times", peer, least=True),
 ]

@@ -19,7 +19,9 @@ def multisine(
     snr_db: Annotated[
         float, typer.Option("--snr-db", help="torque-induced DTE over noise, rms in the excited band")
     ] = 40.0,
-    method: Annotated[Literal["lpm", "mesh-feedback"], typer.Option("--method", help="estimator")] = "lpm",
+    method: Annotated[
+        Literal["lpm", "mesh-feedback"] | None, typer.Option("--method", help="estimator; absent: the case's")
+    ] = None,
     band_hz: Annotated[
         tuple[float, float] | None, typer.Option("--band-hz", help="identified band; absent: the case's, else excited")
     ] = None,
@@ -40,7 +42,7 @@ def multisine(
         progress.step("plan")
         found = design(
             loaded,
-            gb.IdentificationSettings(method=method, band=wanted, modes=0),
+            gb.IdentificationSettings(method=method or loaded.identification.method, band=wanted, modes=0),
             snr_db=snr_db,
             progress=progress,
         )

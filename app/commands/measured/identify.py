@@ -42,6 +42,10 @@ def identify(
         float | None,
         typer.Option("--at-mesh-hz", help="of mesh-feedback: predict the response at this mesh frequency"),
     ] = None,
+    accept_doubts: Annotated[
+        bool,
+        typer.Option("--accept-doubts", help="go on with a doubtful channel, or to a result that says nothing"),
+    ] = False,
     export: Annotated[
         list[Path] | None, typer.Option("--export", metavar="FILE", help="write it as .uff or .mat too; repeatable")
     ] = None,
@@ -57,7 +61,7 @@ def identify(
     _check_files(records, out, export or [], pictures)
     settings = gb.IdentificationSettings(
         method=method, harmonics=harmonics, order=order, window=window, band=band_hz, branches=branches,
-        mesh_frequency=at_mesh_hz,
+        mesh_frequency=at_mesh_hz, accept_doubts=accept_doubts,
     )  # fmt: skip
     with Progress("identify") as progress:
         progress.step("reading")
@@ -86,7 +90,7 @@ def _tell(summary: Mapping[str, Any], out: Path) -> None:
     mode = f"first mode {low:.4g}-{high:.4g} Hz" if isfinite(low) else "no mode in the identified band"
     typer.echo(
         f"{out}: {mode}; {summary['unknowns']} unknowns, {summary['equations']} equations"
-        f" a window; expected error of the ITF {summary['expected_error']:.1%}"
+        f"{' a window' if 'window' in summary else ''}; expected error of the ITF {summary['expected_error']:.1%}"
     )
     if summary.get("mesh_basis") == "zones":
         first, second = summary["switch_phases"]

@@ -41,7 +41,9 @@ def draw_distortion(path: Path, split: xr.Dataset) -> None:
         axes.set_xlabel("frequency [Hz]")
         axes.set_ylabel("DTE of a line, rms [nm]")
         axes.set_title(_title(split))
-        axes.legend(loc="upper right", frameon=True, framealpha=0.9, markerscale=2.0, fontsize=9)
+        # Below: lines lie everywhere, and none may be hidden.
+        below = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.12), "ncols": 2, "frameon": False}
+        axes.legend(**below, markerscale=2.0, fontsize=9)
         save(drawing, path)
 
 

@@ -12,9 +12,10 @@ from shared.reference_rig import ReferenceRig, reference_record
 from shared.rig_model import rig_model
 
 from gearbench.identification import IdentificationSettings, exact_itf, identify, itf
-from gearbench.identification.feedback.data import class_data, folded_harmonics
+from gearbench.identification.feedback.data import FURTHER, class_data
 from gearbench.identification.feedback.folding import folded, likely
 from gearbench.identification.feedback.refine import linearised, output_error, refined, response, told_beside
+from gearbench.identification.spectra.folded import folded_harmonics
 from gearbench.identification.spectra.records import record_spectra
 from gearbench.records.record import make_record
 
@@ -66,9 +67,9 @@ def test_lines_come_back_as_a_sampler_makes_them() -> None:
     lines[:, :, ::d] = 0.0
     force, dte = np.fft.irfft(lines, axis=2)
     start = np.array([0.1, 0.47, 0.815])
-    whole = class_data(spectra_of(force, dte, d, start=start), 105)
+    whole = class_data(spectra_of(force, dte, d, start=start), 105, FURTHER)
     sampled = class_data(
-        replace(spectra_of(force[:, ::2], dte[:, ::2], d, start=start), samples=512, spacing=1 / 1024), 105
+        replace(spectra_of(force[:, ::2], dte[:, ::2], d, start=start), samples=512, spacing=1 / 1024), 105, FURTHER
     )
     assert sampled.furthest == whole.furthest > 390 and sampled.folds and not whole.folds
     seen = whole.dte * whole.dte_unit / sampled.dte_unit

@@ -7,6 +7,7 @@ from shared.reference_rig import ReferenceRig
 from shared.varying_rig import truth_at, varying_record, wandering
 
 from gearbench.identification import IdentificationSettings, SpectraError, estimation, identify, itf
+from gearbench.identification.feedback.varying import Signals, loud_at
 from gearbench.identification.feedback.varying_frf import signals_of
 from gearbench.identification.spectra.course import speed_varies
 from gearbench.records.even_speed import mesh_phase
@@ -87,3 +88,20 @@ def test_what_a_varying_speed_cannot_do_without_is_named(record: xr.Dataset) -> 
         signals_of([record.assign(force=record["force"] * 0 + 2000.0)], 1000)
     with pytest.raises(ValueError, match=r"under-determined: \d+ unknowns"):
         identify([record], IdentificationSettings("mesh-feedback", 400, band=(700.0, 1900.0)))
+
+
+def test_what_stands_at_few_mesh_phases_is_loud() -> None:
+    """A residual of a tenth of the force at one fiftieth of the mesh phases, noise at all of them: its power over the
+    force's, on each of the band's lines; noise alone is not loud."""
+    size, rate = 8192, 8192.0
+    time = np.arange(size) / rate
+    cycles = 40.0 * time + 0.6 * np.sin(2 * np.pi * time)
+    rng = np.random.default_rng(2)
+    force, noise = rng.standard_normal(size), 1e-3 * rng.standard_normal(size)
+    here = np.abs(cycles % 1.0 - 0.3) < 0.01
+    signals = Signals(force[None], force[None], cycles[None], rate, 1, 3500, 1.0, 1.0)
+    band = (1, 3500)
+    burst = np.where(here, 0.1 * rng.standard_normal(size), 0.0)
+    found = loud_at(signals, signals.lines(burst + noise)[None], band)
+    assert found == pytest.approx(np.mean(burst**2) / np.mean(force**2) * 3500, rel=0.15)
+    assert loud_at(signals, signals.lines(noise)[None], band) == 0.0

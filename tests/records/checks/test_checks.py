@@ -270,7 +270,9 @@ def test_an_attribute_of_the_wrong_kind_is_refused_by_name(
         gb.validate_record(rigs["free"].assign_attrs({name: value}))
 
 
-SETTINGS = gb.IdentificationSettings(harmonics=40, order=2, window=8, band=(800.0, 1500.0), phases=32)
+SETTINGS = gb.IdentificationSettings(
+    harmonics=40, order=2, window=8, band=(800.0, 1500.0), phases=32, accept_doubts=True
+)
 
 
 @pytest.fixture(scope="module")

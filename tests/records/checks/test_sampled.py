@@ -38,7 +38,7 @@ def test_the_part_of_the_response_beyond_is_said_and_counted_there_only(slow: xr
     frequency = np.fft.rfftfreq(slow.sizes["time"], 1 / slow.attrs["sampling_rate"])
     band = (frequency > 0.5) & (frequency <= 3500)
     share = float(np.linalg.norm(size[band & (frequency > 2000)]) / np.linalg.norm(size[band]))
-    given = {"harmonics": 4, "order": 1, "window": 30, "phases": 16, "modes": 0}
+    given = {"harmonics": 4, "order": 1, "window": 30, "phases": 16, "modes": 0, "accept_doubts": True}
     bands = ((2100.0, 3000.0), (800.0, 1500.0))
     above, below = (gb.identify([slow], gb.IdentificationSettings(band=band, **given)) for band in bands)
     for one in (above, below):

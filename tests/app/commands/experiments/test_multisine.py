@@ -6,6 +6,8 @@ import json
 
 import pytest
 
+import gearbench as gb
+from gearbench.bench import BenchError
 from gearbench.cli import run_command_line
 
 FAST = (
@@ -32,6 +34,20 @@ def test_numbers_as_json(capsys: pytest.CaptureFixture[str]) -> None:
     found = json.loads(capsys.readouterr().out)
     assert found["snr_db"] == 20.0 and found["lines"] == 750
     assert 0.5 < found["expected"] / found["actual"] < 2.0
+
+
+def test_the_estimator_is_that_of_the_case(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = []
+
+    def design(case: object, settings: gb.IdentificationSettings, **_: object) -> None:
+        asked.append(settings.method)
+        raise BenchError("enough")
+
+    monkeypatch.setattr("gearbench.bench.design.design", design)
+    own = ["--set", 'identification.method="mesh-feedback"']
+    for more in ([], own, [*own, "--method", "lpm"]):
+        assert run_command_line(["multisine", "quick_lumped", *more]) == 2
+    assert asked == ["lpm", "mesh-feedback", "lpm"]
 
 
 def test_a_case_without_multisine_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
