@@ -33,7 +33,7 @@ class Answer:
     seed: int = 0
     number: int = 0
     places: tuple[str, ...] = ()  # of every effect, in their order
-    # By how much the held-out transmission error changes without each effect, over its noise (`making.traces`).
+    # By how much the held-out record changes without each effect, over its noise (`making.traces`).
     traces: Mapping[str, float] = field(default_factory=dict)
 
     @property

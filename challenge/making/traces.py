@@ -26,11 +26,13 @@ from gearbench.rig import Condition
 Array = NDArray[np.float64]
 
 HELD_OUT = "held-out"
+TINY = 1e-12  # in a channel's unit: of sensors without noise
 
 
 def traces_of(bench: Bench, structure: Structure, levels: Levels, without: Mapping[str, Levels]) -> dict[str, float]:
-    """For each effect the rms change of the transmission error on the held-out record (the last one, if none has that
-    name) between the levels and those `without` it, over the noise of the mean over the record's periods."""
+    """For each effect the rms change of the held-out record (the last one, if none has that name) between the levels
+    and those `without` it, over the noise of the mean over the record's periods: the largest of transmission error and
+    channels, the driver's torque among them, which replays are given."""
     if not without:
         return {}
     conditions = conditions_of(bench.nominal)
@@ -40,13 +42,16 @@ def traces_of(bench: Bench, structure: Structure, levels: Levels, without: Mappi
     silent = bench.nominal.model_copy(update={"rig": rig.model_copy(update={"sensors": sensors})})
     quiet, rng = replace(bench, nominal=silent), np.random.default_rng(0)
 
-    def error(record: xr.Dataset) -> Array:
+    def seen(record: xr.Dataset) -> dict[str, Array]:
         return _mean_period(record, condition.experiment.periods)
 
-    records = {name: error(measure(quiet, structure, one, condition, "", rng)) for name, one in without.items()}
     here = measure(quiet, structure, levels, condition, "", rng)
-    noise = max(float(error(_noise(bench, condition, here, rng)).std()), 1e-12)
-    return {name: float((one - error(here)).std()) / noise for name, one in records.items()}
+    noise = {name: max(float(values.std()), TINY) for name, values in seen(_noise(bench, condition, here, rng)).items()}
+    out = {}
+    for effect, fewer in without.items():
+        rest = seen(measure(quiet, structure, fewer, condition, "", rng))
+        out[effect] = max(float((rest[name] - values).std()) / noise[name] for name, values in seen(here).items())
+    return out
 
 
 def _noise(bench: Bench, condition: Condition, record: xr.Dataset, rng: np.random.Generator) -> xr.Dataset:
@@ -56,9 +61,9 @@ def _noise(bench: Bench, condition: Condition, record: xr.Dataset, rng: np.rando
     return make_record(noisy(still, bench.nominal.rig.sensors, rng), attributes_of(bench, condition, plan, ""))
 
 
-def _mean_period(record: xr.Dataset, periods: int) -> Array:
-    """Transmission error (N,) [m], the mean over periods."""
+def _mean_period(record: xr.Dataset, periods: int) -> dict[str, Array]:
+    """Channels and transmission error (N,), the mean over periods."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", AngleOnlyWarning)
-        error = dte_of_channels(record).values[0]
-    return np.asarray(error.reshape(periods, -1).mean(axis=0))
+        channels = {**record.data_vars, "dte": dte_of_channels(record)}
+    return {str(name): one.values[0].reshape(periods, -1).mean(axis=0) for name, one in channels.items()}
