@@ -25,6 +25,7 @@ from gearbench.lumped.nonlinear.tangent import Tangent, departures
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+Lines = NDArray[np.complex64]
 Integers = NDArray[np.int64]
 # Places (samples, n, columns) and forces (steps, columns) of `departures`, of one part of the columns after another.
 Departures = Sequence[tuple[NDArray[np.float32], NDArray[np.float32]]]
@@ -72,36 +73,38 @@ class Along:
         """The coordinate that the driver's torque acts on."""
         return W if self.model.elastic_shaft else U1
 
-    def answers(self, forces: NDArray[np.floating[Any]], on: Integers) -> dict[str, Complex]:
+    def answers(self, forces: NDArray[np.floating[Any]], on: Integers) -> dict[str, Lines]:
         """Half-spectra (columns, K), as of numpy's `rfft`, of what the channels change by, as the rig's sensors show
         it, under forces (entries, columns) [N], each added in the mesh or on a coordinate, `on` (columns,): dte [m], rb
         times angles [m], y [m], and the load's torque over the driven gear's base radius [N]."""
         parts = np.array_split(np.arange(len(on)), max(ceil(len(on) / AT_ONCE), 1))
         found = [departures(self.tangent, forces[:, one], on[one], self.substeps, self.early) for one in parts]
-        moved = {"angle_driver": self._moved(found, {U1: 1.0}), "angle_driven": self._moved(found, {U2: 1.0})}
-        for name, row in zip(("y_driver", "y_driven"), self.model.displacements, strict=True):
-            moved[name] = self._moved(found, {int(one): float(row[one]) for one in np.flatnonzero(row)})
-        moved["torque_driven"] = self._borne(found, forces, on)
+        rows = self.model.displacements
+        wanted = {U1, U2, *(int(one) for row in rows for one in np.flatnonzero(row))}
+        if self.model.rig.load.twists:
+            wanted.add(LOAD)
+        lines = {one: np.concatenate([_spectrum(places[:, one, :].T) for places, _ in found]) for one in wanted}
+        moved = {"angle_driver": lines[U1], "angle_driven": lines[U2]}
+        for name, row in zip(("y_driver", "y_driven"), rows, strict=True):
+            moved[name] = np.sum([np.float32(row[one]) * lines[int(one)] for one in np.flatnonzero(row)], axis=0)
+        moved["torque_driven"] = self._borne(found, lines, forces, on)
         sensors, frequency = self.model.rig.sensors, self._omega / (2 * np.pi)
         response = {name: shown_by(sensors, name, frequency).astype(np.complex64) for name in moved}
         seen = {name: change * response[name] for name, change in moved.items()}
         y = seen["y_driver"] - seen["y_driven"]
-        seen["dte"] = seen["angle_driver"] - seen["angle_driven"] + self.model.factor * y
+        seen["dte"] = seen["angle_driver"] - seen["angle_driven"] + np.float32(self.model.factor) * y
         return seen
 
-    def _moved(self, found: Departures, by: Mapping[int, float]) -> Complex:
-        """Half-spectra (columns, K) of coordinates, so much of each."""
-        return np.concatenate(
-            [sum(part * _spectrum(places[:, number, :].T) for number, part in by.items()) for places, _ in found]
-        )
-
-    def _borne(self, found: Departures, forces: NDArray[np.floating[Any]], on: Integers) -> Complex:
-        """Half-spectra (columns, K) of the force [N] that the load bears at its base circle."""
+    def _borne(
+        self, found: Departures, lines: Mapping[int, Lines], forces: NDArray[np.floating[Any]], on: Integers
+    ) -> Lines:
+        """Half-spectra (columns, K) of the force [N] that the load bears at its base circle, from those of the
+        coordinates."""
         if self.model.rig.load.twists:
             shaft = self.model.structure
             assert shaft is not None  # who twists has one
             stiffness = shaft.load_stiffness + 1j * self._omega * shaft.load_damping
-            reaction = stiffness.astype(np.complex64) * self._moved(found, {U2: 1.0, LOAD: -1.0})
+            reaction = stiffness.astype(np.complex64) * (lines[U2] - lines[LOAD])
         else:
             borne = -(self.tangent.mesh[U2] + self.tangent.rubbed[::2, U2]).astype(found[0][1].dtype)
             reaction = np.concatenate([self._shown((two * borne[:, None]).T) for _, two in found])
@@ -111,7 +114,7 @@ class Along:
             reaction[held] += self._shown(forces[::2, held].T)
         return reaction
 
-    def _shown(self, stepped: NDArray[np.floating[Any]]) -> Complex:
+    def _shown(self, stepped: NDArray[np.floating[Any]]) -> Lines:
         """Half-spectra (columns, K) of forces (columns, steps) as the record's sensor has them."""
         if self.instants:
             return _spectrum(stepped[:, :: self.substeps])
@@ -163,7 +166,7 @@ class Along:
         return np.asarray(k * excess + c * self.rate_of(excess))
 
 
-def _spectrum(signal: NDArray[np.floating[Any]]) -> Complex:
+def _spectrum(signal: NDArray[np.floating[Any]]) -> Lines:
     """Half-spectra (columns, K) of signals (columns, samples)."""
     return np.asarray(np.fft.rfft(np.ascontiguousarray(signal, dtype=np.float32), axis=1))
 

@@ -45,12 +45,12 @@ def traces_of(bench: Bench, structure: Structure, levels: Levels, without: Mappi
     def seen(record: xr.Dataset) -> dict[str, Array]:
         return _mean_period(record, condition.experiment.periods)
 
-    here = measure(quiet, structure, levels, condition, "", rng)
-    noise = {name: max(float(values.std()), TINY) for name, values in seen(_noise(bench, condition, here, rng)).items()}
+    record = measure(quiet, structure, levels, condition, "", rng)
+    here, noise = seen(record), seen(_noise(bench, condition, record, rng))
     out = {}
     for effect, fewer in without.items():
         rest = seen(measure(quiet, structure, fewer, condition, "", rng))
-        out[effect] = max(float((rest[name] - values).std()) / noise[name] for name, values in seen(here).items())
+        out[effect] = max(float((rest[name] - here[name]).std() / max(noise[name].std(), TINY)) for name in here)
     return out
 
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -23,6 +24,7 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Flags = NDArray[np.bool_]
 Integers = NDArray[np.int64]
+Spectra = Mapping[str, NDArray[np.complexfloating[Any, Any]]]
 Simulate = Callable[[Case, xr.Dataset], xr.Dataset]
 
 
@@ -130,7 +132,7 @@ class Simulator:
         from gearbench.bench.nonlinear.along import along
         from gearbench.bench.nonlinear.replay import steady_motion
 
-        def one(item: tuple[int, Measurement]) -> tuple[Integers, dict[str, Complex], dict[int, dict[str, Complex]]]:
+        def one(item: tuple[int, Measurement]) -> tuple[Integers, Spectra, dict[int, dict[str, Complex]]]:
             number, measured = item
             case = self.layout.case(p, measured.name)
             tangent = along(steady_motion(case, measured.record, law_of(self.layout.model.sound, case)))
@@ -146,7 +148,7 @@ class Simulator:
                 if chosen[index]:
                     self._put(out, number, np.array([index]), {name: values[None] for name, values in parts.items()})
 
-    def _put(self, out: Complex, number: int, at: Integers, spectra: dict[str, Complex]) -> None:
+    def _put(self, out: Complex, number: int, at: Integers, spectra: Spectra) -> None:
         """Add the lines of half-spectra (n, K) of what a record answers to unknowns `at` (n,), one of which may have
         several answers."""
         samples, start = self.target.measurements[number].phase.size, 0

@@ -6,12 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from shared.fake_simulator import LINES, FakeSimulator, sensitivities, target
 from shared.simulated_lines import demonstration
 
 from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
-from gearbench.diagnosis.output.fit import fit, sensitivity_of
+from gearbench.diagnosis.output.fit import Optimum, fit, sensitivity_of
 from gearbench.diagnosis.output.likely_teeth import LIKELY, gains_of, with_likely_teeth, with_small_cracks
+from gearbench.diagnosis.output.simulator import Simulator
 
 SD = np.array([0.1, 0.1, 0.1, 0.01, 0.01, 0.01, 0.0, 0.0])
 CRACKED = 7  # of the driven gear: its number among all teeth is 27
@@ -48,6 +50,19 @@ def test_gains_are_those_of_least_squares_beside_all_that_may_move() -> None:
     assert gains[1] > 10 * gains[0]
 
 
+def sound_fit(simulator: Simulator, lines: NDArray[np.complex128]) -> tuple[Simulator, Optimum]:
+    """The simulator with these lines for measured ones, and its fit without a soft tooth."""
+    unknowns = simulator.layout.unknowns
+    made = replace(simulator, target=replace(simulator.target, lines=lines), _kept={})
+    sd = unknowns.prior()
+    sd[unknowns[CRACK]] = 0.0
+    first = sensitivity_of(made, np.zeros(unknowns.size), unknowns.prior())
+    assert first is not None
+    base = fit(made, np.zeros(unknowns.size), sd, first)
+    assert base is not None
+    return made, base
+
+
 def test_the_cracked_tooth_of_a_rig_is_among_them_though_nobody_ranked_it() -> None:
     simulator = demonstration()
     unknowns, z1 = simulator.layout.unknowns, simulator.layout.model.teeth[0]
@@ -57,13 +72,7 @@ def test_the_cracked_tooth_of_a_rig_is_among_them_though_nobody_ranked_it() -> N
     p[unknowns[CRACK].start + number] = 0.3
     lines = cracked.lines(p)
     assert lines is not None
-    made = replace(simulator, target=replace(simulator.target, lines=lines), _kept={})
-    sd = unknowns.prior()
-    sd[unknowns[CRACK]] = 0.0
-    first = sensitivity_of(made, np.zeros(unknowns.size), unknowns.prior())
-    assert first is not None
-    base = fit(made, np.zeros(unknowns.size), sd, first)
-    assert base is not None
+    made, base = sound_fit(simulator, lines)
     found, again = with_likely_teeth(made, base, (3,))
     assert found.layout.teeth[0] == 3 and len(found.layout.teeth) <= LIKELY + 1
     assert found.layout.teeth[1] == number
@@ -83,21 +92,15 @@ def test_a_tooth_that_is_a_little_softer_belongs_to_the_background_as_its_record
     p[at] = 0.03
     lines = soft.lines(p)
     assert lines is not None
-    made = replace(simulator, target=replace(simulator.target, lines=lines), _kept={})
-    sd = unknowns.prior()
-    sd[unknowns[CRACK]] = 0.0
-    first = sensitivity_of(made, np.zeros(unknowns.size), unknowns.prior())
-    assert first is not None
-    base = fit(made, np.zeros(unknowns.size), sd, first)
-    assert base is not None
+    made, base = sound_fit(simulator, lines)
     teeth, again = with_likely_teeth(made, base, (3,))
     found = with_small_cracks(teeth, again)
     assert found.sd[at] == unknowns.prior()[at] and np.count_nonzero(found.sd[unknowns[CRACK]]) <= 2
     assert found.p[at] == pytest.approx(0.03, abs=0.004)
     assert found.evidence > again.evidence + 3.0
     # A rig without a softer tooth stays as it is.
-    sound = replace(simulator, target=replace(simulator.target, lines=simulator.lines(np.zeros(p.size))), _kept={})
-    whole = fit(sound, np.zeros(p.size), sd, first)
-    assert whole is not None
+    plain_lines = simulator.lines(np.zeros(p.size))
+    assert plain_lines is not None
+    sound, whole = sound_fit(simulator, plain_lines)
     plain, kept = with_likely_teeth(sound, whole, ())
     assert with_small_cracks(plain, kept) is kept
