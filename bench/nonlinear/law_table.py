@@ -49,12 +49,7 @@ def mesh_law(rig: Rig, simulation: Simulation, load_max_nm: float) -> MeshLaw:
     k(phase) that the case asks for. Raises GeometryError, ContactError, LumpedError or BenchError.
     """
     teeth = teeth_law(rig, simulation, load_max_nm)
-    return with_flanks(teeth, flank_excess(teeth, rig, simulation), rig.mesh.shared_compliance)
-
-
-def with_flanks(teeth: MeshLaw, excess: Array | None, more: float) -> MeshLaw:
-    """The `teeth_law` with the `flank_excess` of a rig, and bodies that yield `more` [m/N] than its own."""
-    return teeth if excess is None and more == 0.0 else formed(teeth, excess, more)
+    return formed(teeth, flank_excess(teeth, rig, simulation), rig.mesh.shared_compliance)
 
 
 def flank_excess(teeth: MeshLaw, rig: Rig, simulation: Simulation) -> Array | None:

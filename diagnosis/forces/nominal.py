@@ -107,7 +107,8 @@ def nominal_model(nominal: Case, load: float, mean: float) -> NominalModel:
     there.
     """
     # Solving it compiles loops on import, which not every user of this module wants.
-    from gearbench.bench.nonlinear.law_table import flank_excess, teeth_law, with_flanks
+    from gearbench.bench.nonlinear.law_table import flank_excess, teeth_law
+    from gearbench.lumped.nonlinear.forms import formed
 
     rig = nominal.rig
     sound = teeth_law(rig, nominal.simulation, load)
@@ -147,7 +148,7 @@ def nominal_model(nominal: Case, load: float, mean: float) -> NominalModel:
         error_sin=rig.mesh.error_sin,
         friction=rig.friction.coefficient,
         transition=rig.friction.transition_speed,
-        law=with_flanks(sound, flank_excess(sound, rig, nominal.simulation), rig.mesh.shared_compliance),
+        law=formed(sound, flank_excess(sound, rig, nominal.simulation), rig.mesh.shared_compliance),
         sound=sound,
         path=meshing.path,
         sd_stiffness=known.both("rig.support.{}.stiffness", [one.stiffness for one in held], "support_stiffness"),

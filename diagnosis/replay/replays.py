@@ -25,8 +25,6 @@ def law_of(sound: MeshLaw, case: Case) -> MeshLaw:
 
     law = _with_backlash(sound, max(pair(case.rig).backlash_normal, 0.0))
     excess, more = flank_excess(sound, case.rig, case.simulation), case.rig.mesh.shared_compliance
-    if excess is None and more == 0.0:
-        return law
     return _with_flanks(law, None if excess is None else excess.tobytes(), more)
 
 

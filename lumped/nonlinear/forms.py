@@ -38,6 +38,8 @@ def formed(law: MeshLaw, excess: Array | None, more: float = 0.0) -> MeshLaw:
     ones. Raises LumpedError for excess of another shape, or beyond reason, and for bodies that would push back.
     """
     if excess is None:
+        if more == 0.0:
+            return law
         excess = np.zeros(law.share.shape)
     if excess.shape != law.share.shape:
         raise LumpedError(f"the excess on a mesh law's flanks has shape {excess.shape}, not {law.share.shape}")
