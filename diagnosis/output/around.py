@@ -54,6 +54,7 @@ LINES, FEWEST = 200, 80  # of all records and of each, excited and operating, th
 # Parts of the local level below which no model is right: wide first, so that distant resonances pull.
 LEVELS = (0.1, 0.01)
 EVALUATIONS = 25
+TOLERANCE = 1e-4  # part of the misfit, about a tenth of a nat, that another step must be worth
 # Where a motion of the housing is looked for: compliances over the supports', logarithms of its frequency over theirs.
 HOUSING_FROM = (0.004, 0.012, 0.04)
 HOUSING_AT = tuple(np.linspace(-2.0, 0.8, 29))
@@ -210,7 +211,7 @@ def _fitted(
             return np.concatenate([by.T, np.diag(1.0 / sd)])
 
         fit = least_squares(misfit, values, slopes, bounds=(low, high), x_scale=sd, max_nfev=evaluations,
-                            tr_solver="lsmr")  # fmt: skip
+                            ftol=TOLERANCE, tr_solver="lsmr")  # fmt: skip
         values = fit.x
     p = whole(values)
     return _misfit(layout, lines, p), p

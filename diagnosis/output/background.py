@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
-from gearbench.diagnosis.output.beginning import Around, beginning
+from gearbench.diagnosis.output.beginning import Around, beginning, nearest
 from gearbench.diagnosis.output.fit import Optimum, fit, fit_afresh
 from gearbench.diagnosis.output.restructured import better, is_close
 from gearbench.diagnosis.output.simulator import Simulator
@@ -26,19 +26,16 @@ def background(
     around: Around | None = None,
     report: Report = lambda step: None,
 ) -> Optimum | None:
-    """The optimum without any effect, from the best of these `beginnings` (size,); `around`: the rig around its mesh,
-    as the records show it. None where no beginning is a rig."""
+    """The optimum without any effect, from the best of these `beginnings` (size,), the first of which is the nominal
+    rig; `around`: the rig around its mesh, as the records show it. None where no beginning is a rig."""
     sd = prior_of(simulator, simulator.layout.unknowns.prior())
     report("simulating: background")
-    begin = beginning(simulator, beginnings, around, sd)
-    base = fit_afresh(simulator, begin, sd, renewals=RENEWALS)
-    if base is None:
-        return None
+    nominal, begin = beginnings[0], nearest(simulator, beginnings, sd)
+    base = fit_afresh(simulator, beginning(simulator, begin, around, sd), sd, renewals=RENEWALS)
     # What the force residuals make of a rig beside a large effect can lead astray: then from the nominal one.
-    if not is_close(simulator, base):
-        other = beginning(simulator, beginnings[:1], around, sd)
-        if not np.array_equal(begin, other):
-            base = _raced(simulator, base, fit_afresh(simulator, other, sd, renewals=RENEWALS_FIRST))
+    if base is not None and begin is not nominal and not is_close(simulator, base):
+        other = beginning(simulator, nominal, around, sd)
+        base = _raced(simulator, base, fit_afresh(simulator, other, sd, renewals=RENEWALS_FIRST))
     return base
 
 

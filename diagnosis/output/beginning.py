@@ -31,18 +31,21 @@ VALLEYS, EVALUATIONS = 3, 10  # followed from the best levels, with so many simu
 COUPLED = 0.03  # cross-coupling by which a support shows how soft it is across
 
 
-def beginning(simulator: Simulator, background: Sequence[Array], around: Around | None, sd: Array) -> Array:
-    """The unknowns (size,) that come closest under the prior `sd` (size,), of those of the `background` and of what
-    `around` says."""
+def nearest(simulator: Simulator, trials: Sequence[Array], sd: Array) -> Array:
+    """The unknowns (size,) that come closest under the prior `sd` (size,), of several."""
+    return min(trials, key=lambda p: cost_of(simulator, p, sd))
+
+
+def beginning(simulator: Simulator, begin: Array, around: Around | None, sd: Array) -> Array:
+    """The unknowns (size,) that come closest under the prior `sd` (size,), of `begin` and of what `around` says."""
     unknowns = simulator.layout.unknowns
-    begin = min(background, key=lambda p: cost_of(simulator, p, sd))
     yielding = begin.copy()
     if ACROSS in unknowns.slices:
         yielding[unknowns[ACROSS]] = SOFT[2]
     seen = seen_by(around, unknowns, yielding)
     if seen is None:
         for _ in MOTIONS:
-            begin = min(housings(unknowns, begin), key=lambda p: cost_of(simulator, p, sd))
+            begin = nearest(simulator, housings(unknowns, begin), sd)
         return begin
     found = levelled(simulator, seen, begin, sd)
     return min((begin, found), key=lambda p: linear_cost(simulator, p, sd))

@@ -48,15 +48,21 @@ class Quadratic:
 
     def cost(self, step: Array) -> float:
         """Nats of the data after a step (q,)."""
-        return float(np.sum(self.target.counts * self.target.nats(self._energies(step))))
+        return self._cost(self._energies(step))
+
+    def _cost(self, energies: Array) -> float:
+        return float(np.sum(self.target.counts * self.target.nats(energies)))
 
     def _energies(self, step: Array) -> Array:
         return _summed(self.target, self.residual - step @ self.derivatives) / self.target.sizes
 
     def weights(self, step: Array) -> Array:
         """2 n / ((s^2 + C) size) (blocks,) after a step."""
+        return self._weights(self._energies(step))
+
+    def _weights(self, energies: Array) -> Array:
         target = self.target
-        return 2 * target.counts / ((target.floors + self._energies(step)) * target.sizes)
+        return 2 * target.counts / ((target.floors + energies) * target.sizes)
 
     def information(self, step: Array) -> Array:
         """Curvature (q, q) of the data's cost there."""
@@ -71,14 +77,16 @@ class Quadratic:
         low, high = (bound[self.active] - here for bound in bounds)
         step = np.clip(np.zeros(len(here)) if start is None else start, low, high)
         free = width > 0.0
-        cost, information = self._whole(step, here, width), self.information(step)
+        energies = self._energies(step)
+        cost = self._cost(energies) + _prior(step, here, width)
         for _ in range(ROUNDS):
-            weights = self.weights(step)
+            weights = self._weights(energies)
             information = np.tensordot(weights, self.squares, axes=1)
             trial = self._solved(information, weights @ self.slopes, here, width, free, (low, high))
-            value = self._whole(trial, here, width)
+            there = self._energies(trial)
+            value = self._cost(there) + _prior(trial, here, width)
             if value < cost:
-                step, gained, cost = trial, cost - value, value
+                step, energies, gained, cost = trial, there, cost - value, value
                 if gained > ENOUGH:
                     continue
             break
@@ -104,10 +112,6 @@ class Quadratic:
             free &= ~outside
         return step
 
-    def _whole(self, step: Array, here: Array, width: Array) -> float:
-        held = width > 0.0
-        return self.cost(step) + 0.5 * float((((here + step)[held] / width[held]) ** 2).sum())
-
     def evidence(self, cost: float, information: Array, sd: Array) -> float:
         """Laplace's log evidence of a cost with its prior, and the information there."""
         width = sd[self.active]
@@ -131,6 +135,12 @@ def quadratic_of(target: Target, residual: Complex, jacobian: Complex, active: N
 def real_parts(values: Complex) -> Array:
     """Real and imaginary parts (..., 2 K), line by line."""
     return np.ascontiguousarray(values).view(np.float64)
+
+
+def _prior(step: Array, here: Array, width: Array) -> float:
+    """Nats of the prior widths (q,) after a step (q,) from `here` (q,); what has no width counts nothing."""
+    held = width > 0.0
+    return 0.5 * float((((here + step)[held] / width[held]) ** 2).sum())
 
 
 def _inside(target: Target) -> list[slice]:
