@@ -42,11 +42,12 @@ U1, U2, W, LOAD = (NAMES.index(name) for name in ("u1", "u2", "w", "load"))
 @dataclass(frozen=True, eq=False)
 class Along:
     """A steady motion of `model` on the half-step grid (entries,) of one repetition: mesh phase [cycles], elastic force
-    of the mesh [N], what each pair has of it on the working flanks, force and tangent (entries, n_o), rate of the
-    deflection [m/s], and the force that the teeth would have without an exponent over the one where that changes
-    nothing. `places` (samples, n) of all coordinates [m], sampled at `sampling_rate`, and `turned` (samples,) what all
-    that turns moves by besides, as the nominal rotation departs from a steady one. `early` steps let free vibrations
-    die out. Samples of forces are those of `instants`, or hold no more than half the sampling rate.
+    of the mesh [N], negative on the back flanks, what each pair has of it on the working ones, force and tangent
+    (entries, n_o), rate of the deflection [m/s], the force that the teeth would have without an exponent over the one
+    where that changes nothing, and how many times as stiff they are for damping that grows with the force. `places`
+    (samples, n) of all coordinates [m], sampled at `sampling_rate`, and `turned` (samples,) what all that turns moves
+    by besides, as the nominal rotation departs from a steady one. `early` steps let free vibrations die out. Samples of
+    forces are those of `instants`, or hold no more than half the sampling rate.
     """
 
     model: NonLinear
@@ -55,6 +56,7 @@ class Along:
     pairs: Pressed
     rate: Array
     level: Array
+    stiffer: Array
     tangent: Tangent
     substeps: int
     early: int
@@ -160,10 +162,20 @@ class Along:
         """Time derivative (entries, columns) of periodic signals on the grid."""
         return np.asarray((np.roll(excess, -1, axis=0) - np.roll(excess, 1, axis=0)) / self.tangent.step)
 
+    @cached_property
+    def pair_stiffness(self) -> Array:
+        """Force (entries, n_o) [N/m] that each pair adds in the mesh per unit of its own excess."""
+        return self.pairs.tangent * self.stiffer[:, None]
+
     def of_excess(self, excess: Array) -> Array:
-        """Force (entries, columns) [N] that more material (entries, columns) [m] adds in the mesh."""
-        k, c = self.tangent.stiffness[:, None], self.tangent.damping[:, None]
-        return np.asarray(k * excess + c * self.rate_of(excess))
+        """Force (entries, columns) [N] that more material (entries, columns) [m] on all working flanks adds in the
+        mesh: none while the back flanks touch."""
+        added = self.tangent.stiffness[:, None] * excess + self.tangent.damping[:, None] * self.rate_of(excess)
+        return np.where(self.elastic[:, None] < 0.0, 0.0, added)
+
+    def of_back_excess(self, excess: Array) -> Array:
+        """The same of more material on all back flanks."""
+        return np.where(self.elastic[:, None] < 0.0, -self.tangent.stiffness[:, None] * excess, 0.0)
 
 
 def _spectrum(signal: NDArray[np.floating[Any]]) -> Lines:
@@ -189,7 +201,8 @@ def along(steady: Steady) -> Along:
     at = instants(model, table, turned, entries)
     fine = resampled(travel, entries)
     force, slope = pressed(model.law, at, fine)
-    closing = resampled(rates @ around.mesh, entries) + table.excess_rate[:entries]
+    # Back flanks close at the rate of the deflection alone.
+    closing = resampled(rates @ around.mesh, entries) + np.where(force < 0.0, 0.0, table.excess_rate[:entries])
 
     def force_at(phase: Array) -> Array:
         elastic, tangent = pressed(model.law, at._replace(phase=np.clip(phase, 0.0, 1.0 - 1e-12)), fine)
@@ -201,16 +214,20 @@ def along(steady: Steady) -> Along:
     level = (np.abs(force / at.gain) / model.rig.mesh.reference_force) ** (1.0 / (1.0 + model.rig.mesh.exponent))
     slope = np.maximum(slope, 0.0)
     damping = model.viscosity(slope, np.abs(force))
+    # Flanks that part faster than they spring back push no more.
+    idle = (force + damping * closing) * force <= 0.0
+    force, slope, damping, turning = (np.where(idle, 0.0, one) for one in (force, slope, damping, turning))
     # Damping that grows with the force is the stiffer for being pressed while the flanks close.
-    stiffer = 1.0 + model.rig.damping.mesh_exponent * damping * closing / np.maximum(np.abs(force), 1e-9 * force.max())
+    stiffer = 1.0 + model.rig.damping.mesh_exponent * damping * closing / np.where(idle, 1.0, force)
     decay = max(model.slowest_decay(float(steady.drive.fine.mean())), 1e-9)
     return Along(
         model=model,
         phase=stepped.phases(0, entries),
         elastic=force,
-        pairs=of_pairs(model.law, at, fine),
+        pairs=Pressed(*(np.where(idle[:, None], 0.0, one) for one in of_pairs(model.law, at, fine))),
         rate=closing,
         level=level,
+        stiffer=stiffer,
         tangent=Tangent(
             *around,
             slope * stiffer,

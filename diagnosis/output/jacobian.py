@@ -126,14 +126,17 @@ def mesh_forces(layout: Layout, p: Array, along: Along, chosen: Flags) -> tuple[
     put("offset", along.of_excess(np.ones((len(phase), 1))))
     put("profile", along.of_excess(wave))
     put(FLANKS, _of_flanks(along, numbers, layout.model.path))
+    between = np.pi - 2 * layout.meshing.working_pressure_angle
     for side, key in enumerate(RUNOUTS.values()):
         turn = 2 * np.pi * phase / (z1, z2)[side]
-        put(key, along.of_excess(np.stack([np.cos(turn), np.sin(turn)], axis=1)))
+        # Normals of working and back flanks are so much of the gear's rotation apart (`lumped.nonlinear.tables`).
+        back = turn + (between, -between)[side]
+        put(key, along.of_excess(_turning(turn)) + along.of_back_excess(_turning(back)))
     for side, key in enumerate(PITCHES.values()):
         tooth = numbers % (z1, z2)[side]
         indices = np.arange(*unknowns[key].indices(unknowns.size))
         if chosen[indices].any():
-            put(key, _by_tooth(tooth, along.pairs.tangent, (z1, z2)[side]))
+            put(key, _by_tooth(tooth, along.pair_stiffness, (z1, z2)[side]))
     soft = []
     for one in layout.teeth:
         side, number = (0, one) if one < z1 else (1, one - z1)
@@ -147,6 +150,11 @@ def mesh_forces(layout: Layout, p: Array, along: Along, chosen: Flags) -> tuple[
     return parts, np.array(at)
 
 
+def _turning(turn: Array) -> Array:
+    """Cosine and sine (entries, 2) of a gear's rotation [rad]."""
+    return np.stack([np.cos(turn), np.sin(turn)], axis=1)
+
+
 def _series_at(cosine: Sequence[float], sine: Sequence[float], phase: Array) -> Array:
     """A series in the mesh phase, of amplitudes at the orders 1, 2, .., at phases (n,) [cycles]."""
     turns = 2 * np.pi * np.arange(1, len(cosine) + 1)[:, None] * phase
@@ -157,7 +165,7 @@ def _of_flanks(along: Along, numbers: NDArray[np.int64], path: tuple[float, floa
     """Force (entries, places) [N] per unit of excess at places along the path of contact, of the pairs `numbers`
     (entries, n_o) that touch."""
     shape = on_path(along.phase[:, None] - numbers, path)
-    return np.asarray((shape * along.pairs.tangent).sum(axis=-1).T)
+    return np.asarray((shape * along.pair_stiffness).sum(axis=-1).T)
 
 
 def _by_tooth(tooth: NDArray[np.int64], stiffness: Array, count: int) -> Array:

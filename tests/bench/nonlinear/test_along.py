@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from gearbench.bench import simulate
 from gearbench.bench.nonlinear.along import Along, along
 from gearbench.bench.nonlinear.law_table import mesh_law
-from gearbench.bench.nonlinear.replay import steady_motion
+from gearbench.bench.nonlinear.replay import Steady, steady_motion
 from gearbench.cases import case_files
 from gearbench.lumped.nonlinear.coordinates import IN_MESH
 from gearbench.lumped.nonlinear.step import columns
@@ -74,6 +74,37 @@ def test_a_measured_torque_changes_by_nothing_from_beyond_half_its_rate() -> Non
     errors = [np.linalg.norm(one - two) for one, two in zip(found, wanted, strict=True)]
     assert all(error < np.linalg.norm(change) / 7 for error, change in zip(errors, wanted, strict=True))
     assert errors[1] < 0.5 * np.linalg.norm(found[0] - wanted[1])
+
+
+@pytest.mark.parametrize("gear", [None, "driver", "driven"])
+def test_more_material_pushes_where_the_back_flanks_touch_by_what_they_have_of_it(gear: str | None) -> None:
+    """Both flanks touch in turn: an error of the working flanks leaves the back ones where they are, run-out moves
+    both, each along its own normal. The motion is known between samples only, where flanks meet: a fifth."""
+    tight = ["experiment.torque_mean_nm=8", *(f"rig.{one}.thinning_um=0" for one in ("driver", "driven"))]
+    case = read_case(case_files()["gap_demo"], tight)
+    record = simulate(case)
+    law = mesh_law(case.rig, case.simulation, 200.0)
+
+    def moved(size: float) -> Steady:
+        if gear is None:
+            update = {"mesh": case.rig.mesh.model_copy(update={"error_mean": size})}
+        else:
+            run_out = {"runout": 2 * abs(size), "runout_phase": 0.0 if size > 0.0 else np.pi}
+            update = {gear: getattr(case.rig, gear).model_copy(update=run_out)}
+        return steady_motion(case.model_copy(update={"rig": case.rig.model_copy(update=update)}), record, law)
+
+    more, plain, less = moved(SMALL), moved(0.0), moved(-SMALL)
+    tangent = along(plain)
+    assert 0.3 < (tangent.elastic < 0.0).mean() < 0.5
+    force = tangent.of_excess(np.full((len(tangent.phase), 1), SMALL))
+    if gear is not None:
+        turn = 2 * np.pi * tangent.phase / getattr(case.rig, gear).teeth
+        apart = np.pi - 2 * plain.setup.meshing.working_pressure_angle
+        back = turn + (apart if gear == "driver" else -apart)
+        force = SMALL * tangent.of_excess(np.cos(turn)[:, None]) + SMALL * tangent.of_back_excess(np.cos(back)[:, None])
+    found = signals(tangent, force, IN_MESH)["dte"][0]
+    change = 0.5 * (more.setup.dte(more.outputs) - less.setup.dte(less.outputs))
+    assert np.linalg.norm(found - change) < 0.22 * np.linalg.norm(change - change.mean())
 
 
 def test_torque_on_the_shaft_does_what_ripple_does() -> None:
