@@ -39,7 +39,7 @@ class Wide:
 
     def entries(self, unknowns: Unknowns) -> NDArray[np.int64]:
         """Indices of the unknowns whose priors are wide."""
-        whole = np.arange(*unknowns[self.key].indices(unknowns.size))
+        whole = unknowns.at(self.key)
         return whole if self.at is None else whole[[self.at]]
 
     def into(self, unknowns: Unknowns, sd: Array) -> None:

@@ -79,6 +79,10 @@ class Unknowns:
     def __getitem__(self, key: str) -> slice:
         return self.slices[key]
 
+    def at(self, key: str) -> NDArray[np.int64]:
+        """Numbers (n,) of the unknowns of that key; none where there is no such group."""
+        return np.arange(self.size)[self.slices.get(key, slice(0))]
+
     def group(self, key: str) -> Group:
         """The group of that key."""
         return next(one for one in self.groups if one.key == key)

@@ -172,7 +172,7 @@ def _fitted(
 ) -> tuple[float, Array]:  # fmt: skip
     """Misfit, and `begin` (size,) with the unknowns of these keys where it is least."""
     unknowns = layout.unknowns
-    at = np.concatenate([np.arange(*unknowns[key].indices(unknowns.size)) for key in keys if key in unknowns.slices])
+    at = np.concatenate([unknowns.at(key) for key in keys])
     sd = _prior(unknowns, begin)[at]
     # Without cross-coupling nothing shows how a support yields across.
     unseen = np.zeros(unknowns.size, dtype=bool)

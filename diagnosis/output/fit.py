@@ -144,10 +144,9 @@ def _standing(unknowns: Unknowns, p: Array) -> tuple[Array, Array]:
     step shorter than that promises what it does not keep."""
     low, high = unknowns.bounds()
     for key, least in LEAST_STEP.items():
-        if key in unknowns.slices:
-            at = np.arange(*unknowns[key].indices(unknowns.size))
-            at = at[(p[at] >= 0.0) & (p[at] < least)]
-            low[at] = high[at] = p[at]
+        at = unknowns.at(key)
+        at = at[(p[at] >= 0.0) & (p[at] < least)]
+        low[at] = high[at] = p[at]
     return low, high
 
 

@@ -99,7 +99,7 @@ def mesh_forces(layout: Layout, p: Array, along: Along, chosen: Flags) -> tuple[
     at: list[int] = []
 
     def put(key: str, columns: Array) -> None:
-        indices = np.arange(*unknowns[key].indices(unknowns.size))
+        indices = unknowns.at(key)
         keep = chosen[indices]
         parts.append(columns[:, keep])
         at.extend(indices[keep])
@@ -134,7 +134,7 @@ def mesh_forces(layout: Layout, p: Array, along: Along, chosen: Flags) -> tuple[
         put(key, along.of_excess(_turning(turn)) + along.of_back_excess(_turning(back)))
     for side, key in enumerate(PITCHES.values()):
         tooth = numbers % (z1, z2)[side]
-        indices = np.arange(*unknowns[key].indices(unknowns.size))
+        indices = unknowns.at(key)
         if chosen[indices].any():
             put(key, _by_tooth(tooth, along.pair_stiffness, (z1, z2)[side]))
     soft = []
@@ -198,7 +198,7 @@ def others_of(layout: Layout, p: Array, sd: Array, chosen: Flags) -> list[Other]
     low, high = unknowns.bounds()
     out = []
     for key in AROUND:
-        for index in range(*unknowns[key].indices(unknowns.size)) if key in unknowns.slices else ():
+        for index in unknowns.at(key):
             absent = 0.0 <= p[index] < LEAST_STEP.get(key, 0.0)
             if absent or not chosen[index] or sd[index] <= 0.0:
                 continue
@@ -206,7 +206,7 @@ def others_of(layout: Layout, p: Array, sd: Array, chosen: Flags) -> list[Other]
             moved = p.copy()
             moved[index] += step if p[index] + step <= high[index] else -step
             if low[index] <= moved[index] and (other := model(moved)).like(here):
-                out.append(Other(index, float(moved[index] - p[index]), other))
+                out.append(Other(int(index), float(moved[index] - p[index]), other))
     return out
 
 

@@ -107,9 +107,7 @@ class Simulator:
         low, high = unknowns.bounds()
         unmoved = self.layout.case(p)
         for key in MOVED:
-            if key not in unknowns.slices:
-                continue
-            for index in range(*unknowns[key].indices(unknowns.size)):
+            for index in unknowns.at(key):
                 if not chosen[index] or sd[index] <= 0.0:
                     continue
                 least = LEAST_STEP.get(key, 0.0)
