@@ -57,8 +57,8 @@ class Hypothesis:
 
     `name` tells it from others of the same effect, `on` says which gears or channels it is about, `choices` out of how
     many like it it was picked. Of those that differ by a tooth's number only one for each gear is `representative` of
-    what forces can tell apart. A rare one is not named where the `usual` one like it explains the records nearly as
-    well: key of its unknowns, and how many times those of this one they are for the same transmission error.
+    what forces can tell apart. A rare one is not named where a `usual` one like it explains the records nearly as well:
+    keys of the unknowns of such, and how many times those of this one they are for the same transmission error.
     """
 
     name: str
@@ -67,7 +67,7 @@ class Hypothesis:
     on: tuple[str, ...] = ()
     choices: int = 1
     representative: bool = True
-    usual: tuple[str, float] | None = None
+    usual: tuple[tuple[str, ...], float] | None = None
     effect: Effect | None = None
 
     def entries(self, unknowns: Unknowns) -> NDArray[np.int64]:

@@ -42,13 +42,13 @@ def unknowns(model: NominalModel, conditions: Sequence[Condition]) -> tuple[Grou
 def hypotheses(model: NominalModel) -> tuple[Hypothesis, ...]:
     """One encoder of the two. To forces alone it looks like a gear's run-out, and represents nothing that they could
     tell apart; in simulation both differ by what inertias make of the latter, and gears stand out by more, as a
-    rule."""
-    return tuple(
-        Hypothesis(
-            f"encoder-runout {side}", "sensor", (Wide(key),), (side,), len(KEYS), False, (RUNOUTS[side], -ADDS[side])
-        )
-        for side, key in KEYS.items()
-    )
+    rule. Of gears with as many teeth either one may look like either encoder."""
+    alike = tuple(RUNOUTS.values()) if model.teeth[0] == model.teeth[1] else ()
+    out = []
+    for side, key in KEYS.items():
+        usual = (alike or (RUNOUTS[side],), -ADDS[side])
+        out.append(Hypothesis(f"encoder-runout {side}", "sensor", (Wide(key),), (side,), len(KEYS), False, usual))
+    return tuple(out)
 
 
 def add(rig: Rig, hypothesis: Hypothesis, fitted: Fitted) -> Added:

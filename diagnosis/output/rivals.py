@@ -29,37 +29,43 @@ def usual_of(weighed: Sequence[Weighed]) -> Weighed | None:
     if not weighed:
         return None
     best = weighed[0]
-    usual = _counterpart(best, weighed)
+    usual = next((one for one in _counterparts(best, weighed) if one.optimum is not None), None)
     if usual is None:
         return best
     needed = min(NEARLY * best.log_bayes_factor, best.log_bayes_factor - APART - _left(usual, best))
-    return usual if usual.optimum is not None and usual.log_bayes_factor > needed else best
+    return usual if usual.log_bayes_factor > needed else best
 
 
 def compared(simulator: Simulator, base: Optimum, weighed: Sequence[Weighed]) -> list[Weighed]:
-    """Those weighed beside `base`, the best first; where a rare one is ahead its usual counterpart is fitted again from
-    where that one got, with what it explains handed over."""
-    best = weighed[0] if weighed else None
-    usual = _counterpart(best, weighed) if best else None
-    if best is None or best.optimum is None or best.hypothesis.usual is None or usual is None:
-        return list(weighed)
-    unknowns, p = simulator.layout.unknowns, best.optimum.p.copy()
-    own = best.hypothesis.entries(unknowns)
-    p[usual.hypothesis.entries(unknowns)] += best.hypothesis.usual[1] * p[own]
+    """Those weighed beside `base`, the best first; where a rare one is ahead its usual counterparts are fitted again
+    from where that one got, with what it explains handed over."""
+    if not weighed:
+        return []
+    best = weighed[0]
+    usual = {id(one): _handed_over(simulator, base, best, one) for one in _counterparts(best, weighed)}
+    return sorted((usual.get(id(one), one) for one in weighed), key=lambda one: -one.log_bayes_factor)
+
+
+def _handed_over(simulator: Simulator, base: Optimum, rare: Weighed, usual: Weighed) -> Weighed:
+    """The usual one, or where it explains more its fit from where the rare one got."""
+    if rare.optimum is None or rare.hypothesis.usual is None:
+        return usual
+    unknowns, p = simulator.layout.unknowns, rare.optimum.p.copy()
+    own = rare.hypothesis.entries(unknowns)
+    p[usual.hypothesis.entries(unknowns)] += rare.hypothesis.usual[1] * p[own]
     p[own] = 0.0
     sd = usual.hypothesis.widened(unknowns, base.sd)
-    found = fit(simulator, p, sd, best.optimum.sensitivity, renewals=RENEWALS)
+    found = fit(simulator, p, sd, rare.optimum.sensitivity, renewals=RENEWALS)
     if found is None:
-        return list(weighed)
+        return usual
     factor = found.evidence - base.evidence - float(np.log(usual.hypothesis.choices))
-    better = usual if factor <= usual.log_bayes_factor else replace(usual, log_bayes_factor=factor, optimum=found)
-    return sorted((better if one is usual else one for one in weighed), key=lambda one: -one.log_bayes_factor)
+    return usual if factor <= usual.log_bayes_factor else replace(usual, log_bayes_factor=factor, optimum=found)
 
 
-def _counterpart(rare: Weighed, weighed: Sequence[Weighed]) -> Weighed | None:
-    """The usual one like a rare one, None of what is not rare."""
-    key = rare.hypothesis.usual[0] if rare.hypothesis.usual else None
-    return next((one for one in weighed if one is not rare and one.hypothesis.wide[0].key == key), None)
+def _counterparts(rare: Weighed, weighed: Sequence[Weighed]) -> list[Weighed]:
+    """The usual ones like a rare one, the best first; none of what is not rare."""
+    keys = rare.hypothesis.usual[0] if rare.hypothesis.usual else ()
+    return [one for one in weighed if one is not rare and one.hypothesis.wide[0].key in keys]
 
 
 def rivals_of(winner: Weighed, weighed: Sequence[Weighed]) -> tuple[Hypothesis, ...]:
@@ -92,7 +98,7 @@ def is_like(one: Hypothesis, entered: Hypothesis) -> bool:
     """Whether one has nothing to add to what entered: the same unknowns, or those of its rare counterpart, which would
     share between them what either explains."""
     keys = {wide.key for wide in entered.wide}
-    return is_same(one, entered) or (one.usual is not None and one.usual[0] in keys)
+    return is_same(one, entered) or (one.usual is not None and bool(keys & set(one.usual[0])))
 
 
 def _same_cause(one: Hypothesis, other: Hypothesis) -> bool:

@@ -197,9 +197,9 @@ def rivals_at(view: View, number: int, size: float, usual: bool = True) -> tuple
         if one.effect is truth.effect:
             continue
         needed = own - APART
-        if usual and one.usual is not None and one.usual[0] in keys:
+        if usual and one.usual is not None and keys & set(one.usual[0]):
             continue
-        if usual and truth.usual is not None and one.wide[0].key == truth.usual[0]:
+        if usual and truth.usual is not None and one.wide[0].key in truth.usual[0]:
             needed = min(NEARLY * own, needed)
         if evidence[other] > max(needed, limit_of(view.known.unknowns, one)):
             out.append(other)

@@ -72,7 +72,7 @@ def test_what_explains_the_records_as_well_is_a_rival_and_leaves_with_the_one_th
     assert not any(other.rivals for other in selected({7: 0.3}).entered)
     # Of the two the usual one is named, whichever explains a little more.
     for number, other in (0, 1), (1, 0):
-        rare = {number: ("crack", 1.0)}
+        rare = {number: (("crack",), 1.0)}
         listed = (FRICTION, RIPPLE, *(replace(CRACKS[one], usual=rare.get(one)) for one in range(2)))
         named = chosen(simulator, listed, [np.zeros(8)], {})
         assert named is not None and names(named) == [f"tooth-crack {other}"]
@@ -80,7 +80,7 @@ def test_what_explains_the_records_as_well_is_a_rival_and_leaves_with_the_one_th
 
 def test_a_rare_effect_gives_way_to_a_usual_one_that_explains_nearly_as_much() -> None:
     optimum = selected({3: 0.4}).best
-    rare = Weighed(replace(FRICTION, usual=("ripple", -0.5)), 100.0, optimum)
+    rare = Weighed(replace(FRICTION, usual=(("ripple",), -0.5)), 100.0, optimum)
     assert usual_of((rare, Weighed(RIPPLE, 80.0, None))) is rare
     for nats, named in (80.0, "torque-ripple"), (70.0, "friction"):
         found = usual_of((rare, Weighed(CRACKS[0], 99.0, optimum), Weighed(RIPPLE, nats, optimum)))
@@ -99,7 +99,7 @@ def test_the_usual_one_is_fitted_from_where_the_rare_one_got() -> None:
     simulator.jacobian = lambda p, sd, chosen, near=None: alike  # type: ignore[method-assign, assignment]
     found = chosen(simulator, (CRACKS[0],), [np.zeros(8)], {})
     assert found is not None and names(found) == ["tooth-crack 0"]
-    first = Weighed(replace(CRACKS[0], usual=("crack", 2.0)), 1e6, found.best)
+    first = Weighed(replace(CRACKS[0], usual=(("crack",), 2.0)), 1e6, found.best)
     one, other = compared(simulator, found.base, [first, Weighed(CRACKS[1], 2.0, None)])
     assert one.optimum is found.best and other.hypothesis.name == "tooth-crack 1"
     assert other.optimum is not None and other.optimum.p[6] == pytest.approx(0.0, abs=0.02)
