@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from math import sqrt
 from typing import Any
 
 import numpy as np
@@ -25,7 +26,7 @@ from gearbench.diagnosis.forces.steadiness import changing_parts, unsteadiness
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.intake.signals import measured_channels
 from gearbench.diagnosis.judging.chances import chances_of, sentence_of_doubt, unlikely
-from gearbench.diagnosis.judging.decided import decide_simulated, relative_size, size_needed
+from gearbench.diagnosis.judging.decided import decide_simulated, relative_size, size_needed, unexplained
 from gearbench.diagnosis.judging.drift import drift_of
 from gearbench.diagnosis.judging.judged import Judged, itself, judged_on
 from gearbench.diagnosis.judging.missing import Missing, missing_forces, nothing_missing
@@ -36,6 +37,7 @@ from gearbench.diagnosis.output.selection import WORTH, Weighed, only, with_ente
 from gearbench.diagnosis.output.simulated import Simulated, simulated
 from gearbench.diagnosis.output.structure import structure_found
 from gearbench.diagnosis.population import POPULATION
+from gearbench.diagnosis.replay.gap import Simulate, gaps
 from gearbench.diagnosis.replay.replays import replays
 from gearbench.diagnosis.verdict import Candidate, Effect, Found, Outcome, Share
 from gearbench.rig import Case
@@ -102,9 +104,12 @@ def find_cause(
         silent = missing_by_equation(problem, fit)
         common["where"] = _places(problem, result.base)
         common["audits"] = {"silent": tuple(silent), "unsteady": tuple(unsteady)}
+        decision = decide(result, silent, unsteady)
         if all(one.phase_known for one in measurements):
             common["advice"] = (PARTED,)
-        return _by_forces_alone(problem, nominal, result, decide(result, silent, unsteady), known, common)
+            plain = recalibrated(nominal, fitted(problem, result.base))
+            decision = unexplained(decision, silent, _left(nominal, plain, held_out or measurements[0], simulate))
+        return _by_forces_alone(problem, nominal, result, decision, known, common)
     report("judging")
     searched = Searched(problem, nominal, tuple(measurements), result, fit, unsteady, tuple(without))
     return _by_simulation(searched, found, held_out, known, common)
@@ -190,6 +195,20 @@ def _missing(of: Searched, found: Simulated) -> Missing:
         missing = nothing_missing()
     lines = sum(float(blocks.count.sum()) for blocks in of.problem.blocks)
     return replace(missing, silent=missing_by_equation(of.problem, of.fit) / lines)
+
+
+def _left(nominal: Case, plain: Case, judged: Measurement, simulate: Simulate) -> float:
+    """Part of the transmission error's gap that the recalibrated rig `plain` leaves in a record beyond its noise, rms
+    over rms; none where a rig cannot be simulated there."""
+    try:
+        gap = next((one for one in gaps(nominal, plain, None, judged, simulate=simulate) if one.channel == "dte"), None)
+    except ValueError:
+        return 0.0
+    if gap is None or gap.floor is None:
+        return 0.0
+    noise = gap.floor.value**2
+    left, whole = gap.recalibrated.value**2 - noise, gap.nominal.value**2 - noise
+    return sqrt(max(left, 0.0) / max(whole, noise))
 
 
 def sized(found: Simulated, limits: Limits = LIMITS) -> Simulated:

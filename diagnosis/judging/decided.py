@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.diagnosis.evidence.calibration import LIMITS, Limits
-from gearbench.diagnosis.evidence.decision import at_place, worst
+from gearbench.diagnosis.evidence.decision import Decision, at_place, worst
 from gearbench.diagnosis.evidence.search import Search
 from gearbench.diagnosis.forces.equations import PLACES
 from gearbench.diagnosis.judging.drift import Drift
@@ -179,3 +179,14 @@ def _by_force(forces: Search, named: tuple[Weighed, ...]) -> float:
         one.log_bayes_factor for one in forces.tried if one.hypothesis.effect and one.hypothesis.effect.name in names
     ]
     return max(found, default=0.0)
+
+
+def unexplained(decision: Decision, silent: Array, left: float, limits: Limits = LIMITS) -> Decision:
+    """The decision of the force residuals alone, or unknown where it names nothing and the recalibrated rig leaves the
+    greater part of the gap: `left` of it, rms over rms. Its place is that of the largest force that `silent`
+    (equations + 1,) says is missing."""
+    if decision.verdict != "none" or left <= GREATER:
+        return decision
+    place, _ = worst(silent, limits.silent)
+    because = "the greater part of the gap stays, and no simulation can follow the records to find its cause"
+    return Decision("unknown", place, None, max(decision.sign, left / GREATER), because)

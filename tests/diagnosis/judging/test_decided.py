@@ -12,12 +12,15 @@ import pytest
 from gearbench.diagnosis.effects.effect import Hypothesis, Wide
 from gearbench.diagnosis.effects.library import LIBRARY
 from gearbench.diagnosis.evidence.calibration import LIMITS
+from gearbench.diagnosis.evidence.decision import Decision
+from gearbench.diagnosis.forces.equations import PLACES
 from gearbench.diagnosis.forces.unknowns import group, unknowns_of
-from gearbench.diagnosis.judging.decided import GREATER, VISIBLE, Decided, decide_simulated
+from gearbench.diagnosis.judging.decided import GREATER, VISIBLE, Decided, decide_simulated, unexplained
 from gearbench.diagnosis.judging.drift import Drift
 from gearbench.diagnosis.judging.missing import OUTSTANDING, Missing
 from gearbench.diagnosis.output.structure import LATE
 from gearbench.diagnosis.population import POPULATION
+from gearbench.diagnosis.verdict import Outcome
 
 EFFECT = next(one for one in LIBRARY if one.name == "friction")
 FRICTION = Hypothesis("friction", "mesh", (Wide("friction"),), effect=EFFECT)
@@ -150,3 +153,20 @@ def test_a_drift_that_explains_what_changes_is_named_and_speaks_against_nothing(
     assert decided(None, unsteady=support, changing=0.01, drift=drift).verdict == "none"
     left = decided(None, unsteady=support, changing=0.2, drift=drift, left=0.9, remains=0.9)
     assert left.verdict == "unknown" and left.drift is None and "98 %" in left.because[-1]
+
+
+@pytest.mark.parametrize(
+    ("verdict", "left", "told"), [("none", 0.9, "unknown"), ("none", 0.4, "none"), ("effects", 0.9, "effects")]
+)
+def test_forces_alone_do_not_call_a_gap_nothing_whose_greater_part_stays(
+    verdict: Outcome, left: float, told: Outcome
+) -> None:
+    before = Decision(verdict, "none" if verdict == "none" else "mesh", None, 0.3, "it is so")
+    parts = (0.1, 0.2, 0.6, 0.3, 0.1)
+    silent = np.array([LIMITS.silent[place] * part for place, part in zip(PLACES, parts, strict=True)])
+    after = unexplained(before, silent, left)
+    assert after.verdict == told
+    if told == verdict:
+        assert after is before
+    else:
+        assert after.place == PLACES[2] and after.sign == pytest.approx(1.8)
