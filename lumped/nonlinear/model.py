@@ -94,6 +94,7 @@ LIMITS = (
     "back flanks are free of friction, pitch errors and cracks",
     "mesh phase is that of the steady rotation, turned on by the centres along their supports and by where the driven"
     " gear stands at rest: what it vibrates beside does not turn the mesh on",
+    "gears that run out begin and end contact where centred ones do",
 )
 ONE_DIRECTION = "the centres move along the support direction only: friction acts on rotations and tangential supports"
 
