@@ -104,12 +104,11 @@ def find_cause(
         silent = missing_by_equation(problem, fit)
         common["where"] = _places(problem, result.base)
         common["audits"] = {"silent": tuple(silent), "unsteady": tuple(unsteady)}
-        decision = decide(result, silent, unsteady)
+        decision, plain = decide(result, silent, unsteady), recalibrated(nominal, fitted(problem, result.base))
         if all(one.phase_known for one in measurements):
             common["advice"] = (PARTED,)
-            plain = recalibrated(nominal, fitted(problem, result.base))
             decision = unexplained(decision, silent, _left(nominal, plain, held_out or measurements[0], simulate))
-        return _by_forces_alone(problem, nominal, result, decision, known, common)
+        return _by_forces_alone(problem, nominal, plain, result, decision, known, common)
     report("judging")
     searched = Searched(problem, nominal, tuple(measurements), result, fit, unsteady, tuple(without))
     return _by_simulation(searched, found, held_out, known, common)
@@ -282,13 +281,14 @@ def _why(judged: Judged, kept: Sequence[Hypothesis]) -> tuple[str, ...]:
 def _by_forces_alone(
     problem: Problem,
     nominal: Case,
+    plain: Case,
     result: Search,
     decision: Decision,
     known: Calibration,
     common: dict[str, Any],
 ) -> Finding:
-    """The finding where records cannot be simulated, as they do not tell the mesh phase."""
-    plain, updated = recalibrated(nominal, fitted(problem, result.base)), None
+    """The finding where no record can be followed by simulation; `plain` is the nominal case recalibrated."""
+    updated = None
     lines = sum(float(blocks.count.sum()) for blocks in problem.blocks)
     ahead = max((one.log_bayes_factor for one in result.tried if one.hypothesis.effect), default=0.0)
     best = effect_signs(ahead, lines, decision.winner is not None, 0.0)

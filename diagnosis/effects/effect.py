@@ -74,6 +74,10 @@ class Hypothesis:
         """Indices of the unknowns whose priors are wide."""
         return np.concatenate([one.entries(unknowns) for one in self.wide])
 
+    def gives_way_to(self, other: Hypothesis) -> bool:
+        """Whether the other is a usual one like this rare one."""
+        return self.usual is not None and any(wide.key in self.usual[0] for wide in other.wide)
+
     def prior(self, unknowns: Unknowns) -> Array:
         """Prior standard deviations (size,) under this hypothesis."""
         return self.widened(unknowns, unknowns.prior())

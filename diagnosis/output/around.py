@@ -30,9 +30,8 @@ from gearbench.diagnosis.output.answering import (
     slopes_of,
     system_of,
 )
-from gearbench.diagnosis.output.fit import prior_cost
 from gearbench.diagnosis.output.layout import Layout
-from gearbench.diagnosis.output.quadratic import real_parts
+from gearbench.diagnosis.output.quadratic import prior_cost, real_parts
 from gearbench.diagnosis.output.structure import (
     ACROSS,
     CROSS,

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from gearbench.diagnosis.forces.unknowns import Unknowns
-from gearbench.diagnosis.output.fit import cost_of, prior_cost
+from gearbench.diagnosis.output.fit import cost_of
+from gearbench.diagnosis.output.quadratic import prior_cost
 from gearbench.diagnosis.output.simulator import Simulator
 from gearbench.diagnosis.output.structure import ACROSS, CROSS, MOTIONS, housings
 

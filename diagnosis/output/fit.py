@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from gearbench.diagnosis.effects.profile_error import FLANKS
 from gearbench.diagnosis.forces.unknowns import Unknowns
-from gearbench.diagnosis.output.quadratic import Quadratic, quadratic_of
+from gearbench.diagnosis.output.quadratic import Quadratic, prior_cost, quadratic_of
 from gearbench.diagnosis.output.simulator import Simulator
 from gearbench.diagnosis.output.structure import LEAST_STEP
 
@@ -117,12 +117,6 @@ def cost_of(simulator: Simulator, p: Array, sd: Array) -> float:
     if lines is None:
         return np.inf
     return simulator.target.cost(simulator.target.lines - lines) + prior_cost(p, sd)
-
-
-def prior_cost(p: Array, sd: Array) -> float:
-    """Nats of the prior; unknowns of sd 0 count nothing."""
-    held = sd > 0.0
-    return 0.5 * float(((p[held] / sd[held]) ** 2).sum())
 
 
 def _stepped(

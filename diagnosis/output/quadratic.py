@@ -78,13 +78,13 @@ class Quadratic:
         step = np.clip(np.zeros(len(here)) if start is None else start, low, high)
         free = width > 0.0
         energies = self._energies(step)
-        cost = self._cost(energies) + _prior(step, here, width)
+        cost = self._cost(energies) + prior_cost(here + step, width)
         for _ in range(ROUNDS):
             weights = self._weights(energies)
             information = np.tensordot(weights, self.squares, axes=1)
             trial = self._solved(information, weights @ self.slopes, here, width, free, (low, high))
             there = self._energies(trial)
-            value = self._cost(there) + _prior(trial, here, width)
+            value = self._cost(there) + prior_cost(here + trial, width)
             if value < cost:
                 step, energies, gained, cost = trial, there, cost - value, value
                 if gained > ENOUGH:
@@ -137,10 +137,10 @@ def real_parts(values: Complex) -> Array:
     return np.ascontiguousarray(values).view(np.float64)
 
 
-def _prior(step: Array, here: Array, width: Array) -> float:
-    """Nats of the prior widths (q,) after a step (q,) from `here` (q,); what has no width counts nothing."""
-    held = width > 0.0
-    return 0.5 * float((((here + step)[held] / width[held]) ** 2).sum())
+def prior_cost(p: Array, sd: Array) -> float:
+    """Nats of the prior `sd` (n,) of unknowns `p` (n,); those of sd 0 count nothing."""
+    held = sd > 0.0
+    return 0.5 * float(((p[held] / sd[held]) ** 2).sum())
 
 
 def _inside(target: Target) -> list[slice]:

@@ -29,7 +29,7 @@ def usual_of(weighed: Sequence[Weighed]) -> Weighed | None:
     if not weighed:
         return None
     best = weighed[0]
-    usual = next((one for one in _counterparts(best, weighed) if one.optimum is not None), None)
+    usual = next((one for one in weighed if _is_usual(one, best) and one.optimum is not None), None)
     if usual is None:
         return best
     needed = min(NEARLY * best.log_bayes_factor, best.log_bayes_factor - APART - _left(usual, best))
@@ -42,8 +42,8 @@ def compared(simulator: Simulator, base: Optimum, weighed: Sequence[Weighed]) ->
     if not weighed:
         return []
     best = weighed[0]
-    usual = {id(one): _handed_over(simulator, base, best, one) for one in _counterparts(best, weighed)}
-    return sorted((usual.get(id(one), one) for one in weighed), key=lambda one: -one.log_bayes_factor)
+    again = (_handed_over(simulator, base, best, one) if _is_usual(one, best) else one for one in weighed)
+    return sorted(again, key=lambda one: -one.log_bayes_factor)
 
 
 def _handed_over(simulator: Simulator, base: Optimum, rare: Weighed, usual: Weighed) -> Weighed:
@@ -62,10 +62,9 @@ def _handed_over(simulator: Simulator, base: Optimum, rare: Weighed, usual: Weig
     return usual if factor <= usual.log_bayes_factor else replace(usual, log_bayes_factor=factor, optimum=found)
 
 
-def _counterparts(rare: Weighed, weighed: Sequence[Weighed]) -> list[Weighed]:
-    """The usual ones like a rare one, the best first; none of what is not rare."""
-    keys = rare.hypothesis.usual[0] if rare.hypothesis.usual else ()
-    return [one for one in weighed if one is not rare and one.hypothesis.wide[0].key in keys]
+def _is_usual(one: Weighed, rare: Weighed) -> bool:
+    """Whether one is a usual counterpart of another, rare one."""
+    return one is not rare and rare.hypothesis.gives_way_to(one.hypothesis)
 
 
 def rivals_of(winner: Weighed, weighed: Sequence[Weighed]) -> tuple[Hypothesis, ...]:
@@ -97,8 +96,7 @@ def is_same(one: Hypothesis, other: Hypothesis) -> bool:
 def is_like(one: Hypothesis, entered: Hypothesis) -> bool:
     """Whether one has nothing to add to what entered: the same unknowns, or those of its rare counterpart, which would
     share between them what either explains."""
-    keys = {wide.key for wide in entered.wide}
-    return is_same(one, entered) or (one.usual is not None and bool(keys & set(one.usual[0])))
+    return is_same(one, entered) or one.gives_way_to(entered)
 
 
 def _same_cause(one: Hypothesis, other: Hypothesis) -> bool:

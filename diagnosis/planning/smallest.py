@@ -191,15 +191,15 @@ def rivals_at(view: View, number: int, size: float, usual: bool = True) -> tuple
     """Hypotheses of other effects that come within three nats of the true one of that size; where the `usual` of two
     causes is named for the other, as these are (`output.rivals`)."""
     truth, evidence = view.hypotheses[number], view.evidence(number, size)
-    own, keys = float(evidence[number]), {wide.key for wide in truth.wide}
+    own = float(evidence[number])
     out = []
     for other, one in enumerate(view.hypotheses):
         if one.effect is truth.effect:
             continue
         needed = own - APART
-        if usual and one.usual is not None and keys & set(one.usual[0]):
+        if usual and one.gives_way_to(truth):
             continue
-        if usual and truth.usual is not None and one.wide[0].key in truth.usual[0]:
+        if usual and truth.gives_way_to(one):
             needed = min(NEARLY * own, needed)
         if evidence[other] > max(needed, limit_of(view.known.unknowns, one)):
             out.append(other)

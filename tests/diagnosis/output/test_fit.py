@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from shared.fake_simulator import LINES, FakeSimulator, sensitivities, target, unknowns
 
-from gearbench.diagnosis.output.fit import Sensitivity, fit, prior_cost, refreshed, sensitivity_of
-from gearbench.diagnosis.output.quadratic import quadratic_of
+from gearbench.diagnosis.output.fit import Sensitivity, fit, refreshed, sensitivity_of
+from gearbench.diagnosis.output.quadratic import prior_cost, quadratic_of
 
 MATRIX = sensitivities()
 TRUE = np.array([0.12, -0.08, 0.05, 0.3, 0.0, 0.0, 0.0, 0.0])

@@ -8,7 +8,7 @@ import pytest
 from gearbench.cases import case_files
 from gearbench.diagnosis.effects.effect import Hypothesis
 from gearbench.diagnosis.effects.library import hypotheses
-from gearbench.diagnosis.output.fit import prior_cost
+from gearbench.diagnosis.output.quadratic import prior_cost
 from gearbench.diagnosis.output.selection import limit_of, relief
 from gearbench.diagnosis.output.simulator import Simulator
 from gearbench.diagnosis.output.target import target_of
