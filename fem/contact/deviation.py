@@ -1,4 +1,5 @@
-"""Micro-geometry and errors in the contact of a tooth pair: how they shift its gap, its place and its normal.
+"""Micro-geometry and errors in the contact of a tooth pair: how they shift its gap, its place and its normal; and where
+run-out holds the gears' geometric centres.
 
 A flank that stands proud of its involute by a(rho) closes the gap by the largest a - t^2/(2 R) over the distance t
 along the flank from the point that touches on ideal involutes, R being the relative radius of curvature there: a slope
@@ -10,7 +11,7 @@ sharp, and excess must be far smaller than the radii of curvature.
 
 from __future__ import annotations
 
-from math import acos, asin, atan2, cos, hypot, pi, sin, sqrt
+from math import asin, atan2, cos, hypot, pi, sin, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -49,6 +50,15 @@ class Flanks(NamedTuple):
     eccentricity: float
     phase: float
     largest: float
+
+
+class Centres(NamedTuple):
+    """Where the geometric centres of driver (1) and driven gear (2) are from their axes [m]."""
+
+    x1: float
+    y1: float
+    x2: float
+    y2: float
 
 
 class EdgeDeviation(NamedTuple):
@@ -204,10 +214,10 @@ def edge_deviation(
 
 @compiled
 def deviate(
-    t1: Tooth, t2: Tooth, f1: Flanks, f2: Flanks, side: int, tooth: int,
-    theta1: float, theta2: float, dx: float, dy: float, k: Contact,
-) -> Contact:  # fmt: skip
-    """The contact of a pair on real flanks, from that on ideal ones."""
+    t1: Tooth, t2: Tooth, f1: Flanks, f2: Flanks, side: int, tooth: int, dx: float, dy: float, k: Contact
+) -> Contact:
+    """The contact of a pair on real flanks, from that on ideal ones; (dx, dy) from driver's to driven gear's geometric
+    centre."""
     a = hypot(dx, dy)
     line = sqrt(a * a - (t1.rb + t2.rb) ** 2)
     shift = 0.5 * min(k.gap, 0.0)
@@ -240,13 +250,27 @@ def deviate(
     else:
         lever2 += e1 * t1.rb * sqrt(max(t2.rb**2 + t2.corner**2 - lever2**2, 0.0)) / max(xi1, LEAST_ROLL)
         lever1 += t1.rb * e1
-    # Run-out moves whole gears: a back flank, whose normal points elsewhere, feels it at another angle.
-    sign = 1.0 - 2.0 * side
-    turn = side * (pi - 2.0 * acos((t1.rb + t2.rb) / a))
-    u1, u2 = theta1 - f1.phase + turn, theta2 - f2.phase - turn
-    gap -= f1.eccentricity * cos(u1) + f2.eccentricity * cos(u2)
-    lever1 -= sign * f1.eccentricity * sin(u1)
-    lever2 += sign * f2.eccentricity * sin(u2)
-    # The direction that balances the moments about both axes.
-    psi = atan2(dy, dx) + asin(sign * (lever1 + lever2) / a)
+    # The direction that balances the moments about both centres.
+    psi = atan2(dy, dx) + asin((1.0 - 2.0 * side) * (lever1 + lever2) / a)
     return Contact(gap, k.slave, xi1, xi2, s1, s2, lever1, lever2, cos(psi), sin(psi))
+
+
+@compiled(forceinline=True)
+def centres_of(f1: Flanks, f2: Flanks, alpha: float, theta1: float, theta2: float) -> Centres:
+    """Geometric centres of gears that run out, at their rotations; alpha: working pressure angle at rest."""
+    if f1.eccentricity == 0.0 and f2.eccentricity == 0.0:
+        return Centres(0.0, 0.0, 0.0, 0.0)
+    # At the phase of the run-out a centre stands on its axis' line along the normal, towards the mate's flank.
+    one, two = 0.5 * pi - alpha + theta1 - f1.phase, -0.5 * pi - alpha - theta2 + f2.phase
+    return Centres(
+        f1.eccentricity * cos(one), f1.eccentricity * sin(one), f2.eccentricity * cos(two), f2.eccentricity * sin(two)
+    )
+
+
+@compiled(forceinline=True)
+def about_axes(k: Contact, side: int, off: Centres) -> Contact:
+    """A contact between gears about their geometric centres, about their axes."""
+    sign = 1.0 - 2.0 * side
+    lever1 = k.lever1 + sign * (off.x1 * k.ny - off.y1 * k.nx)
+    lever2 = k.lever2 - sign * (off.x2 * k.ny - off.y2 * k.nx)
+    return Contact(k.gap, k.slave, k.xi1, k.xi2, k.s1, k.s2, lever1, lever2, k.nx, k.ny)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.fem.contact.curve import Curve, Curves, edge_reach, tabulate
-from gearbench.fem.contact.deviation import Flanks, deviate, flanks_of, ideal_flanks
+from gearbench.fem.contact.deviation import Flanks, about_axes, centres_of, deviate, flanks_of, ideal_flanks
 from gearbench.fem.contact.kernel import Kernel, make_kernel
 from gearbench.fem.contact.kinematics import (
     EDGE1,
@@ -47,15 +47,16 @@ NEAR = 0.25  # of the base pitch: how far beyond the path of contact tooth pairs
 
 
 class Law(NamedTuple):
-    """Contact law: both teeth, both kernels, centre distance [m], 2/(pi E* b) [m/N], the load-approach curves, how
-    far, in roll length, the tip edges of driver and driven gear reach [m], their flanks' excess material, and how
-    much that moves a gap at most [m] (0: ideal flanks)."""
+    """Contact law: both teeth, both kernels, centre distance [m], working pressure angle, 2/(pi E* b) [m/N], the
+    load-approach curves, how far, in roll length, the tip edges of driver and driven gear reach [m], their flanks'
+    excess material, and how much that moves a gap at most [m] (0: ideal flanks)."""
 
     driver: Tooth
     driven: Tooth
     k1: Kernel
     k2: Kernel
     centre: float
+    alpha: float
     half_plane: float
     curves: Curves
     reach1: float
@@ -90,7 +91,8 @@ def make_law(
         curves = (tabulate(t1, t2, k1, k2, half_plane, a, reach1), tabulate(t2, t1, k2, k1, half_plane, a, reach2))
     f1, f2 = _deviations(meshing, gears, reach1, reach2)
     every = Curves(*curves, t1.rho_end, t2.rho_end)
-    return Law(t1, t2, k1, k2, a, half_plane, every, reach1, reach2, f1, f2, f1.largest + f2.largest, 0.0)
+    alpha, play = meshing.working_pressure_angle, f1.largest + f2.largest
+    return Law(t1, t2, k1, k2, a, alpha, half_plane, every, reach1, reach2, f1, f2, play, 0.0)
 
 
 def _deviations(meshing: Pair, gears: tuple[Gear, Gear] | None, reach1: float, reach2: float) -> tuple[Flanks, Flanks]:
@@ -141,6 +143,8 @@ def line_gap(t1: Tooth, t2: Tooth, side: int, theta1: float, theta2: float, fron
 def meet(law: Law, theta1: float, theta2: float, dx: float, dy: float, margin: float, found: Meetings) -> int:
     """Write tooth pairs on the modelled flanks whose gap is below `margin` into `found` (PAIRS,); returns how many."""
     t1, t2 = law.driver, law.driven
+    off = centres_of(law.flanks1, law.flanks2, law.alpha, theta1, theta2)
+    dx, dy = dx + off.x2 - off.x1, dy + off.y2 - off.y1
     front, n = facing(t1, t2, dx, dy), 0
     for side in range(2):
         if line_gap(t1, t2, side, theta1, theta2, front) > margin + law.play + ROUNDED:
@@ -152,7 +156,7 @@ def meet(law: Law, theta1: float, theta2: float, dx: float, dy: float, margin: f
             if not (k.gap < margin + law.play and n < PAIRS and modelled(law, k)):
                 continue
             if law.play > 0.0:
-                k = deviate(t1, t2, law.flanks1, law.flanks2, side, j, theta1, theta2, dx, dy, k)
+                k = about_axes(deviate(t1, t2, law.flanks1, law.flanks2, side, j, dx, dy, k), side, off)
             if k.gap < margin:
                 met = found[n]
                 met.side, met.tooth = side, j
@@ -174,6 +178,8 @@ def find_pairs(law: Law, theta1: float, theta2: float, dx: float, dy: float, mar
 def off_flanks(law: Law, theta1: float, theta2: float, dx: float, dy: float) -> bool:
     """Whether a tooth pair overlaps where its flanks are not modelled: beyond a tip edge's turn, or in a fillet."""
     t1, t2 = law.driver, law.driven
+    off = centres_of(law.flanks1, law.flanks2, law.alpha, theta1, theta2)
+    dx, dy = dx + off.x2 - off.x1, dy + off.y2 - off.y1
     front = facing(t1, t2, dx, dy)
     for side in range(2):
         if line_gap(t1, t2, side, theta1, theta2, front) > law.play + ROUNDED:
@@ -184,7 +190,7 @@ def off_flanks(law: Law, theta1: float, theta2: float, dx: float, dy: float) -> 
             k = seen_contact(t1, t2, side, j, theta1, theta2, at)
             if k.gap < law.play and not modelled(law, k):
                 if law.play > 0.0:
-                    k = deviate(t1, t2, law.flanks1, law.flanks2, side, j, theta1, theta2, dx, dy, k)
+                    k = deviate(t1, t2, law.flanks1, law.flanks2, side, j, dx, dy, k)
                 if k.gap < 0.0:
                     return True
     return False
