@@ -126,12 +126,8 @@ def mesh_forces(layout: Layout, p: Array, along: Along, chosen: Flags) -> tuple[
     put("offset", along.of_excess(np.ones((len(phase), 1))))
     put("profile", along.of_excess(wave))
     put(FLANKS, _of_flanks(along, numbers, layout.model.path))
-    between = np.pi - 2 * layout.meshing.working_pressure_angle
     for side, key in enumerate(RUNOUTS.values()):
-        turn = 2 * np.pi * phase / (z1, z2)[side]
-        # Normals of working and back flanks are so much of the gear's rotation apart (`lumped.nonlinear.tables`).
-        back = turn + (between, -between)[side]
-        put(key, along.of_excess(_turning(turn)) + along.of_back_excess(_turning(back)))
+        put(key, _of_runout(along, side))
     for side, key in enumerate(PITCHES.values()):
         tooth = numbers % (z1, z2)[side]
         indices = unknowns.at(key)
@@ -148,6 +144,22 @@ def mesh_forces(layout: Layout, p: Array, along: Along, chosen: Flags) -> tuple[
         parts.append(np.stack(soft, axis=1)[:, keep])
         at.extend(indices[keep])
     return parts, np.array(at)
+
+
+def _of_runout(along: Along, side: int) -> Array:
+    """Force (entries, 2) [N] per unit of the cosine and the sine of one gear's run-out: its flanks stand proud, and
+    contact begins and ends elsewhere."""
+    from gearbench.lumped.nonlinear.ends import ends_of, turnings
+
+    model = along.model
+    turn = 2 * np.pi * along.phase / (model.rig.driver, model.rig.driven)[side].teeth
+    # Normals of working and back flanks are so much of the gear's rotation apart (`lumped.nonlinear.tables`).
+    between = np.pi - 2 * model.working_pressure_angle
+    proud, back = _turning(turn), _turning(turn + (between, -between)[side])
+    leant = (1, -1)[side] * np.stack([-np.sin(turn), np.cos(turn)], axis=1)
+    per_proud, per_leant = turnings(along.phase, ends_of(model)).T
+    turned = per_proud[:, None] * proud + per_leant[:, None] * leant
+    return along.of_excess(proud) + along.of_back_excess(back) + along.tangent.turning[:, None] * turned
 
 
 def _turning(turn: Array) -> Array:

@@ -94,7 +94,8 @@ LIMITS = (
     "back flanks are free of friction, pitch errors and cracks",
     "mesh phase is that of the steady rotation, turned on by the centres along their supports and by where the driven"
     " gear stands at rest: what it vibrates beside does not turn the mesh on",
-    "gears that run out begin and end contact where centred ones do",
+    "run-out turns neither the direction of the mesh force nor its levers, and moves the ends of contact of back flanks"
+    " as those of the working ones",
 )
 ONE_DIRECTION = "the centres move along the support direction only: friction acts on rotations and tangential supports"
 
@@ -111,6 +112,7 @@ class NonLinear:
     factor: float
     masses: tuple[float, float, float, float, float]
     mesh_mass: float  # m_e [kg]
+    path: tuple[float, float]  # start and end of the path of contact behind the pitch point, in base pitches
     outer: float = 0.0
 
     @cached_property
@@ -385,6 +387,7 @@ def nonlinear_model(rig: Rig, meshing: Pair, law: MeshLaw) -> NonLinear:
         factor=cos(meshing.working_pressure_angle) if rig.support.direction == "tangential" else 1.0,
         masses=(turning[0] / r1**2, turning[1] / r2**2, rotor / r1**2 if elastic else 0.0, one.mass, two.mass),
         mesh_mass=mesh_mass_of(rig, (r1, r2), (one.inertia + rotor, two.inertia + output)),
+        path=meshing.path,
         outer=output / r2**2 if twists and rig.load.boundary != "speed" else 0.0,
     )
 

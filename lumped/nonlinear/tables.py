@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gearbench.kernels.compiled import compiled
+from gearbench.lumped.nonlinear.ends import Ends, ends_of, towards_end
 from gearbench.lumped.nonlinear.model import NonLinear
 from gearbench.lumped.nonlinear.pressing import Instants, alike
 
@@ -167,7 +168,8 @@ def tables(model: NonLinear, motion: Motion) -> Table:
     position, excess, rate, gain, ripple, back, first = np.empty((7, motion.entries + 3))
     table = Table(position, excess, rate, gain, ripple, back, first, _own(model, phase))
     teeth = rig.driver.teeth, rig.driven.teeth
-    _fill(table, phase, floor(phase[0]), law.phases, teeth, correction, _runout(model), _waves(model))
+    alike, ends = not table.own.size, ends_of(model)
+    _fill(table, phase, floor(phase[0]), law.phases, teeth, alike, correction, _runout(model), ends, _waves(model))
     rate[1:-1] = (excess[2:] - excess[:-2]) / motion.step
     pace, pull = (np.empty(0), np.empty(0)) if varied is None else varied[1:]
     return table.part(1, -1)._replace(pace=pace, pull=pull)
@@ -238,27 +240,35 @@ def _rippled(waves: Waves, phase: float) -> float:
 
 @compiled
 def _fill(
-    out: Table, phases: Array, begin: int, rows: int, teeth: tuple[int, int], correction: Correction, runout: Runout,
-    waves: Waves,
+    out: Table, phases: Array, begin: int, rows: int, teeth: tuple[int, int], alike: bool, correction: Correction,
+    runout: Runout, ends: Ends, waves: Waves,
 ) -> None:  # fmt: skip
     """Fill the table but for `excess_rate`, own, pace and pull; entry n belongs to the n-th of `phases` [cycles], whose
-    whole part begins with `begin`; rows: of the force table."""
+    whole part begins with `begin`; rows: of the force table; alike: whether all teeth are."""
     for n in range(len(out.position)):
         phase = phases[n]
         whole = floor(phase)
         cycle = phase - whole
-        turned, turned_back = 0.0, 0.0
+        turned, turned_back, leant = 0.0, 0.0, 0.0
         for i in range(2):
             if runout.cosine[i] != 0.0 or runout.sine[i] != 0.0:
                 angle = 2 * pi * phase / (teeth[0] if i == 0 else teeth[1])
                 along, across = cos(angle), sin(angle)
                 turned += runout.cosine[i] * along + runout.sine[i] * across
                 turned_back += runout.cosine_back[i] * along + runout.sine_back[i] * across
+                leant += (2 * i - 1) * (runout.cosine[i] * across - runout.sine[i] * along)
         first, second = 1.0, 0.0
         if len(correction.error.cosine) or len(correction.stiffness.cosine):
             first, second = cos(2 * pi * cycle), sin(2 * pi * cycle)
         every = correction.mean_error + _wave(correction.error, first, second) + turned
-        out.position[n] = min(cycle * rows, rows * (1.0 - 1e-16))
+        place = cycle
+        if turned != 0.0 or leant != 0.0:
+            near = towards_end(cycle, ends)
+            place += near * ends.proud * turned
+            place += (ends.leant_begin + near * (ends.leant_end - ends.leant_begin)) * leant
+            # An entry's teeth are those of its cycle: they wait at its ends for the next.
+            place = place - floor(place) if alike else max(place, 0.0)
+        out.position[n] = min(place * rows, rows * (1.0 - 1e-16))
         out.first_pair[n] = whole - begin
         out.excess[n] = every
         out.gain[n] = correction.scale * (1.0 + _wave(correction.stiffness, first, second))

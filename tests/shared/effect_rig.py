@@ -24,6 +24,7 @@ GEARS = (2.3e-4, 1.2e-3)  # inertias [kg m^2]
 MASSES = (2.0, 3.0)
 ZETA = 0.05
 FORCE = 3500.0  # T1 / rb1 [N]
+PATH = -0.8, 0.8  # of contact, in base pitches
 
 
 def make_rig(driver: dict[str, Any] | None = None, driven: dict[str, Any] | None = None, **fields: Any) -> Rig:
@@ -50,7 +51,7 @@ def make_model(rig: Rig, law: MeshLaw | None = None) -> NonLinear:
         mesh_mass = inertias[1] / squares[1]
     factor = cos(ALPHA) if rig.support.direction == "tangential" else 1.0
     outer = beyond2 / squares[1] if rig.load.boundary != "speed" else 0.0
-    return NonLinear(rig, law or hat_law(), RADII, ALPHA, factor, masses, mesh_mass, outer)
+    return NonLinear(rig, law or hat_law(), RADII, ALPHA, factor, masses, mesh_mass, PATH, outer)
 
 
 def _shaft(coupling: Coupling | None, gear: float) -> tuple[float, float, float]:

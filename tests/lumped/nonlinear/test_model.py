@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
-from math import cos, pi, sin, tanh
+from math import acos, cos, pi, sin, tanh
 from typing import Any
 
 import numpy as np
@@ -103,6 +103,23 @@ def plain_equations(rig: Rig, mesh_frequency: float, torque: Callable[[float], f
             total += gear.runout / 2 * cos(speed * t - gear.runout_phase)
         return total
 
+    def turned(t: float) -> float:
+        """How far [cycles] run-out turns the mesh on: the line of action of the displaced base circles has turned, and
+        the driver stands behind its place by what the flanks stand proud."""
+        angles = (speed1 * t - rig.driver.runout_phase, pi - speed2 * t + rig.driven.runout_phase)
+        one, two = (
+            gear.runout / 2 * np.exp(1j * (pi / 2 - ALPHA + angle))
+            for gear, angle in zip((rig.driver, rig.driven), angles, strict=True)
+        )
+        apart = sum(RADII) / cos(ALPHA) + two - one
+        tilt = float(np.angle(apart)) - acos(sum(RADII) / abs(apart)) + ALPHA
+        normal = np.exp(1j * (pi / 2 - ALPHA))
+        proud = float(((one - two) * np.conj(normal)).real)
+        begin, end = r2 * tilt / BASE_PITCH, -(proud + r1 * tilt) / BASE_PITCH
+        # Pairs begin at 0.2 and end at 0.8 of the cycle.
+        near = float(np.interp(mesh_frequency * t % 1.0, (-0.2, 0.2, 0.8, 1.2), (1.0, 0.0, 1.0, 0.0)))
+        return begin + near * (end - begin)
+
     def rates(t: float, q: Array) -> list[float]:
         u1, y1, y2, u2, w, v1, vy1, vy2, v2, vw = q
         phase = mesh_frequency * t
@@ -117,7 +134,9 @@ def plain_equations(rig: Rig, mesh_frequency: float, torque: Callable[[float], f
         levers, elastic, tangent = [0.0, 0.0, 0.0], 0.0, 0.0
         # Seen from the line of centres, which their motion turns, the driven gear turns back.
         first, tilt = int(phase), (y1 - y2) * cos(ALPHA) / sum(RADII)
-        phase = min(max(phase - r2 * tilt / BASE_PITCH, first), first + 1 - 1e-12)
+        last = first + 1 - 1e-12
+        phase = min(max(phase + turned(t), first), last)
+        phase = min(max(phase - r2 * tilt / BASE_PITCH, first), last)
         for n in range(first - 1, first + 3):
             share = float(hat(phase - n))
             k = pair_stiffness(phase, n) * gain

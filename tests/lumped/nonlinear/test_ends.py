@@ -1,0 +1,57 @@
+"""Where contact begins and ends on gears that run out, against the contact of gears whose centres are displaced."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from shared.effect_rig import ALPHA, make_model, make_rig
+
+from gearbench.fem.contact.kinematics import ON_LINE, pair_contact, teeth_of
+from gearbench.geometry import pair
+from gearbench.lumped.nonlinear.ends import ends_of, turnings
+
+ECCENTRICITY = 10e-6
+
+
+def last_on_line(meshing: object, centre: np.ndarray, low: float, high: float) -> float:
+    """Phase of the driven gear, between one on the line of action and one on a tip edge, where the pair at the pitch
+    point at phase 0 passes from one to the other as the driver touches it."""
+    one, two = teeth_of(meshing)  # type: ignore[arg-type]
+    for _ in range(50):
+        middle = 0.5 * (low + high)
+        turn = middle * one.pitch
+        for _ in range(8):
+            k = pair_contact(one, two, 0, 0, turn, middle * two.pitch, *centre)
+            turn += k.gap / one.rb
+        low, high = (middle, high) if k.slave == ON_LINE else (low, middle)
+    return low
+
+
+@pytest.mark.parametrize("side", [0, 1])
+@pytest.mark.parametrize("rotation", [0.0, 1.1, 2.3, 4.0])
+def test_ends_of_contact_are_those_of_displaced_gears(side: int, rotation: float) -> None:
+    """`rotation` beyond the phase of the run-out; first order in the eccentricity over the line of action, 1e-3."""
+    meshing = pair(make_rig())
+    assert meshing.working_pressure_angle == pytest.approx(ALPHA)
+    model = make_model(make_rig())
+    model = type(model)(**{**vars(model), "path": meshing.path})
+    alpha = meshing.working_pressure_angle
+    polar = (np.pi / 2 - alpha + rotation, -np.pi / 2 - alpha - rotation)[side]
+    off = ECCENTRICITY * np.array([np.cos(polar), np.sin(polar)])
+    still = np.array([meshing.centre_distance, 0.0])
+    found = []
+    for low, high in ((-0.3, meshing.path[0] - 0.1), (0.3, meshing.path[1] + 0.1)):
+        centred, displaced = (last_on_line(meshing, place, low, high) for place in (still, still + (2 * side - 1) * off))
+        # The mesh is turned back by as much as contact begins or ends later.
+        found.append(centred - displaced)
+    proud, leant = ECCENTRICITY * np.cos(rotation), (2 * side - 1) * ECCENTRICITY * np.sin(rotation)
+    turned = turnings(np.array(meshing.path), ends_of(model)) @ (proud, leant)
+    np.testing.assert_allclose(turned, found, atol=4e-3 * ECCENTRICITY / meshing.base_pitch)
+
+
+def test_between_the_ends_the_mesh_turns_linearly() -> None:
+    model = make_model(make_rig())
+    begin, end = model.path
+    for part in (0.0, 0.25, 0.5, 1.0):
+        here = turnings(np.array([begin + part * ((end - begin) % 1.0)]), ends_of(model))[0]
+        assert here[0] * model.law.base_pitch == pytest.approx(-part, abs=1e-12)
