@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from shared.effect_rig import ALPHA, make_model, make_rig
 
 from gearbench.fem.contact.kinematics import ON_LINE, pair_contact, teeth_of
-from gearbench.geometry import pair
+from gearbench.geometry import Pair, pair
 from gearbench.lumped.nonlinear.ends import ends_of, turnings
 
 ECCENTRICITY = 10e-6
 
 
-def last_on_line(meshing: object, centre: np.ndarray, low: float, high: float) -> float:
+def last_on_line(meshing: Pair, centre: np.ndarray, low: float, high: float) -> float:
     """Phase of the driven gear, between one on the line of action and one on a tip edge, where the pair at the pitch
     point at phase 0 passes from one to the other as the driver touches it."""
-    one, two = teeth_of(meshing)  # type: ignore[arg-type]
+    one, two = teeth_of(meshing)
     for _ in range(50):
         middle = 0.5 * (low + high)
         turn = middle * one.pitch
@@ -33,15 +35,15 @@ def test_ends_of_contact_are_those_of_displaced_gears(side: int, rotation: float
     """`rotation` beyond the phase of the run-out; first order in the eccentricity over the line of action, 1e-3."""
     meshing = pair(make_rig())
     assert meshing.working_pressure_angle == pytest.approx(ALPHA)
-    model = make_model(make_rig())
-    model = type(model)(**{**vars(model), "path": meshing.path})
+    model = replace(make_model(make_rig()), path=meshing.path)
     alpha = meshing.working_pressure_angle
     polar = (np.pi / 2 - alpha + rotation, -np.pi / 2 - alpha - rotation)[side]
     off = ECCENTRICITY * np.array([np.cos(polar), np.sin(polar)])
     still = np.array([meshing.centre_distance, 0.0])
     found = []
     for low, high in ((-0.3, meshing.path[0] - 0.1), (0.3, meshing.path[1] + 0.1)):
-        centred, displaced = (last_on_line(meshing, place, low, high) for place in (still, still + (2 * side - 1) * off))
+        places = still, still + (2 * side - 1) * off
+        centred, displaced = (last_on_line(meshing, place, low, high) for place in places)
         # The mesh is turned back by as much as contact begins or ends later.
         found.append(centred - displaced)
     proud, leant = ECCENTRICITY * np.cos(rotation), (2 * side - 1) * ECCENTRICITY * np.sin(rotation)
