@@ -158,6 +158,10 @@ class Along:
             forces[IN_MESH] = (changed / factor - 1.0) * self.tangent.damping * self.rate
         return forces
 
+    def fine(self, coordinate: int) -> Array:
+        """A coordinate [m] on the half-step grid (entries,)."""
+        return resampled(self.places[:, coordinate], len(self.phase))
+
     def rate_of(self, excess: Array) -> Array:
         """Time derivative (entries, columns) of periodic signals on the grid."""
         return np.asarray((np.roll(excess, -1, axis=0) - np.roll(excess, 1, axis=0)) / self.tangent.step)

@@ -29,6 +29,7 @@ from gearbench.diagnosis.effects.torque_ripple import ORDERS
 from gearbench.diagnosis.forces.basis import on_path, waves
 from gearbench.diagnosis.output.contrast import CONTRAST, contrast_slope
 from gearbench.diagnosis.output.layout import Layout
+from gearbench.diagnosis.output.runout import in_mesh_of_runout, on_gears_of_runout
 from gearbench.diagnosis.output.structure import GAIN, LATE, LEAST_STEP, PHASE, SEAT, STRUCTURE
 from gearbench.diagnosis.output.target import Target
 from gearbench.diagnosis.output.viscous import LOADED, damping_reference
@@ -79,7 +80,7 @@ def forces_of(
     holds the gears by `others`."""
     parts, in_mesh = mesh_forces(layout, p, along, chosen)
     drive, on_drive = drive_forces(layout, along, condition)
-    held = around_forces(along, others)
+    held = [*_leaning_forces(layout, along, chosen), *around_forces(along, others)]
     used = chosen[on_drive]
     parts += [drive[:, used], *(force[:, None] for _, _, force in held)]
     values = np.empty((len(along.phase), sum(one.shape[1] for one in parts)), np.float32)
@@ -127,7 +128,7 @@ def mesh_forces(layout: Layout, p: Array, along: Along, chosen: Flags) -> tuple[
     put("profile", along.of_excess(wave))
     put(FLANKS, _of_flanks(along, numbers, layout.model.path))
     for side, key in enumerate(RUNOUTS.values()):
-        put(key, _of_runout(along, side))
+        put(key, in_mesh_of_runout(along, side))
     for side, key in enumerate(PITCHES.values()):
         tooth = numbers % (z1, z2)[side]
         indices = unknowns.at(key)
@@ -144,27 +145,6 @@ def mesh_forces(layout: Layout, p: Array, along: Along, chosen: Flags) -> tuple[
         parts.append(np.stack(soft, axis=1)[:, keep])
         at.extend(indices[keep])
     return parts, np.array(at)
-
-
-def _of_runout(along: Along, side: int) -> Array:
-    """Force (entries, 2) [N] per unit of the cosine and the sine of one gear's run-out: its flanks stand proud, and
-    contact begins and ends elsewhere."""
-    from gearbench.lumped.nonlinear.ends import ends_of, turnings
-
-    model = along.model
-    turn = 2 * np.pi * along.phase / (model.rig.driver, model.rig.driven)[side].teeth
-    # Normals of working and back flanks are so much of the gear's rotation apart (`lumped.nonlinear.tables`).
-    between = np.pi - 2 * model.working_pressure_angle
-    proud, back = _turning(turn), _turning(turn + (between, -between)[side])
-    leant = (1, -1)[side] * np.stack([-np.sin(turn), np.cos(turn)], axis=1)
-    per_proud, per_leant = turnings(along.phase, ends_of(model)).T
-    turned = per_proud[:, None] * proud + per_leant[:, None] * leant
-    return along.of_excess(proud) + along.of_back_excess(back) + along.tangent.turning[:, None] * turned
-
-
-def _turning(turn: Array) -> Array:
-    """Cosine and sine (entries, 2) of a gear's rotation [rad]."""
-    return np.stack([np.cos(turn), np.sin(turn)], axis=1)
 
 
 def _series_at(cosine: Sequence[float], sine: Sequence[float], phase: Array) -> Array:
@@ -186,6 +166,16 @@ def _by_tooth(tooth: NDArray[np.int64], stiffness: Array, count: int) -> Array:
     rows = np.arange(len(tooth))
     for column in range(tooth.shape[1]):
         out[rows, tooth[:, column]] += stiffness[:, column]
+    return out
+
+
+def _leaning_forces(layout: Layout, along: Along, chosen: Flags) -> list[tuple[int, int, Array]]:
+    """Those of chosen run-outs on the gears, as `around_forces`."""
+    out = []
+    for side, key in enumerate(RUNOUTS.values()):
+        indices = layout.unknowns.at(key)
+        for on, force in on_gears_of_runout(along, side).items() if chosen[indices].any() else ():
+            out += [(int(one), on, force[:, part]) for part, one in enumerate(indices) if chosen[one]]
     return out
 
 

@@ -22,6 +22,7 @@ class Constants(NamedTuple):
     shaft_stiffness: float  # S [N/m]
     shaft_damping: float  # D [N s/m]
     factor: float  # g
+    slide: float  # sin(a), a being the angle from the supports' direction to the line of action
     stiffness1: float  # [N/m]
     stiffness2: float
     damping1: float  # [N s/m]

@@ -14,7 +14,6 @@ where pairs beside the one that ends have begun.
 
 from __future__ import annotations
 
-from math import tan
 from typing import NamedTuple
 
 import numpy as np
@@ -44,7 +43,7 @@ def ends_of(model: NonLinear) -> Ends:
     begin, end = (place % 1.0 for place in model.path)
     rb1, rb2 = model.base_radii
     pitch = model.law.base_pitch
-    line = (rb1 + rb2) * tan(model.working_pressure_angle)
+    line = model.length_of_action
     span = min(max((end - begin) % 1.0, LEAST_SPAN), 1.0 - LEAST_SPAN)
     return Ends(begin, span, -1.0 / pitch, rb2 / (line * pitch), -rb1 / (line * pitch))
 

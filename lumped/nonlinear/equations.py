@@ -48,36 +48,59 @@ class Answer(NamedTuple):
 
 
 class Felt(NamedTuple):
-    """Forces [N] of mesh, driver's coupling and torque on the driver, and friction as in `Rubbed` but as a force."""
+    """Forces [N] of the mesh, on both base circles, along and across the supports; of the driver's coupling and of the
+    torque on the driver; and friction as in `Rubbed` but as a force."""
 
     mesh: float
+    driver: float
+    driven: float
+    along: float
+    across: float
     shaft: float
     drive: float
     rubbed: Rubbed
 
 
 @compiled(fastmath=ROUNDING)
-def _seen(travel: float, e: Any, s: Any) -> float:
-    """DTE, or its rate, with the part of the centres across their supports."""
+def _travel(q: Coordinates, e: Any, at: Entry, p: Constants) -> float:
+    """What the coordinates q and e, or their rates, close the mesh by."""
+    turned = (1.0 + at.lever1) * q.u1 - (1.0 + at.lever2) * q.u2
+    travel = turned + (p.factor + at.tilt * p.slide) * (q.y1 - q.y2)
     if len(e) == 0:
         return travel
-    return travel + s.slide * (e.x1 - e.x2)
+    return travel + (p.slide - at.tilt * p.factor) * (e.x1 - e.x2)
+
+
+@compiled(fastmath=ROUNDING)
+def _felt(f: float, shaft: float, drive: float, rubbed: Rubbed, at: Entry, p: Constants) -> Felt:
+    """The forces of a mesh pressed by f; what run-out turns is known of the working flanks."""
+    part = 1.0 if f > 0.0 else 0.0
+    return Felt(
+        mesh=f,
+        driver=f * (1.0 + part * at.lever1),
+        driven=f * (1.0 + part * at.lever2),
+        along=f * (p.factor + part * at.tilt * p.slide),
+        across=f * (p.slide - part * at.tilt * p.factor),
+        shaft=shaft,
+        drive=drive,
+        rubbed=rubbed,
+    )
 
 
 @compiled(fastmath=ROUNDING)
 def _plain(q: Coordinates, v: Coordinates, felt: Felt, force: float, p: Constants, free: float) -> Answer:
     """The answer of a rig without more structure."""
-    f, pull, pull2 = felt.mesh, felt.rubbed.driver, felt.rubbed.driven
-    load = free * (force - pull) + (1.0 - free) * f + pull2
-    across = p.factor * f + felt.rubbed.along
+    push, pull, pull2 = felt.driver, felt.rubbed.driver, felt.rubbed.driven
+    load = free * (force - pull - push) + felt.driven + pull2
+    across = felt.along + felt.rubbed.along
     acceleration = Coordinates(
-        u1=p.inverse_u1 * (p.rigid * felt.drive + felt.shaft - f - pull),
+        u1=p.inverse_u1 * (p.rigid * felt.drive + felt.shaft - push - pull),
         y1=p.inverse_y1 * (-across - p.damping1 * v.y1 - spring(q.y1, p.stiffness1, p.exponent1, p.reference1)),
         y2=p.inverse_y2 * (across - p.damping2 * v.y2 - spring(q.y2, p.stiffness2, p.exponent2, p.reference2)),
-        u2=p.inverse_u2 * (f + pull2 - load),
+        u2=p.inverse_u2 * (felt.driven + pull2 - load),
         w=p.inverse_w * (felt.drive - felt.shaft),
     )
-    return Answer(acceleration, (), f, load, felt.drive)
+    return Answer(acceleration, (), felt.mesh, load, felt.drive)
 
 
 @compiled(fastmath=ROUNDING)
@@ -86,11 +109,11 @@ def _structured(
     s: Structure,
 ) -> Answer:  # fmt: skip
     """The answer of a rig with structure; e, r: its further coordinates and their rates."""
-    f, rubbed = felt.mesh, felt.rubbed
+    taken, given = felt.driver + felt.rubbed.driver, felt.driven + felt.rubbed.driven
     twist = s.load_stiffness * (q.u2 - e.load) + s.load_damping * (v.u2 - r.load)
-    reaction = twist + s.rigid_load * (f + rubbed.driven)
-    load = s.held * reaction + s.follow * force + s.constant * mean + s.balance * (rubbed.driven - rubbed.driver)
-    along, across = p.factor * f + rubbed.along, s.slide * f - rubbed.across
+    reaction = twist + s.rigid_load * given
+    load = s.held * reaction + s.follow * force + s.constant * mean + s.balance * (given - taken)
+    along, across = felt.along + felt.rubbed.along, felt.across - felt.rubbed.across
     h, k = s.housing, s.rocking
     y1 = q.y1 - h.share1 * e.housing - k.share1 * e.rocking
     y2 = q.y2 - h.share2 * e.housing - k.share2 * e.rocking
@@ -107,10 +130,10 @@ def _structured(
     onto_h = h.share1 * one + h.share2 * two + h.across1 * side1 + h.across2 * side2
     onto_k = k.share1 * one + k.share2 * two + k.across1 * side1 + k.across2 * side2
     acceleration = Coordinates(
-        u1=p.inverse_u1 * (p.rigid * felt.drive + felt.shaft - f - rubbed.driver),
+        u1=p.inverse_u1 * (p.rigid * felt.drive + felt.shaft - taken),
         y1=p.inverse_y1 * (-along - one),
         y2=p.inverse_y2 * (along - two),
-        u2=p.inverse_u2 * (f + rubbed.driven - twist - s.rigid_load * load),
+        u2=p.inverse_u2 * (given - twist - s.rigid_load * load),
         w=p.inverse_w * (felt.drive - felt.shaft),
     )
     further = Further(
@@ -120,7 +143,7 @@ def _structured(
         x1=s.inverse_x1 * (-across - side1),
         x2=s.inverse_x2 * (across - side2),
     )
-    return Answer(acceleration, further, f, load, felt.shaft + p.rigid * (f + rubbed.driver))
+    return Answer(acceleration, further, felt.mesh, load, felt.shaft + p.rigid * taken)
 
 
 @compiled(fastmath=ROUNDING)
@@ -179,15 +202,9 @@ def _accelerated(found: Answer, pull: float, of: Equations) -> Answer:
 def answer(q: Coordinates, v: Coordinates, e: Any, r: Any, at: Entry, force: float, of: Equations) -> Answer:
     """Accelerations and forces at the coordinates q and e and their rates v and r, under T1/rb1 = force [N]."""
     p, s = of.constants, of.structure
-    closed = p.factor * (q.y1 - q.y2)
-    travel = _seen(q.u1 - q.u2 + closed, e, s)
-    at = turned_on(at, -p.leaning * closed, of.secant.shape[0] - 1, of.apart)
-    f = mesh(travel, _seen(v.u1 - v.u2 + p.factor * (v.y1 - v.y2), r, s), at, of.secant, of.apart, p)
-    felt = Felt(
-        mesh=f,
-        shaft=p.shaft_stiffness * (q.w - q.u1) + p.shaft_damping * (v.w - v.u1),
-        drive=force + at.ripple,
-        rubbed=_rubbed(f, v, r, at, p, of.rubbing),
-    )
+    at = turned_on(at, -p.leaning * p.factor * (q.y1 - q.y2), of.secant.shape[0] - 1, of.apart)
+    f = mesh(_travel(q, e, at, p), _travel(v, r, at, p), at, of.secant, of.apart, p)
+    shaft = p.shaft_stiffness * (q.w - q.u1) + p.shaft_damping * (v.w - v.u1)
+    felt = _felt(f, shaft, force + at.ripple, _rubbed(f, v, r, at, p, of.rubbing), at, p)
     found = _answered(q, v, e, r, felt, force, of.mean, p, s, of.free)
     return found if at.pull == 0.0 else _accelerated(found, at.pull, of)

@@ -38,6 +38,9 @@ class Entry(NamedTuple):
     back: float
     pace: float
     pull: float
+    lever1: float
+    lever2: float
+    tilt: float
 
 
 class Rubbed(NamedTuple):
@@ -60,7 +63,7 @@ def apart_of(table: Table, law: MeshLaw) -> Apart | tuple[()]:
 @compiled(fastmath=ROUNDING)
 def entry(table: Table, i: int) -> Entry:
     """Entry i of the table."""
-    changes = len(table.pull) > 0
+    changes, runs_out = len(table.pull) > 0, len(table.levers) > 0
     return Entry(
         first_pair=int(table.first_pair[i]),
         position=table.position[i],
@@ -71,6 +74,9 @@ def entry(table: Table, i: int) -> Entry:
         back=table.back[i],
         pace=table.pace[i] if changes else 1.0,
         pull=table.pull[i] if changes else 0.0,
+        lever1=table.levers[i, 0] if runs_out else 0.0,
+        lever2=table.levers[i, 1] if runs_out else 0.0,
+        tilt=table.levers[i, 2] if runs_out else 0.0,
     )
 
 
@@ -82,7 +88,10 @@ def turned_on(at: Entry, rows: float, count: int, apart: Any) -> Entry:
         position -= count * floor(position / count)
     # An entry's teeth are those of its cycle: they wait at its ends for the next.
     position = min(max(position, 0.0), last)
-    return Entry(at.first_pair, position, at.excess, at.excess_rate, at.gain, at.ripple, at.back, at.pace, at.pull)
+    return Entry(
+        at.first_pair, position, at.excess, at.excess_rate, at.gain, at.ripple, at.back, at.pace, at.pull, at.lever1,
+        at.lever2, at.tilt,
+    )  # fmt: skip
 
 
 @compiled(fastmath=ROUNDING)

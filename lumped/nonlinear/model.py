@@ -8,6 +8,9 @@ that the linear model leaves out.
     delta = u1 - u2 + g (y1 - y2) + a,   f = max(0, G F(delta, phase) + 2 zeta sqrt(G dF/d delta m_e) delta')
     F = sum over pairs of F_n(delta + e_n, phase) / (1 + b_n)
 
+Run-out makes the levers of f rb_i (1 + l_i) and turns it, and the line of action, by phi: M_1 u1'' has (1 + l_1) f, M_2
+u2'' (1 + l_2) f, g is cos(a) + phi sin(a), and delta has the same factors (`tables`).
+
 u_i = rb_i (theta_i - Omega_i t); g, signs and zeros as in `lumped.model`. a is the excess material common to all pairs:
 run-out of both gears, errors over the mesh cycle. F_n is what pair n carries of the force of sound teeth at a
 deflection, e_n its own excess, the pitch errors of its two teeth, and b_n what a crack adds to its compliance: (bending
@@ -46,7 +49,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from math import cos, inf, pi, sin
+from math import cos, inf, pi, sin, tan
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,6 +60,7 @@ from gearbench.lumped.linear.model import equivalent_mass
 from gearbench.lumped.nonlinear.constants import Constants, Rubbing
 from gearbench.lumped.nonlinear.coordinates import Coordinates, Further, leaning_of
 from gearbench.lumped.nonlinear.law import MeshLaw
+from gearbench.lumped.nonlinear.limits import limits_of
 from gearbench.lumped.nonlinear.pressing import Instants, alike, travel_under
 from gearbench.lumped.nonlinear.rest import (
     Around,
@@ -87,17 +91,6 @@ RESOLVED = 0.125
 UNSEEN = 0.5
 
 REST_PHASES = 16  # over which the place at rest is averaged
-
-LIMITS = (
-    "forces of unbalance, also of eccentric gears, are left out",
-    "a pair deflects as between sound neighbours: what the neighbours of an uneven tooth carry does not bend it",
-    "back flanks are free of friction, pitch errors and cracks",
-    "mesh phase is that of the steady rotation, turned on by the centres along their supports and by where the driven"
-    " gear stands at rest: what it vibrates beside does not turn the mesh on",
-    "run-out turns neither the direction of the mesh force nor its levers, and moves the ends of contact of back flanks"
-    " as those of the working ones",
-)
-ONE_DIRECTION = "the centres move along the support direction only: friction acts on rotations and tangential supports"
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,6 +125,11 @@ class NonLinear:
         return sin(self.working_pressure_angle) if self.rig.support.direction == "tangential" else 0.0
 
     @property
+    def length_of_action(self) -> float:
+        """Length [m] of the line of action between the base circles."""
+        return sum(self.base_radii) * tan(self.working_pressure_angle)
+
+    @property
     def leaning(self) -> float:
         """How far [cycles] the mesh turns back where a motion of the centres along their supports closes it by 1 m."""
         return leaning_of(self.base_radii, self.rig.support.direction == "tangential") / self.teeth.base_pitch
@@ -156,13 +154,12 @@ class NonLinear:
     @property
     def structure(self) -> Structure | None:
         """What the integrator needs beyond `constants`; None for a rig without more structure."""
-        return structure_of(self.rig, self.masses[3:], self.outer, self.base_radii[1], self.slide)
+        return structure_of(self.rig, self.masses[3:], self.outer, self.base_radii[1])
 
     @property
     def limits(self) -> tuple[str, ...]:
         """What the model leaves out of this rig, in words."""
-        across = self.rig.support.driver.across is not None and self.rig.support.driven.across is not None
-        return LIMITS if across else (LIMITS[0], ONE_DIRECTION, *LIMITS[1:])
+        return limits_of(self.rig)
 
     @property
     def size(self) -> int:
@@ -221,6 +218,7 @@ class NonLinear:
             shaft_stiffness=stiffness,
             shaft_damping=damping,
             factor=self.factor,
+            slide=self.slide,
             stiffness1=held1.stiffness,
             stiffness2=held2.stiffness,
             damping1=held1.damping,

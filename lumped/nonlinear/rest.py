@@ -121,7 +121,7 @@ def inverse_masses(c: Constants, s: Structure | None) -> Array:
 def mesh_direction(c: Constants, s: Structure | None) -> Array:
     """What each coordinate contributes to the DTE; (5,) or (10,)."""
     plain = [1.0, c.factor, -c.factor, -1.0, 0.0]
-    return np.array(plain if s is None else [*plain, 0.0, 0.0, 0.0, s.slide, -s.slide])
+    return np.array(plain if s is None else [*plain, 0.0, 0.0, 0.0, c.slide, -c.slide])
 
 
 def support_directions(s: Structure | None) -> tuple[Array, Array]:

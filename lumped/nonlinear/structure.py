@@ -48,7 +48,6 @@ class Structure(NamedTuple):
     balance: float  # part of the friction that it makes up for
     housing: Moves
     rocking: Moves
-    slide: float  # sin(a)
     inverse_x1: float
     inverse_x2: float
     stiffness1: float  # k_x [N/m]
@@ -70,11 +69,9 @@ def has_structure(rig: Rig) -> bool:
     return rig.support.move_across or rig.housing is not None or rig.load.twists or other
 
 
-def structure_of(
-    rig: Rig, masses: tuple[float, float], outer: float, base_radius: float, slide: float
-) -> Structure | None:
+def structure_of(rig: Rig, masses: tuple[float, float], outer: float, base_radius: float) -> Structure | None:
     """The structure of a rig, None where it has none. masses (m_1, m_2) of the gears and `outer` M_l [kg]; base_radius
-    of the driven gear [m]; slide: sin(a)."""
+    of the driven gear [m]."""
     if not has_structure(rig):
         return None
     shaft, housing, square = rig.load.coupling, rig.housing, base_radius**2
@@ -91,7 +88,6 @@ def structure_of(
         balance=1.0 if rig.turns_freely else 0.0,
         housing=_moves(housing),
         rocking=_moves(housing.rocking if housing is not None else None),
-        slide=slide,
         inverse_x1=1.0 / masses[0] if one is not None else 0.0,
         inverse_x2=1.0 / masses[1] if two is not None else 0.0,
         stiffness1=one.stiffness if one is not None else 0.0,

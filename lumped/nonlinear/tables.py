@@ -23,7 +23,8 @@ Integers = NDArray[np.int64]
 
 
 class Table(NamedTuple):
-    """What the mesh is at each half step; arrays (entries + 1,), pace and pull empty where the speed is constant.
+    """What the mesh is at each half step; arrays (entries + 1,), pace and pull empty where the speed is constant, and
+    levers where no gear runs out.
 
     excess, its rate and gain are common to all pairs. Pair o of an entry has row first_pair + o of `own` besides, which
     is empty where all teeth are alike.
@@ -39,6 +40,9 @@ class Table(NamedTuple):
     own: Array  # (pairs, 3): excess [m], growths of the bending compliance of both teeth
     pace: Array = np.empty(0)  # speed of the nominal rotation over the one that friction is told of
     pull: Array = np.empty(0)  # acceleration of the nominal rotation along the line of action [m/s^2]
+    # (entries + 1, 3): by what part both gears' levers about their axes are longer than their base radii, and by what
+    # angle [rad] the line of action has turned against the driven gear.
+    levers: Array = np.empty((0, 3))
 
     def part(self, first: int | None, end: int | None = None) -> Table:
         """The entries from `first` to before `end`."""
@@ -54,12 +58,14 @@ class Series(NamedTuple):
 
 class Runout(NamedTuple):
     """Of driver and driven gear (2,): what working and back flanks stand proud by [m], as factors of cosine and sine of
-    the gear's nominal rotation."""
+    the gear's nominal rotation, and base radii [m]; the line of action's length [m]."""
 
     cosine: Array
     sine: Array
     cosine_back: Array
     sine_back: Array
+    radius: Array
+    line: float
 
 
 class Waves(NamedTuple):
@@ -166,7 +172,9 @@ def tables(model: NonLinear, motion: Motion) -> Table:
         phase = varied.phase
     # One entry before and one behind, for the rate of the excess.
     position, excess, rate, gain, ripple, back, first = np.empty((7, motion.entries + 3))
-    table = Table(position, excess, rate, gain, ripple, back, first, _own(model, phase))
+    runs_out = any(gear.runout for gear in (rig.driver, rig.driven))
+    levers = np.empty((len(phase) if runs_out else 0, 3))
+    table = Table(position, excess, rate, gain, ripple, back, first, _own(model, phase), levers=levers)
     teeth = rig.driver.teeth, rig.driven.teeth
     alike, ends = not table.own.size, ends_of(model)
     _fill(table, phase, floor(phase[0]), law.phases, teeth, alike, correction, _runout(model), ends, _waves(model))
@@ -192,7 +200,8 @@ def _runout(model: NonLinear) -> Runout:
     size = np.array([gear.runout / 2 for gear in gears])
     phase = np.array([gear.runout_phase for gear in gears])
     back = phase - np.array([turn, -turn])
-    return Runout(size * np.cos(phase), size * np.sin(phase), size * np.cos(back), size * np.sin(back))
+    parts = size * np.cos(phase), size * np.sin(phase), size * np.cos(back), size * np.sin(back)
+    return Runout(*parts, np.array(model.base_radii), model.length_of_action)
 
 
 def _waves(model: NonLinear) -> Waves:
@@ -244,7 +253,8 @@ def _fill(
     runout: Runout, ends: Ends, waves: Waves,
 ) -> None:  # fmt: skip
     """Fill the table but for `excess_rate`, own, pace and pull; entry n belongs to the n-th of `phases` [cycles], whose
-    whole part begins with `begin`; rows: of the force table; alike: whether all teeth are."""
+    whole part begins with `begin`; rows: of the force table; alike: whether all teeth are. A lever about a gear's
+    axis is the base radius and how far its centre stands aside of the normal through that axis."""
     for n in range(len(out.position)):
         phase = phases[n]
         whole = floor(phase)
@@ -256,7 +266,13 @@ def _fill(
                 along, across = cos(angle), sin(angle)
                 turned += runout.cosine[i] * along + runout.sine[i] * across
                 turned_back += runout.cosine_back[i] * along + runout.sine_back[i] * across
-                leant += (2 * i - 1) * (runout.cosine[i] * across - runout.sine[i] * along)
+                aside = (2 * i - 1) * (runout.cosine[i] * across - runout.sine[i] * along)
+                leant += aside
+                out.levers[n, i] = aside / runout.radius[i]
+            elif len(out.levers) > 0:
+                out.levers[n, i] = 0.0
+        if len(out.levers) > 0:
+            out.levers[n, 2] = leant / runout.line
         first, second = 1.0, 0.0
         if len(correction.error.cosine) or len(correction.stiffness.cosine):
             first, second = cos(2 * pi * cycle), sin(2 * pi * cycle)

@@ -1,0 +1,69 @@
+"""Forces that stand for a gear's run-out along a motion: its flanks stand proud, contact begins and ends elsewhere, and
+the mesh force turns and has other levers (`lumped.nonlinear.ends`, `lumped.nonlinear.equations`)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.lumped.nonlinear.coordinates import NAMES
+
+if TYPE_CHECKING:
+    from gearbench.bench.nonlinear.along import Along
+
+Array = NDArray[np.float64]
+
+U1, Y1, Y2, U2, X1, X2 = (NAMES.index(name) for name in ("u1", "y1", "y2", "u2", "x1", "x2"))
+
+
+def in_mesh_of_runout(along: Along, side: int) -> Array:
+    """Force (entries, 2) [N] in the mesh per unit of the cosine and the sine of the run-out of a gear (0: driver)."""
+    # Its loops are compiled on import, which not every user of this module wants.
+    from gearbench.lumped.nonlinear.ends import ends_of, turnings
+
+    turn = _turn(along, side)
+    # Normals of working and back flanks are so much of the gear's rotation apart (`lumped.nonlinear.tables`).
+    between = np.pi - 2 * along.model.working_pressure_angle
+    proud, back = _proud(turn), _proud(turn + (between, -between)[side])
+    per_proud, per_leant = turnings(along.phase, ends_of(along.model)).T
+    turned = per_proud[:, None] * proud + per_leant[:, None] * _leant(turn, side)
+    closed = sum(change * along.fine(on)[:, None] for on, change in _directions(along, side).items())
+    return along.of_excess(proud + closed) + along.of_back_excess(back) + along.tangent.turning[:, None] * turned
+
+
+def on_gears_of_runout(along: Along, side: int) -> dict[int, Array]:
+    """Force (entries, 2) [N] on coordinates per unit of both: that of the mesh pushes along another direction."""
+    pressed = np.maximum(along.elastic + along.tangent.damping * along.rate, 0.0)
+    pressed[along.elastic < 0.0] = 0.0
+    return {on: -pressed[:, None] * change for on, change in _directions(along, side).items()}
+
+
+def _directions(along: Along, side: int) -> dict[int, Array]:
+    """What coordinates that the run-out acts on contribute more to the deflection (entries, 2) per unit of both."""
+    model, leant = along.model, _leant(_turn(along, side), side)
+    tilt = leant / model.length_of_action
+    out = {(U1, U2)[side]: (1.0, -1.0)[side] * leant / model.base_radii[side]}
+    if model.slide:
+        out |= {Y1: model.slide * tilt, Y2: -model.slide * tilt}
+    if model.rig.support.move_across:
+        out |= {X1: -model.factor * tilt, X2: model.factor * tilt}
+    return out
+
+
+def _turn(along: Along, side: int) -> Array:
+    """Rotation (entries,) [rad] of a gear."""
+    rig = along.model.rig
+    return 2 * np.pi * along.phase / (rig.driver, rig.driven)[side].teeth
+
+
+def _proud(turn: Array) -> Array:
+    """Cosine and sine (entries, 2) of a gear's rotation [rad]."""
+    return np.stack([np.cos(turn), np.sin(turn)], axis=1)
+
+
+def _leant(turn: Array, side: int) -> Array:
+    """How far (entries, 2) the gear's centre stands aside of the normal through its axis, against the driver's
+    rotation, per unit of both."""
+    return (1, -1)[side] * np.stack([-np.sin(turn), np.cos(turn)], axis=1)
