@@ -1,14 +1,17 @@
 """Equations of motion of the truth rig and their fourth-order Runge-Kutta integration, compiled.
 
-dte = rb1 theta1 - rb2 theta2 + (y1 - y2) cos a + (x1 - x2) sin a; docs/physics.md, "Axes, signs, zeros". Friction acts
-across the line of action against the sliding velocity rho1 theta1' - rho2 theta2' + (y1' - y2') sin a - (x1' - x2')
-cos a of each pair. The back flanks touch along the mirrored line of action once the backlash is used up; they carry
-no friction, and their teeth no errors but eccentricity and profile.
+dte = rb1 theta1 - rb2 theta2 - (rb1 + rb2) phi - (l - l0), to first order rb1 theta1 - rb2 theta2 + (y1 - y2) cos a +
+(x1 - x2) sin a; docs/physics.md, "Axes, signs, zeros". The common tangent of the base circles, wherever the geometric
+centres are, has the length l and has turned by phi (`_line`). A pair begins where the driven gear's tip meets it and
+ends where the driver's does. Friction acts across the line of action against the sliding velocity rho1 theta1' - rho2
+theta2' + (y1' - y2') sin a - (x1' - x2') cos a of each pair. The back flanks touch along the mirrored line of action
+once the backlash is used up; they carry no friction, and their teeth no errors but eccentricity and profile.
 """
 
 from __future__ import annotations
 
-from math import cos, floor, pi, sin, sqrt, tanh
+from math import atan2, cos, floor, pi, sin, sqrt, tanh
+from typing import NamedTuple
 
 import numpy as np
 
@@ -101,6 +104,28 @@ def _pair_force(
     return max(elastic + damping * tangent * closing, 0.0)
 
 
+class _Line(NamedTuple):
+    """The line of action: how far its centres' motion has closed the flanks [m], its normal force's direction on the
+    driven gear, its length [m] and by what angle it has turned."""
+
+    closed: float
+    nx: float
+    ny: float
+    length: float
+    turned: float
+
+
+@_compiled
+def _line(c: Record, apart_x: float, apart_y: float) -> _Line:
+    """That of gears whose geometric centres have come closer by these parts [m], driver's less driven gear's."""
+    both, alpha = c.base_driver + c.base_driven, atan2(c.sine, c.cosine)
+    x, y = both / c.cosine - apart_x, -apart_y
+    length = sqrt(x * x + y * y - both * both)
+    turned = atan2(y, x) - atan2(length, both) + alpha
+    closed = c.line_of_action - length - both * turned
+    return _Line(closed, sin(alpha - turned), cos(alpha - turned), length, turned)
+
+
 @_compiled
 def _sliding(c: Record, speed: float) -> float:
     """Regularised sign of a sliding speed."""
@@ -111,20 +136,22 @@ def _sliding(c: Record, speed: float) -> float:
 
 @_compiled
 def _working(
-    c: Record, mesh: Mesh, s: Array, turn: float, speed1: float, speed2: float, dte: float, rate: float, scale: float
-) -> tuple[float, float, float, float]:
-    """Of all pairs on the working flanks: normal force, friction, and friction's moments on both gears."""
-    last = c.teeth.first + c.teeth.pitch * (mesh.table.shape[0] - 1)
+    c: Record, mesh: Mesh, s: Array, turn1: float, turn2: float, at: _Line, speed1: float, speed2: float, dte: float,
+    rate: float, scale: float,
+) -> tuple[float, float, float, float]:  # fmt: skip
+    """Of all pairs on the working flanks: normal force, friction, and friction's moments on both gears. turn1, turn2:
+    by what part of a pitch each gear has turned beyond the line of action, where tooth 0 passes the pitch point."""
+    span = c.teeth.pitch * (mesh.table.shape[0] - 1)
     d = DEGREES
-    across = (s[d + Y_DRIVER] - s[d + Y_DRIVEN]) * c.sine - (s[d + X_DRIVER] - s[d + X_DRIVEN]) * c.cosine
+    across = (s[d + Y_DRIVER] - s[d + Y_DRIVEN]) * at.nx - (s[d + X_DRIVER] - s[d + X_DRIVEN]) * at.ny
     sweep = c.base_driver / c.base_pitch * speed1
     normal, rubbing, moment1, moment2 = 0.0, 0.0, 0.0, 0.0
-    for number in range(floor(turn - last) + 1, floor(turn - c.teeth.first) + 1):
-        v = turn - number
+    for number in range(floor(turn2 - c.teeth.first - span), floor(turn2 - c.teeth.first) + 1):
+        v = c.teeth.first + (turn2 - number - c.teeth.first) * span / (span - turn1 + turn2)
         force = _pair_force(c, mesh, number, v, sweep, dte, rate, scale)
         if force > 0.0:
-            rho1 = c.roll_pitch + v * c.base_pitch
-            rho2 = c.line_of_action - rho1
+            rho1 = c.roll_pitch + (turn1 - number) * c.base_pitch
+            rho2 = at.length - rho1
             rub = c.teeth.friction * force * _sliding(c, rho1 * speed1 - rho2 * speed2 + across)
             normal += force
             rubbing += rub
@@ -204,33 +231,34 @@ def _derivative(c: Record, mesh: Mesh, time: float, torque: float, s: Array, rat
     e1, e2 = c.eccentricity.driver, c.eccentricity.driven
     x1, y1 = e1 * cos(pole1), e1 * sin(pole1)
     x2, y2 = e2 * cos(pole2), e2 * sin(pole2)
-    # Their part in the levers: derivative of dte to each angle.
-    lever1 = c.base_driver + x1 * c.cosine - y1 * c.sine
-    lever2 = c.base_driven - x2 * c.cosine + y2 * c.sine
     u1, w1 = -y1 * speed1 + s[d + X_DRIVER], x1 * speed1 + s[d + Y_DRIVER]
     u2, w2 = y2 * speed2 + s[d + X_DRIVEN], -x2 * speed2 + s[d + Y_DRIVEN]
     apart_x, apart_y = s[X_DRIVER] + x1 - s[X_DRIVEN] - x2, s[Y_DRIVER] + y1 - s[Y_DRIVEN] - y2
     apart_u, apart_w = u1 - u2, w1 - w2
     twist = c.base_driver * s[DRIVER] - c.base_driven * s[DRIVEN]
     twist_rate = c.base_driver * s[d + DRIVER] - c.base_driven * s[d + DRIVEN]
-    dte = twist + apart_y * c.cosine + apart_x * c.sine
-    dte_rate = twist_rate + apart_w * c.cosine + apart_u * c.sine
-    # Seen from the line of centres, which leans where they move across it, the driver has turned on.
-    leaning = apart_y * c.cosine / (c.base_driver + c.base_driven)
-    turn = mesh.driver.shape[0] * (angle1 + leaning) / (2.0 * pi)
+    at = _line(c, apart_x, apart_y)
+    dte = twist + at.closed
+    dte_rate = twist_rate + apart_w * at.ny + apart_u * at.nx
+    turn1 = mesh.driver.shape[0] * (angle1 - at.turned) / (2.0 * pi)
+    turn2 = mesh.driven.shape[0] * (angle2 + at.turned) / (2.0 * pi)
     scale = 1.0 + progress * c.drift.mesh
-    force, rub, moment1, moment2 = _working(c, mesh, s, turn, speed1, speed2, dte, dte_rate, scale)
-    pull1, pull2 = force * lever1 + moment1, force * lever2 + moment2
-    fy = force * c.cosine + rub * c.sine
-    fx = force * c.sine - rub * c.cosine
-    closed = -twist - apart_y * c.cosine + apart_x * c.sine - c.teeth.backlash
+    force, rub, moment1, moment2 = _working(c, mesh, s, turn1, turn2, at, speed1, speed2, dte, dte_rate, scale)
+    # Levers about the axes: derivatives of dte to each angle.
+    pull1 = force * (c.base_driver + x1 * at.ny - y1 * at.nx) + moment1
+    pull2 = force * (c.base_driven - x2 * at.ny + y2 * at.nx) + moment2
+    fy = force * at.ny + rub * at.nx
+    fx = force * at.nx - rub * at.ny
+    back = _line(c, apart_x, -apart_y)  # in the mirror
+    closed = back.closed - twist - c.teeth.backlash
     if closed > -2e-5:  # errors and profile of the back flanks are smaller
-        closing = -twist_rate - apart_w * c.cosine + apart_u * c.sine
+        closing = -twist_rate - apart_w * back.ny + apart_u * back.nx
+        turn = mesh.driver.shape[0] * (angle1 + back.turned) / (2.0 * pi)
         push = _back(c, mesh, turn, speed1, closed, closing, scale)
-        pull1 -= push * (c.base_driver + x1 * c.cosine + y1 * c.sine)
-        pull2 -= push * (c.base_driven - x2 * c.cosine - y2 * c.sine)
-        fy -= push * c.cosine
-        fx += push * c.sine
+        pull1 -= push * (c.base_driver + x1 * back.ny + y1 * back.nx)
+        pull2 -= push * (c.base_driven - x2 * back.ny - y2 * back.nx)
+        fy -= push * back.ny
+        fx += push * back.nx
     for i in range(d):
         rate[i] = s[d + i]
     passed = _drive(c, time, torque, s, rate)

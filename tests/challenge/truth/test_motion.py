@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
-from shared.truth_plants import drawn_plant, undamped
+from shared.ends_of_contact import last_on_line
+from shared.truth_plants import drawn_plant, short_case, undamped
 
 from gearbench.challenge.errors import ChallengeError
 from gearbench.challenge.truth.motion import derivative, integrate
@@ -30,9 +33,23 @@ from gearbench.challenge.truth.plant import (
     Seen,
     Tone,
 )
+from gearbench.fem.contact.kinematics import pair_contact, teeth_of
+from gearbench.geometry import Pair, pair
 
 FORCE, DTE = OUTPUTS.index("force"), OUTPUTS.index("dte")
 HUGE = 1e12
+
+
+def touching(plant: Plant, x: float, y: float) -> tuple[float, float]:
+    """How far [m] a motion of the driver's geometric centre against the driven gear's closes flanks that do not turn,
+    and the angle [rad] of the tangent to both base circles from the line across that of the centres at rest."""
+    both = plant.base_driver + plant.base_driven
+    apart = complex(both / plant.cosine - x, -y)
+    pressure = np.arccos(both / abs(apart))
+    tangent = pressure - np.angle(apart)
+    # The strings of both base circles are wound off by as much as the tangent turns.
+    wound = both * (tangent - np.arctan2(plant.sine, plant.cosine))
+    return float(wound + both * plant.sine / plant.cosine - abs(apart) * np.sin(pressure)), float(tangent)
 
 
 def energy(plant: Plant, state: Array, torque: float) -> float:
@@ -50,8 +67,8 @@ def energy(plant: Plant, state: Array, torque: float) -> float:
     x = q[X_DRIVER] + plant.eccentricity.driver * np.cos(one) - q[X_DRIVEN] - plant.eccentricity.driven * np.cos(two)
     y = q[Y_DRIVER] + plant.eccentricity.driver * np.sin(one) - q[Y_DRIVEN] - plant.eccentricity.driven * np.sin(two)
     twist = plant.base_driver * q[DRIVER] - plant.base_driven * q[DRIVEN]
-    working = twist + plant.cosine * y + plant.sine * x
-    back = -twist - plant.cosine * y + plant.sine * x - plant.teeth.backlash
+    working = twist + touching(plant, x, y)[0]
+    back = -twist + touching(plant, x, -y)[0] - plant.teeth.backlash
     teeth = plant.teeth
     e = teeth.exponent
     for closed in (working, back):
@@ -181,17 +198,19 @@ def test_static_equilibrium() -> None:
     plant = undamped(plant)._replace(sensor_on_housing=1.0, eccentricity=Gears(0.0, 0.0), load_torque=150.0)
     torque = 150.0 * plant.base_driver / plant.base_driven
     force = torque / plant.base_driver
-    pull = force * np.array([-plant.sine, -plant.cosine, plant.sine, plant.cosine])
     p = plant.support_exponent
-    stretch = np.sign(pull) * (np.abs(pull) * plant.support_reference**p / plant.support) ** (1 / (1 + p))
-    modes = plant.mode_shape @ pull / plant.mode_stiffness
-    centres = stretch + modes @ plant.mode_shape
+    centres, across = np.zeros(4), 0.0
+    for _ in range(20):  # the centres' motion turns the force, by 1e-3
+        across, angle = touching(plant, centres[0] - centres[2], centres[1] - centres[3])
+        pull = force * np.array([-np.sin(angle), -np.cos(angle), np.sin(angle), np.cos(angle)])
+        stretch = np.sign(pull) * (np.abs(pull) * plant.support_reference**p / plant.support) ** (1 / (1 + p))
+        modes = plant.mode_shape @ pull / plant.mode_stiffness
+        centres = stretch + modes @ plant.mode_shape
     teeth = plant.teeth
     deflection = (force * teeth.reference**teeth.exponent / 4e8) ** (1 / (1 + teeth.exponent))
     state = np.zeros(STATES)
     state[X_DRIVER:MODE_1], state[MODE_1:DEGREES] = centres, modes
     state[DRIVEN] = 150.0 / plant.shaft.stiffness
-    across = (state[Y_DRIVER] - state[Y_DRIVEN]) * plant.cosine + (state[X_DRIVER] - state[X_DRIVEN]) * plant.sine
     state[DRIVER] = (deflection - across + plant.base_driven * state[DRIVEN]) / plant.base_driver
     state[TWIST] = torque / plant.coupling.stiffness
     state[ROTOR] = state[DRIVER] + state[TWIST]
@@ -204,16 +223,15 @@ def test_static_equilibrium() -> None:
     assert seen == pytest.approx(wanted, rel=1e-9)
 
 
-def sliding_velocity(plant: Plant, state: Array, roll: float) -> float:
-    """Speed of the driver's flank over the driven one, across the line of action, from both rigid motions."""
-    alpha = np.arctan2(plant.sine, plant.cosine)
+def sliding_velocity(plant: Plant, state: Array, roll: float, alpha: float, distance: complex) -> float:
+    """Speed of the driver's flank over the driven one, across the line of action at an angle alpha, from both rigid
+    motions; distance [m]: of the centres."""
     tangent = np.array([-np.cos(alpha), np.sin(alpha)])
     base = plant.base_driver * np.array([np.cos(alpha), -np.sin(alpha)])
     contact = base + roll * np.array([np.sin(alpha), np.cos(alpha)])
-    distance = (plant.base_driver + plant.base_driven) / plant.cosine
     v = state[DEGREES:]
     spin1, spin2 = plant.speed_driver + v[DRIVER], -(plant.speed_driven + v[DRIVEN])
-    from_driven = contact - np.array([distance, 0.0])
+    from_driven = contact - np.array([distance.real, distance.imag])
     one = np.array([v[X_DRIVER], v[Y_DRIVER]]) + spin1 * np.array([-contact[1], contact[0]])
     two = np.array([v[X_DRIVEN], v[Y_DRIVEN]]) + spin2 * np.array([-from_driven[1], from_driven[0]])
     return float(tangent @ (one - two))
@@ -231,12 +249,14 @@ def test_friction_takes_force_times_sliding_velocity(turn: float) -> None:
     masses = inertias(plant)
     forces = masses * (with_it - without)[DEGREES:TWIST]
     velocity = state[DEGREES:TWIST] + np.array([0, 100.0, sound.speed_driven, *[0.0] * 7])
-    # The line of centres has turned by gamma = (y1 - y2) / a: the contact lies rb1 gamma further on.
+    # Where the line of action has turned against the driver's rotation, the contact lies further on.
     one, two = plant.eccentricity_angle.driver + state[DRIVER], plant.eccentricity_angle.driven - state[DRIVEN]
-    apart = plant.eccentricity.driver * np.sin(one) - plant.eccentricity.driven * np.sin(two)
-    apart += state[Y_DRIVER] - state[Y_DRIVEN]
-    gamma = apart * plant.cosine / (plant.base_driver + plant.base_driven)
-    slide = sliding_velocity(sound, state, plant.roll_pitch + turn * plant.base_pitch + plant.base_driver * gamma)
+    off = plant.eccentricity.driver * np.exp(1j * one) - plant.eccentricity.driven * np.exp(1j * two)
+    off += complex(state[X_DRIVER] - state[X_DRIVEN], state[Y_DRIVER] - state[Y_DRIVEN])
+    alpha = touching(plant, off.real, off.imag)[1]
+    rolled = plant.base_driver * (alpha - np.arctan2(plant.sine, plant.cosine))
+    roll = plant.roll_pitch + turn * plant.base_pitch + rolled
+    slide = sliding_velocity(sound, state, roll, alpha, (plant.base_driver + plant.base_driven) / plant.cosine - off)
     assert seen.force > 1000.0
     assert forces @ velocity == pytest.approx(-0.1 * seen.force * abs(slide), rel=1e-6)
     assert np.sign(slide) == np.sign(turn)
@@ -304,7 +324,59 @@ def test_eccentric_centres_add_material_at_the_run_out_phase() -> None:
         state = np.zeros(STATES)
         state[DRIVER] = turned
         state[DRIVEN] = plant.base_driver * turned / plant.base_driven
-        assert derivative(placed, 0.0, 0.0, state)[1].dte == pytest.approx(expected, abs=1e-12)
+        # Second order: the square of the eccentricity over the length of the line of action.
+        assert derivative(placed, 0.0, 0.0, state)[1].dte == pytest.approx(expected, abs=(5e-6) ** 2 / 0.01)
+
+
+def displaced(rotation: float) -> tuple[Plant, Pair, Callable[[float, float], tuple[float, float]]]:
+    """A plant without errors whose pairs carry on the path of contact alone, its gears far off their axes; and where
+    its driven gear's geometric centre is from the driver's, at both rotations."""
+    meshing = pair(short_case().rig)
+    plant = undamped(drawn_plant())
+    alpha, (low, high) = meshing.working_pressure_angle, meshing.path
+    poles = Gears(np.pi / 2 - alpha + rotation, -np.pi / 2 - alpha - 0.7 * rotation)
+    teeth = plant.teeth._replace(first=low, pitch=(high - low) / (plant.teeth.stiffness.size - 1), exponent=0.0)
+    plant = plant._replace(eccentricity=Gears(30e-6, 50e-6), eccentricity_angle=poles, teeth=teeth)
+
+    def place(turn1: float, turn2: float) -> tuple[float, float]:
+        one = plant.eccentricity.driver * np.exp(1j * (poles.driver + turn1))
+        two = plant.eccentricity.driven * np.exp(1j * (poles.driven - turn2))
+        apart = meshing.centre_distance + two - one
+        return float(apart.real), float(apart.imag)
+
+    return plant, meshing, place
+
+
+def at_rest(turn1: float, turn2: float) -> Array:
+    state = np.zeros(STATES)
+    state[DRIVER], state[DRIVEN] = turn1, turn2
+    return state
+
+
+@pytest.mark.parametrize("rotation", [0.0, 1.3, 2.9, 4.4])
+def test_flanks_close_as_those_of_displaced_gears(rotation: float) -> None:
+    """Truth: the gap of ideal gears whose centres are displaced."""
+    plant, meshing, place = displaced(rotation)
+    one, two = teeth_of(meshing)
+    for phase in (-0.3, 0.1, 0.4):
+        turn1, turn2 = phase * one.pitch + 4e-4, phase * two.pitch
+        gap = pair_contact(one, two, 0, 0, turn1, turn2, *place(turn1, turn2)).gap
+        assert derivative(plant, 0.0, 0.0, at_rest(turn1, turn2))[1].dte == pytest.approx(-gap, abs=1e-14)
+
+
+@pytest.mark.parametrize("rotation", [0.0, 1.3, 2.9, 4.4])
+def test_pairs_begin_and_end_at_the_tips_of_displaced_gears(rotation: float) -> None:
+    plant, meshing, place = displaced(rotation)
+    for low, high in ((-0.3, meshing.path[0] - 0.1), (0.3, meshing.path[1] + 0.1)):
+        turn1, turn2 = last_on_line(meshing, place, low, high)
+        beyond = np.copysign(1e-5, high)  # of a pitch; run-out and the displaced line of action shift ends by 1e-2
+        pairs = []
+        for part in (-beyond, beyond):
+            # Pressed by ten nanometres, which counts pairs and moves no end.
+            state = at_rest(turn1 + part * meshing.driver.pitch_angle, turn2 + part * meshing.driven.pitch_angle)
+            state[DRIVER] += (1e-8 - derivative(plant, 0.0, 0.0, state)[1].dte) / plant.base_driver
+            pairs.append(derivative(plant, 0.0, 0.0, state)[1].force / (4e8 * 1e-8))
+        assert pairs == pytest.approx([2.0, 1.0], rel=2e-3)
 
 
 def test_integration_refuses_nonsense() -> None:

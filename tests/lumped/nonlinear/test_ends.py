@@ -7,26 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from shared.effect_rig import ALPHA, make_model, make_rig
+from shared.ends_of_contact import last_on_line
 
-from gearbench.fem.contact.kinematics import ON_LINE, pair_contact, teeth_of
-from gearbench.geometry import Pair, pair
+from gearbench.geometry import pair
 from gearbench.lumped.nonlinear.ends import ends_of, turnings
 
 ECCENTRICITY = 10e-6
-
-
-def last_on_line(meshing: Pair, centre: np.ndarray, low: float, high: float) -> float:
-    """Phase of the driven gear, between one on the line of action and one on a tip edge, where the pair at the pitch
-    point at phase 0 passes from one to the other as the driver touches it."""
-    one, two = teeth_of(meshing)
-    for _ in range(50):
-        middle = 0.5 * (low + high)
-        turn = middle * one.pitch
-        for _ in range(8):
-            k = pair_contact(one, two, 0, 0, turn, middle * two.pitch, *centre)
-            turn += k.gap / one.rb
-        low, high = (middle, high) if k.slave == ON_LINE else (low, middle)
-    return low
 
 
 @pytest.mark.parametrize("side", [0, 1])
@@ -43,9 +29,9 @@ def test_ends_of_contact_are_those_of_displaced_gears(side: int, rotation: float
     found = []
     for low, high in ((-0.3, meshing.path[0] - 0.1), (0.3, meshing.path[1] + 0.1)):
         places = still, still + (2 * side - 1) * off
-        centred, displaced = (last_on_line(meshing, place, low, high) for place in places)
+        centred, displaced = (last_on_line(meshing, lambda *_, at=at: (at[0], at[1]), low, high)[1] for at in places)
         # The mesh is turned back by as much as contact begins or ends later.
-        found.append(centred - displaced)
+        found.append((centred - displaced) / meshing.driven.pitch_angle)
     proud, leant = ECCENTRICITY * np.cos(rotation), (2 * side - 1) * ECCENTRICITY * np.sin(rotation)
     turned = turnings(np.array(meshing.path), ends_of(model)) @ (proud, leant)
     np.testing.assert_allclose(turned, found, atol=4e-3 * ECCENTRICITY / meshing.base_pitch)
