@@ -37,11 +37,26 @@ def _turning(side: int, condition: Condition) -> NDArray[np.float64]:
     return condition.lobes[side]
 
 
+def _levers(side: int, condition: Condition) -> NDArray[np.float64]:
+    """What both parts add to the levers (2, 3, N)."""
+    return condition.leaning[side]
+
+
+def _ends(side: int, condition: Condition) -> NDArray[np.float64]:
+    """How far both parts turn the mesh on (2, N)."""
+    return condition.ends[side]
+
+
 def unknowns(model: NominalModel, conditions: Sequence[Condition]) -> tuple[Group, ...]:
     """Cosine and sine part of the excess material along the line of action, for either gear."""
     sound, large = SD * model.deflection, WIDE * model.deflection
     return tuple(
-        group(key, "m", ("cos", "sin"), sound, large, slot="excess", basis=partial(_turning, number))
+        group(
+            *(key, "m", ("cos", "sin"), sound, large),
+            slot="excess",
+            basis=partial(_turning, number),
+            also={"levers": partial(_levers, number), "turned": partial(_ends, number)},
+        )
         for number, key in enumerate(KEYS.values())
     )
 

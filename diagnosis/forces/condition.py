@@ -12,6 +12,7 @@ from gearbench.diagnosis.forces.basis import hats, on_path, waves
 from gearbench.diagnosis.forces.nominal import NominalModel
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.lumped.nonlinear.coordinates import leaning_of
+from gearbench.lumped.nonlinear.ends import ends_between, turnings
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -33,7 +34,9 @@ class Condition:
     touch, `load_share` (N, n_o) their shares of the load, `bending` (N, n_o, 2) the teeth's parts of their flexibility;
     `lever_arms` (3, N) of friction over base radius, for driver rotation, y and driven rotation; `waves` (2 orders, N)
     of the rotation's mesh phase, `flanks` (places, N) what the mesh as a whole has of a unit of excess at each of the
-    `basis.PLACES_ON_PATH` of all pairs, `lobes` (2, 2, N) cosine and sine of both rotations; `pitch_speed`
+    `basis.PLACES_ON_PATH` of all pairs, `lobes` (2, 2, N) cosine and sine of both rotations, `leaning` (2, 2,
+    3, N) what these parts of a unit of either gear's run-out add to the levers of `Departures` [1/m], `ends` (2, 2, N)
+    how far they turn the mesh on [cycles/m]; `pitch_speed`
     rb speed [m/s]; `force_level` [N] and `stiffness_level` [N/m] of the mesh at the mean torque; `force_full` (N/2
     + 1,) spectrum of the mesh force that a nominal equation gives, zero beyond the used bins; `hats_full` basis of
     smooth functions of frequency (knots, N/2 + 1).
@@ -55,6 +58,8 @@ class Condition:
     waves: Array
     flanks: Array
     lobes: Array
+    leaning: Array
+    ends: Array
     pitch_speed: float
     teeth: tuple[int, int]
     torque_mean: float
@@ -94,6 +99,8 @@ def prepare(measured: Measurement, model: NominalModel, band: float) -> Conditio
         waves=waves(measured.phase),
         flanks=(on_path(phase[:, None] - numbers, model.path) * share).sum(axis=-1),
         lobes=np.stack([(np.cos(turn), np.sin(turn)) for turn in turns]),
+        leaning=np.stack([_leaning(model, side, turn) for side, turn in enumerate(turns)]),
+        ends=np.stack([_ends(model, phase, side, turn) for side, turn in enumerate(turns)]),
         pitch_speed=2 * np.pi * measured.mesh_frequency / model.teeth[0] * rb1,
         teeth=model.teeth,
         torque_mean=mean,
@@ -102,6 +109,29 @@ def prepare(measured: Measurement, model: NominalModel, band: float) -> Conditio
         force_full=force,
         hats_full=hats(omega / (2 * np.pi), band),
     )
+
+
+def _leaning(model: NominalModel, side: int, turn: Array) -> Array:
+    """What run-out of a gear (0: driver) adds to the levers (2, 3, N) [1/m] at its rotations (N,): its centre stands
+    aside of the normal through its axis, and turns the line of action (`lumped.nonlinear.ends`)."""
+    aside = _aside(side, turn)
+    out = np.zeros((2, 3, turn.size))
+    out[:, (0, 2)[side]] = aside / model.base_radius[side]
+    if model.support_factor < 1.0:  # supports across the line of centres, with the force's part tan(a_w) across them
+        out[:, 1] = aside / sum(model.base_radius)
+    return out
+
+
+def _ends(model: NominalModel, phase: Array, side: int, turn: Array) -> Array:
+    """How far that run-out turns the mesh on (2, N) [cycles/m] at phases (N,) [cycles], as it moves the ends of
+    contact."""
+    proud, leant = turnings(phase, ends_between(model.path, model.base_radius, model.law.base_pitch, model.line)).T
+    return proud * np.stack([np.cos(turn), np.sin(turn)]) + leant * _aside(side, turn)
+
+
+def _aside(side: int, turn: Array) -> Array:
+    """How far (2, N) a gear's centre stands aside of the normal through its axis, against the driver's rotation."""
+    return (1, -1)[side] * np.stack([-np.sin(turn), np.cos(turn)])
 
 
 def _turned_on(model: NominalModel, spectra: Mapping[str, Complex], samples: int) -> Array:

@@ -23,16 +23,18 @@ class Departures:
     """Departures from the nominal rig in one condition of N samples and K bins, SI; all zero: the nominal rig.
 
     Arrays over gears are driver, driven. Supports: logarithms `stiffness`, `damping` of the factors on both, `mass`
-    (relative), `exponent` of the spring's hardening; `radial` (4,) logarithms of the factors on the radial supports'
-    stiffnesses and dampings. Rotation: `inertia` (3,) relative, of driver, driven gear and rotor; `coupling`
-    [rad/(N m)] compliance added at the drive; `torque` (K,) spectrum [N m] of what acts there besides the recorded
-    torque. Mesh: `scale`, `mesh_ratio` logarithms of the factors on stiffness and damping ratio; `shape` (2 orders,)
-    relative stiffness and `profile` (2 orders,) [m] excess material by mesh orders, cosine and sine in turn; `offset`
-    [m] excess material; `excess` (N,) [m] excess material that all pairs share and `pitch` (z1 + z2,) [m] that of each
-    tooth; `loss` (z1 + z2,) part of each tooth's bending stiffness that is lost; `curvature` exponent of the mesh
+    (relative), `exponent` of the spring's hardening; `radial` (4,) logarithms of the factors on the radial
+    supports' stiffnesses and dampings. Rotation: `inertia` (3,) relative, of driver, driven gear and rotor;
+    `coupling` [rad/(N m)] compliance added at the drive; `torque` (K,) spectrum [N m] of what acts there besides
+    the recorded torque. Mesh: `scale`, `mesh_ratio` logarithms of the factors on stiffness and damping ratio;
+    `shape` (2 orders,) relative stiffness and `profile` (2 orders,) [m] excess material by mesh orders, cosine and
+    sine in turn; `offset` [m] excess material; `excess` (N,) [m] excess material that all pairs share and `pitch`
+    (z1 + z2,) [m] that of each tooth; `turned` (N,) [cycles] how far the mesh is turned on; `levers` (3, N) by what
+    part the mesh force's levers about the driver's axis, along the supports and about the driven gear's axis are
+    longer; `loss` (z1 + z2,) part of each tooth's bending stiffness that is lost; `curvature` exponent of the mesh
     force over its level; `dissipation` [N s^2/m^2]; `friction` coefficient; `backlash` [m]; `yielding` (2 knots,)
-    compliance of webs and shafts over that of the mesh, real then imaginary part. `delay` (4,) [s] of the sensors of
-    `equations.DELAYED`; `filters` (4, 2 knots) parts of the mesh force, by frequency, that each equation misses.
+    compliance of webs and shafts over that of the mesh, real then imaginary part. `delay` (4,) [s] of the sensors
+    of `equations.DELAYED`; `filters` (4, 2 knots) parts of the mesh force, by frequency, that each equation misses.
     """
 
     stiffness: Array
@@ -49,6 +51,8 @@ class Departures:
     profile: Array
     offset: float
     excess: Array
+    turned: Array
+    levers: Array
     pitch: Array
     loss: Array
     curvature: float

@@ -38,6 +38,7 @@ from gearbench.diagnosis.forces.residuals import (
     carried_force,
     coupling_compliance,
     support_force,
+    transform,
 )
 from gearbench.diagnosis.forces.unknowns import Unknowns
 
@@ -71,9 +72,10 @@ def linearised(
     out = np.zeros((len(Equation), len(used), unknowns.size), dtype=complex)
     entries, moved = _mesh_columns(at, unknowns, used)
     mesh_jacobian = np.zeros((len(used), unknowns.size), dtype=complex)
-    mesh_jacobian[:, entries] = moved.T
+    np.add.at(mesh_jacobian.T, entries, moved)
     # One error of the mesh force shows in every equation, as strongly as it enters there.
-    out[:, :, entries] = -residuals.mesh_factor[:, used, None] * moved.T
+    columns = np.unique(entries)
+    out[:, :, columns] = -residuals.mesh_factor[:, used, None] * mesh_jacobian[:, columns]
     put = _Put(out, used, unknowns)
     _support_columns(at, put)
     _drive_columns(at, put)
@@ -108,7 +110,8 @@ class _Put:
 
 
 def _mesh_columns(at: _Point, unknowns: Unknowns, used: NDArray[np.int64]) -> tuple[list[int], Complex]:
-    """What moves the mesh force: entries (n,) and spectra (n, B) of the derivatives of F_m, the same everywhere."""
+    """What moves the mesh force: entries (n,), some more than once, and spectra (n, B) of what each adds to the
+    derivatives of F_m, the same everywhere."""
     listed: list[tuple[int, Array]] = []
     for slot, derivatives in _mesh_slots(at):
         for element, value in derivatives.items():
@@ -117,6 +120,10 @@ def _mesh_columns(at: _Point, unknowns: Unknowns, used: NDArray[np.int64]) -> tu
         assert one.basis is not None
         start = unknowns[one.key].start
         listed.extend((start + i, at.mesh.tangent * wave) for i, wave in enumerate(one.basis(at.condition)))
+    turned = unknowns.moved_besides("turned")
+    turning = _turning(at) if turned else np.zeros(0)
+    for own, basis in turned:
+        listed.extend((own.start + i, turning * wave) for i, wave in enumerate(basis(at.condition)))
     entries = [entry for entry, _ in listed]
     values = np.fft.rfft(np.stack([value for _, value in listed]), axis=-1)[:, used] / at.condition.samples
     return entries, np.asarray(values)
@@ -209,6 +216,15 @@ def _backlash(at: _Point) -> Array:
     return (carried(present + BACKLASH_STEP) - carried(present)) / BACKLASH_STEP
 
 
+def _turning(at: _Point) -> Array:
+    """What the elastic force grows by (N,) [N/cycle] as the mesh turns on, between two rows of its law."""
+    law, phase = at.model.hardened, at.condition.phase + at.departures.turned
+    row = np.floor(phase * law.phases)
+    ahead, behind = (law.evaluate(at.mesh.delta, one / law.phases)[0] for one in (row + 1, row))
+    factor = at.model.scale * stiffness_factor(at.condition, at.departures)
+    return np.asarray(factor * (ahead - behind) * law.phases)
+
+
 def _support_columns(at: _Point, put: _Put) -> None:
     """Both supports, and the direct part of a late displacement."""
     model, departures, n, k = at.model, at.departures, at.condition.samples, at.condition.bins
@@ -257,11 +273,17 @@ def _drive_columns(at: _Point, put: _Put) -> None:
 
 
 def _friction_columns(at: _Point, put: _Put) -> None:
-    """Friction, and the smooth filters of single equations."""
+    """Friction, levers, and the smooth filters of single equations."""
     condition, k, n = at.condition, at.condition.bins, at.condition.samples
     rubbing = np.fft.rfft(at.mesh.force * condition.lever_arms, axis=-1)[:, :k] / n
+    turned = [
+        (entries, transform(condition, at.mesh.force * basis(condition))[..., put.used])
+        for entries, basis in put.unknowns.moved_besides("levers")
+    ]
     for equation in Equation:
         factor = at.residuals.mesh_factor[equation]
+        for entries, spectra in turned:
+            put.out[equation, :, entries] -= (factor[put.used] * spectra[:, LEVER_OF[equation]]).T
         put(equation, "friction", 0, -factor * rubbing[LEVER_OF[equation]])
         weighted = condition.hats_full[:, :k] * (factor * at.carried[equation])
         first = int(equation) * 2 * len(KNOTS)

@@ -100,7 +100,7 @@ def mesh(model: NominalModel, condition: Condition, departures: Departures, spec
     weight = condition.load_share * softened(condition, departures.loss)
     weight = weight / weight.sum(axis=-1, keepdims=True)
     delta = delta + (weight * _pitch_excess(condition, departures)).sum(axis=-1)
-    force, slope = law.evaluate(delta, condition.phase)
+    force, slope = law.evaluate(delta, condition.phase + departures.turned)
     if departures.curvature:
         level = np.maximum(np.abs(force), 1e-3 * condition.force_level) / model.reference_force
         stiffer = departures.curvature / (1.0 + model.hardening)

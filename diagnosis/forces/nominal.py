@@ -62,6 +62,7 @@ class NominalModel:
     law: MeshLaw
     sound: MeshLaw  # of teeth without what `law` knows of their flanks
     path: tuple[float, float]  # of contact, behind the pitch point [base pitches]
+    line: float  # length of the line of action between the base circles [m]
     sd_stiffness: tuple[float, float]
     sd_damping: tuple[float, float]
     sd_mass: tuple[float, float]
@@ -151,6 +152,7 @@ def nominal_model(nominal: Case, load: float, mean: float) -> NominalModel:
         law=formed(sound, flank_excess(sound, rig, nominal.simulation), rig.mesh.shared_compliance),
         sound=sound,
         path=meshing.path,
+        line=meshing.line_of_action,
         sd_stiffness=known.both("rig.support.{}.stiffness", [one.stiffness for one in held], "support_stiffness"),
         sd_damping=known.both("rig.support.{}.damping", [s.damping for s in supports], "support_damping"),
         sd_mass=known.both("rig.{}.mass", [b.mass for b in bodies], "mass"),

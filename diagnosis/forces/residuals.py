@@ -2,7 +2,8 @@
 
 In a periodic record accelerations follow in the frequency domain, so every equation of motion gives its own estimate of
 the one normal force in the mesh, without simulation. With s = j omega, F_m the force that the mesh law gives for the
-measured deflection, mu A friction over its lever arm in each equation, Q(y) the support's force:
+measured deflection, mu A friction over its lever arm in each equation, without what run-out adds to that, Q(y) the
+support's force:
 
     drive           [T1 + ripple - J_r s^2 theta1 - (1 + J_r s^2 H)(J_1 s^2 theta1 + rb1 F_m (1 + mu A1))] / rb1
     driver support  [-(m1 s^2 + c1 s) y1 - Q1(y1)] / g - F_m (1 + mu As)
@@ -32,7 +33,8 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 LOSS_FACTOR = 0.05  # of a coupling that the nominal rig takes for rigid
-# Which lever arm of friction acts in each equation: 0 driver rotation, 1 along the supports, 2 driven rotation.
+# Which lever, of friction and of the force, acts in each equation: 0 driver rotation, 1 along the supports, 2 driven
+# rotation.
 LEVER_OF = {Equation.DRIVE: 0, Equation.DRIVER_SUPPORT: 1, Equation.LOAD: 2, Equation.DRIVEN_SUPPORT: 1}
 
 
@@ -94,9 +96,10 @@ def transform(condition: Condition, values: Array) -> Complex:
 
 
 def carried_force(model: NominalModel, condition: Condition, departures: Departures, force: Array) -> Complex:
-    """Spectra (4, K) of the mesh force with friction as each equation feels it, without the coupling's part."""
+    """Spectra (4, K) of the mesh force with friction and its levers as each equation feels it, without the coupling's
+    part."""
     mu = model.friction + departures.friction
-    by_lever = transform(condition, force * (1 + mu * condition.lever_arms))
+    by_lever = transform(condition, force * (1 + mu * condition.lever_arms + departures.levers))
     return by_lever[[LEVER_OF[equation] for equation in Equation]]
 
 

@@ -7,8 +7,8 @@ belongs to is taken to be at work.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from math import prod
 from typing import Any
 
@@ -20,7 +20,8 @@ from gearbench.diagnosis.forces.departures import SHAPES, TOOTH_SLOTS, Departure
 
 Array = NDArray[np.float64]
 
-# Of each unknown of a group (n), what it adds per unit to a slot over samples or bins: (n, N) or (n, K).
+# Of each unknown of a group (n), what it adds per unit to a slot over samples or bins: (n, N) or (n, K), or (n, 3, N)
+# to the levers.
 Basis = Callable[[Condition], NDArray[Any]]
 
 
@@ -29,7 +30,8 @@ class Group:
     """A named run of unknowns of one kind.
 
     `names` (n,), `unit` SI; `sd`, `wide` (n,) prior standard deviations; `low`, `high` bounds of every entry. They move
-    the elements `first` .. `first` + n - 1 of the slot `slot` of `Departures`, or all of it by their `basis`.
+    the elements `first` .. `first` + n - 1 of the slot `slot` of `Departures`, or all of it by their `basis`, and other
+    slots besides by these `also`.
     """
 
     key: str
@@ -42,6 +44,7 @@ class Group:
     basis: Basis | None = None
     low: float = -np.inf
     high: float = np.inf
+    also: Mapping[str, Basis] = field(default_factory=dict)
 
 
 def group(
@@ -56,11 +59,13 @@ def group(
     basis: Basis | None = None,
     low: float = -np.inf,
     high: float = np.inf,
+    also: Mapping[str, Basis] | None = None,
 ) -> Group:
     """A group; `names` may be a count, and priors are shared by all its entries unless given for each."""
     listed = tuple(str(i) for i in range(names)) if isinstance(names, int) else tuple(names)
     ones = np.ones(len(listed))
-    return Group(key, unit, listed, sd * ones, (sd if wide is None else wide) * ones, slot, first, basis, low, high)
+    large = (sd if wide is None else wide) * ones
+    return Group(key, unit, listed, sd * ones, large, slot, first, basis, low, high, also or {})
 
 
 @dataclass(frozen=True)
@@ -109,6 +114,10 @@ class Unknowns:
         high = np.concatenate([np.full(len(one.names), one.high) for one in self.groups])
         return low, high
 
+    def moved_besides(self, slot: str) -> tuple[tuple[slice, Basis], ...]:
+        """Unknowns that move a slot besides their own, and how."""
+        return tuple((self.slices[one.key], one.also[slot]) for one in self.groups if slot in one.also)
+
     def based(self, slot: str) -> tuple[Group, ...]:
         """The groups that move a slot by a basis."""
         return tuple(one for one in self.groups if one.slot == slot and one.basis is not None)
@@ -118,6 +127,7 @@ class Unknowns:
         sizes = {slot: prod(shape) for slot, shape in SHAPES.items()} | dict.fromkeys(TOOTH_SLOTS, self.teeth)
         values: dict[str, Any] = {slot: np.zeros(size) for slot, size in sizes.items()}
         values["excess"] = np.zeros(condition.samples)
+        values["turned"], values["levers"] = np.zeros(condition.samples), np.zeros((3, condition.samples))
         values["torque"] = np.zeros(condition.bins, dtype=complex)
         for one in self.groups:
             part = p[self.slices[one.key]]
@@ -125,6 +135,8 @@ class Unknowns:
                 values[one.slot][one.first : one.first + len(part)] += part
             else:
                 values[one.slot] = values[one.slot] + part @ one.basis(condition)
+            for slot, basis in one.also.items() if part.any() else ():
+                values[slot] = values[slot] + np.tensordot(part, basis(condition), 1)
         shaped = {
             slot: values[slot].reshape(shape) if shape else float(values[slot][0]) for slot, shape in SHAPES.items()
         }

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.lumped.nonlinear.coordinates import NAMES
+from gearbench.lumped.nonlinear.ends import ends_of, turnings
 
 if TYPE_CHECKING:
     from gearbench.bench.nonlinear.along import Along
@@ -20,9 +21,6 @@ U1, Y1, Y2, U2, X1, X2 = (NAMES.index(name) for name in ("u1", "y1", "y2", "u2",
 
 def in_mesh_of_runout(along: Along, side: int) -> Array:
     """Force (entries, 2) [N] in the mesh per unit of the cosine and the sine of the run-out of a gear (0: driver)."""
-    # Its loops are compiled on import, which not every user of this module wants.
-    from gearbench.lumped.nonlinear.ends import ends_of, turnings
-
     turn = _turn(along, side)
     # Normals of working and back flanks are so much of the gear's rotation apart (`lumped.nonlinear.tables`).
     between = np.pi - 2 * along.model.working_pressure_angle

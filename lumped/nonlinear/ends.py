@@ -14,13 +14,13 @@ where pairs beside the one that ends have begun.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.kernels.compiled import compiled
-from gearbench.lumped.nonlinear.model import NonLinear
+if TYPE_CHECKING:
+    from gearbench.lumped.nonlinear.model import NonLinear
 
 Array = NDArray[np.float64]
 
@@ -40,29 +40,18 @@ class Ends(NamedTuple):
 
 def ends_of(model: NonLinear) -> Ends:
     """Those of a model."""
-    begin, end = (place % 1.0 for place in model.path)
-    rb1, rb2 = model.base_radii
-    pitch = model.law.base_pitch
-    line = model.length_of_action
+    return ends_between(model.path, model.base_radii, model.law.base_pitch, model.length_of_action)
+
+
+def ends_between(path: tuple[float, float], base_radii: tuple[float, float], pitch: float, line: float) -> Ends:
+    """Those of a path of contact, in base pitches from the pitch point; base radii, base pitch and length of the line
+    of action in m."""
+    begin, end = (place % 1.0 for place in path)
     span = min(max((end - begin) % 1.0, LEAST_SPAN), 1.0 - LEAST_SPAN)
-    return Ends(begin, span, -1.0 / pitch, rb2 / (line * pitch), -rb1 / (line * pitch))
+    return Ends(begin, span, -1.0 / pitch, base_radii[1] / (line * pitch), -base_radii[0] / (line * pitch))
 
 
-@compiled(inline="always")
-def towards_end(cycle: float, ends: Ends) -> float:
-    """How near [0 to 1] the phase in the cycle is to the end of contact, 0 being its beginning."""
-    since = cycle - ends.begin
-    if since < 0.0:
-        since += 1.0
-    return since / ends.span if since < ends.span else (1.0 - since) / (1.0 - ends.span)
-
-
-@compiled
 def turnings(phases: Array, ends: Ends) -> Array:
     """How far [cycles] the mesh is turned on at phases (n,) [cycles], per e and per L phi [m] (n, 2)."""
-    out = np.empty((len(phases), 2))
-    for n in range(len(phases)):
-        near = towards_end(phases[n] - np.floor(phases[n]), ends)
-        out[n, 0] = near * ends.proud
-        out[n, 1] = ends.leant_begin + near * (ends.leant_end - ends.leant_begin)
-    return out
+    near = np.interp(phases, (ends.begin, ends.begin + ends.span), (0.0, 1.0), period=1.0)
+    return np.stack([near * ends.proud, ends.leant_begin + near * (ends.leant_end - ends.leant_begin)], axis=1)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gearbench.kernels.compiled import compiled
-from gearbench.lumped.nonlinear.ends import Ends, ends_of, towards_end
+from gearbench.lumped.nonlinear.ends import Ends, ends_of
 from gearbench.lumped.nonlinear.model import NonLinear
 from gearbench.lumped.nonlinear.pressing import Instants, alike
 
@@ -229,6 +229,15 @@ def _wave(series: Series, cosine: float, sine: float) -> float:
 
 
 @compiled(inline="always")
+def _towards_end(cycle: float, ends: Ends) -> float:
+    """How near [0 to 1] the phase in the cycle is to the end of contact, 0 being its beginning."""
+    since = cycle - ends.begin
+    if since < 0.0:
+        since += 1.0
+    return since / ends.span if since < ends.span else (1.0 - since) / (1.0 - ends.span)
+
+
+@compiled(inline="always")
 def _rippled(waves: Waves, phase: float) -> float:
     """Force [N] of the torque's ripple at a phase [cycles]."""
     total = 0.0
@@ -279,7 +288,7 @@ def _fill(
         every = correction.mean_error + _wave(correction.error, first, second) + turned
         place = cycle
         if turned != 0.0 or leant != 0.0:
-            near = towards_end(cycle, ends)
+            near = _towards_end(cycle, ends)
             place += near * ends.proud * turned
             place += (ends.leant_begin + near * (ends.leant_end - ends.leant_begin)) * leant
             # An entry's teeth are those of its cycle: they wait at its ends for the next.

@@ -85,16 +85,14 @@ def base() -> Bench:
     return bench("base")
 
 
-# The residuals leave out how run-out turns the mesh force and its levers: 5e-3 of what its excess does.
-LEVERS = 150.0
 TURN = np.random.default_rng(8)
 # Values of the effect, and by how much the residuals must shrink. With friction, steps of the force where pairs enter
 # and leave fold back from beyond the sampled band; pitch errors shift where that happens; the coupling's loss is
 # structural in the rows and viscous in the rig.
 EFFECTS: dict[str, tuple[dict[str, object], float]] = {
     "friction": ({"friction": 0.06}, 5.0),
-    "eccentricity driver": ({"eccentricity-driver": (5e-6, -8e-6)}, LEVERS),
-    "eccentricity driven": ({"eccentricity-driven": (-4e-6, 7e-6)}, LEVERS),
+    "eccentricity driver": ({"eccentricity-driver": (5e-6, -8e-6)}, 300.0),
+    "eccentricity driven": ({"eccentricity-driven": (-4e-6, 7e-6)}, 300.0),
     "pitch-error driver": ({"pitch-driver": 2e-6 * TURN.standard_normal(20)}, 10.0),
     "pitch-error driven": ({"pitch-driven": 2e-6 * TURN.standard_normal(30)}, 10.0),
     "tooth-crack 7": ({"crack": 0.3 * (np.arange(50) == 7)}, 10.0),
