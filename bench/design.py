@@ -2,15 +2,20 @@
 
 The linearised lumped model of a case has a known harmonic transfer function. With it the spectra of the planned record
 are written down, line by line and with noise, in place of being integrated; the identification that the record would
-get is carried out on them, and both what it expects of itself and what it errs by are known.
+get is carried out on them, and both what it expects of itself and what it errs by are known. Where L, R or n are
+prescribed and err by more than ENOUGH, the identification that chooses them is carried out as well: it tells whether
+they or the record are what limits.
 
     Y(k) = sum_l G_l(k - l d) U(k - l d) + noise,     noise: `snr_db` below the response, rms over the excited band
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from math import ceil
+from functools import partial
+from math import ceil, sqrt
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -24,6 +29,7 @@ from gearbench.bench.results.exact import lumped_periodic_system
 from gearbench.geometry import pair
 from gearbench.identification.estimation import identify_spectra
 from gearbench.identification.lpm.accuracy import BANDWIDTHS, RULE
+from gearbench.identification.lpm.local_solve import LpmError
 from gearbench.identification.response.frf import itf
 from gearbench.identification.spectra.joint import Spectra, joint_periods
 from gearbench.identification.task import IdentificationSettings
@@ -41,6 +47,30 @@ BRANCHES = 200
 PHASES = 1000
 # Phases on which frozen modes are followed.
 FOLLOWED = 64
+# Relative rms error of the ITF up to which prescribed L, R and n are not compared with those that would be chosen.
+ENOUGH = 0.02
+# What an identification says of its fit, and of what limits it.
+ACCOUNT = (
+    *("method", "branches", "harmonics", "order", "window", "smooth_bandwidth", "joint_period", "periods_averaged"),
+    *("unknowns", "equations", "expected_error", "variance_error", "truncation_error", "unexplained_error"),
+    *("noise_error", "branches_error", "window_error", "limited_by"),
+)
+
+Numbers = tuple[int | None, int | None, int | None]
+
+
+@dataclass(frozen=True)
+class Fit:
+    """One identification of the planned record: `method` and `window` (L, R, n) as carried out; `expected`: what it
+    expects to err by, `actual`: what it errs by (relative rms of the ITF over `identified` [Hz]); `account`: the
+    attributes of the result that say what limits it, with the first mode's `bandwidth` [Hz]."""
+
+    method: str
+    window: Numbers
+    identified: tuple[float, float]
+    expected: float
+    actual: float
+    account: dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -53,7 +83,11 @@ class Design:
     bandwidth; `branches` that the travel of that mode asks for and `needed` [s] of distinct excitation for them;
     `headroom`: factor by which the multisine may grow until the linear response would unload the mesh; `expected`: what
     the identification will expect to err by, `actual`: what it errs by on the synthetic spectra (relative rms of the
-    ITF over `identified` [Hz]); `method` and `window` (L, R, n) that it chose.
+    ITF over `identified` [Hz]); `method` and `window` (L, R, n) as carried out, `account` of what limits them (Fit).
+
+    `prescribed`: L, R and n that the settings ask for; `refusal`: why the record cannot be identified with them, else
+    empty (the numbers are then those of the free choice); `free`: the choice without them, where they were refused or
+    err by more than ENOUGH.
     """
 
     mesh_frequency: float
@@ -74,9 +108,18 @@ class Design:
     snr_db: float
     identified: tuple[float, float]
     method: str
-    window: tuple[int | None, int | None, int | None]
+    window: Numbers
     expected: float
     actual: float
+    account: dict[str, Any]
+    prescribed: Numbers
+    refusal: str
+    free: Fit | None
+
+    @property
+    def enough(self) -> bool:
+        """Whether the response is known so well that other L, R and n need no trial."""
+        return self.actual <= ENOUGH
 
     @property
     def realisations_needed(self) -> int:
@@ -111,12 +154,13 @@ def design(
     spectra = _noisy(clean, wanted.band, snr_db, case.experiment.seed)
     excited = np.flatnonzero(np.abs(clean.force).max(axis=0)[1:]) + 1
     edges = float(excited[0] * clean.spacing), float(excited[-1] * clean.spacing)
-    report(0.3, "identification")
-    found = identify_spectra(spectra, edges, settings, progress=lambda part, note: report(0.3 + 0.7 * part, note))
     mesh_frequency = clean.mesh_lines * clean.spacing
     branches = ceil((natural[1] - natural[0] + BANDWIDTHS * bandwidth) / mesh_frequency)
-    order = int(found.attrs.get("order", 1))
-    frequency = found["frequency"].values
+    fit = partial(_fit, edges, htf, bandwidth)
+    asked, free, refusal = _fits(fit, spectra, settings, report)
+    if free is not None and not refusal and asked.account.get("branches") == "polynomials":
+        asked = _with_cause(asked, partial(fit, replace(clean, noise=np.zeros(clean.highest + 1))), settings)
+    order = asked.window[1]
     return Design(
         mesh_frequency=mesh_frequency,
         lines=int(np.count_nonzero(np.abs(clean.force[0, 1:]))),
@@ -131,14 +175,87 @@ def design(
         natural=natural,
         bandwidth=bandwidth,
         branches=branches,
-        needed=RULE * (2 * branches + 1) * (order + 1) / bandwidth,
+        needed=RULE * (2 * branches + 1) * ((1 if order is None else order) + 1) / bandwidth,
         headroom=_headroom(case, system, clean),
         snr_db=snr_db,
-        identified=(float(frequency[0]), float(frequency[-1])),
+        identified=asked.identified,
+        method=asked.method,
+        window=asked.window,
+        expected=asked.expected,
+        actual=asked.actual,
+        account=asked.account,
+        prescribed=_prescribed(settings),
+        refusal=refusal,
+        free=free,
+    )
+
+
+def _prescribed(settings: IdentificationSettings) -> Numbers:
+    return settings.harmonics, settings.order, settings.window
+
+
+def _fits(
+    fit: Callable[[Spectra, IdentificationSettings, ProgressReport], Fit],
+    spectra: Spectra,
+    settings: IdentificationSettings,
+    report: ProgressReport,
+) -> tuple[Fit, Fit | None, str]:
+    """The identification as asked for; the one that chooses L, R and n, where there is reason to compare; and why the
+    first cannot be, in whose place the second then stands. Raises LpmError where neither can be."""
+    report(0.3, "identification")
+    refusal = ""
+    asked: Fit | None = None
+    try:
+        asked = fit(spectra, settings, lambda part, note: report(0.3 + 0.35 * part, note))
+    except LpmError as error:
+        if _prescribed(settings) == (None, None, None):
+            raise
+        refusal = str(error)
+    if asked is not None and (_prescribed(settings) == (None, None, None) or asked.actual <= ENOUGH):
+        return asked, None, ""
+    chosen = replace(settings, harmonics=None, order=None, window=None)
+    try:
+        free = fit(spectra, chosen, lambda part, note: report(0.65 + 0.35 * part, note))
+    except LpmError:
+        if asked is None:
+            raise
+        return asked, None, ""
+    return asked or free, free, refusal
+
+
+def _with_cause(
+    asked: Fit, fit: Callable[[IdentificationSettings, ProgressReport], Fit], settings: IdentificationSettings
+) -> Fit:
+    """The same with the account of what limits it known: `fit` sees spectra known to be without noise.
+
+    What one period takes for missing response may be noise; here the error without any is known, and the rest is noise.
+    """
+    harmonics, order, window = asked.window
+    quiet = fit(replace(settings, harmonics=harmonics, order=order, window=window), lambda part, note: None)
+    noise = sqrt(max(asked.actual**2 - quiet.actual**2, 0.0))
+    limit = "noise" if noise > quiet.actual else quiet.account["limited_by"]
+    return replace(asked, account=quiet.account | {"noise_error": noise, "limited_by": limit})
+
+
+def _fit(
+    edges: tuple[float, float],
+    htf: CubicSpline,
+    bandwidth: float,
+    spectra: Spectra,
+    settings: IdentificationSettings,
+    report: ProgressReport,
+) -> Fit:
+    """What the identification of the spectra finds. Raises LpmError."""
+    found = identify_spectra(spectra, edges, settings, progress=report)
+    frequency = found["frequency"].values
+    account = {name: found.attrs[name] for name in ACCOUNT if found.attrs.get(name) is not None}
+    return Fit(
         method=str(found.attrs["method"]),
         window=tuple(found.attrs.get(name) for name in ("harmonics", "order", "window")),  # type: ignore[arg-type]
+        identified=(float(frequency[0]), float(frequency[-1])),
         expected=float(found.attrs["expected_error"]),
         actual=_error(found, htf),
+        account=account | {"bandwidth": bandwidth},
     )
 
 

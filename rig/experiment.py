@@ -181,8 +181,8 @@ class Identification(Value):
 
     method: Literal["lpm", "mesh-feedback"] = quantity("lpm", doc="estimator")
     harmonics: int = quantity(0, ge=0, le=2000, doc="branches L on each side; 0: as many as the record supports")
-    order: int | None = quantity(None, ge=0, le=6, doc="polynomial order R; absent: chosen by predicted error")
-    window: int = quantity(0, ge=0, le=500, doc="half-width n of the local window, in lines; 0: chosen")
+    order: int | None = quantity(None, ge=0, le=6, doc="of lpm: polynomial order R; absent: chosen by predicted error")
+    window: int = quantity(0, ge=0, le=500, doc="of lpm: half-width n of the window, in lines; 0: chosen")
     band: tuple[float, float] | None = quantity(None, "hz", doc="identified band; absent: the multisine's")
 
     @model_validator(mode="after")

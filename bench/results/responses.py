@@ -17,12 +17,13 @@ EXACT_HARMONICS = 100
 
 
 def identification_settings(wanted: Identification) -> IdentificationSettings:
-    """The settings of a case, in which 0 stands for "chosen"."""
+    """The settings of a case, in which 0 stands for "chosen"; order and window are the local method's."""
+    local = wanted.method == "lpm"
     return IdentificationSettings(
         method=wanted.method,
         harmonics=wanted.harmonics or None,
-        order=wanted.order,
-        window=wanted.window or None,
+        order=wanted.order if local else None,
+        window=(wanted.window or None) if local else None,
         band=wanted.band,
         # Sensors that are late or at the end of their range are what the case asks for, and more realisations too.
         accept_doubts=True,

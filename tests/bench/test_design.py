@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from gearbench.bench.design import _first_mode, _known_htf, _spectra, design
+from gearbench.bench.design import Design, _first_mode, _known_htf, _spectra, design
 from gearbench.bench.errors import BenchError
 from gearbench.bench.experiment import simulate
 from gearbench.bench.results.exact import lumped_periodic_system
@@ -80,6 +80,39 @@ def test_plan_is_that_of_the_case() -> None:
     assert told.natural == pytest.approx((min(lowest) / (2 * np.pi), max(lowest) / (2 * np.pi)), rel=1e-6)
     assert told.needed == pytest.approx(3 * (2 * told.branches + 1) * 2 / told.bandwidth)
     assert told.distinct == pytest.approx(1.0)
+
+
+def prescribed(harmonics: int | None, order: int | None, window: int | None, snr_db: float) -> Design:
+    return design(
+        planned(),
+        IdentificationSettings(
+            harmonics=harmonics, order=order, window=window, band=(1100.0, 1500.0), step=4, phases=50, modes=0
+        ),
+        snr_db=snr_db,
+    )
+
+
+def test_noise_is_told_from_missing_response_though_one_period_does_not() -> None:
+    """The estimate is linear in the record: errors by noise and by missing response are independent, squares add. With
+    the identification's own account, which knows one period only, windows are blamed."""
+    loud, silent = (prescribed(8, 1, 10, snr_db) for snr_db in (10.0, 200.0))
+    assert loud.account["limited_by"] == "noise"
+    assert loud.account["noise_error"] ** 2 + silent.actual**2 == pytest.approx(loud.actual**2, rel=0.02)
+    assert loud.free is not None and loud.free.actual < 0.5 * loud.actual
+
+
+def test_windows_too_wide_are_told_from_too_few_branches() -> None:
+    """161 lines of 2 Hz beside a bandwidth of 197 Hz; narrow windows with the same branches err by less than half."""
+    wide, narrow, alone = (prescribed(*numbers, 60.0) for numbers in ((3, 1, 80), (3, 1, 10), (1, 1, 10)))
+    assert (wide.account["limited_by"], alone.account["limited_by"]) == ("window", "branches")
+    assert narrow.actual < 0.5 * wide.actual and narrow.actual < 0.7 * alone.actual
+
+
+def test_what_the_record_cannot_bear_is_said_and_the_free_choice_stands_in() -> None:
+    told, free = prescribed(3, 3, 3, 60.0), prescribed(None, None, None, 60.0)
+    assert "L = 3 branches a side of order R = 3 are 28 unknowns" in told.refusal
+    assert (told.window, told.actual) == (free.window, free.actual) and told.free is not None
+    assert free.prescribed == (None, None, None) and free.free is None and not free.refusal
 
 
 def test_what_cannot_be_planned_is_refused() -> None:

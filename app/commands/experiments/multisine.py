@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
 from gearbench.shell.options import CaseArgument, JsonOption, SetOption, load_case, print_json
 from gearbench.shell.progress import Progress
+from gearbench.words.accuracy import limit_and_advice
 
 if TYPE_CHECKING:
-    from gearbench.bench.design import Design
+    from gearbench.bench.design import Design, Numbers
+    from gearbench.identification import IdentificationSettings
+    from gearbench.rig import Case
+
+# Part of the error with prescribed numbers below which the free choice is no gain worth the name.
+GAIN = 0.8
 
 
 def multisine(
@@ -20,7 +26,8 @@ def multisine(
         float, typer.Option("--snr-db", help="torque-induced DTE over noise, rms in the excited band")
     ] = 40.0,
     method: Annotated[
-        Literal["lpm", "mesh-feedback"] | None, typer.Option("--method", help="estimator; absent: the case's")
+        Literal["lpm", "mesh-feedback"] | None,
+        typer.Option("--method", help="estimator, which chooses L, R, n; absent: the case's, with those of the case"),
     ] = None,
     band_hz: Annotated[
         tuple[float, float] | None, typer.Option("--band-hz", help="identified band; absent: the case's, else excited")
@@ -31,18 +38,16 @@ def multisine(
     """Tell what the planned multisine of a case will resolve: branches, record length, expected error of the response.
 
     The spectra of the planned record are written down from the exact response of the linearised lumped model, with
-    noise, and identified as the record would be.
+    noise, and identified as the record would be, with the branches L, order R and window n that the case prescribes.
     """
     loaded = load_case(case, settings)
-    import gearbench as gb
     from gearbench.bench.design import design
 
-    wanted = band_hz or loaded.identification.band
     with Progress(f"multisine {loaded.name}") as progress:
         progress.step("plan")
         found = design(
             loaded,
-            gb.IdentificationSettings(method=method or loaded.identification.method, band=wanted, modes=0),
+            planned_settings(loaded, method, band_hz),
             snr_db=snr_db,
             progress=progress,
         )
@@ -54,10 +59,21 @@ def multisine(
         typer.echo(f"advice: {sentence}")
 
 
+def planned_settings(
+    case: Case, method: Literal["lpm", "mesh-feedback"] | None, band: tuple[float, float] | None
+) -> IdentificationSettings:
+    """The settings with which `run` identifies the case's record, in another band or by another method if asked for;
+    what the case prescribes belongs to its own method."""
+    from gearbench.bench.results.responses import identification_settings
+
+    own = identification_settings(case.identification)
+    if method is not None and method != own.method:
+        own = replace(own, method=method, harmonics=None, order=None, window=None)
+    return replace(own, band=band or own.band, modes=0)
+
+
 def sentences(found: Design) -> list[str]:
     """The plan, the mode that it is meant for, and what comes out."""
-    chosen = zip("LRn", found.window, strict=True)
-    window = ", ".join(f"{name} = {value}" for name, value in chosen if value is not None)
     return [
         f"excitation: {found.lines} lines {found.spacing:g} Hz apart in {found.band[0]:g}-{found.band[1]:g} Hz,"
         f" {found.peak:.4g} N m peak, {found.rms:.4g} N m rms, crest {found.crest:.3g};"
@@ -65,9 +81,36 @@ def sentences(found: Design) -> list[str]:
         f"mesh: {found.mesh_frequency:g} Hz; first mode {found.natural[0]:.4g}-{found.natural[1]:.4g} Hz with"
         f" {found.bandwidth:.3g} Hz of bandwidth: {found.branches} branches a side, {found.needed:.3g} s of distinct"
         " excitation",
-        f"at {found.snr_db:g} dB, {found.identified[0]:g}-{found.identified[1]:g} Hz: {found.method} ({window})"
-        f" would err by {found.actual:.1%}, and expect of itself {found.expected:.1%}",
+        f"at {found.snr_db:g} dB, {found.identified[0]:g}-{found.identified[1]:g} Hz:"
+        f" {found.method} ({_in_words(found.window)}) would err by {found.actual:.1%}, and expect of itself"
+        f" {found.expected:.1%}",
+        *_of_prescribed(found),
     ]
+
+
+def _in_words(numbers: Numbers) -> str:
+    """L, R and n, as far as there are any."""
+    given = zip("LRn", numbers, strict=True)
+    return ", ".join(f"{name} = {value}" for name, value in given if value is not None)
+
+
+def _of_prescribed(found: Design) -> list[str]:
+    """Whether the prescribed L, R, n are enough, and if not, what is amiss."""
+    given = _in_words(found.prescribed)
+    if not given:
+        return []
+    if found.refusal:
+        return [f"prescribed {given}: not possible, and left to choose above; {found.refusal}"]
+    size = f"{found.account['unknowns']} unknowns from {found.account['equations']} equations"
+    if found.enough:
+        return [f"prescribed {given}: enough, {size}"]
+    cause, _ = limit_and_advice(found.account)
+    if found.free is None:
+        return [f"prescribed {given}: {size}; what limits is {cause}; nothing else fits the record"]
+    free = f"{found.free.method} ({_in_words(found.free.window)}) would err by {found.free.actual:.1%}"
+    if found.free.actual < GAIN * found.actual:
+        return [f"prescribed {given}: not enough, {size}; what limits is {cause}; left to choose, {free}"]
+    return [f"prescribed {given}: as good as the record allows, {size}; what limits is {cause}; left to choose, {free}"]
 
 
 def advice(found: Design) -> list[str]:
