@@ -67,7 +67,7 @@ def common_clock(signals: Sequence[Signal], attributes: Mapping[str, float | str
     if held < wanted * samples:
         raise RecordError(
             f"the channels share {held} samples at {rate:.9g} Hz, less than the {wanted} x {samples} that {wanted}"
-            f" excitation period(s) of {samples / rate:.6g} s need"
+            f" excitation period(s) of {samples / rate:.6g} s need: {_ends_in_words(signals)}"
         )
     left = held - wanted * samples
     if left:
@@ -75,6 +75,12 @@ def common_clock(signals: Sequence[Signal], attributes: Mapping[str, float | str
             f"the last {left} samples ({left / rate:.4g} s) are left out: {wanted} whole excitation period(s) remain"
         )
     return Common(begin, rate, samples, wanted)
+
+
+def _ends_in_words(signals: Sequence[Signal]) -> str:
+    """Which channel begins last and which ends first."""
+    late, short = max(signals, key=lambda one: one.clock.start), min(signals, key=lambda one: one.clock.end)
+    return f"{late.name} begins at {late.clock.start:.6g} s, {short.name} ends at {short.clock.end:.6g} s"
 
 
 def _rate(signals: Sequence[Signal], attributes: Mapping[str, float | str], notes: list[str]) -> tuple[float, int]:

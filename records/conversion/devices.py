@@ -41,11 +41,7 @@ def clocks_by_teeth(
     ratio = speeds[0] / speeds[1]
     if not chosen:
         if _shows(angles, teeth, abs(ratio - 1)):
-            notes.append(
-                f"angle_driver and angle_driven pass teeth at rates that differ by {1e6 * (ratio - 1):+.3g} ppm: if"
-                " they come from devices with clocks of their own, clock = 'teeth' for the channels of one of them"
-                " makes them agree"
-            )
+            notes.append(_said_of(ratio))
         return list(signals)
     own = [gear for gear in GEARS if f"angle_{gear}" in chosen]
     if len(own) != 1:
@@ -63,6 +59,17 @@ def clocks_by_teeth(
         " both gears pass: taken off. Its offset is not known from them"
     )
     return [replace(s, clock=_faster(s.clock, factor)) if s.name in chosen else s for s in signals]
+
+
+def _said_of(ratio: float) -> str:
+    """What angles that pass teeth at rates of that ratio may come from."""
+    rates = f"angle_driver and angle_driven pass teeth at rates that differ by {1e6 * (ratio - 1):+.3g} ppm"
+    if abs(ratio - 1) > LARGEST:
+        return f"{rates}, more than clocks do (limit {LARGEST:.1%}): wrong pulses per revolution, teeth or unit of one"
+    return (
+        f"{rates}: if they come from devices with clocks of their own, clock = 'teeth' for the channels of one of them"
+        " makes them agree"
+    )
 
 
 def reference_rate(signals: Sequence[Signal], specs: Mapping[str, ChannelSpec]) -> dict[str, float | str]:

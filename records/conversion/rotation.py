@@ -7,6 +7,7 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
+from gearbench.records.conversion.pulses import pulse_numbers
 from gearbench.records.errors import RecordError
 from gearbench.records.formats.source import Array
 
@@ -38,28 +39,20 @@ def unwrapped(angle: Array, name: str, notes: list[str]) -> Array:
     return np.unwrap(angle, axis=1)
 
 
-def pulse_angle(times: Array, pulses: float, name: str) -> tuple[Array, Array]:
+def pulse_angle(times: Array, pulses: float, name: str, notes: list[str]) -> tuple[Array, Array]:
     """Times [s] and angles [rad] of the pulses of an encoder with that many a turn, NaN at the end ignored.
 
-    Raises RecordError for times that do not rise and for fewer than 6 pulses.
+    Raises RecordError for times that do not rise, for fewer than 6 pulses, and for a pulse missing or too many.
     """
-    known = times[np.isfinite(times)]
-    if np.isfinite(times[: known.size]).sum() < known.size:
-        raise RecordError(f"{name} has pulse times that are not finite between others, first at pulse {known.size}")
+    finite = np.isfinite(times)
+    known = times[finite]
+    if not finite[: known.size].all():
+        raise RecordError(
+            f"{name} has pulse times that are not finite between others, first at pulse {int(np.argmin(finite))}"
+        )
     if known.size < 6:
         raise RecordError(f"{name} has {known.size} pulses, at least 6 are needed")
-    steps = np.diff(known)
-    if steps.min() <= 0:
-        bad = int(np.argmax(steps <= 0)) + 1
-        raise RecordError(f"{name}: pulse {bad} at {known[bad]:.9g} s does not come after the one before")
-    usual = np.median(steps)
-    if steps.max() > 1.8 * usual:
-        bad = int(steps.argmax())
-        raise RecordError(
-            f"{name}: {steps[bad] / usual:.3g} usual steps pass after pulse {bad} (limit 1.8): pulses are missing,"
-            " or it has a gap for an index"
-        )
-    return known, np.arange(known.size, dtype=np.float64) * (2 * pi / pulses)
+    return known, pulse_numbers(known, pulses, name, notes) * (2 * pi / pulses)
 
 
 def rising_edges(level: Array, clock_times: Array, name: str) -> Array:

@@ -59,12 +59,12 @@ def signal_of(
     where = f"channel {name} (column {' and '.join(spec.column)})"
     unit = _unit(name, spec, columns[0], where)
     if unit.quantity == "pulse time":
-        return _pulses(name, spec, columns[0], unit, where)
+        return _pulses(name, spec, columns[0], unit, where, notes)
     for column in columns:
         _check_finite(column, where)
     clock = replace_start(_clock(columns[0], spec, source, attributes, notes), -spec.delay)
     if unit.quantity in PULSES:
-        return _encoder(name, spec, columns, clock, unit, where)
+        return _encoder(name, spec, columns, clock, unit, where, notes)
     _check_clipped(columns[0], where)
     wanted = QUANTITIES[unit_of_channel(name)]
     integrals = 0 if unit.quantity == wanted else INTEGRALS[wanted][unit.quantity]
@@ -173,17 +173,19 @@ def _check_equal(column: Column, source: Source) -> None:
         )
 
 
-def _pulses(name: str, spec: ChannelSpec, column: Column, unit: Unit, where: str) -> Signal:
+def _pulses(name: str, spec: ChannelSpec, column: Column, unit: Unit, where: str, notes: list[str]) -> Signal:
     """Angle at the pulses of one track: its clock are the pulse times."""
     pulses = _per_turn(spec, where)
     if column.runs > 1:
         raise RecordError(f"{where} has {column.runs} runs of pulse times; convert them one by one")
-    times, angle = pulse_angle(column.values[0] * unit.factor - spec.delay, pulses, where)
+    times, angle = pulse_angle(column.values[0] * unit.factor - spec.delay, pulses, where, notes)
     clock = Clock(float(times[0]), 1 / float(np.median(np.diff(times))), times.size, times)
     return Signal(name, spec.sign * angle[np.newaxis], clock, turns=True, absolute=False)
 
 
-def _encoder(name: str, spec: ChannelSpec, columns: Sequence[Column], clock: Clock, unit: Unit, where: str) -> Signal:
+def _encoder(
+    name: str, spec: ChannelSpec, columns: Sequence[Column], clock: Clock, unit: Unit, where: str, notes: list[str]
+) -> Signal:
     """Angle from counts, or from one or two sampled tracks."""
     pulses = _per_turn(spec, where)
     values = columns[0].values
@@ -191,7 +193,7 @@ def _encoder(name: str, spec: ChannelSpec, columns: Sequence[Column], clock: Clo
         if columns[0].runs > 1:
             raise RecordError(f"{where} has {columns[0].runs} runs of an encoder track; convert them one by one")
         times = clock.time if clock.time is not None else clock.start + np.arange(clock.samples) / clock.rate
-        edges, angle = pulse_angle(rising_edges(values[0], times, where), pulses, where)
+        edges, angle = pulse_angle(rising_edges(values[0], times, where), pulses, where, notes)
         track = Clock(float(edges[0]), 1 / float(np.median(np.diff(edges))), edges.size, edges)
         return Signal(name, spec.sign * angle[np.newaxis], track, turns=True, absolute=False)
     if len(columns) == 2:

@@ -49,7 +49,7 @@ _WORDS: dict[str, dict[str, float]] = {
     "mesh cycles": {"cycles": 1.0},
     "count": {"pulses": 1.0, "pulse": 1.0, "counts": 1.0, "count": 1.0, "ticks": 1.0, "Impulse": 1.0},
     "quadrature count": {"quadrature counts": 1.0},
-    "pulse time": {"pulse times s": 1.0, "pulse times ms": 1e-3, "pulse times us": 1e-6},
+    "pulse time": {"pulse times s": 1.0, "pulse times ms": 1e-3, "pulse times us": 1e-6, "pulse times ns": 1e-9},
     "level": {"quadrature levels": 1.0, "V": 1.0, "TTL": 1.0},
     "number": {"1": 1.0},
 }  # fmt: skip
