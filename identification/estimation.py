@@ -226,7 +226,9 @@ def _second_opinion(frf: xr.Dataset, polynomials: Callable[[], xr.Dataset]) -> x
         return frf
     if other.attrs["expected_error"] >= expected:
         return frf
-    said = f"mesh-feedback expects to err by {expected:.1%} here (unexplained {frf.attrs['unexplained_error']:.1%})"
+    parts = {"variance": "variance", "truncation": "branches left out", "unexplained": "unexplained"}
+    named = ", ".join(f"{words} {frf.attrs[f'{name}_error']:.1%}" for name, words in parts.items())
+    said = f"mesh-feedback expects to err by {expected:.1%} here ({named})"
     other.attrs["warnings"] = "\n".join(
         [f"{said}: this is the result of the local polynomial method instead", other.attrs["warnings"]]
     ).strip()
