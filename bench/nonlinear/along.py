@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from math import ceil, log
 from typing import Any
@@ -11,16 +11,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gearbench.bench.nonlinear.fine import averaged, integrated, interpolated, placed
+from gearbench.bench.nonlinear.pushing import Pushing, pushing, stepped
 from gearbench.bench.nonlinear.replay import Steady, resampled
 from gearbench.bench.record.sensors import shown_by
 from gearbench.lumped.nonlinear.coordinates import IN_MESH, NAMES
 from gearbench.lumped.nonlinear.law import MeshLaw
 from gearbench.lumped.nonlinear.model import NonLinear
-from gearbench.lumped.nonlinear.pressing import Pressed, of_pairs, pressed
+from gearbench.lumped.nonlinear.pressing import Pressed
 from gearbench.lumped.nonlinear.rest import inverse_masses, springs_and_dampers
-from gearbench.lumped.nonlinear.rubbing import rubbed_along
-from gearbench.lumped.nonlinear.step import columns
-from gearbench.lumped.nonlinear.tables import Table, instants
 from gearbench.lumped.nonlinear.tangent import Tangent, departures
 
 Array = NDArray[np.float64]
@@ -34,6 +33,7 @@ MOST = 3  # steps per sample that suffice: the frequency of a mode at 0.2 of the
 STABLE = 1.8  # largest rate of a mode times the step: Runge-Kutta bears 2.8
 # Of its first size, that free vibrations keep when the first sample is taken: a mean is far larger than the lines.
 TRANSIENT = 1e-9
+IMPACTS = 4  # instants for each half step, over which flanks that part and meet are averaged
 AT_ONCE = 96  # departures carried together: their states stay in the fastest memory
 
 U1, U2, W, LOAD = (NAMES.index(name) for name in ("u1", "u2", "w", "load"))
@@ -190,57 +190,33 @@ def _spectrum(signal: NDArray[np.floating[Any]]) -> Lines:
 def along(steady: Steady) -> Along:
     """The tangent of a steady motion."""
     setup, model = steady.setup, steady.setup.model
-    samples, out = len(steady.outputs), columns(steady.outputs)
-    places = np.stack([getattr(out, name) for name in NAMES[: model.size]], axis=1)
+    samples = len(steady.outputs)
+    places = placed(model.size, steady.outputs)
     around = model.around(_mean_deflections(model, places))
-    travel = places @ around.mesh
-    rates = _rates_of(places, setup.sampling_rate)
     substeps = _substeps(steady)
     entries = 2 * substeps * samples
     step = 1.0 / (setup.sampling_rate * substeps)
-    stepped = replace(setup, substeps=substeps, table=None)
-    table = stepped.table_for(0, samples)
-    turned = table.position[:entries] / model.law.phases + resampled(model.turned_on(places), entries)
-    turned = np.clip(turned, 0.0, 1.0 - 1e-12)  # the teeth are those of the entry's cycle
-    at = instants(model, table, turned, entries)
-    fine = resampled(travel, entries)
-    force, slope = pressed(model.law, at, fine)
-    # Back flanks close at the rate of the deflection alone.
-    closing = resampled(rates @ around.mesh, entries) + np.where(force < 0.0, 0.0, table.excess_rate[:entries])
-
-    def force_at(phase: Array) -> Array:
-        elastic, tangent = pressed(model.law, at._replace(phase=np.clip(phase, 0.0, 1.0 - 1e-12)), fine)
-        return np.asarray(elastic + model.viscosity(np.maximum(tangent, 0.0), np.abs(elastic)) * closing)
-
-    # Between two rows of the law the motion sees a straight line.
-    row = np.floor(turned * model.law.phases)
-    turning = (force_at((row + 1) / model.law.phases) - force_at(row / model.law.phases)) * model.law.phases
-    level = (np.abs(force / at.gain) / model.rig.mesh.reference_force) ** (1.0 / (1.0 + model.rig.mesh.exponent))
-    slope = np.maximum(slope, 0.0)
-    damping = model.viscosity(slope, np.abs(force))
-    # Flanks that part faster than they spring back push no more.
-    idle = (force + damping * closing) * force <= 0.0
-    force, slope, damping, turning = (np.where(idle, 0.0, one) for one in (force, slope, damping, turning))
-    # Damping that grows with the force is the stiffer for being pressed while the flanks close.
-    stiffer = 1.0 + model.rig.damping.mesh_exponent * damping * closing / np.where(idle, 1.0, force)
+    times = IMPACTS if setup.apart(steady.outputs).any() else 1
+    fine = (integrated if times > 1 else interpolated)(steady, times * entries)
+    found = Pushing(*(averaged(one, times) for one in pushing(steady, fine, around.mesh, substeps * times)))
     decay = max(model.slowest_decay(float(steady.drive.fine.mean())), 1e-9)
     return Along(
         model=model,
-        phase=stepped.phases(0, entries),
-        elastic=force,
-        pairs=Pressed(*(np.where(idle[:, None], 0.0, one) for one in of_pairs(model.law, at, fine))),
-        rate=closing,
-        level=level,
-        stiffer=stiffer,
+        phase=stepped(steady, substeps).phases(0, entries),
+        elastic=found.elastic,
+        pairs=Pressed(found.pair_force, found.pair_tangent),
+        rate=found.rate,
+        level=found.level,
+        stiffer=found.stiffer,
         tangent=Tangent(
             *around,
-            slope * stiffer,
-            damping,
+            found.stiffness,
+            found.damping,
             step,
             *_bearings(model, places, entries),
             model.turned_on(np.eye(model.size)),
-            turning,
-            _rubbed(steady, table, rates, turned * model.law.phases),
+            found.turning,
+            found.rubbed,
         ),
         substeps=substeps,
         early=min(ceil(log(1 / TRANSIENT) / decay / step), samples * substeps),
@@ -265,24 +241,6 @@ def _linear(model: NonLinear) -> tuple[Array, Array, Array]:
     still[LOAD:][:1] = False
     springs[still], dampers[still] = 0.0, 0.0
     return springs, dampers, masses
-
-
-def _rates_of(places: Array, sampling_rate: float) -> Array:
-    """Time derivatives (samples, n) of places (samples, n) that repeat."""
-    frequency = np.fft.rfftfreq(len(places), 1 / sampling_rate)
-    lines = 2j * np.pi * frequency[:, None] * np.fft.rfft(places, axis=0)
-    return np.asarray(np.fft.irfft(lines, len(places), axis=0))
-
-
-def _rubbed(steady: Steady, table: Table, rates: Array, position: Array) -> Array:
-    """What friction adds to the direction of a force in the mesh (entries, n), at the rates (samples, n) and positions
-    (entries,) in rows of the mesh law."""
-    setup, entries = steady.setup, len(position)
-    if setup.model.rig.friction.coefficient == 0.0:
-        return np.zeros((entries, rates.shape[1]))
-    fine = np.stack([resampled(one, entries) for one in rates.T], axis=1)
-    pace = table.pace[:entries] if table.pace.size else np.ones(entries)
-    return rubbed_along(setup.model, position, pace, fine, setup.mesh_frequency)
 
 
 def _bearings(model: NonLinear, places: Array, entries: int) -> tuple[Array, Array]:

@@ -55,13 +55,14 @@ class Given(NamedTuple):
 
 class Steady(NamedTuple):
     """A rig in the steady motion of a record: its setup, what drives it, one repetition of outputs (samples, n) and of
-    the force at the load's base circle (samples,) [N] as a sensor shows it, how steady that is, and what the record
-    imposes."""
+    the force at the load's base circle (samples,) [N] as a sensor shows it, the state (2 size,) at its first sample,
+    how steady that is, and what the record imposes."""
 
     setup: Setup
     drive: Drive
     outputs: Array
     load_force: Array
+    state: Array
     residual: float
     given: Given
 
@@ -99,9 +100,9 @@ def steady_motion(case: Case, record: xr.Dataset, law: MeshLaw | None = None, re
     setup = make_setup(case, given.plan, law, given.phase, given.turning, nominal=given.nominal)
     drive = Drive(torque, resampled(torque, 2 * setup.substeps * torque.size) / setup.meshing.driver.base_radius)
     load_forces = np.empty(setup.substeps * setup.block_samples)
-    outputs, residual = _settled(setup, drive, load_forces)
+    outputs, state, residual = _settled(setup, drive, load_forces)
     shown = columns(outputs).load_force if given.instants else seen_at(load_forces, len(outputs))
-    return Steady(setup, drive, outputs, np.asarray(shown, dtype=float), residual, given)
+    return Steady(setup, drive, outputs, np.asarray(shown, dtype=float), state, residual, given)
 
 
 def replay(case: Case, record: xr.Dataset, law: MeshLaw | None = None, realisation: int = 0) -> xr.Dataset:
@@ -219,9 +220,10 @@ def _experiment(
     return base.at_mesh_frequency(frequency).model_copy(update=values)
 
 
-def _settled(setup: Setup, drive: Drive, load_forces: Array) -> tuple[Array, float]:
+def _settled(setup: Setup, drive: Drive, load_forces: Array) -> tuple[Array, Array, float]:
     """Outputs (samples, n) of one repetition after free vibrations have died out, with the `load_forces` (steps,) [N]
-    of its steps, and how steady it is; of a rig that drifts, what is left of free vibrations."""
+    of its steps, the state (2 size,) at its first sample, and how steady it is; of a rig that drifts, what is left of
+    free vibrations."""
     mean = float(drive.fine.mean())
     block = setup.block_samples
     decay = setup.model.slowest_decay(mean)
@@ -229,15 +231,15 @@ def _settled(setup: Setup, drive: Drive, load_forces: Array) -> tuple[Array, flo
     begin, _ = setup.advance(drive, setup.at_rest(mean, -early), early)
     end, outputs = setup.advance(drive, begin, block, load_forces)
     if setup.model.rig.mesh.stiffness_drift:
-        return outputs, TRANSIENT
+        return outputs, begin.values, TRANSIENT
     residual = _unsteady(setup, begin.values, end.values, outputs)
     for _ in range(PERIODS_MAX):
         if residual <= TOLERANCE:
             break
-        before = outputs
+        before, begin = outputs, end
         end, outputs = setup.advance(drive, end, block, load_forces)
         residual = change(setup.dte(before), setup.dte(outputs))
-    return outputs, residual
+    return outputs, begin.values, residual
 
 
 def _unsteady(setup: Setup, start: Array, end: Array, outputs: Array) -> float:

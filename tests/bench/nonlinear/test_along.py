@@ -79,7 +79,8 @@ def test_a_measured_torque_changes_by_nothing_from_beyond_half_its_rate() -> Non
 @pytest.mark.parametrize("gear", [None, "driver", "driven"])
 def test_more_material_pushes_where_the_back_flanks_touch_by_what_they_have_of_it(gear: str | None) -> None:
     """Both flanks touch in turn: an error of the working flanks leaves the back ones where they are, run-out moves
-    both, each along its own normal. The motion is known between samples only, where flanks meet: a fifth."""
+    both, each along its own normal. Found: 0.12 and 0.06; 0.19 and 0.09 without the jump of the damping where flanks
+    meet. Two simulations themselves are rough there: steps hit the jump at one side or the other."""
     tight = ["experiment.torque_mean_nm=8", *(f"rig.{one}.thinning_um=0" for one in ("driver", "driven"))]
     case = read_case(case_files()["gap_demo"], tight)
     record = simulate(case)
@@ -104,7 +105,7 @@ def test_more_material_pushes_where_the_back_flanks_touch_by_what_they_have_of_i
         force = SMALL * tangent.of_excess(np.cos(turn)[:, None]) + SMALL * tangent.of_back_excess(np.cos(back)[:, None])
     found = signals(tangent, force, IN_MESH)["dte"][0]
     change = 0.5 * (more.setup.dte(more.outputs) - less.setup.dte(less.outputs))
-    assert np.linalg.norm(found - change) < 0.22 * np.linalg.norm(change - change.mean())
+    assert np.linalg.norm(found - change) < 0.14 * np.linalg.norm(change - change.mean())
 
 
 def test_torque_on_the_shaft_does_what_ripple_does() -> None:

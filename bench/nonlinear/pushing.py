@@ -1,0 +1,95 @@
+"""The mesh along a motion, instant by instant: what it carries and how that changes with deflection, rate and phase."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.bench.nonlinear.fine import Fine
+from gearbench.bench.nonlinear.replay import Steady
+from gearbench.bench.nonlinear.run import Setup
+from gearbench.lumped.nonlinear.model import NonLinear
+from gearbench.lumped.nonlinear.pressing import of_pairs, pressed
+from gearbench.lumped.nonlinear.rubbing import rubbed_along
+from gearbench.lumped.nonlinear.tables import Table, instants
+
+Array = NDArray[np.float64]
+
+
+class Pushing(NamedTuple):
+    """Arrays (instants, ...) of `bench.nonlinear.along.Along` and of its `Tangent`."""
+
+    elastic: Array
+    pair_force: Array
+    pair_tangent: Array
+    rate: Array
+    level: Array
+    stiffer: Array
+    stiffness: Array
+    damping: Array
+    turning: Array
+    rubbed: Array
+
+
+def stepped(steady: Steady, substeps: int) -> Setup:
+    """The setup of a motion with so many steps per sample."""
+    return replace(steady.setup, substeps=substeps, table=None)
+
+
+def pushing(steady: Steady, motion: Fine, mesh: Array, substeps: int) -> Pushing:
+    """The mesh along a motion at the half steps of so many steps per sample; mesh (n,): what coordinates contribute to
+    the deflection."""
+    setup = stepped(steady, substeps)
+    model, count = setup.model, len(motion.places)
+    table = setup.table_for(0, len(steady.outputs))
+    turned = table.position[:count] / model.law.phases + model.turned_on(motion.places)
+    turned = np.clip(turned, 0.0, 1.0 - 1e-12)  # the teeth are those of the entry's cycle
+    at = instants(model, table, turned, count)
+    travel = motion.places @ mesh
+    force, slope = pressed(model.law, at, travel)
+    # Back flanks close at the rate of the deflection alone.
+    closing = motion.rates @ mesh + np.where(force < 0.0, 0.0, table.excess_rate[:count])
+
+    def force_at(phase: Array) -> Array:
+        elastic, tangent = pressed(model.law, at._replace(phase=np.clip(phase, 0.0, 1.0 - 1e-12)), travel)
+        return np.asarray(elastic + _damping(model, elastic, tangent) * closing)
+
+    # Between two rows of the law the motion sees a straight line.
+    row = np.floor(turned * model.law.phases)
+    turning = (force_at((row + 1) / model.law.phases) - force_at(row / model.law.phases)) * model.law.phases
+    level = (np.abs(force / at.gain) / model.rig.mesh.reference_force) ** (1.0 / (1.0 + model.rig.mesh.exponent))
+    slope = np.maximum(slope, 0.0)
+    damping = _damping(model, force, slope)
+    # Flanks that part faster than they spring back push no more.
+    idle = (force + damping * closing) * force <= 0.0
+    force, slope, damping, turning = (np.where(idle, 0.0, one) for one in (force, slope, damping, turning))
+    # Damping that grows with the force is the stiffer for being pressed while the flanks close.
+    stiffer = 1.0 + model.rig.damping.mesh_exponent * damping * closing / np.where(idle, 1.0, force)
+    stiffness = slope * stiffer + _met(damping, force, closing, setup.step / 2)
+    pair_force, pair_tangent = (np.where(idle[:, None], 0.0, one) for one in of_pairs(model.law, at, travel))
+    rubbed = _rubbed(setup, table, motion.rates, turned * model.law.phases)
+    return Pushing(force, pair_force, pair_tangent, closing, level, stiffer, stiffness, damping, turning, rubbed)
+
+
+def _damping(model: NonLinear, elastic: Array, tangent: Array) -> Array:
+    return model.viscosity(np.maximum(tangent, 0.0), np.abs(elastic))
+
+
+def _met(damping: Array, force: Array, closing: Array, apart: float) -> Array:
+    """Stiffness (instants,) [N/m] of flanks that have met since the instant before, `apart` [s]: their damping begins
+    with a jump, which comes the earlier the deeper they are, by one over the rate of closing."""
+    met = (np.roll(damping, 1) == 0.0) & (damping > 0.0) & (closing * force > 0.0)
+    return np.where(met, damping / apart, 0.0)
+
+
+def _rubbed(setup: Setup, table: Table, rates: Array, position: Array) -> Array:
+    """What friction adds to the direction of a force in the mesh (instants, n), at the rates (instants, n) and the
+    positions (instants,) in rows of the mesh law."""
+    count = len(position)
+    if setup.model.rig.friction.coefficient == 0.0:
+        return np.zeros(rates.shape)
+    pace = table.pace[:count] if table.pace.size else np.ones(count)
+    return rubbed_along(setup.model, position, pace, rates, setup.mesh_frequency)
