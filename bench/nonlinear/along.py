@@ -197,8 +197,8 @@ def along(steady: Steady) -> Along:
     entries = 2 * substeps * samples
     step = 1.0 / (setup.sampling_rate * substeps)
     times = IMPACTS if setup.apart(steady.outputs).any() else 1
-    fine = (integrated if times > 1 else interpolated)(steady, times * entries)
-    found = Pushing(*(averaged(one, times) for one in pushing(steady, fine, around.mesh, substeps * times)))
+    motion = (integrated if times > 1 else interpolated)(steady, around.mesh, times * entries)
+    found = Pushing(*(averaged(one, times) for one in pushing(steady, motion, substeps * times)))
     decay = max(model.slowest_decay(float(steady.drive.fine.mean())), 1e-9)
     return Along(
         model=model,

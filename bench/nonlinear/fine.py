@@ -13,26 +13,36 @@ from gearbench.bench.nonlinear.replay import Steady, resampled
 from gearbench.bench.nonlinear.run import State
 from gearbench.bench.protocol import Drive
 from gearbench.lumped.nonlinear.coordinates import NAMES
+from gearbench.lumped.nonlinear.model import NonLinear
 from gearbench.lumped.nonlinear.step import columns
 
 Array = NDArray[np.float64]
 
 
-class Fine(NamedTuple):
-    """Places and rates (instants, n) of all coordinates [m, m/s] over one repetition."""
+class Motion(NamedTuple):
+    """At instants of one repetition (instants,): deflection of the mesh [m], its rate [m/s], and how far the centres
+    turn the mesh on [cycles]; rates (instants, n) of all coordinates [m/s], without columns on a rig without
+    friction."""
 
-    places: Array
+    travel: Array
+    rate: Array
+    turned: Array
     rates: Array
 
 
-def interpolated(steady: Steady, instants: int) -> Fine:
-    """Through the samples, of a motion that holds no more than half the sampling rate."""
+def interpolated(steady: Steady, mesh: Array, instants: int) -> Motion:
+    """Through the samples, of a motion that holds no more than half the sampling rate; mesh (n,): what coordinates
+    contribute to the deflection."""
     places = placed(steady.setup.model.size, steady.outputs)
-    rates = rates_of(places, steady.setup.sampling_rate)
-    return Fine(*(np.stack([resampled(one, instants) for one in values.T], axis=1) for values in (places, rates)))
+    found = _motion(steady.setup.model, places, mesh, steady.setup.sampling_rate)
+    travel, rate, turned = (resampled(one, instants) for one in found[:3])
+    rates = np.empty((instants, found.rates.shape[1]))
+    for column, values in enumerate(found.rates.T):
+        rates[:, column] = resampled(values, instants)
+    return Motion(travel, rate, turned, rates)
 
 
-def integrated(steady: Steady, instants: int) -> Fine:
+def integrated(steady: Steady, mesh: Array, instants: int) -> Motion:
     """By running through the repetition again, which impacts call for."""
     setup, samples = steady.setup, len(steady.outputs)
     times = instants // samples
@@ -48,8 +58,14 @@ def integrated(steady: Steady, instants: int) -> Fine:
     torque = steady.drive.torque
     fine = resampled(torque, 2 * finer.substeps * times * torque.size) / setup.meshing.driver.base_radius
     _, outputs = finer.advance(Drive(torque, fine), State(0, steady.state), instants)
-    places = placed(setup.model.size, outputs)
-    return Fine(places, rates_of(places, finer.sampling_rate))
+    return _motion(setup.model, placed(setup.model.size, outputs), mesh, finer.sampling_rate)
+
+
+def _motion(model: NonLinear, places: Array, mesh: Array, sampling_rate: float) -> Motion:
+    """That of places (instants, n) at their own instants."""
+    rates = _rates_of(places, sampling_rate)
+    rubs = model.rig.friction.coefficient != 0.0
+    return Motion(places @ mesh, rates @ mesh, model.turned_on(places), rates if rubs else rates[:, :0])
 
 
 def placed(size: int, outputs: Array) -> Array:
@@ -58,7 +74,7 @@ def placed(size: int, outputs: Array) -> Array:
     return np.stack([getattr(out, name) for name in NAMES[:size]], axis=1)
 
 
-def rates_of(places: Array, sampling_rate: float) -> Array:
+def _rates_of(places: Array, sampling_rate: float) -> Array:
     """Time derivatives (samples, n) of places (samples, n) that repeat."""
     frequency = np.fft.rfftfreq(len(places), 1 / sampling_rate)
     lines = 2j * np.pi * frequency[:, None] * np.fft.rfft(places, axis=0)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.bench.nonlinear.fine import Fine
+from gearbench.bench.nonlinear.fine import Motion
 from gearbench.bench.nonlinear.replay import Steady
 from gearbench.bench.nonlinear.run import Setup
 from gearbench.lumped.nonlinear.model import NonLinear
@@ -39,19 +39,17 @@ def stepped(steady: Steady, substeps: int) -> Setup:
     return replace(steady.setup, substeps=substeps, table=None)
 
 
-def pushing(steady: Steady, motion: Fine, mesh: Array, substeps: int) -> Pushing:
-    """The mesh along a motion at the half steps of so many steps per sample; mesh (n,): what coordinates contribute to
-    the deflection."""
+def pushing(steady: Steady, motion: Motion, substeps: int) -> Pushing:
+    """The mesh along a motion at the half steps of so many steps per sample."""
     setup = stepped(steady, substeps)
-    model, count = setup.model, len(motion.places)
+    model, travel, count = setup.model, motion.travel, len(motion.travel)
     table = setup.table_for(0, len(steady.outputs))
-    turned = table.position[:count] / model.law.phases + model.turned_on(motion.places)
+    turned = table.position[:count] / model.law.phases + motion.turned
     turned = np.clip(turned, 0.0, 1.0 - 1e-12)  # the teeth are those of the entry's cycle
     at = instants(model, table, turned, count)
-    travel = motion.places @ mesh
     force, slope = pressed(model.law, at, travel)
     # Back flanks close at the rate of the deflection alone.
-    closing = motion.rates @ mesh + np.where(force < 0.0, 0.0, table.excess_rate[:count])
+    closing = motion.rate + np.where(force < 0.0, 0.0, table.excess_rate[:count])
 
     def force_at(phase: Array) -> Array:
         elastic, tangent = pressed(model.law, at._replace(phase=np.clip(phase, 0.0, 1.0 - 1e-12)), travel)
@@ -70,7 +68,7 @@ def pushing(steady: Steady, motion: Fine, mesh: Array, substeps: int) -> Pushing
     stiffer = 1.0 + model.rig.damping.mesh_exponent * damping * closing / np.where(idle, 1.0, force)
     stiffness = slope * stiffer + _met(damping, force, closing, setup.step / 2)
     pair_force, pair_tangent = (np.where(idle[:, None], 0.0, one) for one in of_pairs(model.law, at, travel))
-    rubbed = _rubbed(setup, table, motion.rates, turned * model.law.phases)
+    rubbed = _rubbed(setup, table, motion, turned * model.law.phases)
     return Pushing(force, pair_force, pair_tangent, closing, level, stiffer, stiffness, damping, turning, rubbed)
 
 
@@ -85,11 +83,11 @@ def _met(damping: Array, force: Array, closing: Array, apart: float) -> Array:
     return np.where(met, damping / apart, 0.0)
 
 
-def _rubbed(setup: Setup, table: Table, rates: Array, position: Array) -> Array:
-    """What friction adds to the direction of a force in the mesh (instants, n), at the rates (instants, n) and the
-    positions (instants,) in rows of the mesh law."""
+def _rubbed(setup: Setup, table: Table, motion: Motion, position: Array) -> Array:
+    """What friction adds to the direction of a force in the mesh (instants, n) along a motion, at positions (instants,)
+    in rows of the mesh law."""
     count = len(position)
     if setup.model.rig.friction.coefficient == 0.0:
-        return np.zeros(rates.shape)
+        return np.zeros((count, setup.model.size))
     pace = table.pace[:count] if table.pace.size else np.ones(count)
-    return rubbed_along(setup.model, position, pace, rates, setup.mesh_frequency)
+    return rubbed_along(setup.model, position, pace, motion.rates, setup.mesh_frequency)

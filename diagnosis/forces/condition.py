@@ -12,7 +12,7 @@ from gearbench.diagnosis.forces.basis import hats, on_path, waves
 from gearbench.diagnosis.forces.nominal import NominalModel
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.lumped.nonlinear.coordinates import leaning_of
-from gearbench.lumped.nonlinear.ends import ends_between, turnings
+from gearbench.lumped.nonlinear.ends import aside_of, ends_between, turned_by
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -78,6 +78,7 @@ def prepare(measured: Measurement, model: NominalModel, band: float) -> Conditio
     bins = min(int(np.searchsorted(omega, 2 * np.pi * band, side="right")), samples // 2)
     numbers, share = model.law.pairs(phase)
     turns = [2 * np.pi * measured.phase / z for z in model.teeth]
+    ends = ends_between(model.path, model.base_radius, model.law.base_pitch, model.line)
     rb1 = model.base_radius[0]
     mean = float(spectra["torque_driver"][0].real)
     force = _force(model, spectra, omega)
@@ -100,7 +101,7 @@ def prepare(measured: Measurement, model: NominalModel, band: float) -> Conditio
         flanks=(on_path(phase[:, None] - numbers, model.path) * share).sum(axis=-1),
         lobes=np.stack([(np.cos(turn), np.sin(turn)) for turn in turns]),
         leaning=np.stack([_leaning(model, side, turn) for side, turn in enumerate(turns)]),
-        ends=np.stack([_ends(model, phase, side, turn) for side, turn in enumerate(turns)]),
+        ends=np.stack([turned_by(phase, turn, side, ends) for side, turn in enumerate(turns)]),
         pitch_speed=2 * np.pi * measured.mesh_frequency / model.teeth[0] * rb1,
         teeth=model.teeth,
         torque_mean=mean,
@@ -114,24 +115,12 @@ def prepare(measured: Measurement, model: NominalModel, band: float) -> Conditio
 def _leaning(model: NominalModel, side: int, turn: Array) -> Array:
     """What run-out of a gear (0: driver) adds to the levers (2, 3, N) [1/m] at its rotations (N,): its centre stands
     aside of the normal through its axis, and turns the line of action (`lumped.nonlinear.ends`)."""
-    aside = _aside(side, turn)
+    aside = aside_of(turn, side)
     out = np.zeros((2, 3, turn.size))
     out[:, (0, 2)[side]] = aside / model.base_radius[side]
     if model.support_factor < 1.0:  # supports across the line of centres, with the force's part tan(a_w) across them
         out[:, 1] = aside / sum(model.base_radius)
     return out
-
-
-def _ends(model: NominalModel, phase: Array, side: int, turn: Array) -> Array:
-    """How far that run-out turns the mesh on (2, N) [cycles/m] at phases (N,) [cycles], as it moves the ends of
-    contact."""
-    proud, leant = turnings(phase, ends_between(model.path, model.base_radius, model.law.base_pitch, model.line)).T
-    return proud * np.stack([np.cos(turn), np.sin(turn)]) + leant * _aside(side, turn)
-
-
-def _aside(side: int, turn: Array) -> Array:
-    """How far (2, N) a gear's centre stands aside of the normal through its axis, against the driver's rotation."""
-    return (1, -1)[side] * np.stack([-np.sin(turn), np.cos(turn)])
 
 
 def _turned_on(model: NominalModel, spectra: Mapping[str, Complex], samples: int) -> Array:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.lumped.nonlinear.coordinates import NAMES
-from gearbench.lumped.nonlinear.ends import ends_of, turnings
+from gearbench.lumped.nonlinear.ends import aside_of, ends_of, turned_by
 
 if TYPE_CHECKING:
     from gearbench.bench.nonlinear.along import Along
@@ -25,8 +25,7 @@ def in_mesh_of_runout(along: Along, side: int) -> Array:
     # Normals of working and back flanks are so much of the gear's rotation apart (`lumped.nonlinear.tables`).
     between = np.pi - 2 * along.model.working_pressure_angle
     proud, back = _proud(turn), _proud(turn + (between, -between)[side])
-    per_proud, per_leant = turnings(along.phase, ends_of(along.model)).T
-    turned = per_proud[:, None] * proud + per_leant[:, None] * _leant(turn, side)
+    turned = turned_by(along.phase, turn, side, ends_of(along.model)).T
     closed = sum(change * along.fine(on)[:, None] for on, change in _directions(along, side).items())
     return along.of_excess(proud + closed) + along.of_back_excess(back) + along.tangent.turning[:, None] * turned
 
@@ -40,9 +39,9 @@ def on_gears_of_runout(along: Along, side: int) -> dict[int, Array]:
 
 def _directions(along: Along, side: int) -> dict[int, Array]:
     """What coordinates that the run-out acts on contribute more to the deflection (entries, 2) per unit of both."""
-    model, leant = along.model, _leant(_turn(along, side), side)
-    tilt = leant / model.length_of_action
-    out = {(U1, U2)[side]: (1.0, -1.0)[side] * leant / model.base_radii[side]}
+    model, aside = along.model, aside_of(_turn(along, side), side).T
+    tilt = aside / model.length_of_action
+    out = {(U1, U2)[side]: (1.0, -1.0)[side] * aside / model.base_radii[side]}
     if model.slide:
         out |= {Y1: model.slide * tilt, Y2: -model.slide * tilt}
     if model.rig.support.move_across:
@@ -59,9 +58,3 @@ def _turn(along: Along, side: int) -> Array:
 def _proud(turn: Array) -> Array:
     """Cosine and sine (entries, 2) of a gear's rotation [rad]."""
     return np.stack([np.cos(turn), np.sin(turn)], axis=1)
-
-
-def _leant(turn: Array, side: int) -> Array:
-    """How far (entries, 2) the gear's centre stands aside of the normal through its axis, against the driver's
-    rotation, per unit of both."""
-    return (1, -1)[side] * np.stack([-np.sin(turn), np.cos(turn)], axis=1)

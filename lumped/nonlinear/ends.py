@@ -55,3 +55,15 @@ def turnings(phases: Array, ends: Ends) -> Array:
     """How far [cycles] the mesh is turned on at phases (n,) [cycles], per e and per L phi [m] (n, 2)."""
     near = np.interp(phases, (ends.begin, ends.begin + ends.span), (0.0, 1.0), period=1.0)
     return np.stack([near * ends.proud, ends.leant_begin + near * (ends.leant_end - ends.leant_begin)], axis=1)
+
+
+def aside_of(turn: Array, side: int) -> Array:
+    """How far (2, n) the centre of a gear (0: driver) stands aside of the normal through its axis, against the driver's
+    rotation, at its rotations (n,) [rad], per unit of the cosine and the sine of its run-out: what it adds to L phi."""
+    return (1, -1)[side] * np.stack([-np.sin(turn), np.cos(turn)])
+
+
+def turned_by(phases: Array, turn: Array, side: int, ends: Ends) -> Array:
+    """How far a gear's run-out turns the mesh on (2, n) [cycles/m] at phases (n,) [cycles], per unit of both."""
+    proud, leant = turnings(phases, ends).T
+    return np.asarray(proud * np.stack([np.cos(turn), np.sin(turn)]) + leant * aside_of(turn, side))
