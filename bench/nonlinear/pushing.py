@@ -45,7 +45,10 @@ def pushing(steady: Steady, motion: Motion, substeps: int) -> Pushing:
     model, travel, count = setup.model, motion.travel, len(motion.travel)
     table = setup.table_for(0, len(steady.outputs))
     turned = table.position[:count] / model.law.phases + motion.turned
-    turned = np.clip(turned, 0.0, 1.0 - 1e-12)  # the teeth are those of the entry's cycle
+    # Pairs are those of the entry's cycle, and wait at its ends for the next where teeth differ.
+    within = np.clip(turned, 0.0, 1.0 - 1e-12)
+    waits = ((turned < 0.0) | (turned >= 1.0)) if table.own.size else np.zeros(count, dtype=bool)
+    turned = within if table.own.size else turned - np.floor(turned)
     at = instants(model, table, turned, count)
     force, slope = pressed(model.law, at, travel)
     # Back flanks close at the rate of the deflection alone.
@@ -58,6 +61,7 @@ def pushing(steady: Steady, motion: Motion, substeps: int) -> Pushing:
     # Between two rows of the law the motion sees a straight line.
     row = np.floor(turned * model.law.phases)
     turning = (force_at((row + 1) / model.law.phases) - force_at(row / model.law.phases)) * model.law.phases
+    turning[waits] = 0.0
     level = (np.abs(force / at.gain) / model.rig.mesh.reference_force) ** (1.0 / (1.0 + model.rig.mesh.exponent))
     slope = np.maximum(slope, 0.0)
     damping = _damping(model, force, slope)
@@ -66,8 +70,9 @@ def pushing(steady: Steady, motion: Motion, substeps: int) -> Pushing:
     force, slope, damping, turning = (np.where(idle, 0.0, one) for one in (force, slope, damping, turning))
     # Damping that grows with the force is the stiffer for being pressed while the flanks close.
     stiffer = 1.0 + model.rig.damping.mesh_exponent * damping * closing / np.where(idle, 1.0, force)
+    paired = at._replace(phase=within)
     stiffness = slope * stiffer + _met(damping, force, closing, setup.step / 2)
-    pair_force, pair_tangent = (np.where(idle[:, None], 0.0, one) for one in of_pairs(model.law, at, travel))
+    pair_force, pair_tangent = (np.where(idle[:, None], 0.0, one) for one in of_pairs(model.law, paired, travel))
     rubbed = _rubbed(setup, table, motion, turned * model.law.phases)
     return Pushing(force, pair_force, pair_tangent, closing, level, stiffer, stiffness, damping, turning, rubbed)
 

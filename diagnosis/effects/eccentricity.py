@@ -53,7 +53,7 @@ def unknowns(model: NominalModel, conditions: Sequence[Condition]) -> tuple[Grou
     return tuple(
         group(
             *(key, "m", ("cos", "sin"), sound, large),
-            slot="excess",
+            slot="closed",
             basis=partial(_turning, number),
             also={"levers": partial(_levers, number), "turned": partial(_ends, number)},
         )

@@ -34,7 +34,7 @@ def unknowns(model: NominalModel, conditions: Sequence[Condition]) -> tuple[Grou
     """Cosine and sine part of what either encoder reads ahead, along its gear's base circle."""
     sound, large = SD * model.deflection, WIDE * model.deflection
     return tuple(
-        group(key, "m", ("cos", "sin"), sound, large, slot="excess", basis=partial(_lacking, side))
+        group(key, "m", ("cos", "sin"), sound, large, slot="closed", basis=partial(_lacking, side))
         for side, key in KEYS.items()
     )
 

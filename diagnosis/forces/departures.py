@@ -29,10 +29,11 @@ class Departures:
     the recorded torque. Mesh: `scale`, `mesh_ratio` logarithms of the factors on stiffness and damping ratio;
     `shape` (2 orders,) relative stiffness and `profile` (2 orders,) [m] excess material by mesh orders, cosine and
     sine in turn; `offset` [m] excess material; `excess` (N,) [m] excess material that all pairs share and `pitch`
-    (z1 + z2,) [m] that of each tooth; `turned` (N,) [cycles] how far the mesh is turned on; `levers` (3, N) by what
-    part the mesh force's levers about the driver's axis, along the supports and about the driven gear's axis are
-    longer; `loss` (z1 + z2,) part of each tooth's bending stiffness that is lost; `curvature` exponent of the mesh
-    force over its level; `dissipation` [N s^2/m^2]; `friction` coefficient; `backlash` [m]; `yielding` (2 knots,)
+    (z1 + z2,) [m] that of each tooth, all on the working flanks; `closed` (N,) [m] by how much the gears are closer to
+    each other there, and farther on the back flanks; `turned` (N,) [cycles] how far the mesh is turned on; `levers`
+    (3, N) by what part the mesh force's levers about the driver's axis, along the supports and about the driven gear's
+    axis are longer; `loss` (z1 + z2,) part of each tooth's bending stiffness that is lost; `curvature` exponent of the
+    mesh force over its level; `dissipation` [N s^2/m^2]; `friction` coefficient; `backlash` [m]; `yielding` (2 knots,)
     compliance of webs and shafts over that of the mesh, real then imaginary part. `delay` (4,) [s] of the sensors
     of `equations.DELAYED`; `filters` (4, 2 knots) parts of the mesh force, by frequency, that each equation misses.
     """
@@ -51,6 +52,7 @@ class Departures:
     profile: Array
     offset: float
     excess: Array
+    closed: Array
     turned: Array
     levers: Array
     pitch: Array

@@ -116,10 +116,11 @@ def _mesh_columns(at: _Point, unknowns: Unknowns, used: NDArray[np.int64]) -> tu
     for slot, derivatives in _mesh_slots(at):
         for element, value in derivatives.items():
             listed.extend((entry, value) for entry in unknowns.moving.get((slot, element), ()))
-    for one in unknowns.based("excess"):
-        assert one.basis is not None
-        start = unknowns[one.key].start
-        listed.extend((start + i, at.mesh.tangent * wave) for i, wave in enumerate(one.basis(at.condition)))
+    for slot, tangent in (("excess", at.mesh.working_tangent), ("closed", at.mesh.tangent)):
+        for one in unknowns.based(slot):
+            assert one.basis is not None
+            start = unknowns[one.key].start
+            listed.extend((start + i, tangent * wave) for i, wave in enumerate(one.basis(at.condition)))
     turned = unknowns.moved_besides("turned")
     turning = _turning(at) if turned else np.zeros(0)
     for own, basis in turned:
@@ -137,9 +138,9 @@ def _mesh_slots(at: _Point) -> Iterator[tuple[str, dict[int, Array]]]:
     yield "scale", {0: state.elastic + 0.5 * viscous}
     yield "mesh_ratio", {0: viscous}
     yield "dissipation", {0: np.abs(state.rate) * state.rate * state.touching}
-    yield "offset", {0: state.tangent}
+    yield "offset", {0: state.working_tangent}
     yield "shape", dict(enumerate(state.elastic * condition.waves))
-    yield "profile", dict(enumerate(state.tangent * condition.waves))
+    yield "profile", dict(enumerate(state.working_tangent * condition.waves))
     yield "curvature", {0: state.elastic * np.log(level)}
     yield "backlash", {0: _backlash(at)}
     yield "radial", dict(enumerate(_radial(at)))
@@ -183,7 +184,7 @@ def _teeth(condition: Condition, loss: Array, state: Mesh) -> tuple[Array, Array
     left = (condition.load_share * soft).sum(axis=-1)
     weaker = (condition.load_share * soft**2)[..., None] * condition.bending
     both = np.stack([condition.load_share, condition.load_share], axis=-1)
-    pitch = _of_teeth(condition, both * state.tangent[:, None, None])
+    pitch = _of_teeth(condition, both * state.working_tangent[:, None, None])
     own = (1.0 - loss[:, None]) ** -2
     return pitch, own * _of_teeth(condition, weaker * (-state.elastic / left)[:, None, None])
 
@@ -201,15 +202,15 @@ def _of_teeth(condition: Condition, weights: Array) -> Array:
 
 def _backlash(at: _Point) -> Array:
     """As a difference, of the damping too: flanks that hardly touch have most of their force from it."""
-    law, phase = at.model.hardened, at.condition.phase
+    law, phase = at.model.hardened, at.condition.phase + at.departures.turned
     present = max(law.backlash + at.departures.backlash, 0.0)
-    if not np.any(at.mesh.delta < -present):
+    if not np.any(at.mesh.delta < at.mesh.filled - present):
         return np.zeros(at.condition.samples)
     factor = at.model.scale * stiffness_factor(at.condition, at.departures)
     ratio = at.model.mesh_ratio * np.exp(at.departures.mesh_ratio)
 
     def carried(backlash: float) -> Array:
-        force, slope = replace(law, backlash=backlash).evaluate(at.mesh.delta, phase)
+        force, slope = replace(law, backlash=backlash).evaluate(at.mesh.delta, phase, at.mesh.filled)
         viscosity = 2 * ratio * np.sqrt(np.maximum(factor * slope, 0.0) * at.model.mesh_mass)
         return np.asarray(factor * force + viscosity * at.mesh.rate * at.mesh.touching)
 
@@ -220,7 +221,7 @@ def _turning(at: _Point) -> Array:
     """What the elastic force grows by (N,) [N/cycle] as the mesh turns on, between two rows of its law."""
     law, phase = at.model.hardened, at.condition.phase + at.departures.turned
     row = np.floor(phase * law.phases)
-    ahead, behind = (law.evaluate(at.mesh.delta, one / law.phases)[0] for one in (row + 1, row))
+    ahead, behind = (law.evaluate(at.mesh.delta, one / law.phases, at.mesh.filled)[0] for one in (row + 1, row))
     factor = at.model.scale * stiffness_factor(at.condition, at.departures)
     return np.asarray(factor * (ahead - behind) * law.phases)
 

@@ -24,11 +24,13 @@ RADIAL_STIFFNESS, RADIAL_DAMPING = 5.0, 1.5  # of radial supports, as multiples 
 class Mesh:
     """The mesh of one condition under given departures, over time (N,).
 
-    Deflection [m], force without damping [N], its tangent [N/m], damping coefficient [N s/m], rate of the DTE [m/s],
-    the whole force [N] and the touching flags; `stiffening` is the mean logarithm of the stiffness's factor.
+    Deflection [m], what working flanks alone have of it [m], force without damping [N], its tangent [N/m], damping
+    coefficient [N s/m], rate of the DTE [m/s], the whole force [N] and the touching flags; `stiffening` is the mean
+    logarithm of the stiffness's factor.
     """
 
     delta: Array
+    filled: Array
     elastic: Array
     tangent: Array
     viscosity: Array
@@ -36,6 +38,11 @@ class Mesh:
     force: Array
     touching: NDArray[np.bool_]
     stiffening: float
+
+    @property
+    def working_tangent(self) -> Array:
+        """The tangent [N/m] where the working flanks touch: what is on them is not felt on the back flanks."""
+        return np.where(self.elastic < 0.0, 0.0, self.tangent)
 
 
 def corrected(condition: Condition, departures: Departures) -> dict[str, Complex]:
@@ -90,8 +97,7 @@ def mesh(model: NominalModel, condition: Condition, departures: Departures, spec
     dte = closing(model, spectra)
     filtered = dte + _yielding(model, condition, departures)
     n = condition.samples
-    common = model.law.lead + departures.offset + departures.excess + departures.profile @ condition.waves
-    delta = np.fft.irfft(filtered, n) * n + common
+    delta = np.fft.irfft(filtered, n) * n + departures.closed
     rate = np.fft.irfft(1j * condition.omega * dte, n) * n
     law = replace(model.hardened, backlash=max(model.law.backlash + departures.backlash, 0.0))
     modulated = stiffness_factor(condition, departures)
@@ -99,8 +105,10 @@ def mesh(model: NominalModel, condition: Condition, departures: Departures, spec
     # The errors of all pairs in contact act together, each by its part of the stiffness.
     weight = condition.load_share * softened(condition, departures.loss)
     weight = weight / weight.sum(axis=-1, keepdims=True)
-    delta = delta + (weight * _pitch_excess(condition, departures)).sum(axis=-1)
-    force, slope = law.evaluate(delta, condition.phase + departures.turned)
+    filled = model.law.lead + departures.offset + departures.excess + departures.profile @ condition.waves
+    filled = filled + (weight * _pitch_excess(condition, departures)).sum(axis=-1)
+    delta = delta + filled
+    force, slope = law.evaluate(delta, condition.phase + departures.turned, filled)
     if departures.curvature:
         level = np.maximum(np.abs(force), 1e-3 * condition.force_level) / model.reference_force
         stiffer = departures.curvature / (1.0 + model.hardening)
@@ -113,7 +121,7 @@ def mesh(model: NominalModel, condition: Condition, departures: Departures, spec
     quadratic = departures.dissipation * np.abs(rate)
     total = elastic + (viscosity + quadratic) * rate * touching
     stiffening = float(np.log(np.maximum(modulated, 1e-3)).mean())
-    return Mesh(delta, elastic, tangent, viscosity, rate, total, touching, stiffening)
+    return Mesh(delta, filled, elastic, tangent, viscosity, rate, total, touching, stiffening)
 
 
 def _pitch_excess(condition: Condition, departures: Departures) -> Array:

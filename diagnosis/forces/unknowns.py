@@ -126,7 +126,7 @@ class Unknowns:
         """The departures (size,) as the residuals of one condition take them."""
         sizes = {slot: prod(shape) for slot, shape in SHAPES.items()} | dict.fromkeys(TOOTH_SLOTS, self.teeth)
         values: dict[str, Any] = {slot: np.zeros(size) for slot, size in sizes.items()}
-        values["excess"] = np.zeros(condition.samples)
+        values["excess"], values["closed"] = np.zeros((2, condition.samples))
         values["turned"], values["levers"] = np.zeros(condition.samples), np.zeros((3, condition.samples))
         values["torque"] = np.zeros(condition.bins, dtype=complex)
         for one in self.groups:

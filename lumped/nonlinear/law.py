@@ -109,16 +109,18 @@ class MeshLaw:
         travel = self.offsets[column] * self.base_pitch
         return float(self.rho1[0, column] + travel), float(self.rho2[0, column] - travel)
 
-    def evaluate(self, delta: ArrayLike, phase: ArrayLike) -> tuple[Array, Array]:
+    def evaluate(self, delta: ArrayLike, phase: ArrayLike, filled: ArrayLike = 0.0) -> tuple[Array, Array]:
         """Force [N] and tangent stiffness [N/m] at deflections [m] and phases [cycles] (shapes broadcast).
 
-        Nothing touches from delta = 0 down to -backlash; below, the back flanks push the other way. Beyond the last
-        node the secant goes on as between the last two.
+        Nothing touches from delta = 0 down to -backlash, which excess material on working and back flanks has `filled`
+        [m] in part; below, the back flanks push the other way. Beyond the last node the secant goes on as between the
+        last two.
         """
         delta, phase = np.asarray(delta, dtype=float), np.asarray(phase, dtype=float)
-        back = delta < -self.backlash
+        pressed = -delta - self.backlash + np.asarray(filled, dtype=float)
+        back = (pressed > 0.0) & (delta <= 0.0)
         if np.any(back):
-            depth = np.where(back, -delta - self.backlash, np.maximum(delta, 0.0))
+            depth = np.where(back, pressed, np.maximum(delta, 0.0))
             force, tangent = self._pressed(depth, np.where(back, self.mirror - phase, phase))
             return np.where(back, -force, force), np.where(back | (delta > 0), tangent, 0.0)
         force, tangent = self._pressed(np.maximum(delta, 0.0), phase)

@@ -18,12 +18,13 @@ CLOSE = 1e-14  # of the tabulated deflections, at which a deflection is found
 
 
 class Instants(NamedTuple):
-    """A mesh at instants (n,): mesh phase [cycles], excess [m] and gain common to all pairs, and those that pairs have
-    of their own (n, n_o), without columns where all teeth are alike."""
+    """A mesh at instants (n,): mesh phase [cycles], excess [m] and gain common to all pairs, excess [m] on the back
+    flanks, and those that pairs have of their own (n, n_o), without columns where all teeth are alike."""
 
     phase: Array
     excess: Array
     gain: Array
+    back: Array
     pair_excess: Array
     pair_gain: Array
 
@@ -40,11 +41,13 @@ class Pressed(NamedTuple):
     tangent: Array
 
 
-def alike(phase: ArrayLike, excess: ArrayLike = 0.0, gain: ArrayLike = 1.0) -> Instants:
+def alike(
+    phase: ArrayLike, excess: ArrayLike = 0.0, gain: ArrayLike = 1.0, back: ArrayLike = 0.0
+) -> Instants:
     """A mesh whose teeth do not differ."""
-    at, over, factor = np.broadcast_arrays(np.atleast_1d(np.asarray(phase, dtype=float)), excess, gain)
+    at, over, factor, behind = np.broadcast_arrays(np.atleast_1d(np.asarray(phase, dtype=float)), excess, gain, back)
     none = np.empty((at.size, 0))
-    return Instants(at, over, factor, none, none)
+    return Instants(at, over, factor, behind, none, none)
 
 
 def of_pairs(law: MeshLaw, at: Instants, travel: Array) -> Pressed:
@@ -59,13 +62,12 @@ def of_pairs(law: MeshLaw, at: Instants, travel: Array) -> Pressed:
 
 def pressed(law: MeshLaw, at: Instants, travel: Array) -> Pressed:
     """What all pairs carry at the DTE `travel` (..., n) [m]."""
-    depth = travel + at.excess
-    force, tangent = law.evaluate(depth, at.phase)
+    force, tangent = law.evaluate(travel + at.excess, at.phase, at.excess + at.back)
     if not at.differ:
         return Pressed(at.gain * force, at.gain * tangent)
-    pairs, back = of_pairs(law, at, travel), depth < -law.backlash
+    pairs = of_pairs(law, at, travel)
     working, stiff = pairs.force.sum(axis=-1), pairs.tangent.sum(axis=-1)
-    back &= working == 0.0
+    back = (force < 0.0) & (working == 0.0)
     return Pressed(np.where(back, at.gain * force, working), np.where(back, at.gain * tangent, stiff))
 
 

@@ -148,11 +148,13 @@ def instants(model: NonLinear, table: Table, phase: ArrayLike, end: int | None =
     """The mesh at the table's entries to before `end`; phase [cycles] of each."""
     at = np.atleast_1d(np.asarray(phase, dtype=float))
     if not table.own.size:
-        return alike(at, table.excess[:end], table.gain[:end])
+        return alike(at, table.excess[:end], table.gain[:end], table.back[:end])
     columns = len(model.law.offsets)
     own = table.own[table.first_pair[:end].astype(np.int64)[:, None] + np.arange(columns)]
     softer = (model.law.bending_of(at) * own[..., 1:]).sum(axis=-1)
-    return Instants(at, table.excess[:end], table.gain[:end], own[..., 0], 1.0 / (1.0 + softer))
+    return Instants(
+        at, table.excess[:end], table.gain[:end], table.back[:end], own[..., 0], 1.0 / (1.0 + softer)
+    )
 
 
 def tables(model: NonLinear, motion: Motion) -> Table:
