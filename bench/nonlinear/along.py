@@ -20,7 +20,7 @@ from gearbench.lumped.nonlinear.law import MeshLaw
 from gearbench.lumped.nonlinear.model import NonLinear
 from gearbench.lumped.nonlinear.pressing import Pressed
 from gearbench.lumped.nonlinear.rest import inverse_masses, springs_and_dampers
-from gearbench.lumped.nonlinear.tangent import Tangent, departures
+from gearbench.lumped.nonlinear.tangent import AT_ONCE, OVER_STEP, Tangent, departures
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -34,7 +34,7 @@ STABLE = 1.8  # largest rate of a mode times the step: Runge-Kutta bears 2.8
 # Of its first size, that free vibrations keep when the first sample is taken: a mean is far larger than the lines.
 TRANSIENT = 1e-9
 IMPACTS = 4  # instants for each half step, over which flanks that part and meet are averaged
-AT_ONCE = 96  # departures carried together: their states stay in the fastest memory
+TOGETHER = 96  # departures carried together: their states stay in the fastest memory
 
 U1, U2, W, LOAD = (NAMES.index(name) for name in ("u1", "u2", "w", "load"))
 
@@ -79,8 +79,9 @@ class Along:
         """Half-spectra (columns, K), as of numpy's `rfft`, of what the channels change by, as the rig's sensors show
         it, under forces (entries, columns) [N], each added in the mesh or on a coordinate, `on` (columns,): dte [m], rb
         times angles [m], y [m], and the load's torque over the driven gear's base radius [N]."""
-        parts = np.array_split(np.arange(len(on)), max(ceil(len(on) / AT_ONCE), 1))
-        found = [departures(self.tangent, forces[:, one], on[one], self.substeps, self.early) for one in parts]
+        parts = np.array_split(np.arange(len(on)), max(ceil(len(on) / TOGETHER), 1))
+        weights = AT_ONCE if self.instants else OVER_STEP
+        found = [departures(self.tangent, forces[:, one], on[one], self.substeps, self.early, weights) for one in parts]
         rows = self.model.displacements
         wanted = {U1, U2, *(int(one) for row in rows for one in np.flatnonzero(row))}
         if self.model.rig.load.twists:
@@ -109,7 +110,7 @@ class Along:
             reaction = stiffness.astype(np.complex64) * (lines[U2] - lines[LOAD])
         else:
             borne = -(self.tangent.mesh[U2] + self.tangent.rubbed[::2, U2]).astype(found[0][1].dtype)
-            reaction = np.concatenate([self._shown((two * borne[:, None]).T) for _, two in found])
+            reaction = np.concatenate([self._shown((two * borne[:, None]).T) for _, two in found]) / self._smeared
         # What pushes at an end that is held is borne there.
         held = (on == LOAD) | ((on == U2) & (self.tangent.inverse[U2] == 0.0))
         if held.any():
@@ -121,6 +122,14 @@ class Along:
         if self.instants:
             return _spectrum(stepped[:, :: self.substeps])
         return _spectrum(stepped)[:, : len(self._omega)] / np.float32(self.substeps)
+
+    @cached_property
+    def _smeared(self) -> Complex:
+        """What the mean over each step has of a force (K,) at its beginning: impacts fall between two of these."""
+        if self.instants:
+            return np.ones(len(self._omega), dtype=complex)
+        step = self._omega / (2 * np.pi) * self.tangent.step
+        return np.asarray(np.sinc(step) * np.exp(1j * np.pi * step))
 
     @cached_property
     def _omega(self) -> Array:

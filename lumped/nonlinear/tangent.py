@@ -30,6 +30,8 @@ Integers = NDArray[np.int64]
 
 # A plain 0.5 would be of double precision, and what it is multiplied with.
 HALF, SIXTH, TWO = np.float32(0.5), np.float32(1 / 6), np.float32(2.0)
+# Of a step's outer and inner two stages in the mesh force that is told of it.
+AT_ONCE, OVER_STEP = (1.0, 0.0), (1 / 6, 1 / 3)
 
 
 class Tangent(NamedTuple):
@@ -55,16 +57,18 @@ class Tangent(NamedTuple):
 
 
 def departures(
-    tangent: Tangent, forces: NDArray[np.floating[Any]], on: Integers, substeps: int, early: int
-) -> tuple[Single, Single]:
+    tangent: Tangent, forces: NDArray[np.floating[Any]], on: Integers, substeps: int, early: int,
+    weights: tuple[float, float] = AT_ONCE,
+) -> tuple[Single, Single]:  # fmt: skip
     """Departures (samples, n, columns) of the coordinates [m] and (steps, columns) of the mesh force [N] under forces
     (entries, columns) [N], each in the mesh or on one coordinate, `on` (columns,): its number or `IN_MESH`; `early`
-    steps before the first sample begin at rest.
+    steps before the first sample begin at rest. The mesh force is that at the beginning of each step, or with the
+    `weights` OVER_STEP the mean over it.
     """
     entries, columns = forces.shape
     size = len(tangent.inverse)
     samples = entries // (2 * substeps)
-    places, pushes = np.empty((samples, size, columns), np.float32), np.empty((entries // 2, columns), np.float32)
+    places, pushes = np.empty((samples, size, columns), np.float32), np.zeros((entries // 2, columns), np.float32)
     inverse = tangent.inverse[:, None]
     in_mesh = on == IN_MESH
     direction = np.where(in_mesh, 0.0, inverse * (np.arange(size)[:, None] == on))
@@ -75,7 +79,7 @@ def departures(
         -inverse.T * tangent.bearings, tangent.stiffer, tangent.turned_on, tangent.turning,
     )  # fmt: skip
     single = (np.ascontiguousarray(one, np.float32) for one in values)
-    _run(*single, np.float32(tangent.step), substeps, early, places, pushes)
+    _run(*single, np.float32(tangent.step), substeps, early, np.array(weights, np.float32), places, pushes)
     return places, pushes
 
 
@@ -110,10 +114,19 @@ def _rates(
 
 
 @compiled(fastmath=ROUNDING)
+def _gather(push: Single, weight: np.float32, number: int, pushes: Single) -> None:
+    """Add a stage's part of the force in the mesh to that of its step."""
+    if number >= 0 and weight > 0.0:
+        for p in range(len(push)):
+            pushes[number, p] += weight * push[p]
+
+
+@compiled(fastmath=ROUNDING)
 def _run(
     springs: Single, dampers: Single, mesh: Single, pushed: Single, direction: Single, in_mesh: Single,
     stiffness: Single, damping: Single, forces: Single, bearings: Single, held: Single, stiffer: Single,
-    turned: Single, turning: Single, h: np.float32, substeps: int, early: int, places: Single, pushes: Single,
+    turned: Single, turning: Single, h: np.float32, substeps: int, early: int, weights: Single, places: Single,
+    pushes: Single,
 ) -> None:  # fmt: skip
     """Fill places and pushes."""
     entries, columns = forces.shape
@@ -133,27 +146,29 @@ def _run(
             for c in range(size):
                 for p in range(columns):
                     places[sample, c, p] = q[c, p]
-        if number >= 0:
-            for p in range(columns):
-                pushes[number, p] = push[p]
+        _gather(push, weights[0], number, pushes)
         for c in range(size):
             for p in range(columns):
                 q2[c, p] = q[c, p] + HALF * h * v[c, p]
                 v2[c, p] = v[c, p] + HALF * h * a1[c, p]
         _rates(q2, v2, springs, dampers, mesh, pushed[middle], direction, in_mesh, stiffness[middle], damping[middle],
                forces[middle], bearings, held, stiffer[middle], turned, turning[middle], a2, push)  # fmt: skip
+        _gather(push, weights[1], number, pushes)
         for c in range(size):
             for p in range(columns):
                 q2[c, p] = q[c, p] + HALF * h * v2[c, p]
                 v3[c, p] = v[c, p] + HALF * h * a2[c, p]
         _rates(q2, v3, springs, dampers, mesh, pushed[middle], direction, in_mesh, stiffness[middle], damping[middle],
                forces[middle], bearings, held, stiffer[middle], turned, turning[middle], a3, push)  # fmt: skip
+        _gather(push, weights[1], number, pushes)
         for c in range(size):
             for p in range(columns):
                 q2[c, p] = q[c, p] + h * v3[c, p]
                 v4[c, p] = v[c, p] + h * a3[c, p]
         _rates(q2, v4, springs, dampers, mesh, pushed[after], direction, in_mesh, stiffness[after], damping[after],
                forces[after], bearings, held, stiffer[after], turned, turning[after], a4, push)  # fmt: skip
+        if weights[1] > 0.0:
+            _gather(push, weights[0], number, pushes)
         for c in range(size):
             for p in range(columns):
                 q[c, p] += SIXTH * h * (v[c, p] + TWO * (v2[c, p] + v3[c, p]) + v4[c, p])
