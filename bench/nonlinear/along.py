@@ -43,8 +43,9 @@ U1, U2, W, LOAD = (NAMES.index(name) for name in ("u1", "u2", "w", "load"))
 class Along:
     """A steady motion of `model` on the half-step grid (entries,) of one repetition: mesh phase [cycles], elastic force
     of the mesh [N], negative on the back flanks, what each pair has of it on the working ones, force and tangent
-    (entries, n_o), rate of the deflection [m/s], the force that the teeth would have without an exponent over the one
-    where that changes nothing, and how many times as stiff they are for damping that grows with the force. `places`
+    (entries, n_o), rate of the deflection [m/s], the logarithm of the force that the teeth's own law has over the one
+    where an exponent changes nothing, the stiffness [N/m] by which more compliance that the pairs share takes from the
+    force, and how many times as stiff they are for damping that grows with the force. `places`
     (samples, n) of all coordinates [m], sampled at `sampling_rate`, and `turned` (samples,) what all that turns moves
     by besides, as the nominal rotation departs from a steady one. `early` steps let free vibrations die out. Samples of
     forces are those of `instants`, or hold no more than half the sampling rate.
@@ -56,6 +57,7 @@ class Along:
     pairs: Pressed
     rate: Array
     level: Array
+    own: Array
     stiffer: Array
     tangent: Tangent
     substeps: int
@@ -216,6 +218,7 @@ def along(steady: Steady) -> Along:
         pairs=Pressed(found.pair_force, found.pair_tangent),
         rate=found.rate,
         level=found.level,
+        own=found.own,
         stiffer=found.stiffer,
         tangent=Tangent(
             *around,

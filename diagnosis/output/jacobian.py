@@ -116,13 +116,10 @@ def mesh_forces(layout: Layout, p: Array, along: Along, chosen: Flags) -> tuple[
         pressed = np.maximum(np.abs(along.elastic) / about, SMALLEST)
         put(LOADED, damped * np.log(pressed)[:, None])
     put("mesh-ratio", damped)
-    put("curvature", (along.elastic * np.log(np.maximum(along.level, SMALLEST)))[:, None])
     mesh = along.model.rig.mesh
+    put("curvature", stiffer * along.level[:, None] + 0.5 / (1.0 + mesh.exponent) * damped)
     series = 1.0 + _series_at(mesh.stiffness_cos, mesh.stiffness_sin, phase)
-    # Of the teeth's own law, before its exponent and what multiplies the force.
-    level = np.maximum(along.level, SMALLEST) ** mesh.exponent
-    own = along.pairs.tangent.sum(axis=1) / (mesh.stiffness_scale * series * level)
-    put(CONTRAST, stiffer * contrast_slope(layout.tangents, float(p[unknowns[CONTRAST]][0]), own)[:, None])
+    put(CONTRAST, stiffer * contrast_slope(layout.tangents, float(p[unknowns[CONTRAST]][0]), along.own)[:, None])
     put("shape", stiffer * (wave / series[:, None]))
     put("offset", along.of_excess(np.ones((len(phase), 1))))
     put("profile", along.of_excess(wave))

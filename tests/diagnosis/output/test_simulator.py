@@ -63,6 +63,30 @@ def test_a_derivative_is_what_two_simulations_differ_by(bench: Bench, key: str, 
     assert largest > 0.0
 
 
+@pytest.fixture(scope="module")
+def uneven() -> tuple[Simulator, np.ndarray, np.ndarray]:
+    """Simulator, unknowns and Jacobian of a rig whose teeth differ by as much as its mesh is pressed."""
+    simulator = demonstration()
+    unknowns, p = simulator.layout.unknowns, np.zeros(simulator.layout.size)
+    for key in ("pitch-driver", "pitch-driven"):
+        at = unknowns.at(key)
+        p[at] = 6e-6 * np.cos(2.4 * np.arange(len(at)))
+    p[unknowns["curvature"]] = 0.1
+    return simulator, p, jacobian_at(simulator, p)
+
+
+@pytest.mark.parametrize(("key", "part"), [("curvature", 0.1), (CONTRAST, 0.1), ("scale", 0.1)])
+def test_teeth_that_differ_are_each_as_far_up_the_law_as_they_are_pressed(
+    uneven: tuple[Simulator, np.ndarray, np.ndarray], key: str, part: float
+) -> None:
+    simulator, p, jacobian = uneven
+    at = simulator.layout.unknowns[key].start
+    found = off(simulator, jacobian[at], p, at, part * simulator.layout.unknowns.prior()[at])
+    for channel, (error, size) in found.items():
+        # Edges of contact that move: see EDGES of `test_structure_derivatives`.
+        assert error < (0.25 if channel == "torque_driven" else 0.06) * size, channel
+
+
 @pytest.mark.parametrize("place", [0, 3, 6])
 def test_the_derivative_by_a_form_of_the_flanks_is_close(bench: Bench, place: int) -> None:
     """Between the nodes of two tables; supports feel what is left where the error takes up nearly all of the form."""
