@@ -31,6 +31,7 @@ from gearbench.diagnosis.judging.drift import drift_of
 from gearbench.diagnosis.judging.judged import Judged, itself, judged_on
 from gearbench.diagnosis.judging.missing import Missing, missing_forces, nothing_missing
 from gearbench.diagnosis.judging.naming import drifts_of, effects_of, parameters_of
+from gearbench.diagnosis.judging.repeating import repeating, sentences_of_others
 from gearbench.diagnosis.odds import Calibration, effect_signs
 from gearbench.diagnosis.output.contrast import other_flanks
 from gearbench.diagnosis.output.selection import WORTH, Weighed, only, with_entered
@@ -90,12 +91,12 @@ def find_cause(
     result = search(problem, without, report)
     best = named(result)
     fit = best.fit if best and best.fit else result.base
-    report("steadiness")
-    band = problem.conditions[0].band
-    unsteady = unsteadiness(problem.model, measurements, problem.unknowns, fit.p, band)
     simulate = replays(problem.model.sound)
     apart = held_out is not None and held_out.phase_known
     found = simulated(problem, result, measurements, nominal, simulate, without, report, apart=apart)
+    report("steadiness")
+    band, steady = problem.conditions[0].band, repeating(measurements, found)
+    unsteady = unsteadiness(problem.model, steady, problem.unknowns, fit.p, band)
     common: dict[str, Any] = {
         "indistinguishable": alike(fit, problem.unknowns, representatives(problem, without)),
         "evidence": {one.hypothesis.name: one.log_bayes_factor for one in result.tried},
@@ -110,20 +111,21 @@ def find_cause(
             decision = unexplained(decision, silent, _left(nominal, plain, held_out or measurements[0], simulate))
         return _by_forces_alone(problem, nominal, plain, result, decision, known, common)
     report("judging")
-    searched = Searched(problem, nominal, tuple(measurements), result, fit, unsteady, tuple(without))
+    searched = Searched(problem, nominal, tuple(measurements), result, fit, steady, unsteady, tuple(without))
     return _by_simulation(searched, found, held_out, known, common)
 
 
 @dataclass(frozen=True)
 class Searched:
     """What the search by forces had and found: `fit` is the best effect's, else the background's; `unsteady`
-    (equations + 1,) the excess scatter between repetitions, `without` the effects left out."""
+    (equations + 1,) the excess scatter between repetitions of the records `steady`, `without` the effects left out."""
 
     problem: Problem
     nominal: Case
     measurements: tuple[Measurement, ...]
     result: Search
     fit: Fit
+    steady: tuple[Measurement, ...]
     unsteady: Array
     without: tuple[str, ...] = ()
 
@@ -134,7 +136,8 @@ def _by_simulation(
     """The finding that simulation justifies."""
     entered = found.selection.entered
     judged = judgement(of.problem, sized(seconded(found, of.result)), held_out, of.measurements)
-    changing = changing_of(judged, changing_parts(of.measurements, of.problem.conditions[0].band))
+    band = of.problem.conditions[0].band
+    changing = changing_of(judged, changing_parts(of.steady, band))
     doubts: tuple[str, ...] = ()
     while True:
         found = judged.found
@@ -164,7 +167,8 @@ def _by_simulation(
         where=places_of(judged, kept, missing),
         recalibrated=found.recalibrated if kept else found.layout.case(found.selection.base.p),
         with_effect=found.with_effects if decided.named else None,
-        because=(*decided.because, *_why(judged, kept), *doubts, *flanks),
+        because=(*decided.because, *_why(judged, kept), *doubts, *flanks,
+                 *sentences_of_others(of.measurements, of.steady, band)),
         structure=structure_found(found.layout.unknowns, found.selection.best.p, found.std),
         missing=missing,
         places=tuple(one.place for one in kept),
