@@ -45,10 +45,11 @@ class Along:
     of the mesh [N], negative on the back flanks, what each pair has of it on the working ones, force and tangent
     (entries, n_o), rate of the deflection [m/s], the logarithm of the force that the teeth's own law has over the one
     where an exponent changes nothing, the stiffness [N/m] by which more compliance that the pairs share takes from the
-    force, and how many times as stiff they are for damping that grows with the force. `places`
-    (samples, n) of all coordinates [m], sampled at `sampling_rate`, and `turned` (samples,) what all that turns moves
-    by besides, as the nominal rotation departs from a steady one. `early` steps let free vibrations die out. Samples of
-    forces are those of `instants`, or hold no more than half the sampling rate.
+    force, what it grows by per excess by the form of each pair's flanks (entries, n_o) [N/m], and how many times as
+    stiff they are for damping that grows with the force. `places` (samples, n) of all coordinates [m], sampled at
+    `sampling_rate`, and `turned` (samples,) what all that turns moves by besides, as the nominal rotation departs from
+    a steady one. `early` steps let free vibrations die out. Samples of forces are those of `instants`, or hold no more
+    than half the sampling rate.
     """
 
     model: NonLinear
@@ -58,6 +59,7 @@ class Along:
     rate: Array
     level: Array
     own: Array
+    form: Array
     stiffer: Array
     tangent: Tangent
     substeps: int
@@ -182,6 +184,11 @@ class Along:
         """Force (entries, n_o) [N/m] that each pair adds in the mesh per unit of its own excess."""
         return self.pairs.tangent * self.stiffer[:, None]
 
+    @cached_property
+    def form_stiffness(self) -> Array:
+        """The same (entries, n_o) [N/m] per excess by the form of its flanks."""
+        return self.form * self.stiffer[:, None]
+
     def of_excess(self, excess: Array) -> Array:
         """Force (entries, columns) [N] that more material (entries, columns) [m] on all working flanks adds in the
         mesh: none while the back flanks touch."""
@@ -219,6 +226,7 @@ def along(steady: Steady) -> Along:
         rate=found.rate,
         level=found.level,
         own=found.own,
+        form=found.form,
         stiffer=found.stiffer,
         tangent=Tangent(
             *around,

@@ -34,7 +34,7 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 PHASES = 512
-NODES = 49
+NODES = 67
 LOAD_STEP = 2**0.5  # tables are solved up to the next power of this [N m], so that similar loads share them
 REFERENCE = 0.3  # of the largest load: where the shares of the pairs are taken
 OFFSETS = 4  # pairs looked at on either side of the one at the pitch point

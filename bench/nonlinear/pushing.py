@@ -12,13 +12,12 @@ from gearbench.bench.nonlinear.fine import Motion
 from gearbench.bench.nonlinear.replay import Steady
 from gearbench.bench.nonlinear.run import Setup
 from gearbench.lumped.nonlinear.model import NonLinear
-from gearbench.lumped.nonlinear.pressing import Instants, of_pairs, pressed
+from gearbench.lumped.nonlinear.pressing import of_pairs, pressed
 from gearbench.lumped.nonlinear.rubbing import rubbed_along
+from gearbench.lumped.nonlinear.sensitive import sensitivities
 from gearbench.lumped.nonlinear.tables import Table, instants
 
 Array = NDArray[np.float64]
-
-LEAST_LEVEL = 1e-4  # of the load at which an exponent changes nothing, below which its logarithm is cut
 
 
 class Pushing(NamedTuple):
@@ -27,6 +26,7 @@ class Pushing(NamedTuple):
     elastic: Array
     pair_force: Array
     pair_tangent: Array
+    form: Array
     rate: Array
     level: Array
     own: Array
@@ -73,37 +73,15 @@ def pushing(steady: Steady, motion: Motion, substeps: int) -> Pushing:
     # Damping that grows with the force is the stiffer for being pressed while the flanks close.
     stiffer = 1.0 + model.rig.damping.mesh_exponent * damping * closing / np.where(idle, 1.0, force)
     paired = at._replace(phase=within)
-    level, own = _levels(model, paired, travel, force, slope)
+    answer = sensitivities(model.law, paired, travel, model.rig.mesh.exponent, model.rig.mesh.reference_force)
     stiffness = slope * stiffer + _met(damping, force, closing, setup.step / 2)
-    pair_force, pair_tangent = (np.where(idle[:, None], 0.0, one) for one in of_pairs(model.law, paired, travel))
+    pairs = (*of_pairs(model.law, paired, travel), answer.form)
+    pair_force, pair_tangent, form = (np.where(idle[:, None], 0.0, one) for one in pairs)
     rubbed = _rubbed(setup, table, motion, turned * model.law.phases)
-    return Pushing(force, pair_force, pair_tangent, closing, level, own, stiffer, stiffness, damping, turning, rubbed)
-
-
-def _levels(model: NonLinear, at: Instants, travel: Array, force: Array, slope: Array) -> tuple[Array, Array]:
-    """Logarithm of the force that the teeth's own law has over the one where an exponent changes nothing, mean over the
-    force, and the stiffness by which what the pairs share more takes from the force [N/m], of forces and tangents
-    `force`, `slope`; arrays (instants,). Pairs with an excess of their own are each as far up the law as they are
-    pressed themselves."""
-    mesh = model.rig.mesh
-
-    def level(force: Array, gain: Array) -> Array:
-        """Of the force that all pairs have where one is pressed as far."""
-        return np.asarray((np.abs(force / gain) / mesh.reference_force) ** (1.0 / (1.0 + mesh.exponent)))
-
-    whole = level(force, at.gain)
-    bent, own = np.log(np.maximum(whole, LEAST_LEVEL)), slope * whole
-    if at.differ:
-        found = of_pairs(model.law, at, travel)
-        deep = travel[:, None] + at.excess[:, None] + at.pair_excess
-        levels = level(model.law.evaluate(np.maximum(deep, 0.0), at.phase[:, None])[0], np.ones(1))
-        total = found.force.sum(axis=1)
-        working = total > 0.0
-        of_each = (found.force * np.log(np.maximum(levels, LEAST_LEVEL))).sum(axis=1)
-        bent = np.divide(of_each, total, out=bent, where=working)
-        own = np.where(working, (found.tangent * levels).sum(axis=1), own)
-    pressed = np.where(force == 0.0, np.inf, np.abs(force))
-    return bent, own * mesh.reference_force / pressed
+    return Pushing(
+        force, pair_force, pair_tangent, form, closing, answer.level, answer.own, stiffer, stiffness, damping, turning,
+        rubbed,
+    )  # fmt: skip
 
 
 def _damping(model: NonLinear, elastic: Array, tangent: Array) -> Array:

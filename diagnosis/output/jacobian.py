@@ -154,7 +154,7 @@ def _of_flanks(along: Along, numbers: NDArray[np.int64], path: tuple[float, floa
     """Force (entries, places) [N] per unit of excess at places along the path of contact, of the pairs `numbers`
     (entries, n_o) that touch."""
     shape = on_path(along.phase[:, None] - numbers, path)
-    return np.asarray((shape * along.pair_stiffness).sum(axis=-1).T)
+    return np.asarray((shape * along.form_stiffness).sum(axis=-1).T)
 
 
 def _by_tooth(tooth: NDArray[np.int64], stiffness: Array, count: int) -> Array:

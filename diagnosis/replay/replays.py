@@ -57,4 +57,4 @@ def replays_of(nominal: Case, measurements: Sequence[Measurement]) -> Callable[[
     """The replays of these measurements on the nominal rig's law."""
     from gearbench.bench.nonlinear.law_table import teeth_law
 
-    return replays(teeth_law(nominal.rig, nominal.simulation, table_load(measurements)))
+    return replays(teeth_law(nominal.rig, nominal.simulation, table_load(nominal.rig, measurements)))

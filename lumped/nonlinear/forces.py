@@ -104,6 +104,15 @@ def _viscosity(elastic: float, tangent: float, p: Constants) -> float:
 
 
 @compiled(fastmath=ROUNDING)
+def _beyond(depth: float, low: float, high: float, last: int, root: float) -> tuple[float, float]:
+    """Force and tangent behind the last node of a table whose last two secants are these; `root`: nodes per root of
+    a deflection [m]."""
+    end, before = (last / root) ** 2, ((last - 1) / root) ** 2
+    tangent = max((end * high - before * low) / (end - before), 0.0)
+    return end * high + tangent * (depth - end), tangent
+
+
+@compiled(fastmath=ROUNDING)
 def _pressed(depth: float, rate: float, position: float, gain: float, secant: Array, p: Constants) -> float:
     """Force [N] of flanks pressed by depth > 0 [m] and closing at rate [m/s]; never negative."""
     last = secant.shape[1] - 1
@@ -117,6 +126,9 @@ def _pressed(depth: float, rate: float, position: float, gain: float, secant: Ar
     stiffness = low + (root - node) * rise
     tangent = max(stiffness + 0.5 * root * rise, 0.0)
     elastic = gain * depth * stiffness
+    if root > last:
+        elastic, tangent = _beyond(depth, low, high, last, p.root)
+        elastic *= gain
     return max(elastic + _viscosity(elastic, gain * tangent, p) * rate, 0.0)
 
 
@@ -151,8 +163,12 @@ def _pressed_apart(travel: float, rate: float, at: Entry, apart: Apart, p: Const
         rise = high - low
         stiffness = low + (root - node + 1) * rise
         left = _left(apart.bending, apart.own, pair, row, o, weight)
-        elastic += left * depth * stiffness
-        tangent += left * max(stiffness + 0.5 * root * rise, 0.0)
+        if root > last:
+            force, slope = _beyond(depth, low, high, last, p.root)
+        else:
+            force, slope = depth * stiffness, max(stiffness + 0.5 * root * rise, 0.0)
+        elastic += left * force
+        tangent += left * slope
     elastic *= at.gain
     return max(elastic + _viscosity(elastic, at.gain * tangent, p) * rate, 0.0)
 

@@ -23,7 +23,7 @@ from gearbench.lumped.nonlinear.law import MeshLaw, approach_grid
 
 Array = NDArray[np.float64]
 
-NODES = 97  # deflections of the table: flanks that come into contact one after another bend it more often
+NODES = 131  # deflections of the table: flanks that come into contact one after another bend it more often
 FINE = 4  # steps between two nodes, where forces are found before the table is read off
 NOTHING = 1e-12  # m, by which flanks may differ that are alike
 LEAST_LEFT = 0.9  # part of the mesh's compliance at its stiffest that less of the bodies' may take away, at most

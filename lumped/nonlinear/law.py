@@ -113,7 +113,7 @@ class MeshLaw:
         """Force [N] and tangent stiffness [N/m] at deflections [m] and phases [cycles] (shapes broadcast).
 
         Nothing touches from delta = 0 down to -backlash, which excess material on working and back flanks has `filled`
-        [m] in part; below, the back flanks push the other way. Beyond the last node the secant goes on as between the
+        [m] in part; below, the back flanks push the other way. Beyond the last node the force goes on as between the
         last two.
         """
         delta, phase = np.asarray(delta, dtype=float), np.asarray(phase, dtype=float)
@@ -147,9 +147,17 @@ class MeshLaw:
             at = at + np.arange(wide)
         low = table[at] + weight * (table[at + next_row] - table[at])
         at = at + wide
-        rise = table[at] + weight * (table[at + next_row] - table[at]) - low
+        high = table[at] + weight * (table[at + next_row] - table[at])
+        rise = high - low
         stiffness = low + (root - node) * rise
-        return depth * stiffness, stiffness + 0.5 * root * rise
+        force, tangent = depth * stiffness, stiffness + 0.5 * root * rise
+        beyond = root > last
+        if np.any(beyond):
+            before, end = self.approach[-2:]
+            slope = np.maximum((end * high - before * low) / (end - before), 0.0)
+            force = np.where(beyond, end * high + slope * (depth - end), force)
+            tangent = np.where(beyond, slope, tangent)
+        return force, tangent
 
     @cached_property
     def closed(self) -> tuple[Array, Array]:

@@ -17,6 +17,7 @@ from numpy.linalg import norm
 
 from gearbench.bench import simulate
 from gearbench.bench.nonlinear.replay import replay
+from gearbench.bench.nonlinear.run import HEADROOM
 from gearbench.cases import case_files
 from gearbench.diagnosis.effects.effect import Effect, Estimate, Fitted, Hypothesis, added
 from gearbench.diagnosis.effects.library import LIBRARY, all_unknowns, hypotheses
@@ -75,7 +76,7 @@ def bench(name: str) -> Bench:
     case = read_case(case_files()["gap_demo"], [*QUIET, SETTINGS[name]])
     nominal = case.under(next(c for c in case.conditions if c.name == name))
     record = simulate(nominal)
-    made = nominal_model(nominal, 1.3 * float(np.abs(record["torque_driver"].values).max()), 100.0)
+    made = nominal_model(nominal, HEADROOM * float(np.abs(record["torque_driver"].values).max()), 100.0)
     condition = prepare(measurement(record, "base", nominal), made, BAND)
     return Bench(nominal, record, made, all_unknowns(made, [condition]))
 

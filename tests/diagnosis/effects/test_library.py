@@ -142,7 +142,7 @@ def test_departures_gather_what_moves_a_slot(where: Unknowns, model: NominalMode
     assert list(got.pitch) == [*np.zeros(20), *np.arange(30.0)]
     assert list(got.delay) == [0.0, 0.0, 3e-6, 0.0]
     turns = 2 * np.pi * measurement().phase
-    assert got.excess == pytest.approx(3e-6 * np.cos(turns / 20) + 2e-6 * np.sin(turns / 30))
+    assert got.closed == pytest.approx(3e-6 * np.cos(turns / 20) + 2e-6 * np.sin(turns / 30))
     # Six times a driver revolution, of which 60 mesh cycles hold three.
     assert np.flatnonzero(got.torque).tolist() == [18] and got.torque[18] == 1.0 - 0.5j
     assert got.friction == 0.0 and not got.filters.any()

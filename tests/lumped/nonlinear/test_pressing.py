@@ -32,7 +32,7 @@ def test_flanks_of_both_sides_carry_what_the_integrator_has(uneven: bool) -> Non
     at = instants(model, table, phase, -1)
     secant, constants, apart = np.ascontiguousarray(law.secant), model.constants(), apart_of(table, law)
     sides = set()
-    for travel in (12e-6, -0.2 * law.backlash, -law.backlash + 3e-6, -law.backlash - 9e-6):
+    for travel in (law.approach[-1] + 20e-6, 12e-6, -0.2 * law.backlash, -law.backlash + 3e-6, -law.backlash - 9e-6):
         found = pressed(law, at, np.full(phase.size, travel)).force
         wanted = [mesh(travel, -table.excess_rate[i], entry(table, i), secant, apart, constants) for i in range(240)]
         sides |= set(np.sign(wanted))

@@ -1,0 +1,94 @@
+"""How the mesh's elastic force answers the numbers of its law at an unchanged deflection, at instants: an exponent,
+compliance that the pairs share, and errors of the flanks' form.
+
+Where teeth differ, each pair o carries what the law gives it where all pairs are pressed as far as this one,
+f_o(delta_o) = g_o(u) (F_0 / F_ref)^n with delta_o = u + c F_0: F_0 is the force of all there without the exponent n, c
+the compliance that they share (`lumped.nonlinear.forms`). An error e_p of the form of pair p moves it by
+
+    d f_o = (F_0 / F_ref)^n (g_o' (d e_o - c sum_p t_p d e_p) + n g_o / F_0 sum_p t_p d e_p),   t_p = g_p' / (1 + c G')
+
+with t_p the tangents of the law's parts and G' the sum of all g_p'.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.lumped.nonlinear.law import MeshLaw
+from gearbench.lumped.nonlinear.pressing import Instants, pressed
+
+Array = NDArray[np.float64]
+
+LEAST_LEVEL = 1e-4  # of the load at which an exponent changes nothing, below which its logarithm is cut
+
+
+class Sensitivities(NamedTuple):
+    """At instants (n,): `level`, the relative change of the force by the exponent, logarithm of a force over the
+    reference; `own` [N/m], that by compliance which the pairs share more; `form` (n, n_o) [N/m], what the force grows
+    by per excess that a pair's flanks have more by their form."""
+
+    level: Array
+    own: Array
+    form: Array
+
+
+def sensitivities(law: MeshLaw, at: Instants, travel: Array, exponent: float, reference: float) -> Sensitivities:
+    """Those of a law at the DTE `travel` (n,) [m]; `exponent` is in the law, `reference` [N] the force at which it
+    changes nothing."""
+    count = len(law.offsets)
+    depths = travel[:, None] + at.excess[:, None] + at.pair_excess
+    parts = [_part(law, at.phase, depths[:, o], o, exponent, reference) for o in range(depths.shape[1])]
+    if not at.differ:
+        parts = [_part(law, at.phase, travel + at.excess, None, exponent, reference)]
+    gains = at.pair_gain if at.differ else np.ones((travel.size, 1))
+    force, level, own = np.zeros((3, travel.size))
+    form = np.zeros((travel.size, count))
+    for gain, part in zip(gains.T, parts, strict=True):
+        force, level, own = (
+            total + gain * one for total, one in zip((force, level, own), part[:3], strict=True)
+        )
+        form += (gain * at.gain)[:, None] * part.form
+    working = force > 0.0
+    level, own = (np.divide(one, force, out=np.zeros(travel.size), where=working) for one in (level, own))
+    whole = pressed(law, at, travel)
+    back = whole.force < 0.0
+    depth = (np.abs(whole.force / at.gain) / reference) ** (1.0 / (1.0 + exponent))
+    level = np.where(back, np.log(np.maximum(depth, LEAST_LEVEL)), level)
+    own = np.where(back, whole.tangent * depth * reference / np.where(back, -whole.force, 1.0), own)
+    return Sensitivities(level, own, np.where(back[:, None], 0.0, form))
+
+
+class _Part(NamedTuple):
+    """Of what one pair carries, or all (n,): the force [N], the same times the logarithm of the level, and times what
+    shared compliance takes from it [N/m]; (n, n_o) what it grows by with the forms of all pairs [N/m]."""
+
+    force: Array
+    level: Array
+    own: Array
+    form: Array
+
+
+def _part(
+    law: MeshLaw, phase: Array, depth: Array, pair: int | None, exponent: float, reference: float
+) -> _Part:
+    """That of one pair, or of all, where all are pressed by `depth` (n,) [m]."""
+    n = exponent
+    force, tangent = law.of_pairs(np.broadcast_to(depth[:, None], (depth.size, len(law.offsets))), phase)
+    whole, stiff = force.sum(axis=1), tangent.sum(axis=1)
+    loaded = whole > 0.0
+    safe = np.where(loaded, whole, 1.0)
+    level = np.where(loaded, whole / reference, 0.0) ** (1.0 / (1.0 + n))
+    log = np.log(np.maximum(level, LEAST_LEVEL))
+    # Tangents of the parts at an unchanged level: what is left without the growth of the level itself.
+    bare = tangent - n / (1.0 + n) * force * (stiff / safe)[:, None]
+    if pair is None:
+        form = (1.0 + n) * bare
+        return _Part(whole, whole * log, stiff * level * reference, form)
+    lift = np.where(loaded, (safe / reference) ** (n / (1.0 + n)), 1.0)
+    alone = bare[:, pair] / np.maximum(1.0 - law.shared * bare.sum(axis=1) / lift, 1e-3)
+    form = (n * force[:, pair] / safe - law.shared * alone / lift)[:, None] * bare
+    form[:, pair] += alone
+    return _Part(force[:, pair], force[:, pair] * log, tangent[:, pair] * level * reference, form)
