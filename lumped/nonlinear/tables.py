@@ -22,6 +22,9 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 
+ANEW = 64  # entries between which a wave is turned on: 1e-14 of it
+
+
 class Table(NamedTuple):
     """What the mesh is at each half step; arrays (entries + 1,), pace and pull empty where the speed is constant, and
     levers where no gear runs out.
@@ -169,9 +172,10 @@ def tables(model: NonLinear, motion: Motion) -> Table:
     )
     varied = motion.varied
     if varied is None:
-        phase = motion.first_phase + np.arange(-1.0, motion.entries + 2) * (motion.cycles / motion.entries)
+        each = motion.cycles / motion.entries
+        phase = motion.first_phase + np.arange(-1.0, motion.entries + 2) * each
     else:
-        phase = varied.phase
+        phase, each = varied.phase, 0.0
     # One entry before and one behind, for the rate of the excess.
     position, excess, rate, gain, ripple, back, first = np.empty((7, motion.entries + 3))
     runs_out = any(gear.runout for gear in (rig.driver, rig.driven))
@@ -179,7 +183,8 @@ def tables(model: NonLinear, motion: Motion) -> Table:
     table = Table(position, excess, rate, gain, ripple, back, first, _own(model, phase), levers=levers)
     teeth = rig.driver.teeth, rig.driven.teeth
     alike, ends = not table.own.size, ends_of(model)
-    _fill(table, phase, floor(phase[0]), law.phases, teeth, alike, correction, _runout(model), ends, _waves(model))
+    fixed = correction, _runout(model), ends, _waves(model)
+    _fill(table, phase, each, floor(phase[0]), law.phases, teeth, alike, *fixed)
     rate[1:-1] = (excess[2:] - excess[:-2]) / motion.step
     pace, pull = (np.empty(0), np.empty(0)) if varied is None else varied[1:]
     return table.part(1, -1)._replace(pace=pace, pull=pull)
@@ -260,12 +265,16 @@ def _rippled(waves: Waves, phase: float) -> float:
 
 @compiled
 def _fill(
-    out: Table, phases: Array, begin: int, rows: int, teeth: tuple[int, int], alike: bool, correction: Correction,
-    runout: Runout, ends: Ends, waves: Waves,
+    out: Table, phases: Array, each: float, begin: int, rows: int, teeth: tuple[int, int], alike: bool,
+    correction: Correction, runout: Runout, ends: Ends, waves: Waves,
 ) -> None:  # fmt: skip
-    """Fill the table but for `excess_rate`, own, pace and pull; entry n belongs to the n-th of `phases` [cycles], whose
-    whole part begins with `begin`; rows: of the force table; alike: whether all teeth are. A lever about a gear's
-    axis is the base radius and how far its centre stands aside of the normal through that axis."""
+    """Fill the table but for `excess_rate`, own, pace and pull; entry n belongs to the n-th of `phases` [cycles], which
+    lie `each` apart (0: any way) and whose whole part begins with `begin`; rows: of the force table; alike: whether all
+    teeth are. A lever about a gear's axis is the base radius and how far its centre stands aside of the normal through
+    that axis."""
+    series = len(correction.error.cosine) > 0 or len(correction.stiffness.cosine) > 0
+    first, second = 1.0, 0.0
+    onward, aslant = cos(2 * pi * each), sin(2 * pi * each)
     for n in range(len(out.position)):
         phase = phases[n]
         whole = floor(phase)
@@ -284,9 +293,10 @@ def _fill(
                 out.levers[n, i] = 0.0
         if len(out.levers) > 0:
             out.levers[n, 2] = leant / runout.line
-        first, second = 1.0, 0.0
-        if len(correction.error.cosine) or len(correction.stiffness.cosine):
+        if series and (each == 0.0 or n % ANEW == 0):
             first, second = cos(2 * pi * cycle), sin(2 * pi * cycle)
+        elif series:
+            first, second = first * onward - second * aslant, second * onward + first * aslant
         every = correction.mean_error + _wave(correction.error, first, second) + turned
         place = cycle
         if turned != 0.0 or leant != 0.0:
