@@ -58,7 +58,7 @@ class Along:
     pairs: Pressed
     rate: Array
     level: Array
-    own: Array
+    sharing: Array
     form: Array
     stiffer: Array
     tangent: Tangent
@@ -225,7 +225,7 @@ def along(steady: Steady) -> Along:
         pairs=Pressed(found.pair_force, found.pair_tangent),
         rate=found.rate,
         level=found.level,
-        own=found.own,
+        sharing=found.sharing,
         form=found.form,
         stiffer=found.stiffer,
         tangent=Tangent(

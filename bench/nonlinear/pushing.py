@@ -29,7 +29,7 @@ class Pushing(NamedTuple):
     form: Array
     rate: Array
     level: Array
-    own: Array
+    sharing: Array
     stiffer: Array
     stiffness: Array
     damping: Array
@@ -50,10 +50,12 @@ def pushing(steady: Steady, motion: Motion, substeps: int) -> Pushing:
     turned = table.position[:count] / model.law.phases + motion.turned
     # Pairs are those of the entry's cycle, and wait at its ends for the next where teeth differ.
     within = np.clip(turned, 0.0, 1.0 - 1e-12)
-    waits = ((turned < 0.0) | (turned >= 1.0)) if table.own.size else np.zeros(count, dtype=bool)
-    turned = within if table.own.size else turned - np.floor(turned)
+    differ = table.own.size > 0
+    waits = differ & (turned != within)
+    turned = within if differ else turned - np.floor(turned)
     at = instants(model, table, turned, count)
-    force, slope = pressed(model.law, at, travel)
+    whole = pressed(model.law, at, travel)
+    force, slope = whole
     # Back flanks close at the rate of the deflection alone.
     closing = motion.rate + np.where(force < 0.0, 0.0, table.excess_rate[:count])
 
@@ -73,14 +75,15 @@ def pushing(steady: Steady, motion: Motion, substeps: int) -> Pushing:
     # Damping that grows with the force is the stiffer for being pressed while the flanks close.
     stiffer = 1.0 + model.rig.damping.mesh_exponent * damping * closing / np.where(idle, 1.0, force)
     paired = at._replace(phase=within)
-    answer = sensitivities(model.law, paired, travel, model.rig.mesh.exponent, model.rig.mesh.reference_force)
+    mesh = model.rig.mesh
+    answer = sensitivities(model.law, paired, travel, whole, mesh.exponent, mesh.reference_force)
     stiffness = slope * stiffer + _met(damping, force, closing, setup.step / 2)
     pairs = (*of_pairs(model.law, paired, travel), answer.form)
     pair_force, pair_tangent, form = (np.where(idle[:, None], 0.0, one) for one in pairs)
     rubbed = _rubbed(setup, table, motion, turned * model.law.phases)
     return Pushing(
-        force, pair_force, pair_tangent, form, closing, answer.level, answer.own, stiffer, stiffness, damping, turning,
-        rubbed,
+        force, pair_force, pair_tangent, form, closing, answer.level, answer.sharing, stiffer, stiffness, damping,
+        turning, rubbed,
     )  # fmt: skip
 
 

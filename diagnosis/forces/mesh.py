@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,7 +40,7 @@ class Mesh:
     touching: NDArray[np.bool_]
     stiffening: float
 
-    @property
+    @cached_property
     def working_tangent(self) -> Array:
         """The tangent [N/m] where the working flanks touch: what is on them is not felt on the back flanks."""
         return np.where(self.elastic < 0.0, 0.0, self.tangent)

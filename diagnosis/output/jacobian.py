@@ -34,6 +34,7 @@ from gearbench.diagnosis.output.structure import GAIN, LATE, LEAST_STEP, PHASE, 
 from gearbench.diagnosis.output.target import Target
 from gearbench.diagnosis.output.viscous import LOADED, damping_reference
 from gearbench.lumped.nonlinear.coordinates import IN_MESH
+from gearbench.lumped.nonlinear.sensitive import LEAST_LEVEL
 
 if TYPE_CHECKING:
     from gearbench.bench.nonlinear.along import Along
@@ -53,7 +54,6 @@ FOLLOWED = DELAYS["angle_driven"]
 MOVED, STEP = (FRICTION, COMPLIANCE, *STRUCTURE, SEAT, LATE, FOLLOWED, PHASE), 0.05
 # Of those what hypotheses are weighed by, and what goes along with one: by a late angle the mesh is turned on as well.
 WEIGHED = (FRICTION, COMPLIANCE, FOLLOWED, PHASE)
-SMALLEST = 1e-4  # of the load at which an exponent changes nothing, below which its logarithm is cut
 
 
 class Other(NamedTuple):
@@ -113,13 +113,13 @@ def mesh_forces(layout: Layout, p: Array, along: Along, chosen: Flags) -> tuple[
     put("scale", stiffer)
     if LOADED in unknowns.slices:
         about = damping_reference(loaded, layout.model)
-        pressed = np.maximum(np.abs(along.elastic) / about, SMALLEST)
+        pressed = np.maximum(np.abs(along.elastic) / about, LEAST_LEVEL)
         put(LOADED, damped * np.log(pressed)[:, None])
     put("mesh-ratio", damped)
     mesh = along.model.rig.mesh
     put("curvature", stiffer * along.level[:, None] + 0.5 / (1.0 + mesh.exponent) * damped)
     series = 1.0 + _series_at(mesh.stiffness_cos, mesh.stiffness_sin, phase)
-    put(CONTRAST, stiffer * contrast_slope(layout.tangents, float(p[unknowns[CONTRAST]][0]), along.own)[:, None])
+    put(CONTRAST, stiffer * contrast_slope(layout.tangents, float(p[unknowns[CONTRAST]][0]), along.sharing)[:, None])
     put("shape", stiffer * (wave / series[:, None]))
     put("offset", along.of_excess(np.ones((len(phase), 1))))
     put("profile", along.of_excess(wave))

@@ -12,13 +12,14 @@ with t_p the tangents of the law's parts and G' the sum of all g_p'.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.lumped.nonlinear.law import MeshLaw
-from gearbench.lumped.nonlinear.pressing import Instants, pressed
+from gearbench.lumped.nonlinear.pressing import Instants, Pressed
 
 Array = NDArray[np.float64]
 
@@ -27,38 +28,38 @@ LEAST_LEVEL = 1e-4  # of the load at which an exponent changes nothing, below wh
 
 class Sensitivities(NamedTuple):
     """At instants (n,): `level`, the relative change of the force by the exponent, logarithm of a force over the
-    reference; `own` [N/m], that by compliance which the pairs share more; `form` (n, n_o) [N/m], what the force grows
-    by per excess that a pair's flanks have more by their form."""
+    reference; `sharing` [N/m], that by compliance which the pairs share more; `form` (n, n_o) [N/m], what the force
+    grows by per excess that a pair's flanks have more by their form."""
 
     level: Array
-    own: Array
+    sharing: Array
     form: Array
 
 
-def sensitivities(law: MeshLaw, at: Instants, travel: Array, exponent: float, reference: float) -> Sensitivities:
-    """Those of a law at the DTE `travel` (n,) [m]; `exponent` is in the law, `reference` [N] the force at which it
-    changes nothing."""
-    count = len(law.offsets)
-    depths = travel[:, None] + at.excess[:, None] + at.pair_excess
-    parts = [_part(law, at.phase, depths[:, o], o, exponent, reference) for o in range(depths.shape[1])]
-    if not at.differ:
-        parts = [_part(law, at.phase, travel + at.excess, None, exponent, reference)]
-    gains = at.pair_gain if at.differ else np.ones((travel.size, 1))
-    force, level, own = np.zeros((3, travel.size))
-    form = np.zeros((travel.size, count))
-    for gain, part in zip(gains.T, parts, strict=True):
-        force, level, own = (
-            total + gain * one for total, one in zip((force, level, own), part[:3], strict=True)
-        )
-        form += (gain * at.gain)[:, None] * part.form
-    working = force > 0.0
-    level, own = (np.divide(one, force, out=np.zeros(travel.size), where=working) for one in (level, own))
-    whole = pressed(law, at, travel)
+def sensitivities(
+    law: MeshLaw, at: Instants, travel: Array, whole: Pressed, exponent: float, reference: float
+) -> Sensitivities:
+    """Those of a law at the DTE `travel` (n,) [m], where all pairs carry `whole`; `exponent` is in the law, `reference`
+    [N] the force at which it changes nothing."""
+    if at.differ:
+        depths = travel[:, None] + at.excess[:, None] + at.pair_excess
+        parts = [_part(law, at.phase, depth, pair, exponent, reference) for pair, depth in enumerate(depths.T)]
+        gains = list(at.pair_gain.T)
+    else:
+        parts, gains = [_part(law, at.phase, travel + at.excess, None, exponent, reference)], [np.ones(travel.size)]
+
+    def total(of: Callable[[_Part], Array]) -> Array:
+        return np.sum([(gain * of(part).T).T for gain, part in zip(gains, parts, strict=True)], axis=0)
+
+    force = total(lambda part: part.force)
+    working = np.where(force > 0.0, force, np.inf)
+    level, sharing = total(lambda part: part.level) / working, total(lambda part: part.sharing) / working
+    form = at.gain[:, None] * total(lambda part: part.form)
     back = whole.force < 0.0
     depth = (np.abs(whole.force / at.gain) / reference) ** (1.0 / (1.0 + exponent))
     level = np.where(back, np.log(np.maximum(depth, LEAST_LEVEL)), level)
-    own = np.where(back, whole.tangent * depth * reference / np.where(back, -whole.force, 1.0), own)
-    return Sensitivities(level, own, np.where(back[:, None], 0.0, form))
+    sharing = np.where(back, whole.tangent * depth * reference / np.where(back, -whole.force, 1.0), sharing)
+    return Sensitivities(level, sharing, np.where(back[:, None], 0.0, form))
 
 
 class _Part(NamedTuple):
@@ -67,7 +68,7 @@ class _Part(NamedTuple):
 
     force: Array
     level: Array
-    own: Array
+    sharing: Array
     form: Array
 
 
@@ -87,7 +88,7 @@ def _part(
     if pair is None:
         form = (1.0 + n) * bare
         return _Part(whole, whole * log, stiff * level * reference, form)
-    lift = np.where(loaded, (safe / reference) ** (n / (1.0 + n)), 1.0)
+    lift = np.where(loaded, level**n, 1.0)
     alone = bare[:, pair] / np.maximum(1.0 - law.shared * bare.sum(axis=1) / lift, 1e-3)
     form = (n * force[:, pair] / safe - law.shared * alone / lift)[:, None] * bare
     form[:, pair] += alone

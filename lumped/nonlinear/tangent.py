@@ -30,8 +30,8 @@ Integers = NDArray[np.int64]
 
 # A plain 0.5 would be of double precision, and what it is multiplied with.
 HALF, SIXTH, TWO = np.float32(0.5), np.float32(1 / 6), np.float32(2.0)
-# Of a step's outer and inner two stages in the mesh force that is told of it.
-AT_ONCE, OVER_STEP = (1.0, 0.0), (1 / 6, 1 / 3)
+# Of a step's four stages in the mesh force that is told of it.
+AT_ONCE, OVER_STEP = (1.0, 0.0, 0.0, 0.0), (1 / 6, 1 / 3, 1 / 3, 1 / 6)
 
 
 class Tangent(NamedTuple):
@@ -58,7 +58,7 @@ class Tangent(NamedTuple):
 
 def departures(
     tangent: Tangent, forces: NDArray[np.floating[Any]], on: Integers, substeps: int, early: int,
-    weights: tuple[float, float] = AT_ONCE,
+    weights: tuple[float, float, float, float] = AT_ONCE,
 ) -> tuple[Single, Single]:  # fmt: skip
     """Departures (samples, n, columns) of the coordinates [m] and (steps, columns) of the mesh force [N] under forces
     (entries, columns) [N], each in the mesh or on one coordinate, `on` (columns,): its number or `IN_MESH`; `early`
@@ -160,15 +160,14 @@ def _run(
                 v3[c, p] = v[c, p] + HALF * h * a2[c, p]
         _rates(q2, v3, springs, dampers, mesh, pushed[middle], direction, in_mesh, stiffness[middle], damping[middle],
                forces[middle], bearings, held, stiffer[middle], turned, turning[middle], a3, push)  # fmt: skip
-        _gather(push, weights[1], number, pushes)
+        _gather(push, weights[2], number, pushes)
         for c in range(size):
             for p in range(columns):
                 q2[c, p] = q[c, p] + h * v3[c, p]
                 v4[c, p] = v[c, p] + h * a3[c, p]
         _rates(q2, v4, springs, dampers, mesh, pushed[after], direction, in_mesh, stiffness[after], damping[after],
                forces[after], bearings, held, stiffer[after], turned, turning[after], a4, push)  # fmt: skip
-        if weights[1] > 0.0:
-            _gather(push, weights[0], number, pushes)
+        _gather(push, weights[3], number, pushes)
         for c in range(size):
             for p in range(columns):
                 q[c, p] += SIXTH * h * (v[c, p] + TWO * (v2[c, p] + v3[c, p]) + v4[c, p])

@@ -102,7 +102,9 @@ def test_columns_where_back_flanks_touch(prepared: Prepared, name: str) -> None:
     assert 0.05 < np.mean(state.elastic < 0.0) < 0.95
     above, below = (residuals(made, condition, where.departures(x, condition)) for x in (p + step, p - step))
     difference = (above.left - below.left) / 2e-12
-    assert norm(difference - at.jacobian[:, :, entry]) < 0.03 * norm(difference)
+    # What damping changes by with the stiffness weighs more where the back flanks feel nothing of it.
+    on_working_flanks = name.split(".")[0].split("-")[0] in ("offset", "profile", "flanks", "pitch")
+    assert norm(difference - at.jacobian[:, :, entry]) < (0.03 if on_working_flanks else 0.02) * norm(difference)
 
 
 def test_working_flanks_that_stand_back_leave_the_back_ones_where_they_are() -> None:

@@ -53,16 +53,17 @@ def force(law: MeshLaw, uneven: bool) -> Array:
 def test_forces_change_as_between_two_laws(plain: MeshLaw, uneven: bool) -> None:
     law = made(plain)
     at, travel = at_instants(law, uneven), np.full(PHASES.size, TRAVEL)
-    found, whole = sensitivities(law, at, travel, EXPONENT, REFERENCE), force(law, uneven)
+    found = sensitivities(law, at, travel, pressed(law, at, travel), EXPONENT, REFERENCE)
+    whole = force(law, uneven)
 
     def change(step: float, more: MeshLaw, less: MeshLaw) -> Array:
         return np.asarray((force(more, uneven) - force(less, uneven)) / (2 * step))
 
     wanted = {"level": change(1e-4, *(made(plain, exponent=EXPONENT + step) for step in (1e-4, -1e-4)))}
     step = 1e-3 * MORE
-    wanted["own"] = change(step, *(made(plain, more=MORE + one) for one in (step, -step)))
+    wanted["sharing"] = change(step, *(made(plain, more=MORE + one) for one in (step, -step)))
     for name, expected in wanted.items():
-        sign = -1.0 if name == "own" else 1.0
+        sign = -1.0 if name == "sharing" else 1.0
         np.testing.assert_allclose(
             sign * whole * getattr(found, name), expected, atol=2e-3 * np.abs(expected).max(), err_msg=name
         )
