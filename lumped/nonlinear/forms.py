@@ -57,15 +57,22 @@ def formed(law: MeshLaw, excess: Array | None, more: float = 0.0) -> MeshLaw:
     nodes = len(law.approach) if lower[touching].min() > -NOTHING else NODES
     approach = approach_grid(deepest, nodes)
     trial = approach_grid(left, FINE * (nodes - 1) + 1)
-    parts = np.zeros((law.phases, nodes, len(law.offsets)))
-    _press(law.approach, law.parts, lower, law.shared, law.shared + more, trial, approach, parts)
-    force = parts.sum(axis=2)
+
+    def of_pairs(standing_back: Array, sharing: float) -> Array:
+        parts = np.zeros((law.phases, nodes, len(law.offsets)))
+        _press(law.approach, law.parts, standing_back, law.shared, sharing, trial, approach, parts)
+        return parts
+
+    parts, before = of_pairs(lower, law.shared + more), of_pairs(np.zeros(lower.shape), law.shared)
+    # The law's own shares are finer than its table: what the flanks change them by is read off two alike ones.
+    level = REFERENCE * float(law.force[:, -1].max())
+    share = np.clip(law.share + _shares(parts, level) - _shares(before, level), 0.0, None)
     return replace(
         law,
         approach=approach,
-        force=force,
+        force=parts.sum(axis=2),
         parts=parts,
-        share=_shares(force, parts),
+        share=share / share.sum(axis=1, keepdims=True),
         shared=law.shared + more,
         lead=law.lead + lead,
     )
@@ -124,9 +131,9 @@ def _press(
                 out[i, j, o] = max(found[n - 1, o] + weight * (found[n, o] - found[n - 1, o]), 0.0)
 
 
-def _shares(force: Array, parts: Array) -> Array:
-    """Parts (phases, n_o) of the pairs in the tangent stiffness at the node below the reference force."""
-    level = REFERENCE * float(force[:, -1].max())
+def _shares(parts: Array, level: float) -> Array:
+    """Parts (phases, n_o) of the pairs in the tangent stiffness at the node below a force."""
+    force = parts.sum(axis=2)
     node = np.clip((force < level).sum(axis=1) - 1, 0, force.shape[1] - 2)
     rows = np.arange(len(force))
     tangent = np.maximum(parts[rows, node + 1] - parts[rows, node], 0.0)

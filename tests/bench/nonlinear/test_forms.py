@@ -127,6 +127,22 @@ def test_a_pair_that_stands_back_carries_as_two_springs_do(shared: float) -> Non
     np.testing.assert_allclose(law.share.sum(axis=1), 1.0)
 
 
+def test_a_pair_that_does_not_touch_at_the_reference_load_has_no_share() -> None:
+    law = springs()
+    back = formed(law, np.tile([0.0, -0.8 * law.approach[-1]], (8, 1)))
+    np.testing.assert_allclose(back.share, np.tile([1.0, 0.0], (8, 1)))
+
+
+@pytest.mark.parametrize(("size", "more"), [(1e-11, 0.0), (0.0, 1e-15), (1e-11, 1e-15)])
+def test_flanks_and_bodies_that_hardly_depart_leave_the_shares(size: float, more: float) -> None:
+    """Friction follows them: a jump there is one of all that the record shows."""
+    law = teeth_law(make_rig({}), SIMULATION, 150.0)
+    excess = size * np.cos(2 * np.pi * np.arange(law.phases) / law.phases)[:, None] * np.ones(len(law.offsets))
+    found = formed(law, excess, more)
+    assert not np.array_equal(found.force, law.force)
+    np.testing.assert_allclose(found.share, law.share, atol=1e-4)
+
+
 def test_wear_of_all_flanks_alike_turns_the_driver_on_and_changes_nothing_else() -> None:
     worn = {"driver": {"wear": 5e-6}, "driven": {"wear": 2e-6}}
     np.testing.assert_allclose(lumped_error(make_rig(worn)) - lumped_error(make_rig({})), 7e-6, rtol=1e-9)
