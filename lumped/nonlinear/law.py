@@ -21,6 +21,8 @@ from gearbench.lumped.errors import LumpedError
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
+REFERENCE = 0.3  # of the largest force, where the parts of the pairs are taken
+
 
 def approach_grid(largest: float, nodes: int) -> Array:
     """Deflections (nodes,) [m] from 0 to `largest`, uniform in their square root."""
@@ -168,6 +170,20 @@ class MeshLaw:
         bending[-1, 1:] = self.bending[0, :-1]
         return share, bending
 
+    @cached_property
+    def carried(self) -> Array:
+        """Parts (phases + 1, n_o) of the force that the pairs carry at `REFERENCE` of the largest, the end of the cycle
+        appended: a pair that begins to touch has little of it, whatever it adds to the stiffness."""
+        node = np.clip((self.force < REFERENCE * self.force[:, -1].max()).sum(axis=1), 1, len(self.approach) - 1)
+        rows = np.arange(self.phases)
+        low, high = self.force[rows, node - 1], self.force[rows, node]
+        weight = ((REFERENCE * self.force[:, -1].max() - low) / (high - low))[:, None]
+        at = self.parts[rows, node - 1] + weight * (self.parts[rows, node] - self.parts[rows, node - 1])
+        table = np.zeros((self.phases + 1, len(self.offsets)))
+        table[:-1] = at / at.sum(axis=1, keepdims=True)
+        table[-1, 1:] = table[0, :-1]
+        return table
+
     def pairs(self, phase: ArrayLike) -> tuple[Integers, Array]:
         """Numbers (..., n_o) of the pairs near contact at `phase` (...), and their tangent shares (..., n_o)."""
         phase = np.asarray(phase, dtype=float)
@@ -184,7 +200,8 @@ class MeshLaw:
         return np.asarray(table[row] + weight * (table[row + 1] - table[row]))
 
     def friction(self, phase: ArrayLike, transition: float = 0.0) -> tuple[Array, Array, Array]:
-        """Levers of friction: sums over the pairs of share sgn rho1 [m], share sgn [-] and share sgn rho2 [m].
+        """Levers of friction: sums over the pairs of part sgn rho1 [m], part sgn [-] and part sgn rho2 [m], the part
+        of the force that a pair carries.
 
         sgn is that of the steady rotation, which vibration may turn round (`lumped.nonlinear`): +1 after the pitch
         point, where the driver's flank slides faster, and -1 before. Friction of coefficient
@@ -195,7 +212,7 @@ class MeshLaw:
         away = (phase - np.floor(phase))[..., None] - self.offsets
         travel = away * self.base_pitch
         sign = np.sign(travel) if transition <= 0.0 else np.tanh(travel / transition)
-        weight = self._between(self.closed[0], phase) * sign
+        weight = self._between(self.carried, phase) * sign
         centre1, centre2 = self.pitch_roll
         total = weight.sum(axis=-1)
         spread = (weight * travel).sum(axis=-1)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from shared.effect_rig import FORCE, GEARS, MASSES, along_line_of_action, make_model, make_rig, run, steady_dte
-from shared.hat_mesh import ALPHA, BASE_PITCH, PHASES, PITCH_ROLL, RADII, hat, hat_law
+from shared.hat_mesh import ALPHA, BASE_PITCH, PITCH_ROLL, RADII, hat, hat_law
 
 from gearbench.lumped.nonlinear.coordinates import COORDINATES, Coordinates
 from gearbench.lumped.nonlinear.model import NonLinear
@@ -143,7 +143,8 @@ def test_vibration_turns_dry_friction_into_a_smaller_mean_force(away: float) -> 
     mu, frequency, line = 0.01, 5.0, 4000.0
     rig = make_rig(friction=Friction(coefficient=mu, transition_speed=5e-4), load=Load(boundary="speed"))
     law = hat_law(swing=0.0, bend=0.0)
-    model = make_model(along_line_of_action(rig), replace(law, share=np.tile(law.offsets == 0, (PHASES, 1)) * 1.0))
+    alone = law.force[..., None] * (law.offsets == 0)
+    model = make_model(along_line_of_action(rig), replace(law, parts=alone))
     steps, swings = 400, 40
     step = 1 / line / steps
     motion = Motion(cycles=frequency * swings / line, entries=2 * swings * steps, step=step, first_phase=away)

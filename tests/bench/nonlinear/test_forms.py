@@ -133,6 +133,15 @@ def test_a_pair_that_does_not_touch_at_the_reference_load_has_no_share() -> None
     np.testing.assert_allclose(back.share, np.tile([1.0, 0.0], (8, 1)))
 
 
+def test_pairs_carry_what_two_springs_do_at_the_reference_load() -> None:
+    """k u + k (u - r) = F."""
+    one, back = 2e8, 3e-6
+    law = formed(springs(), np.tile([0.0, -back], (8, 1)))
+    force = 0.3 * law.force[:, -1].max()
+    pressed = (force + one * back) / (2 * one) - np.array([0.0, back])
+    np.testing.assert_allclose(law.carried[:-1], np.tile(one * pressed / force, (8, 1)), atol=3e-3)
+
+
 @pytest.mark.parametrize(("size", "more"), [(1e-11, 0.0), (0.0, 1e-15), (1e-11, 1e-15)])
 def test_flanks_and_bodies_that_hardly_depart_leave_the_shares(size: float, more: float) -> None:
     """Friction follows them: a jump there is one of all that the record shows."""
