@@ -203,7 +203,7 @@ def _lever_arms(
     pitch point, and turns part of Coulomb's friction into damping.
     """
     law, n = model.law, phase.size
-    numbers, share = law.pairs(phase)
+    numbers, carried = law.pairs(phase)[0], law.carried_at(phase)
     travel = (phase[:, None] - numbers) * law.base_pitch
     centre1, centre2 = law.pitch_roll
     rho1, rho2 = centre1 + travel, centre2 - travel
@@ -218,7 +218,7 @@ def _lever_arms(
     speed1, speed2 = turn1 + rate("angle_driver") / rb1, turn2 + rate("angle_driven") / rb2
     across = model.cross_factor * (rate("y_driver") - rate("y_driven"))
     sliding = rho1 * speed1[:, None] - rho2 * speed2[:, None] + across[:, None]
-    weight = share * np.tanh(sliding / model.transition)
+    weight = carried * np.tanh(sliding / model.transition)
     m1, m2 = (weight * rho1).sum(axis=-1), (weight * rho2).sum(axis=-1)
     factor = model.cross_factor / model.support_factor
     return np.stack([m1 / rb1, weight.sum(axis=-1) * factor, m2 / rb2])

@@ -190,6 +190,10 @@ class MeshLaw:
         numbers = np.floor(phase).astype(np.int64)[..., None] + self.offsets
         return numbers, self._between(self.closed[0], phase)
 
+    def carried_at(self, phase: ArrayLike) -> Array:
+        """Parts (..., n_o) of the force that the pairs carry that `pairs` lists."""
+        return self._between(self.carried, np.asarray(phase, dtype=float))
+
     def bending_of(self, phase: ArrayLike) -> Array:
         """Bending parts (..., n_o, 2) of the pairs that `pairs` lists."""
         return self._between(self.closed[1], np.asarray(phase, dtype=float))
@@ -212,7 +216,7 @@ class MeshLaw:
         away = (phase - np.floor(phase))[..., None] - self.offsets
         travel = away * self.base_pitch
         sign = np.sign(travel) if transition <= 0.0 else np.tanh(travel / transition)
-        weight = self._between(self.carried, phase) * sign
+        weight = self.carried_at(phase) * sign
         centre1, centre2 = self.pitch_roll
         total = weight.sum(axis=-1)
         spread = (weight * travel).sum(axis=-1)
