@@ -52,5 +52,5 @@ class Rubbing(NamedTuple):
     pitch1: float
     pitch2: float
     slide: float  # sin(a_w), or 0 along the line of action
-    offset: float  # of the first column of `share`
-    share: Array  # (phases + 1, n_o)
+    offset: float  # of the first column of `carried`
+    carried: Array  # (phases + 1, n_o), parts of the force in the mesh

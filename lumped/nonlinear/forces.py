@@ -223,13 +223,13 @@ def friction(v: Coordinates, further: Any, at: Entry, r: Rubbing, factor: float)
     position = at.position
     row = int(position)
     weight = position - row
-    cycle = position / (r.share.shape[0] - 1)
+    cycle = position / (r.carried.shape[0] - 1)
     # The sliding velocity is linear in the distance from the pitch point.
     middle = _aside(r.centre1 * v.u1 - r.centre2 * v.u2 + r.slide * (v.y1 - v.y2), further, factor)
     slope = at.pace * r.drift + r.pitch1 * v.u1 + r.pitch2 * v.u2
     m1, s, m2 = 0.0, 0.0, 0.0
-    for o in range(r.share.shape[1]):
-        part = r.share[row, o] + weight * (r.share[row + 1, o] - r.share[row, o])
+    for o in range(r.carried.shape[1]):
+        part = r.carried[row, o] + weight * (r.carried[row + 1, o] - r.carried[row, o])
         if part != 0.0:
             away = cycle - r.offset - o
             part *= r.coefficient * _slid((middle + away * slope) * r.steepness)

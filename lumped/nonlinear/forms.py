@@ -27,7 +27,6 @@ NODES = 131  # deflections of the table: flanks that come into contact one after
 FINE = 4  # steps between two nodes, where forces are found before the table is read off
 NOTHING = 1e-12  # m, by which flanks may differ that are alike
 LEAST_LEFT = 0.9  # part of the mesh's compliance at its stiffest that less of the bodies' may take away, at most
-REFERENCE = 0.3  # of the largest force, where the shares of the pairs are taken
 
 
 def formed(law: MeshLaw, excess: Array | None, more: float = 0.0) -> MeshLaw:
@@ -65,7 +64,7 @@ def formed(law: MeshLaw, excess: Array | None, more: float = 0.0) -> MeshLaw:
 
     parts, before = of_pairs(lower, law.shared + more), of_pairs(np.zeros(lower.shape), law.shared)
     # The law's own shares are finer than its table: what the flanks change them by is read off two alike ones.
-    level = REFERENCE * float(law.force[:, -1].max())
+    level = law.reference_force
     share = np.clip(law.share + _shares(parts, level) - _shares(before, level), 0.0, None)
     return replace(
         law,

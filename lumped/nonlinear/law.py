@@ -99,10 +99,7 @@ class MeshLaw:
     @cached_property
     def pair_secants(self) -> Array:
         """Those of the pairs (phases + 1, n_d, n_o); where the cycle ends every pair has moved on by one offset."""
-        table = np.zeros((self.phases + 1, *self.parts.shape[1:]))
-        table[:-1] = np.moveaxis(_over(np.moveaxis(self.parts, 1, 2), self.approach), 2, 1)
-        table[-1, :, 1:] = table[0, :, :-1]
-        return table
+        return _moved_on(np.moveaxis(_over(np.moveaxis(self.parts, 1, 2), self.approach), 2, 1))
 
     @property
     def pitch_roll(self) -> tuple[float, float]:
@@ -164,25 +161,25 @@ class MeshLaw:
     @cached_property
     def closed(self) -> tuple[Array, Array]:
         """share and bending with the end of the cycle appended, where every pair has moved on by one offset."""
-        share, bending = np.zeros((self.phases + 1, len(self.offsets))), self.bending[[*range(self.phases), -1]]
-        share[:-1] = self.share
-        share[-1, 1:] = self.share[0, :-1]
+        bending = self.bending[[*range(self.phases), -1]]
         bending[-1, 1:] = self.bending[0, :-1]
-        return share, bending
+        return _moved_on(self.share), bending
+
+    @property
+    def reference_force(self) -> float:
+        """Force [N] at which the parts of the pairs are taken."""
+        return REFERENCE * float(self.force[:, -1].max())
 
     @cached_property
     def carried(self) -> Array:
-        """Parts (phases + 1, n_o) of the force that the pairs carry at `REFERENCE` of the largest, the end of the cycle
+        """Parts (phases + 1, n_o) of the force that the pairs carry at the reference force, the end of the cycle
         appended: a pair that begins to touch has little of it, whatever it adds to the stiffness."""
-        node = np.clip((self.force < REFERENCE * self.force[:, -1].max()).sum(axis=1), 1, len(self.approach) - 1)
-        rows = np.arange(self.phases)
+        level, rows = self.reference_force, np.arange(self.phases)
+        node = np.clip((self.force < level).sum(axis=1), 1, len(self.approach) - 1)
         low, high = self.force[rows, node - 1], self.force[rows, node]
-        weight = ((REFERENCE * self.force[:, -1].max() - low) / (high - low))[:, None]
+        weight = ((level - low) / (high - low))[:, None]
         at = self.parts[rows, node - 1] + weight * (self.parts[rows, node] - self.parts[rows, node - 1])
-        table = np.zeros((self.phases + 1, len(self.offsets)))
-        table[:-1] = at / at.sum(axis=1, keepdims=True)
-        table[-1, 1:] = table[0, :-1]
-        return table
+        return _moved_on(at / at.sum(axis=1, keepdims=True))
 
     def pairs(self, phase: ArrayLike) -> tuple[Integers, Array]:
         """Numbers (..., n_o) of the pairs near contact at `phase` (...), and their tangent shares (..., n_o)."""
@@ -230,6 +227,14 @@ def _over(force: Array, approach: Array) -> Array:
     table[..., 1:] = force[..., 1:] / approach[1:]
     table[..., 0] = np.maximum(2 * table[..., 1] - table[..., 2], 0.0)
     return table
+
+
+def _moved_on(table: Array) -> Array:
+    """What pairs have (phases, ..., n_o) with the end of the cycle appended, where each has moved on by one offset."""
+    closed = np.zeros((len(table) + 1, *table.shape[1:]))
+    closed[:-1] = table
+    closed[-1, ..., 1:] = table[0, ..., :-1]
+    return closed
 
 
 def place_phase(phase: ArrayLike, phases: int) -> tuple[Integers, Array]:

@@ -259,7 +259,7 @@ class NonLinear:
             pitch2=law.base_pitch / r2,
             slide=self.slide,
             offset=float(law.offsets[0]),
-            share=law.carried,
+            carried=law.carried,
         )
 
     def friction_rate(self) -> float:

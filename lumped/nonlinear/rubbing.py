@@ -30,11 +30,11 @@ def rubbed_along(model: NonLinear, position: Array, pace: Array, rates: Array, m
     u1, u2, closing = rates[:, U1], rates[:, U2], rates[:, Y1] - rates[:, Y2]
     middle = r.centre1 * u1 - r.centre2 * u2 + r.slide * closing - aside
     slope = pace * r.drift + r.pitch1 * u1 + r.pitch2 * u2
-    rows = len(r.share) - 1
+    rows = len(r.carried) - 1
     row = np.minimum(position.astype(int), rows - 1)
-    share = r.share[row] + (position - row)[:, None] * (r.share[row + 1] - r.share[row])
-    away = (position / rows - r.offset)[:, None] - np.arange(r.share.shape[1])
-    part = share * r.coefficient * np.tanh((middle[:, None] + away * slope[:, None]) * r.steepness)
+    carried = r.carried[row] + (position - row)[:, None] * (r.carried[row + 1] - r.carried[row])
+    away = (position / rows - r.offset)[:, None] - np.arange(r.carried.shape[1])
+    part = carried * r.coefficient * np.tanh((middle[:, None] + away * slope[:, None]) * r.steepness)
     along = part.sum(axis=1)
     out[:, U1] = (part * (r.centre1 + away * r.pitch1)).sum(axis=1)
     out[:, U2] = -(part * (r.centre2 - away * r.pitch2)).sum(axis=1)
