@@ -48,12 +48,10 @@ def pushing(steady: Steady, motion: Motion, substeps: int) -> Pushing:
     model, travel, count = setup.model, motion.travel, len(motion.travel)
     table = setup.table_for(0, len(steady.outputs))
     turned = table.position[:count] / model.law.phases + motion.turned
-    # Pairs are those of the entry's cycle, and wait at its ends for the next where teeth differ.
-    within = np.clip(turned, 0.0, 1.0 - 1e-12)
-    differ = table.own.size > 0
-    waits = differ & (turned != within)
-    turned = within if differ else turned - np.floor(turned)
-    at = instants(model, table, turned, count)
+    cycles = np.floor(turned)
+    turned = np.minimum(turned - cycles, 1.0 - 1e-12)
+    first = table.first_pair[:count] + cycles
+    at = instants(model, table._replace(position=turned * model.law.phases, first_pair=first), count)
     whole = pressed(model.law, at, travel)
     force, slope = whole
     # Back flanks close at the rate of the deflection alone.
@@ -66,7 +64,6 @@ def pushing(steady: Steady, motion: Motion, substeps: int) -> Pushing:
     # Between two rows of the law the motion sees a straight line.
     row = np.floor(turned * model.law.phases)
     turning = (force_at((row + 1) / model.law.phases) - force_at(row / model.law.phases)) * model.law.phases
-    turning[waits] = 0.0
     slope = np.maximum(slope, 0.0)
     damping = _damping(model, force, slope)
     # Flanks that part faster than they spring back push no more.
@@ -74,17 +71,29 @@ def pushing(steady: Steady, motion: Motion, substeps: int) -> Pushing:
     force, slope, damping, turning = (np.where(idle, 0.0, one) for one in (force, slope, damping, turning))
     # Damping that grows with the force is the stiffer for being pressed while the flanks close.
     stiffer = 1.0 + model.rig.damping.mesh_exponent * damping * closing / np.where(idle, 1.0, force)
-    paired = at._replace(phase=within)
     mesh = model.rig.mesh
-    answer = sensitivities(model.law, paired, travel, whole, mesh.exponent, mesh.reference_force)
+    answer = sensitivities(model.law, at, travel, whole, mesh.exponent, mesh.reference_force)
     stiffness = slope * stiffer + _met(damping, force, closing, setup.step / 2)
-    pairs = (*of_pairs(model.law, paired, travel), answer.form)
+    nominal = setup.phases(0, count)
+    ahead = np.round(nominal - turned) - np.floor(nominal)
+    pairs = (_numbered(one, ahead) for one in (*of_pairs(model.law, at, travel), answer.form))
     pair_force, pair_tangent, form = (np.where(idle[:, None], 0.0, one) for one in pairs)
     rubbed = _rubbed(setup, table, motion, turned * model.law.phases)
     return Pushing(
         force, pair_force, pair_tangent, form, closing, answer.level, answer.sharing, stiffer, stiffness, damping,
         turning, rubbed,
     )  # fmt: skip
+
+
+def _numbered(values: Array, ahead: Array) -> Array:
+    """What pairs have (instants, n_o) in the columns of the nominal rotation's cycle, of a mesh that is turned into the
+    cycle `ahead` (instants,), 1, or behind, -1."""
+    out = values.copy()
+    for cycles, here, there in ((1, slice(1, None), slice(None, -1)), (-1, slice(None, -1), slice(1, None))):
+        rows = ahead == cycles
+        out[rows] = 0.0
+        out[rows, here] = values[rows, there]
+    return out
 
 
 def _damping(model: NonLinear, elastic: Array, tangent: Array) -> Array:

@@ -266,7 +266,7 @@ class Setup:
         """Static equilibrium under the mean force [N] at a sample."""
         table = self.table_for(sample, 1)
         phase = self.phase_at(sample)
-        state = self.model.equilibrium(mean_force, instants(self.model, table, phase, 1))
+        state = self.model.equilibrium(mean_force, instants(self.model, table, 1))
         return State(sample, state + under_ripple(self.model, self.mesh_frequency, phase), begins=True)
 
 

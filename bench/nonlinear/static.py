@@ -42,7 +42,7 @@ def static_nonlinear(case: Case, loads: Loads, phase: Array) -> xr.Dataset:
     law = mesh_law(case.rig, case.simulation, most)
     model = nonlinear_model(case.rig, meshing, law)
     table = tables(model, Motion(cycles=1.0, entries=len(phase), step=1.0))
-    at = instants(model, table, phase, -1)
+    at = instants(model, table, -1)
     shape = (len(values), len(phase))
     if unit == "N m":
         dte = travel_under(model.law, at, np.broadcast_to(values[:, None] / radius, shape))
@@ -73,7 +73,7 @@ def linearised_matrices(case: Case, meshing: Pair, phases: int) -> tuple[Array, 
     model = nonlinear_model(rig, meshing, law)
     twisted = model.twisted_on(force)
     table = tables(model, Motion(cycles=1.0, entries=phases, step=1.0, first_phase=twisted))
-    at = instants(model, table, twisted + np.arange(phases) / phases, -1)
+    at = instants(model, table, -1)
     tangent = pressed(model.law, at, travel_under(model.law, at, np.array(force))).tangent
     seen = _relative(model)
     back = np.linalg.pinv(seen)

@@ -81,15 +81,24 @@ def entry(table: Table, i: int) -> Entry:
 
 
 @compiled(fastmath=ROUNDING)
+def _held(cycles: float, first: int, apart: Any) -> int:
+    """By how many pairs `first` moves on with so many cycles, of those that there are."""
+    if len(apart) == 0:
+        return 0
+    last = apart.own.shape[0] - apart.secant.shape[2]
+    return int(min(max(first + cycles, 0.0), float(last))) - first
+
+
+@compiled(fastmath=ROUNDING)
 def turned_on(at: Entry, rows: float, count: int, apart: Any) -> Entry:
     """The entry with the mesh turned on by so many rows of a table of `count`."""
-    position, last = at.position + rows, count * (1.0 - 1e-16)
-    if len(apart) == 0 and not 0.0 <= position < count:
-        position -= count * floor(position / count)
-    # An entry's teeth are those of its cycle: they wait at its ends for the next.
-    position = min(max(position, 0.0), last)
+    position, first = at.position + rows, at.first_pair
+    if not 0.0 <= position < count:
+        cycles = floor(position / count)
+        position = min(max(position - count * cycles, 0.0), count * (1.0 - 1e-16))
+        first += _held(cycles, first, apart)
     return Entry(
-        at.first_pair, position, at.excess, at.excess_rate, at.gain, at.ripple, at.back, at.pace, at.pull, at.lever1,
+        first, position, at.excess, at.excess_rate, at.gain, at.ripple, at.back, at.pace, at.pull, at.lever1,
         at.lever2, at.tilt,
     )  # fmt: skip
 

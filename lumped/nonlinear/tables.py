@@ -11,7 +11,7 @@ from math import cos, floor, pi, sin
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from gearbench.kernels.compiled import compiled
 from gearbench.lumped.nonlinear.ends import Ends, ends_of
@@ -30,7 +30,8 @@ class Table(NamedTuple):
     levers where no gear runs out.
 
     excess, its rate and gain are common to all pairs. Pair o of an entry has row first_pair + o of `own` besides, which
-    is empty where all teeth are alike.
+    is empty where all teeth are alike; else it holds a pair more at either end, for a mesh that is turned into the
+    cycle before or behind an entry's.
     """
 
     position: Array  # in rows of the force table, which are phases
@@ -147,9 +148,9 @@ def teeth_of(model: NonLinear) -> Teeth:
     return Teeth(excess[0], excess[1], growth[0], growth[1])
 
 
-def instants(model: NonLinear, table: Table, phase: ArrayLike, end: int | None = None) -> Instants:
-    """The mesh at the table's entries to before `end`; phase [cycles] of each."""
-    at = np.atleast_1d(np.asarray(phase, dtype=float))
+def instants(model: NonLinear, table: Table, end: int | None = None) -> Instants:
+    """The mesh at the table's entries to before `end`."""
+    at = table.position[:end] / model.law.phases
     if not table.own.size:
         return alike(at, table.excess[:end], table.gain[:end], table.back[:end])
     columns = len(model.law.offsets)
@@ -182,20 +183,20 @@ def tables(model: NonLinear, motion: Motion) -> Table:
     levers = np.empty((len(phase) if runs_out else 0, 3))
     table = Table(position, excess, rate, gain, ripple, back, first, _own(model, phase), levers=levers)
     teeth = rig.driver.teeth, rig.driven.teeth
-    alike, ends = not table.own.size, ends_of(model)
-    fixed = correction, _runout(model), ends, _waves(model)
-    _fill(table, phase, each, floor(phase[0]), law.phases, teeth, alike, *fixed)
+    fixed = correction, _runout(model), ends_of(model), _waves(model)
+    _fill(table, phase, each, floor(phase[0]), law.phases, teeth, *fixed)
     rate[1:-1] = (excess[2:] - excess[:-2]) / motion.step
     pace, pull = (np.empty(0), np.empty(0)) if varied is None else varied[1:]
     return table.part(1, -1)._replace(pace=pace, pull=pull)
 
 
 def _own(model: NonLinear, phase: Array) -> Array:
-    """What pairs have of their own (pairs, 3), from the first one that is near contact at the first phase [cycles]."""
+    """What pairs have of their own (pairs, 3), from the one before the first that is near contact at the first phase
+    [cycles] on."""
     teeth, offsets = teeth_of(model), model.law.offsets
     if not teeth.differ:
         return np.empty((0, 3))
-    number = np.arange(floor(phase[0]) + offsets[0], floor(phase[-1]) + offsets[-1] + 1)
+    number = np.arange(floor(phase[0]) + offsets[0] - 1, floor(phase[-1]) + offsets[-1] + 2)
     one, two = number % len(teeth.excess1), number % len(teeth.excess2)
     return np.stack([teeth.excess1[one] + teeth.excess2[two], teeth.growth1[one], teeth.growth2[two]], axis=1)
 
@@ -265,13 +266,12 @@ def _rippled(waves: Waves, phase: float) -> float:
 
 @compiled
 def _fill(
-    out: Table, phases: Array, each: float, begin: int, rows: int, teeth: tuple[int, int], alike: bool,
+    out: Table, phases: Array, each: float, begin: int, rows: int, teeth: tuple[int, int],
     correction: Correction, runout: Runout, ends: Ends, waves: Waves,
 ) -> None:  # fmt: skip
     """Fill the table but for `excess_rate`, own, pace and pull; entry n belongs to the n-th of `phases` [cycles], which
-    lie `each` apart (0: any way) and whose whole part begins with `begin`; rows: of the force table; alike: whether all
-    teeth are. A lever about a gear's axis is the base radius and how far its centre stands aside of the normal through
-    that axis."""
+    lie `each` apart (0: any way) and whose whole part begins with `begin`; rows: of the force table. A lever about a
+    gear's axis is the base radius and how far its centre stands aside of the normal through that axis."""
     series = len(correction.error.cosine) > 0 or len(correction.stiffness.cosine) > 0
     first, second = 1.0, 0.0
     onward, aslant = cos(2 * pi * each), sin(2 * pi * each)
@@ -303,10 +303,10 @@ def _fill(
             near = _towards_end(cycle, ends)
             place += near * ends.proud * turned
             place += (ends.leant_begin + near * (ends.leant_end - ends.leant_begin)) * leant
-            # An entry's teeth are those of its cycle: they wait at its ends for the next.
-            place = place - floor(place) if alike else max(place, 0.0)
+            ahead = floor(place)
+            place, whole = place - ahead, whole + ahead
         out.position[n] = min(place * rows, rows * (1.0 - 1e-16))
-        out.first_pair[n] = whole - begin
+        out.first_pair[n] = whole - begin + 1
         out.excess[n] = every
         out.gain[n] = correction.scale * (1.0 + _wave(correction.stiffness, first, second))
         out.ripple[n] = _rippled(waves, phase)

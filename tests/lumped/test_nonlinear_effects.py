@@ -70,7 +70,7 @@ def test_a_cracked_tooth_softens_the_mesh_while_it_carries_and_never_else() -> N
     for side, teeth in enumerate((20, 30)):
         cracked = {("driver", "driven")[side]: {"crack": Crack(tooth=3, stiffness_loss=0.5)}}
         model = make_model(make_rig(**cracked))
-        gain = instants(model, tables(model, ALL), phase, -1).pair_gain
+        gain = instants(model, tables(model, ALL), -1).pair_gain
         # Its pair: compliance 1/k grows by its bending part when that doubles.
         np.testing.assert_allclose(gain, np.where(pairs % teeth == 3, 1 / (1 + BENDING[side]), 1.0), rtol=1e-12)
     assert not tables(make_model(make_rig()), ALL).own.size

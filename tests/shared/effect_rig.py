@@ -83,4 +83,4 @@ def steady_dte(rig: Rig, *, frequency: float = 4.0, swing: float = 0.0) -> tuple
 
 
 def first_entry(model: NonLinear) -> Instants:
-    return instants(model, tables(model, Motion(1.0, 2, 1.0)), 0.0, 1)
+    return instants(model, tables(model, Motion(1.0, 2, 1.0)), 1)

@@ -60,7 +60,7 @@ def lumped_error(rig: Rig, simulation: Simulation = SIMULATION) -> Array:
     """Transmission error (torques, phases) [m] of the non-linear lumped model."""
     meshing = pair(rig)
     model = nonlinear_model(rig, meshing, mesh_law(rig, simulation, 150.0))
-    at = instants(model, tables(model, Motion(cycles=1.0, entries=len(PHASE), step=1.0)), PHASE, -1)
+    at = instants(model, tables(model, Motion(cycles=1.0, entries=len(PHASE), step=1.0)), -1)
     force = np.array(TORQUES)[:, None] / meshing.driver.base_radius
     return travel_under(model.law, at, np.broadcast_to(force, (len(TORQUES), len(PHASE))))
 
@@ -93,7 +93,7 @@ def test_reliefs_beside_the_table_do_what_those_in_it_do(flanks: dict[str, dict[
     meshing, law = pair(rig), teeth_law(sound, SIMULATION, 150.0)
     back = excess_of(rig, law)
     model = nonlinear_model(sound, meshing, formed(law, back))
-    at = instants(model, tables(model, Motion(cycles=1.0, entries=len(PHASE), step=1.0)), PHASE, -1)
+    at = instants(model, tables(model, Motion(cycles=1.0, entries=len(PHASE), step=1.0)), -1)
     force = np.array(TORQUES)[:, None] / meshing.driver.base_radius
     found = travel_under(model.law, at, np.broadcast_to(force, (len(TORQUES), len(PHASE))))
     true, plain = lumped_error(rig), lumped_error(sound)

@@ -162,7 +162,7 @@ def test_uneven_teeth_carry_as_finite_elements_say(torque: float, most: float) -
     expected = static_cycle(uneven, phase, torque=[torque]).transmission_error[0]
     even = static_cycle(sound, phase[:16], torque=[torque]).transmission_error[0]
     model = nonlinear_model(rig, pair(rig), mesh_law(rig, SIMULATION, 150.0))
-    at = instants(model, tables(model, Motion(14.0, phase.size, 1.0)), phase, -1)
+    at = instants(model, tables(model, Motion(14.0, phase.size, 1.0)), -1)
     found = travel_under(model.law, at, np.array(torque / model.base_radii[0]))
     change = np.std(expected - np.tile(even, 14))
     assert change > 2.0e-6
@@ -179,7 +179,7 @@ def test_relieved_flanks_carry_as_finite_elements_say(torque: float) -> None:
         for one in (rig, make_rig())
     )
     model = nonlinear_model(rig, pair(rig), mesh_law(rig, SIMULATION, 150.0))
-    at = instants(model, tables(model, Motion(1.0, phase.size, 1.0)), phase, -1)
+    at = instants(model, tables(model, Motion(1.0, phase.size, 1.0)), -1)
     found = travel_under(model.law, at, np.array(torque / model.base_radii[0]))
     change = np.std(expected - plain)
     assert change > 0.5e-6

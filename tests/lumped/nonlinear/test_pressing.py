@@ -29,7 +29,7 @@ def test_flanks_of_both_sides_carry_what_the_integrator_has(uneven: bool) -> Non
     model = nonlinear_model(rig, pair(rig), law)
     table = tables(model, Motion(cycles=7.0, entries=240, step=1e-4, first_phase=0.3))
     phase = table.position[:-1] / law.phases
-    at = instants(model, table, phase, -1)
+    at = instants(model, table, -1)
     secant, constants, apart = np.ascontiguousarray(law.secant), model.constants(), apart_of(table, law)
     sides = set()
     for travel in (law.approach[-1] + 20e-6, 12e-6, -0.2 * law.backlash, -law.backlash + 3e-6, -law.backlash - 9e-6):
