@@ -118,7 +118,11 @@ def replay(case: Case, record: xr.Dataset, law: MeshLaw | None = None, realisati
     Attribute `settling_residual` is the change of the DTE over the last two periods; a motion that does not settle is
     returned with a warning. Raises BenchError for a record that says too little.
     """
-    steady = steady_motion(case, record, law, realisation)
+    return seen_of(case, steady_motion(case, record, law, realisation))
+
+
+def seen_of(case: Case, steady: Steady) -> xr.Dataset:
+    """The record of a steady motion of the case's rig, as `replay` has it."""
     setup, outputs = steady.setup, steady.outputs
     applied = repeated(steady.given.torque, len(outputs))
     channels = setup.channels(outputs, applied)

@@ -128,16 +128,18 @@ class Simulator:
         """Fill in what forces in the mesh and on the coordinates, and sensors, do."""
         # Its time loop is compiled on import, which not every user of this module wants.
         from gearbench.bench.nonlinear.along import along
-        from gearbench.bench.nonlinear.replay import steady_motion
+        from gearbench.bench.nonlinear.replay import seen_of, steady_motion
 
         def one(item: tuple[int, Measurement]) -> tuple[Integers, Spectra, dict[int, dict[str, Complex]]]:
             number, measured = item
             case = self.layout.case(p, measured.name)
-            tangent = along(steady_motion(case, measured.record, law_of(self.layout.model.sound, case)))
+            steady = steady_motion(case, measured.record, law_of(self.layout.model.sound, case))
+            tangent = along(steady)
             forces = forces_of(self.layout, p, tangent, measured.name, chosen, others)
             answers = tangent.answers(forces.values, forces.on)
             answers["torque_driven"] *= self.layout.model.base_radius[1]
-            sensed = sensor_columns(self.layout, self.target, number, self.channels(p, measured))
+            seen = simulated_channels(measured, seen_of(case, steady))
+            sensed = sensor_columns(self.layout, self.target, number, seen)
             return forces.at, answers, sensed
 
         for number, (at, answers, sensed) in enumerate(side_by_side(one, list(enumerate(self.target.measurements)))):

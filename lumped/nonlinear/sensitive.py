@@ -88,7 +88,7 @@ def _part(
     if pair is None:
         form = (1.0 + n) * bare
         return _Part(whole, whole * log, stiff * level * reference, form)
-    lift = np.where(loaded, level**n, 1.0)
+    lift = np.where(loaded, level, 1.0) ** n
     alone = bare[:, pair] / np.maximum(1.0 - law.shared * bare.sum(axis=1) / lift, 1e-3)
     form = (n * force[:, pair] / safe - law.shared * alone / lift)[:, None] * bare
     form[:, pair] += alone
