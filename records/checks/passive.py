@@ -12,6 +12,9 @@ from gearbench.records.checks.look import GEARS, Look
 # Cosine between force and rate of the transmission error over the excited lines. At the gears themselves a passive rig
 # has it at 0 or above; the gear centres, on which the force does not work, may bring dte a little below.
 LIMIT = -0.1
+# Part of the excited lines, the lowest, in which a channel that is late still moves with the torque: it turns the
+# highest ones first, a sign all of them.
+LOW = 1 / 3
 
 
 def force_feeds_the_rig(look: Look) -> list[Finding]:
@@ -20,7 +23,8 @@ def force_feeds_the_rig(look: Look) -> list[Finding]:
     Behind a soft coupling the torque of the drive may well work against the gear. So a negative cosine counts where the
     balance of both gears says that the torques are theirs, or where the means are opposed too, by more than the dte
     fluctuates: flanks that part have their mean anywhere in the backlash. Where the zero of the dte is arbitrary it is
-    only said. A delay that is found elsewhere explains it.
+    only said, and so it is where the lowest lines move with the torque: a delay is no contradiction, and one that is
+    found elsewhere explains it.
     """
     force = look.force
     if force is None or float(np.ptp(force)) <= 1e-9 * float(np.abs(force).max()):
@@ -36,20 +40,28 @@ def force_feeds_the_rig(look: Look) -> list[Finding]:
     certain = opposed or accounts_agree(look)
     if not certain and (look.zero_known or name == "angles"):
         return []
-    return [
-        Finding(
-            f"the {name} move against the torque that shakes them: the cosine between force and rate is {cosine:.2f}"
-            f" (limit {LIMIT:g}), as if the rig fed the drive: are driver and driven swapped, is a sign reversed, or a"
-            " channel shifted in time?",
-            refused=certain,
-            error=0.0 if certain else 1.0,
+    low = _cosine(look, force, error, LOW)
+    moves = f"the {name} move against the torque that shakes them"
+    if certain and low > 0.0:
+        words = (
+            f"{moves} at the upper excited lines, at the lower ones with it: the cosine between force and rate is"
+            f" {cosine:.2f} (limit {LIMIT:g}), {low:.2f} in the lowest third: is a channel shifted in time?"
         )
-    ]
+        return [Finding(words, refused=False, error=1.0)]
+    words = (
+        f"{moves}: the cosine between force and rate is {cosine:.2f} (limit {LIMIT:g}), as if the rig fed the drive: are"
+        " driver and driven swapped, is a sign reversed, or a channel shifted in time?"
+    )
+    return [Finding(words, refused=certain, error=0.0 if certain else 1.0)]
 
 
-def _cosine(look: Look, force: NDArray[np.float64], error: NDArray[np.float64]) -> float:
+def _cosine(
+    look: Look, force: NDArray[np.float64], error: NDArray[np.float64], part: float = 1.0
+) -> float:
+    """That of force and rate of an error over the excited lines, or a part of these, the lowest."""
     driving = look.spectrum(force)
-    lines = look.excited(force)
+    lines = np.flatnonzero(look.excited(force))
+    lines = lines[: max(int(np.ceil(part * lines.size)), 1)]
     driving, rate = driving[lines], (1j * look.omega * look.spectrum(error))[lines]
     size = float(np.linalg.norm(driving) * np.linalg.norm(rate))
     return float(np.vdot(driving, rate).real) / size if size > 0 else 0.0

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 import xarray as xr
 
 import gearbench as gb
+from gearbench.records.checks import passive
 from gearbench.records.checks.look import Look
 from gearbench.records.checks.passive import force_feeds_the_rig
 
@@ -32,4 +34,32 @@ def test_a_mean_of_the_dte_that_lacks_a_motion_opposes_no_force(record: xr.Datas
     unseen = turned.assign(y_driver=(turned.y_driver - 4e-5).assign_attrs(turned.y_driver.attrs))
     assert force_feeds_the_rig(Look(unseen)) == []
     (found,) = force_feeds_the_rig(Look(swinging_against(record, -1.0)))
+    assert found.refused
+
+
+def test_a_late_angle_turns_the_highest_lines_first_and_a_sign_all(
+    record: xr.Dataset, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The balance of forces shows no delay where little of the force accelerates the gear."""
+    monkeypatch.setattr(passive, "clocks_agree", lambda look: [])
+    monkeypatch.setattr(passive, "accounts_agree", lambda look: True)
+    one, two = (record.attrs[f"base_radius_{gear}"] for gear in ("driver", "driven"))
+    look, count = Look(record), record.sizes["time"]
+    assert look.force is not None
+    omega = 2 * np.pi * np.fft.rfftfreq(count, 1 / record.sampling_rate)
+    top = look.omega[look.excited(look.force)][-1]
+    yielding = np.zeros(omega.size, dtype=complex)
+    yielding[1:] = np.fft.rfft(look.force)[1:] / (1j * omega[1:])
+
+    def late(delay: float, sign: float) -> xr.Dataset:
+        """The record of a rig that is a damper, whose driver's angle is late by a part of the shortest period."""
+        turned = np.fft.irfft(sign * yielding * np.exp(-2j * np.pi * delay * omega / top), count)
+        rolled = 1e-5 + 1e-6 * turned / turned.std()
+        return record.assign(angle_driver=((two * record.angle_driven + rolled) / one).assign_attrs(units="rad"))
+
+    assert force_feeds_the_rig(Look(late(0.0, 1.0))) == []
+    (found,) = force_feeds_the_rig(Look(late(0.6, 1.0)))
+    assert not found.refused
+    assert "shifted in time" in found.sentence
+    (found,) = force_feeds_the_rig(Look(late(0.0, -1.0)))
     assert found.refused
