@@ -49,8 +49,8 @@ def force_feeds_the_rig(look: Look) -> list[Finding]:
         )
         return [Finding(words, refused=False, error=1.0)]
     words = (
-        f"{moves}: the cosine between force and rate is {cosine:.2f} (limit {LIMIT:g}), as if the rig fed the drive: are"
-        " driver and driven swapped, is a sign reversed, or a channel shifted in time?"
+        f"{moves}: the cosine between force and rate is {cosine:.2f} (limit {LIMIT:g}), as if the rig fed the drive:"
+        " are driver and driven swapped, is a sign reversed, or a channel shifted in time?"
     )
     return [Finding(words, refused=certain, error=0.0 if certain else 1.0)]
 
