@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil, log
 from typing import Any
@@ -49,7 +49,7 @@ class Along:
     stiff they are for damping that grows with the force. `places` (samples, n) of all coordinates [m], sampled at
     `sampling_rate`, and `turned` (samples,) what all that turns moves by besides, as the nominal rotation departs from
     a steady one. `early` steps let free vibrations die out. Samples of forces are those of `instants`, or hold no more
-    than half the sampling rate.
+    than half the sampling rate. `led` (entries,): velocity [m/s] that the driver is nudged towards, if it is.
     """
 
     model: NonLinear
@@ -68,6 +68,7 @@ class Along:
     turned: Array
     sampling_rate: float
     instants: bool
+    led: Array
 
     @property
     def law(self) -> MeshLaw:
@@ -153,7 +154,7 @@ class Along:
         """Forces (entries,) [N] by coordinate, or in the mesh, that do in first order what turning into `other` does, a
         model like this one that differs by little around its mesh."""
         moved: dict[int, Array] = {}
-        here, there = _linear(self.model), _linear(other)
+        here, there = _linear(self.model), _linear(replace(other, nudge=self.model.nudge))
         springs, dampers, masses = (two - one for one, two in zip(here, there, strict=True))
         for number in np.flatnonzero(springs.any(axis=1) | dampers.any(axis=1) | (masses != 0.0)):
             lines = springs[number] @ self._lines + 1j * self._omega * (dampers[number] @ self._lines)
@@ -244,6 +245,7 @@ def along(steady: Steady) -> Along:
         turned=setup.departures(samples) * model.law.base_pitch,
         sampling_rate=setup.sampling_rate,
         instants=steady.given.instants,
+        led=stepped(steady, substeps).table_for(0, samples).led[:-1],
     )
 
 

@@ -60,6 +60,10 @@ class Followed:
         """Mesh frequency (m,) [Hz]."""
         return np.asarray(self.cycles_per_sample * self.sampling_rate + self._at(time, 1))
 
+    def velocity(self, time: Array) -> Array:
+        """Rate (m,) [cycles/s] of the departure."""
+        return self._at(time, 1)
+
     def acceleration(self, time: Array) -> Array:
         """Angular acceleration (m,) [rad/s^2] of the driver that turns with it."""
         return np.asarray(2 * np.pi / self.teeth * self._at(time, 2))
@@ -84,22 +88,46 @@ def followed(
     What the rig's sensors do to the angle is taken back. Of lines that the repetitions show not to stand out of noise
     there is none.
     """
-    attributes, sensors, teeth = record.attrs, rig.sensors, rig.driven.teeth
-    rate = float(attributes["sampling_rate"])
-    samples, periods = int(attributes["samples_per_period"]), int(attributes["periods"])
-    angle = record["angle_driven"].values[realisation]
-    phase = first + np.arange(angle.size) * cycles_per_sample
-    turned = angle - 2 * np.pi / teeth * phase - encoder_error(sensors, "driven", 2 * np.pi / teeth * phase)
-    repetitions = turned.reshape(periods, samples)
-    swing = taken_back(repetitions.mean(axis=0), sensors, sensors.delay_angle_driven, rate)
-    lines = np.fft.rfft(swing) * teeth / (2 * np.pi)
-    if samples % 2 == 0:
-        lines[-1] = 0.0  # of which half is seen
+    attributes, sensors = record.attrs, rig.sensors
+    rate, samples = float(attributes["sampling_rate"]), int(attributes["samples_per_period"])
+    lines = _lines(rig, record, realisation, "driven", cycles_per_sample, first)
     if attributes.get("mesh_phase_origin") == "geometry":
         late = lag(sensors, "angle_driven")
         lines[0] += samples * (cycles_per_sample * rate * late - sensors.mesh_phase_zero)
     else:
         lines[0] = 0.0
+    found = Followed(lines, samples, rate, cycles_per_sample, first, rig.driver.teeth)
+    return found if np.ptp(found.departures) > STILL else None
+
+
+def guide_of(
+    rig: Rig, record: xr.Dataset, realisation: int, cycles_per_sample: float, first: float, turning: Followed | None
+) -> Followed:
+    """The driver's motion beside the rotation as a record shows it, without its mean: what nudges a simulated one."""
+    rate, samples = float(record.attrs["sampling_rate"]), int(record.attrs["samples_per_period"])
+    lines = _lines(rig, record, realisation, "driver", cycles_per_sample, first)
+    if turning is not None:
+        lines = lines - turning.lines
+    lines[0] = 0.0
+    return Followed(lines, samples, rate, cycles_per_sample, first, rig.driver.teeth)
+
+
+def _lines(
+    rig: Rig, record: xr.Dataset, realisation: int, gear: str, cycles_per_sample: float, first: float
+) -> Complex:
+    """Half-spectrum (n // 2 + 1,) [mesh cycles] of a gear's departure from a steady rotation, what its sensors do taken
+    back; nothing where the repetitions show no more than noise."""
+    attributes, sensors, teeth = record.attrs, rig.sensors, getattr(rig, gear).teeth
+    samples, periods = int(attributes["samples_per_period"]), int(attributes["periods"])
+    angle = record[f"angle_{gear}"].values[realisation]
+    phase = first + np.arange(angle.size) * cycles_per_sample
+    turned = angle - 2 * np.pi / teeth * phase - encoder_error(sensors, gear, 2 * np.pi / teeth * phase)
+    repetitions = turned.reshape(periods, samples)
+    delay = getattr(sensors, f"delay_angle_{gear}")
+    swing = taken_back(repetitions.mean(axis=0), sensors, delay, float(attributes["sampling_rate"]))
+    lines: Complex = np.fft.rfft(swing) * teeth / (2 * np.pi)
+    if samples % 2 == 0:
+        lines[-1] = 0.0  # of which half is seen
     if periods > 1:
         scatter = np.fft.rfft(repetitions - repetitions.mean(axis=0), axis=1) * teeth / (2 * np.pi)
         variance = (np.abs(scatter) ** 2).sum(axis=0) / (periods * (periods - 1))
@@ -108,5 +136,4 @@ def followed(
         unseen = np.abs(lines) <= SEEN * np.sqrt(around)
         unseen[0] = False
         lines[unseen] = 0.0
-    found = Followed(lines, samples, rate, cycles_per_sample, first, rig.driver.teeth)
-    return found if np.ptp(found.departures) > STILL else None
+    return lines

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.fft import irfft, rfft
 
 from gearbench.bench.errors import BenchError
-from gearbench.bench.nonlinear.followed import Followed, followed, follows
+from gearbench.bench.nonlinear.followed import Followed, followed, follows, guide_of
 from gearbench.bench.nonlinear.law_table import mesh_law
 from gearbench.bench.nonlinear.run import HEADROOM, Setup, make_setup
 from gearbench.bench.plan.schedule import Schedule, schedule
@@ -91,13 +91,22 @@ def given_by(case: Case, record: xr.Dataset, realisation: int = 0) -> Given:
     return Given(case, plan, torque, frequency, phase, turning, nominal, "model" in record.attrs)
 
 
-def steady_motion(case: Case, record: xr.Dataset, law: MeshLaw | None = None, realisation: int = 0) -> Steady:
+def steady_motion(
+    case: Case, record: xr.Dataset, law: MeshLaw | None = None, realisation: int = 0, nudge: float = 0.0
+) -> Steady:
     """The steady motion of the case's rig under the record's torque, as its sensors would not show it; arguments and
     refusals as those of `replay`."""
+    if nudge and "angle_driver" not in record:
+        raise BenchError("a replay can be nudged towards angle_driver only, a channel that the record does not have")
     given = given_by(case, record, realisation)
     case, torque = given.case, given.torque
     law = law or mesh_law(case.rig, case.simulation, HEADROOM * float(np.abs(torque).max()))
-    setup = make_setup(case, given.plan, law, given.phase, given.turning, nominal=given.nominal)
+    guide = None
+    if nudge:
+        guide = guide_of(case.rig, record, realisation, given.plan.cycles_per_sample, given.phase, given.turning)
+    setup = make_setup(
+        case, given.plan, law, given.phase, given.turning, nominal=given.nominal, guide=guide, nudge=nudge
+    )
     drive = Drive(torque, resampled(torque, 2 * setup.substeps * torque.size) / setup.meshing.driver.base_radius)
     load_forces = np.empty(setup.substeps * setup.block_samples)
     outputs, state, residual = _settled(setup, drive, load_forces)
@@ -105,20 +114,23 @@ def steady_motion(case: Case, record: xr.Dataset, law: MeshLaw | None = None, re
     return Steady(setup, drive, outputs, np.asarray(shown, dtype=float), state, residual, given)
 
 
-def replay(case: Case, record: xr.Dataset, law: MeshLaw | None = None, realisation: int = 0) -> xr.Dataset:
+def replay(
+    case: Case, record: xr.Dataset, law: MeshLaw | None = None, realisation: int = 0, nudge: float = 0.0
+) -> xr.Dataset:
     """One steady period of the case's rig under the record's torque, rotation of the driven gear, sampling and starting
     mesh phase.
 
     The torque is the mean over the record's periods of one realisation, as a trigonometric sum; gain, delay and filter
     of the rig's torque sensor are taken back for the torque on the rig. Where the rig prescribes the driven gear's
     speed, it turns as recorded, whatever holds the load (`bench.nonlinear.followed`). What the rig's sensors do is
-    applied, but for
-    noise and quantisation. Where teeth differ and the excitation period does not hold all pairings, the result is as
-    long as they take; where the mesh stiffness drifts, as long as the record.
+    applied, but for noise and quantisation. Where teeth differ and the excitation period does not hold all pairings,
+    the result is as long as they take; where the mesh stiffness drifts, as long as the record. A `nudge` [N s/m] is a
+    damper between the driver and its recorded motion, less its mean rate, that keeps flanks which part on the record's
+    way (Abarbanel et al., SIAM J. Appl. Dyn. Syst. 8, 2009).
     Attribute `settling_residual` is the change of the DTE over the last two periods; a motion that does not settle is
     returned with a warning. Raises BenchError for a record that says too little.
     """
-    return seen_of(case, steady_motion(case, record, law, realisation))
+    return seen_of(case, steady_motion(case, record, law, realisation, nudge))
 
 
 def seen_of(case: Case, steady: Steady) -> xr.Dataset:

@@ -67,6 +67,7 @@ class Setup:
     twisted_on: float = 0.0  # cycles by which the driven gear stands beyond the nominal rotation at rest
     record_samples: int = 1  # over which the mesh stiffness drifts
     rotation: Rotation | Followed | None = None  # where the speed changes
+    guide: Followed | None = None  # motion that the driver is nudged towards
 
     keep: ClassVar[Keep] = "one"
     absolute: ClassVar[bool] = False
@@ -132,6 +133,9 @@ class Setup:
                 varied=self._varied(start, entries),
             ),
         )
+        if self.guide is not None:
+            time = start / self.sampling_rate + np.arange(entries + 1.0) * (self.step / 2)
+            table = table._replace(led=self.model.law.base_pitch * self.guide.velocity(time))
         drift = self.model.rig.mesh.stiffness_drift
         if not drift:
             return table
@@ -281,7 +285,7 @@ def largest_load(experiment: Experiment) -> float:
 
 def make_setup(
     case: Case, plan: Schedule, law: MeshLaw | None = None, first_phase: float = 0.0, followed: Followed | None = None,
-    nominal: bool = True,
+    nominal: bool = True, guide: Followed | None = None, nudge: float = 0.0,
 ) -> Setup:  # fmt: skip
     """Model, step and tables of an experiment that begins at `first_phase` [cycles] of the `nominal` rotation, else of
     the driven gear's own, with the mesh law given or solved, and the rotation of a record in place of a constant
@@ -292,7 +296,7 @@ def make_setup(
     rig, experiment, simulation, meshing = case.rig, case.experiment, case.simulation, pair(case.rig)
     refuse_unknown(rig)
     law = law or mesh_law(rig, simulation, largest_load(experiment))
-    model = nonlinear_model(rig, meshing, law)
+    model = replace(nonlinear_model(rig, meshing, law), nudge=nudge)
     force = experiment.torque_mean / meshing.driver.base_radius
     fastest = model.fastest_rate(force, np.pi * plan.sampling_rate)
     tabled = simulation.mesh_stiffness == "potential-energy"
@@ -310,6 +314,7 @@ def make_setup(
         twisted_on=model.twisted_on(force) if nominal else 0.0,
         record_samples=plan.record_samples,
         rotation=plan.rotation or followed,
+        guide=guide,
     )
     if not plan.repeats or 2 * setup.substeps * setup.block_samples > MOST_ENTRIES:
         return setup

@@ -33,7 +33,7 @@ from gearbench.diagnosis.output.runout import in_mesh_of_runout, on_gears_of_run
 from gearbench.diagnosis.output.structure import GAIN, LATE, LEAST_STEP, PHASE, SEAT, STRUCTURE
 from gearbench.diagnosis.output.target import Target
 from gearbench.diagnosis.output.viscous import LOADED, damping_reference
-from gearbench.lumped.nonlinear.coordinates import IN_MESH
+from gearbench.lumped.nonlinear.coordinates import IN_MESH, NAMES
 from gearbench.lumped.nonlinear.sensitive import LEAST_LEVEL
 
 if TYPE_CHECKING:
@@ -52,6 +52,8 @@ AROUND, APART = ("stiffness", "damping", "mass", "inertia", *BEARINGS.values(), 
 # coupling twists at frequencies that samples do not hold; the zero of the mesh phase turns friction round with it.
 FOLLOWED = DELAYS["angle_driven"]
 MOVED, STEP = (FRICTION, COMPLIANCE, *STRUCTURE, SEAT, LATE, FOLLOWED, PHASE), 0.05
+U1 = NAMES.index("u1")
+SHORT_STEP = 2e-3  # the same where flanks part: of a longer one an impact that is met otherwise makes a jump
 # Of those what hypotheses are weighed by, and what goes along with one: by a late angle the mesh is turned on as well.
 WEIGHED = (FRICTION, COMPLIANCE, FOLLOWED, PHASE)
 
@@ -80,7 +82,7 @@ def forces_of(
     holds the gears by `others`."""
     parts, in_mesh = mesh_forces(layout, p, along, chosen)
     drive, on_drive = drive_forces(layout, along, condition)
-    held = [*_leaning_forces(layout, along, chosen), *around_forces(along, others)]
+    held = [*_leaning_forces(layout, along, chosen), *around_forces(along, others), *_nudged(layout, along, chosen)]
     used = chosen[on_drive]
     parts += [drive[:, used], *(force[:, None] for _, _, force in held)]
     values = np.empty((len(along.phase), sum(one.shape[1] for one in parts)), np.float32)
@@ -174,6 +176,21 @@ def _leaning_forces(layout: Layout, along: Along, chosen: Flags) -> list[tuple[i
         for on, force in on_gears_of_runout(along, side).items() if chosen[indices].any() else ():
             out += [(int(one), on, force[:, part]) for part, one in enumerate(indices) if chosen[one]]
     return out
+
+
+def _nudged(layout: Layout, along: Along, chosen: Flags) -> list[tuple[int, int, Array]]:
+    """What the driver's sensor changes of the motion that it is nudged towards, as `around_forces`."""
+    nudge, unknowns = along.model.nudge, layout.unknowns
+    if not nudge:
+        return []
+    delay, at = unknowns[DELAYS["angle_driver"]].start, unknowns[ENCODERS["driver"]].start
+    turn = 2 * np.pi * along.phase / layout.model.teeth[0]
+    parts = {
+        delay: along.rate_of(along.led[:, None])[:, 0],
+        at: -along.rate_of(np.cos(turn)[:, None])[:, 0],
+        at + 1: -along.rate_of(np.sin(turn)[:, None])[:, 0],
+    }
+    return [(index, U1, nudge * force) for index, force in parts.items() if chosen[index]]
 
 
 def around_forces(along: Along, others: Sequence[Other]) -> list[tuple[int, int, Array]]:

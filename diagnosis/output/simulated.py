@@ -77,7 +77,7 @@ def simulated(
     `apart`: another record judges what enters."""
     layout = layout_of(nominal, problem.model, problem.conditions, ())
     by_forces = carried_over(layout, problem.unknowns, found.base.p)
-    smooth = smooth_records((nominal, layout.case(by_forces)), measurements, simulate)
+    smooth, nudges = followable((nominal, layout.case(by_forces)), measurements, problem, simulate)
     if not smooth:
         return None
     listed = library(problem.model, without)
@@ -85,7 +85,7 @@ def simulated(
     chosen = [measurements[number] for number in smooth]
     conditions = [problem.conditions[number] for number in smooth]
     noises = [noise_left(layout.case(np.zeros(layout.size), one.name), one, simulate) for one in chosen]
-    simulator = Simulator(layout, target_of(chosen, conditions, noises), simulate)
+    simulator = Simulator(layout, target_of(chosen, conditions, noises), simulate, nudges)
 
     def seen(held: Array) -> Array | None:
         # What acts in the mesh may be anything, an impact too.
@@ -110,14 +110,15 @@ def simulated(
     weighed = _weighed(listed, layout)
     selection = select(simulator, base, weighed, starts, report, seen, apart=apart)
     std = selection.best.std
-    rough = [number for number in range(len(measurements)) if number not in smooth]
+    rough = [number for number, one in enumerate(measurements) if number not in smooth or one.name in nudges]
     start = starts.get("backlash")
     if rough and start is not None and start.log_bayes_factor > WORTH:
         report("simulating: backlash")
         target = target_of(
             [measurements[number] for number in rough], [problem.conditions[number] for number in rough]
         )
-        opened = _opened(Simulator(layout, target, simulate), selection, start, apart)
+        nudging = nudges or nudges_of([measurements[number] for number in rough], problem)
+        opened = _opened(Simulator(layout, target, simulate, nudging), selection, start, apart)
         if opened is not None:
             selection = opened
             std[layout.unknowns[BACKLASH]] = SPACING * selection.best.p[layout.unknowns[BACKLASH]]
@@ -163,6 +164,33 @@ def _opened(simulator: Simulator, selection: Selection, start: Start, apart: boo
         return replace(selection, weighed=weighed)
     entered = tuple(sorted((*selection.entered, entered_now), key=lambda one: -one.log_bayes_factor))
     return replace(selection, best=optimum, entered=entered, weighed=weighed)
+
+
+def followable(
+    rigs: Sequence[Case], measurements: Sequence[Measurement], problem: Problem, simulate: Simulate
+) -> tuple[list[int], Mapping[str, float]]:
+    """Numbers of the records that a fit can follow, and what nudges the driver in each that parts its flanks, by its
+    name [N s/m]: those whose flanks stay together on the first rig, else all, nudged."""
+    lost = lost_contact(rigs[0], measurements, simulate)
+    smooth = [number for number, part in enumerate(lost) if part < LOSING]
+    if smooth:
+        return smooth, {}
+    nudges = nudges_of(measurements, problem)
+    if not lost or len(nudges) < len(measurements):
+        return smooth_records(rigs, measurements, simulate), {}
+    return list(range(len(measurements))), nudges
+
+
+def nudges_of(measurements: Sequence[Measurement], problem: Problem) -> dict[str, float]:
+    """Damper [N s/m] between the driver and its motion as each record has it, by the record's name: as stiff as the
+    mesh where the driver vibrates on it."""
+    model, conditions = problem.model, {one.name: one for one in problem.conditions}
+    mass = (model.inertia[0] + model.rotor) / model.base_radius[0] ** 2
+    return {
+        one.name: float(np.sqrt(conditions[one.name].stiffness_level * mass))
+        for one in measurements
+        if "angle_driver" in one.periods
+    }
 
 
 def smooth_records(rigs: Sequence[Case], measurements: Sequence[Measurement], simulate: Simulate) -> list[int]:

@@ -13,34 +13,35 @@ from numpy.typing import NDArray
 from gearbench.bench.plan.workers import side_by_side
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.intake.signals import simulated_channels
-from gearbench.diagnosis.output.jacobian import MOVED, STEP, Other, forces_of, others_of, sensor_columns
+from gearbench.diagnosis.output.jacobian import MOVED, SHORT_STEP, STEP, Other, forces_of, others_of, sensor_columns
 from gearbench.diagnosis.output.layout import Layout
 from gearbench.diagnosis.output.structure import LEAST_STEP
 from gearbench.diagnosis.output.target import Target
 from gearbench.diagnosis.replay.replays import law_of
-from gearbench.rig import Case
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Flags = NDArray[np.bool_]
 Integers = NDArray[np.int64]
 Spectra = Mapping[str, NDArray[np.complexfloating[Any, Any]]]
-Simulate = Callable[[Case, xr.Dataset], xr.Dataset]
+Simulate = Callable[..., xr.Dataset]
 
 
 @dataclass
 class Simulator:
-    """Replays for one layout and target. `simulate(case, record)` is one replay; `replays` counts them."""
+    """Replays for one layout and target. `simulate(case, record)` is one replay, which takes what nudges the driver
+    [N s/m] besides in the records that `nudges` names; `replays` counts them."""
 
     layout: Layout
     target: Target
     simulate: Simulate
+    nudges: Mapping[str, float] = field(default_factory=dict)
     replays: int = 0
     _kept: dict[bytes, Complex] = field(default_factory=dict)
 
     def of_record(self, number: int) -> Simulator:
         """The same for one record alone."""
-        return Simulator(self.layout, self.target.of_record(number), self.simulate)
+        return Simulator(self.layout, self.target.of_record(number), self.simulate, self.nudges)
 
     def lines(self, p: Array) -> Complex | None:
         """Simulated lines (K,) of unknowns (size,); None where no rig has them or it does not settle."""
@@ -68,7 +69,9 @@ class Simulator:
 
     def channels(self, p: Array, measured: Measurement) -> dict[str, Array]:
         """Simulated channels of one record."""
-        replayed = self.simulate(self.layout.case(p, measured.name), measured.record)
+        nudge = self.nudges.get(measured.name, 0.0)
+        told = (nudge,) if nudge else ()
+        replayed = self.simulate(self.layout.case(p, measured.name), measured.record, *told)
         return simulated_channels(measured, replayed)
 
     def jacobian(self, p: Array, sd: Array, chosen: Flags, near: Complex | None = None) -> Complex | None:
@@ -100,6 +103,11 @@ class Simulator:
         self._by_moves(out, p, sd, chosen & self.layout.unknowns.of(MOVED))
         return out
 
+    @property
+    def step(self) -> float:
+        """Part of a standard deviation by which unknowns are moved for a derivative."""
+        return SHORT_STEP if self.nudges else STEP
+
     def _by_moves(self, out: Complex, p: Array, sd: Array, chosen: Flags) -> None:
         """Fill in what is moved and simulated."""
         unknowns, here = self.layout.unknowns, self.lines(p)
@@ -111,7 +119,7 @@ class Simulator:
                 if not chosen[index] or sd[index] <= 0.0:
                     continue
                 least = LEAST_STEP.get(key, 0.0)
-                step = least if 0.0 <= p[index] < least else STEP * sd[index]
+                step = least if 0.0 <= p[index] < least else self.step * sd[index]
                 for signed in (step, -step):
                     moved = p.copy()
                     moved[index] += signed
@@ -133,7 +141,8 @@ class Simulator:
         def one(item: tuple[int, Measurement]) -> tuple[Integers, Spectra, dict[int, dict[str, Complex]]]:
             number, measured = item
             case = self.layout.case(p, measured.name)
-            steady = steady_motion(case, measured.record, law_of(self.layout.model.sound, case))
+            law, nudge = law_of(self.layout.model.sound, case), self.nudges.get(measured.name, 0.0)
+            steady = steady_motion(case, measured.record, law, nudge=nudge)
             tangent = along(steady)
             forces = forces_of(self.layout, p, tangent, measured.name, chosen, others)
             answers = tangent.answers(forces.values, forces.on)

@@ -44,11 +44,11 @@ def replays(sound: MeshLaw) -> Callable[[Case, xr.Dataset], xr.Dataset]:
     """`simulate(case, record)`: one steady repetition of the case's rig under the record's torque, on the non-linear
     lumped model with this law of sound teeth. Rigs may differ in everything but the teeth that it was made for."""
 
-    def simulate(case: Case, record: xr.Dataset) -> xr.Dataset:
+    def simulate(case: Case, record: xr.Dataset, nudge: float = 0.0) -> xr.Dataset:
         # Its time loop is compiled on import, which not every user of this module wants.
         from gearbench.bench.nonlinear.replay import replay
 
-        return replay(case, record, law_of(sound, case))
+        return replay(case, record, law_of(sound, case), nudge=nudge)
 
     return simulate
 

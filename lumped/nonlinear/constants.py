@@ -37,6 +37,7 @@ class Constants(NamedTuple):
     backlash: float  # [m]
     root: float  # grid steps per root of deflection [m^-1/2]
     mirror: float  # phase at which back flanks pass the pitch point, in rows of the force table
+    nudge: float  # d [N s/m] of the force d (v - u1') on the driver, v being a motion that is given
     leaning: float  # rows of the force table by which the mesh turns back where the centres' motion closes it by 1 m
 
 

@@ -49,7 +49,7 @@ class Answer(NamedTuple):
 
 class Felt(NamedTuple):
     """Forces [N] of the mesh, on both base circles, along and across the supports; of the driver's coupling and of the
-    torque on the driver; and friction as in `Rubbed` but as a force."""
+    torque on the driver; what nudges the driver; and friction as in `Rubbed` but as a force."""
 
     mesh: float
     driver: float
@@ -58,6 +58,7 @@ class Felt(NamedTuple):
     across: float
     shaft: float
     drive: float
+    nudge: float
     rubbed: Rubbed
 
 
@@ -72,7 +73,7 @@ def _travel(q: Coordinates, e: Any, at: Entry, p: Constants) -> float:
 
 
 @compiled(fastmath=ROUNDING)
-def _felt(f: float, shaft: float, drive: float, rubbed: Rubbed, at: Entry, p: Constants) -> Felt:
+def _felt(f: float, shaft: float, drive: float, nudge: float, rubbed: Rubbed, at: Entry, p: Constants) -> Felt:
     """The forces of a mesh pressed by f; what run-out turns is known of the working flanks."""
     part = 1.0 if f > 0.0 else 0.0
     return Felt(
@@ -83,6 +84,7 @@ def _felt(f: float, shaft: float, drive: float, rubbed: Rubbed, at: Entry, p: Co
         across=f * (p.slide - part * at.tilt * p.factor),
         shaft=shaft,
         drive=drive,
+        nudge=nudge,
         rubbed=rubbed,
     )
 
@@ -94,7 +96,7 @@ def _plain(q: Coordinates, v: Coordinates, felt: Felt, force: float, p: Constant
     load = free * (force - pull - push) + felt.driven + pull2
     across = felt.along + felt.rubbed.along
     acceleration = Coordinates(
-        u1=p.inverse_u1 * (p.rigid * felt.drive + felt.shaft - push - pull),
+        u1=p.inverse_u1 * (p.rigid * felt.drive + felt.shaft + felt.nudge - push - pull),
         y1=p.inverse_y1 * (-across - p.damping1 * v.y1 - spring(q.y1, p.stiffness1, p.exponent1, p.reference1)),
         y2=p.inverse_y2 * (across - p.damping2 * v.y2 - spring(q.y2, p.stiffness2, p.exponent2, p.reference2)),
         u2=p.inverse_u2 * (felt.driven + pull2 - load),
@@ -130,7 +132,7 @@ def _structured(
     onto_h = h.share1 * one + h.share2 * two + h.across1 * side1 + h.across2 * side2
     onto_k = k.share1 * one + k.share2 * two + k.across1 * side1 + k.across2 * side2
     acceleration = Coordinates(
-        u1=p.inverse_u1 * (p.rigid * felt.drive + felt.shaft - taken),
+        u1=p.inverse_u1 * (p.rigid * felt.drive + felt.shaft + felt.nudge - taken),
         y1=p.inverse_y1 * (-along - one),
         y2=p.inverse_y2 * (along - two),
         u2=p.inverse_u2 * (given - twist - s.rigid_load * load),
@@ -205,6 +207,7 @@ def answer(q: Coordinates, v: Coordinates, e: Any, r: Any, at: Entry, force: flo
     at = turned_on(at, -p.leaning * p.factor * (q.y1 - q.y2), of.secant.shape[0] - 1, of.apart)
     f = mesh(_travel(q, e, at, p), _travel(v, r, at, p), at, of.secant, of.apart, p)
     shaft = p.shaft_stiffness * (q.w - q.u1) + p.shaft_damping * (v.w - v.u1)
-    felt = _felt(f, shaft, force + at.ripple, _rubbed(f, v, r, at, p, of.rubbing), at, p)
+    nudge = p.nudge * (at.led - v.u1)
+    felt = _felt(f, shaft, force + at.ripple, nudge, _rubbed(f, v, r, at, p, of.rubbing), at, p)
     found = _answered(q, v, e, r, felt, force, of.mean, p, s, of.free)
     return found if at.pull == 0.0 else _accelerated(found, at.pull, of)

@@ -41,6 +41,7 @@ class Entry(NamedTuple):
     lever1: float
     lever2: float
     tilt: float
+    led: float
 
 
 class Rubbed(NamedTuple):
@@ -77,6 +78,7 @@ def entry(table: Table, i: int) -> Entry:
         lever1=table.levers[i, 0] if runs_out else 0.0,
         lever2=table.levers[i, 1] if runs_out else 0.0,
         tilt=table.levers[i, 2] if runs_out else 0.0,
+        led=table.led[i] if len(table.led) > 0 else 0.0,
     )
 
 
@@ -99,7 +101,7 @@ def turned_on(at: Entry, rows: float, count: int, apart: Any) -> Entry:
         first += _held(cycles, first, apart)
     return Entry(
         first, position, at.excess, at.excess_rate, at.gain, at.ripple, at.back, at.pace, at.pull, at.lever1,
-        at.lever2, at.tilt,
+        at.lever2, at.tilt, at.led,
     )  # fmt: skip
 
 

@@ -107,6 +107,7 @@ class NonLinear:
     mesh_mass: float  # m_e [kg]
     path: tuple[float, float]  # start and end of the path of contact behind the pitch point, in base pitches
     outer: float = 0.0
+    nudge: float = 0.0  # damper [N s/m] between the driver and the motion that its table has for it
 
     @cached_property
     def law(self) -> MeshLaw:
@@ -233,6 +234,7 @@ class NonLinear:
             backlash=self.teeth.backlash,
             root=(len(self.teeth.approach) - 1) / float(np.sqrt(self.teeth.approach[-1])),
             mirror=self.teeth.mirror * self.teeth.phases,
+            nudge=self.nudge,
             leaning=self.leaning * self.teeth.phases,
         )
 

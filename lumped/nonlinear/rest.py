@@ -189,6 +189,7 @@ def springs_and_dampers(c: Constants, s: Structure | None, tangents: tuple[float
     u1, _, _, u2, w = one[:COORDINATES]
     shaft = u1 - w
     springs, dampers = c.shaft_stiffness * np.outer(shaft, shaft), c.shaft_damping * np.outer(shaft, shaft)
+    dampers[0, 0] += c.nudge
     if s is None:
         for row, k, d in ((1, tangents[0], c.damping1), (2, tangents[1], c.damping2)):
             springs[row, row] += k

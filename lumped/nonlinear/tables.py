@@ -47,6 +47,7 @@ class Table(NamedTuple):
     # (entries + 1, 3): by what part both gears' levers about their axes are longer than their base radii, and by what
     # angle [rad] the line of action has turned against the driven gear.
     levers: Array = np.empty((0, 3))
+    led: Array = np.empty(0)  # velocity [m/s] that the driver is nudged towards; empty where it is not
 
     def part(self, first: int | None, end: int | None = None) -> Table:
         """The entries from `first` to before `end`."""

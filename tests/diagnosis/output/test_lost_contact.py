@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from gearbench.diagnosis.output.simulated import LOSING, LOSING_MORE, lost_contact, smooth_records
+from gearbench.diagnosis.output.simulated import LOSING, LOSING_MORE, followable, lost_contact, smooth_records
 
 
 def answer(case: Any, record: int | None) -> xr.Dataset:
@@ -59,3 +59,28 @@ def test_another_rig_is_asked_where_flanks_part_in_all_records_of_the_first(
 def test_records_without_a_mesh_phase_are_not_simulated() -> None:
     records: Any = [SimpleNamespace(phase_known=False, record=None)]
     assert lost_contact(None, records, answer) == []  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("lost", "channels", "followed", "nudged"),
+    [
+        ([0, 300, 5], ["angle_driver"], [0, 2], []),
+        ([300, 40, 200], ["angle_driver"], [0, 1, 2], ["0", "1", "2"]),
+        ([300, 40, 200], [], [1], []),
+        ([300, None], ["angle_driver"], [], []),
+    ],
+)
+def test_records_are_nudged_where_flanks_part_in_all(
+    lost: list[int | None], channels: list[str], followed: list[int], nudged: list[str]
+) -> None:
+    records: Any = [
+        SimpleNamespace(name=str(number), phase_known=True, record=one, periods=dict.fromkeys(channels))
+        for number, one in enumerate(lost)
+    ]
+    conditions = [SimpleNamespace(name=one.name, stiffness_level=4e8) for one in records]
+    model = SimpleNamespace(inertia=(4e-3, 1e-2), rotor=2e-3, base_radius=(0.1, 0.2))
+    problem: Any = SimpleNamespace(model=model, conditions=conditions)
+    found, nudges = followable([None], records, problem, answer)  # type: ignore[list-item]
+    assert found == followed
+    assert sorted(nudges) == nudged
+    assert all(value == pytest.approx(np.sqrt(4e8 * 6e-3 / 0.1**2)) for value in nudges.values())

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -86,6 +86,40 @@ def test_teeth_that_differ_are_each_as_far_up_the_law_as_they_are_pressed(
     for channel, (error, size) in found.items():
         # Edges of contact that move: see EDGES of `test_structure_derivatives`.
         assert error < (0.25 if channel == "torque_driven" else 0.06) * size, channel
+
+
+@pytest.fixture(scope="module")
+def nudged() -> tuple[Simulator, np.ndarray]:
+    """Simulator and Jacobian where the driver is nudged towards its recorded motion."""
+    simulator = replace(demonstration(), nudges={"base": 4e4})
+    return simulator, jacobian_at(simulator, np.zeros(simulator.layout.size))
+
+
+@pytest.mark.parametrize(
+    ("key", "entry", "part"),
+    [
+        ("stiffness", 0, 0.02),
+        ("damping", 1, 0.05),
+        ("inertia", 0, 0.05),
+        ("scale", 0, 0.02),
+        ("shape", 2, 0.05),
+        ("ripple", 3, 0.5),
+        ("delay-angle_driver", 0, 0.5),
+        ("encoder-driver", 0, 0.5),
+        ("encoder-driver", 1, 0.5),
+    ],
+)
+def test_a_derivative_of_a_nudged_motion_is_what_two_of_them_differ_by(
+    nudged: tuple[Simulator, np.ndarray], key: str, entry: int, part: float
+) -> None:
+    """The driver's sensor moves what it is nudged towards."""
+    simulator, jacobian = nudged
+    p, at = np.zeros(simulator.layout.size), simulator.layout.unknowns[key].start + entry
+    found = off(simulator, jacobian[at], p, at, part * simulator.layout.unknowns.prior()[at])
+    largest = max(size for _, size in found.values())
+    for channel, (error, size) in found.items():
+        if size > 1e-6 * largest:
+            assert error < CLOSE * size, channel
 
 
 @pytest.mark.parametrize("place", [0, 3, 6])
