@@ -165,7 +165,7 @@ def _by_simulation(
         candidates=_candidates(found, held_out if held_out is not None and held_out.phase_known else None),
         place=decided.place,
         where=places_of(judged, kept, missing),
-        recalibrated=found.recalibrated if kept else found.layout.case(found.selection.base.p),
+        recalibrated=found.recalibrated if kept else found.without_any,
         with_effect=found.with_effects if decided.named else None,
         because=(*decided.because, *_why(judged, kept), *doubts, *flanks,
                  *sentences_of_others(of.measurements, of.steady, band)),
@@ -186,7 +186,7 @@ def _by_simulation(
 
 def _missing(of: Searched, found: Simulated) -> Missing:
     """The forces that the rig found lacks, with what the force residuals' fit leaves, a line."""
-    best_p, smooth = found.selection.best.p, found.simulator.target.measurements
+    best_p, smooth = found.end_of(found.selection.best), found.simulator.target.measurements
     try:
         missing = missing_forces(
             of.problem,
@@ -346,7 +346,7 @@ def _candidates(found: Simulated, judged: Measurement | None) -> tuple[Candidate
         if judged is None or measured is None or p is None:
             return None
         try:
-            rest = measured - found.simulator.channels(p, judged)["dte"]
+            rest = measured - found.simulator.free.channels(p, judged)["dte"]
         except ValueError:
             return None
         return float(np.std(rest) / np.std(measured))

@@ -96,8 +96,8 @@ def _drift_at(parts: list[_Part], place: Place) -> Drift:
 
 def _parts(found: Simulated) -> list[_Part]:
     """The channels of all records in which lines change between repetitions."""
-    target, jacobian = found.simulator.target, found.selection.best.sensitivity.jacobian
-    rows, out, start = _rows(found.layout.unknowns), [], 0
+    target, rows, out, start = found.simulator.target, _rows(found.layout.unknowns), [], 0
+    jacobian = _jacobian(found, list(rows.values()))
     for number, channel, bins in target.plan:
         stop = start + len(bins)
         repetitions = measured_channels(target.measurements[number])[channel]
@@ -114,6 +114,17 @@ def _parts(found: Simulated) -> list[_Part]:
                 out.append(_Part(departures, time, columns))
         start = stop
     return out
+
+
+def _jacobian(found: Simulated, rows: list[int]) -> Complex:
+    """Derivatives (size, K) by these unknowns at least, of simulations that are not nudged: what the driver is nudged
+    towards does not drift."""
+    best = found.selection.best
+    if not found.simulator.nudges:
+        return best.sensitivity.jacobian
+    chosen = np.isin(np.arange(best.p.size), rows)
+    free = found.simulator.free.jacobian(best.p, best.sd, chosen)
+    return best.sensitivity.jacobian if free is None else free
 
 
 def _rows(unknowns: Unknowns) -> dict[Place, int]:

@@ -23,7 +23,7 @@ from gearbench.diagnosis.intake.signals import measured_channels
 from gearbench.diagnosis.output.fit import Optimum
 from gearbench.diagnosis.output.passed_noise import noise_left, noise_rms
 from gearbench.diagnosis.output.selection import Weighed, only, taken_out
-from gearbench.diagnosis.output.simulated import Simulated
+from gearbench.diagnosis.output.simulated import Simulated, nudges_of
 from gearbench.diagnosis.output.simulator import Simulator
 from gearbench.diagnosis.output.target import FITTED, Target, target_of
 
@@ -152,7 +152,11 @@ def judged_on(
     `measured` does not feel, or feels too little of to speak for or against it."""
     band = problem.conditions[0].band
     noise = noise_left(found.layout.nominal, measured, found.simulator.simulate)
-    target = target_of([measured], [prepare(measured, problem.model, band)], [noise])
+    condition = prepare(measured, problem.model, band)
+    target = target_of([measured], [condition], [noise])
+    if found.simulator.nudges:
+        nudges = {**found.simulator.nudges, **nudges_of(problem.model, [condition])}
+        found = replace(found, simulator=replace(found.simulator, nudges=nudges))
     smooth = found.simulator.target.measurements
     rough = [one for one in searched if not any(one is own for own in smooth)]
     parted = [target_of([one], [prepare(one, problem.model, band)]) for one in rough]
@@ -201,6 +205,8 @@ def _closings(
     for one in selection.entered:
         optimum = taken_out(simulator, selection, one)
         closing = closing_of(target, simulator.channels(optimum.p, measured), signals)
+        if simulator.nudges:
+            closing = _going_their_own_way(found, target, measured, optimum, closing)
         lacking = inf if one.lacking and not apart else one.lacking
         silent = not feels(target, closing.without, signals) or (not closing.due and closing.gain > -GAIN)
         if parted and not one.lacking and silent:
@@ -210,6 +216,16 @@ def _closings(
     nothing = np.zeros(simulator.layout.size)
     nominal, plain = (simulator.channels(p, measured) for p in (nothing, selection.bare.p))
     return Judged(measured, found, closings, nominal, plain, signals, target=target, noise=noise)
+
+
+def _going_their_own_way(
+    found: Simulated, target: Target, measured: Measurement, without: Optimum, nudged: Closing
+) -> Closing:
+    """What an effect closes by simulations that are `nudged`, if it does so too where nothing holds them on the
+    record's way."""
+    ends = (found.end_of(one) for one in (without, found.selection.best))
+    free = closing_of(target, *(found.simulator.free.channels(p, measured) for p in ends))
+    return nudged if free.due else replace(nudged, gain=min(nudged.gain, free.gain), growth=free.growth)
 
 
 def _closing_there(simulator: Simulator, target: Target, without: Array, with_all: Array) -> Closing:

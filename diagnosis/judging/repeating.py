@@ -15,8 +15,10 @@ from gearbench.diagnosis.words import percent
 
 
 def repeating(measurements: Sequence[Measurement], found: Simulated | None) -> tuple[Measurement, ...]:
-    """The records whose flanks stay together, which simulation follows; all where it follows none."""
-    return found.simulator.target.measurements if found is not None else tuple(measurements)
+    """The records whose flanks stay together, or part little, which simulation follows; all where it follows none."""
+    if found is None:
+        return tuple(measurements)
+    return tuple(one for one in found.simulator.target.measurements if one.name not in found.restless)
 
 
 def sentences_of_others(

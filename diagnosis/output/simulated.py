@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,11 +15,14 @@ from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
 from gearbench.diagnosis.evidence.prediction import predicted_factors
 from gearbench.diagnosis.evidence.problem import Problem
 from gearbench.diagnosis.evidence.search import Search
+from gearbench.diagnosis.forces.condition import Condition
+from gearbench.diagnosis.forces.nominal import NominalModel
 from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.output.around import around
 from gearbench.diagnosis.output.background import background
 from gearbench.diagnosis.output.by_forces import Start, begun_by_forces
+from gearbench.diagnosis.output.fit import Optimum, fit_afresh
 from gearbench.diagnosis.output.layout import Layout, layout_of
 from gearbench.diagnosis.output.likely_teeth import with_likely_teeth, with_small_cracks
 from gearbench.diagnosis.output.passed_noise import noise_left
@@ -48,17 +51,36 @@ class Simulated:
     simulator: Simulator
     selection: Selection
     std: Array  # (size,) of the unknowns at the optimum
+    # Names of records whose motion need not repeat where nothing changes.
+    restless: frozenset[str] = frozenset()
+    _ends: dict[bytes, Array] = field(default_factory=dict)
 
     @property
     def recalibrated(self) -> Case:
         """The nominal case at the optimum of the background alone, without any part of the effects that entered: what a
         good rig has of them would else take their place in the gap."""
-        return self.layout.case(self.selection.bare.p)
+        return self.layout.case(self.end_of(self.selection.bare))
+
+    @property
+    def without_any(self) -> Case:
+        """The nominal case at the optimum of the background."""
+        return self.layout.case(self.end_of(self.selection.base))
 
     @property
     def with_effects(self) -> Case | None:
         """The case at the optimum with all effects that entered; None without any."""
-        return self.layout.case(self.selection.best.p) if self.selection.entered else None
+        return self.layout.case(self.end_of(self.selection.best)) if self.selection.entered else None
+
+    def end_of(self, optimum: Optimum) -> Array:
+        """Unknowns (size,) of an optimum, fitted on without what nudges: gaps are those of simulations that go their
+        own way."""
+        if not self.simulator.nudges:
+            return optimum.p
+        key = optimum.p.tobytes()
+        if key not in self._ends:
+            found = fit_afresh(self.simulator.free, optimum.p, optimum.sd, renewals=1)
+            self._ends[key] = found.p if found is not None else optimum.p
+        return self._ends[key]
 
 
 def simulated(
@@ -77,7 +99,7 @@ def simulated(
     `apart`: another record judges what enters."""
     layout = layout_of(nominal, problem.model, problem.conditions, ())
     by_forces = carried_over(layout, problem.unknowns, found.base.p)
-    smooth, nudges = followable((nominal, layout.case(by_forces)), measurements, problem, simulate)
+    smooth, nudges, restless = followable((nominal, layout.case(by_forces)), measurements, problem, simulate)
     if not smooth:
         return None
     listed = library(problem.model, without)
@@ -117,12 +139,12 @@ def simulated(
         target = target_of(
             [measurements[number] for number in rough], [problem.conditions[number] for number in rough]
         )
-        nudging = nudges or nudges_of([measurements[number] for number in rough], problem)
+        nudging = nudges_of(problem.model, [problem.conditions[number] for number in rough])
         opened = _opened(Simulator(layout, target, simulate, nudging), selection, start, apart)
         if opened is not None:
             selection = opened
             std[layout.unknowns[BACKLASH]] = SPACING * selection.best.p[layout.unknowns[BACKLASH]]
-    return Simulated(layout, simulator, selection, std)
+    return Simulated(layout, simulator, selection, std, restless)
 
 
 def _weighed(listed: Sequence[Hypothesis], layout: Layout) -> list[Hypothesis]:
@@ -168,29 +190,27 @@ def _opened(simulator: Simulator, selection: Selection, start: Start, apart: boo
 
 def followable(
     rigs: Sequence[Case], measurements: Sequence[Measurement], problem: Problem, simulate: Simulate
-) -> tuple[list[int], Mapping[str, float]]:
-    """Numbers of the records that a fit can follow, and what nudges the driver in each that parts its flanks, by its
-    name [N s/m]: those whose flanks stay together on the first rig, else all, nudged."""
+) -> tuple[list[int], Mapping[str, float], frozenset[str]]:
+    """Numbers of the records that a fit can follow, what nudges the driver in each that parts its flanks, by its name
+    [N s/m], and the names of those that part for long: those whose flanks stay together on the first rig, else all,
+    nudged."""
     lost = lost_contact(rigs[0], measurements, simulate)
     smooth = [number for number, part in enumerate(lost) if part < LOSING]
     if smooth:
-        return smooth, {}
-    nudges = nudges_of(measurements, problem)
+        return smooth, {}, frozenset()
+    nudges = nudges_of(problem.model, problem.conditions)
     if not lost or len(nudges) < len(measurements):
-        return smooth_records(rigs, measurements, simulate), {}
-    return list(range(len(measurements))), nudges
+        return smooth_records(rigs, measurements, simulate), {}, frozenset()
+    restless = {one.name for one, part in zip(measurements, lost, strict=True) if part >= LOSING_MORE}
+    return list(range(len(measurements))), nudges, frozenset(restless)
 
 
-def nudges_of(measurements: Sequence[Measurement], problem: Problem) -> dict[str, float]:
-    """Damper [N s/m] between the driver and its motion as each record has it, by the record's name: as stiff as the
+def nudges_of(model: NominalModel, conditions: Sequence[Condition]) -> dict[str, float]:
+    """Damper [N s/m] between the driver and its motion as each condition's record has it, by its name: as stiff as the
     mesh where the driver vibrates on it."""
-    model, conditions = problem.model, {one.name: one for one in problem.conditions}
     mass = (model.inertia[0] + model.rotor) / model.base_radius[0] ** 2
-    return {
-        one.name: float(np.sqrt(conditions[one.name].stiffness_level * mass))
-        for one in measurements
-        if "angle_driver" in one.periods
-    }
+    known = [one for one in conditions if "angle_driver" in one.spectra]
+    return {one.name: float(np.sqrt(one.stiffness_level * mass)) for one in known}
 
 
 def smooth_records(rigs: Sequence[Case], measurements: Sequence[Measurement], simulate: Simulate) -> list[int]:

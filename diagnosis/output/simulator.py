@@ -43,6 +43,11 @@ class Simulator:
         """The same for one record alone."""
         return Simulator(self.layout, self.target.of_record(number), self.simulate, self.nudges)
 
+    @property
+    def free(self) -> Simulator:
+        """The same without what nudges."""
+        return Simulator(self.layout, self.target, self.simulate)
+
     def lines(self, p: Array) -> Complex | None:
         """Simulated lines (K,) of unknowns (size,); None where no rig has them or it does not settle."""
         key = p.tobytes()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -35,6 +35,7 @@ class OfLines(Target):
 @dataclass
 class Answering(FakeSimulator):
     simulate: Any = None
+    nudges: dict[str, float] = field(default_factory=dict)
 
     def channels(self, p: np.ndarray, measured: Any) -> dict[str, np.ndarray]:
         return {"lines": p @ OTHER, "dte": np.zeros(8)}

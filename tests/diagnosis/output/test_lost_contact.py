@@ -74,13 +74,14 @@ def test_records_are_nudged_where_flanks_part_in_all(
     lost: list[int | None], channels: list[str], followed: list[int], nudged: list[str]
 ) -> None:
     records: Any = [
-        SimpleNamespace(name=str(number), phase_known=True, record=one, periods=dict.fromkeys(channels))
-        for number, one in enumerate(lost)
+        SimpleNamespace(name=str(number), phase_known=True, record=one) for number, one in enumerate(lost)
     ]
-    conditions = [SimpleNamespace(name=one.name, stiffness_level=4e8) for one in records]
+    spectra = dict.fromkeys(channels)
+    conditions = [SimpleNamespace(name=one.name, stiffness_level=4e8, spectra=spectra) for one in records]
     model = SimpleNamespace(inertia=(4e-3, 1e-2), rotor=2e-3, base_radius=(0.1, 0.2))
     problem: Any = SimpleNamespace(model=model, conditions=conditions)
-    found, nudges = followable([None], records, problem, answer)  # type: ignore[list-item]
+    found, nudges, restless = followable([None], records, problem, answer)  # type: ignore[list-item]
     assert found == followed
+    assert restless == {one for one in nudges if (lost[int(one)] or 0) >= 1000 * LOSING_MORE}
     assert sorted(nudges) == nudged
     assert all(value == pytest.approx(np.sqrt(4e8 * 6e-3 / 0.1**2)) for value in nudges.values())
