@@ -36,6 +36,7 @@ class OfLines(Target):
 class Answering(FakeSimulator):
     simulate: Any = None
     nudges: dict[str, float] = field(default_factory=dict)
+    free: Any = None
 
     def channels(self, p: np.ndarray, measured: Any) -> dict[str, np.ndarray]:
         return {"lines": p @ OTHER, "dte": np.zeros(8)}
@@ -53,9 +54,10 @@ def judged(
     *,
     apart: bool = False,
     left: float = 0.05,
+    free: Any = None,
 ) -> Judged:
     """Effects of these sizes in the records of the search, and in the judged one, which is waited for (`apart`); so
-    much of the nominal gap is `left`."""
+    much of the nominal gap is `left`; what simulates without what nudges, if it is nudged, is `free`."""
     monkeypatch.setattr(Judged, "left", left)
     p, q = BACKGROUND.copy(), BACKGROUND.copy()
     for number, value in searched.items():
@@ -63,6 +65,10 @@ def judged(
     for number, value in there.items():
         q[number] = value
     simulator = Answering(lambda one: one @ MATRIX, target(noisy(p @ MATRIX, 11)))
+    if free is not None:
+        simulator.nudges, simulator.free = {"base": 1.0}, free
+        monkeypatch.setattr(module, "nudges_of", lambda model, conditions: {})
+        monkeypatch.setattr(Simulated, "end_of", lambda found, optimum: optimum.p)
     simulator.layout.size, simulator.layout.nominal = 8, None
     selection = chosen(simulator, (FRICTION, RIPPLE), [np.zeros(8)], {}, apart=apart)
     assert isinstance(selection, Selection)
@@ -100,6 +106,19 @@ def test_an_effect_that_leaves_the_judged_record_as_it_was_is_not(monkeypatch: p
     assert abs(best[4]) < 0.05 and best[3] == pytest.approx(0.4, abs=0.05)
     none = judged({4: 0.3, 5: -0.2}, {}, monkeypatch)
     assert not none.found.selection.entered and none.found.selection.best is none.found.selection.base
+
+
+def test_what_nudged_simulations_show_is_due_if_free_ones_show_it_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Alike(Answering):
+        """Whatever the unknowns, as simulations are that go their own way."""
+
+        def channels(self, p: np.ndarray, measured: Any) -> dict[str, np.ndarray]:
+            return super().channels(np.zeros(8), measured)
+
+    same, alike = (kind(lambda one: one @ MATRIX, target(np.zeros(LINES, complex))) for kind in (Answering, Alike))
+    assert names(judged({3: 0.4}, {3: 0.4}, monkeypatch, free=same).found.selection.entered) == ["friction"]
+    found = judged({3: 0.4}, {3: 0.4}, monkeypatch, free=alike)
+    assert names(found.dropped) == ["friction"]
 
 
 def test_what_is_left_of_the_records_of_the_search_is_that_of_their_lines(monkeypatch: pytest.MonkeyPatch) -> None:
