@@ -111,7 +111,10 @@ class Judged:
     @cached_property
     def searched(self) -> float:
         """The same on the records that the selection was found from, whose channels are taken together."""
-        simulator, lines = self.found.simulator, self.found.selection.best.lines
+        simulator, best = self.found.simulator, self.found.selection.best
+        lines = best.lines
+        if simulator.nudges and (own := simulator.free.lines(self.found.end_of(best))) is not None:
+            lines = own
         target, left, whole = simulator.target, dict[str, float](), dict[str, float]()
         rest = target.energies(target.lines - lines) - target.noise
         for block, energy, level, size in zip(
@@ -198,34 +201,37 @@ def _closings(
     noise: Mapping[str, Array],
 ) -> Judged:
     simulator, selection = found.simulator, found.selection
-    signals = simulator.channels(selection.best.p, measured)
+    nudged = simulator.channels(selection.best.p, measured)
+    # Sizes are those of simulations that go their own way.
+    free = simulator.free if simulator.nudges else simulator
+    signals = free.channels(found.end_of(selection.best), measured) if simulator.nudges else nudged
     closings = {}
     # A record that had part in the search cannot make up for what it lacked.
     apart = not any(measured is searched for searched in simulator.target.measurements)
     for one in selection.entered:
         optimum = taken_out(simulator, selection, one)
-        closing = closing_of(target, simulator.channels(optimum.p, measured), signals)
+        closing = closing_of(target, simulator.channels(optimum.p, measured), nudged)
+        silent = not feels(target, closing.without, nudged)
         if simulator.nudges:
-            closing = _going_their_own_way(found, target, measured, optimum, closing)
+            without = free.channels(found.end_of(optimum), measured)
+            closing = _both(closing, closing_of(target, without, signals))
         lacking = inf if one.lacking and not apart else one.lacking
-        silent = not feels(target, closing.without, signals) or (not closing.due and closing.gain > -GAIN)
+        silent = silent or (not closing.due and closing.gain > -GAIN)
         if parted and not one.lacking and silent:
             told = [_closing_there(simulator, there, optimum.p, selection.best.p) for there in parted]
             closing = replace(max(told, key=lambda there: there.gain), without=closing.without)
         closings[one.hypothesis.name] = replace(closing, optimum=optimum, lacking=lacking)
     nothing = np.zeros(simulator.layout.size)
-    nominal, plain = (simulator.channels(p, measured) for p in (nothing, selection.bare.p))
+    nominal, plain = (free.channels(p, measured) for p in (nothing, found.end_of(selection.bare)))
     return Judged(measured, found, closings, nominal, plain, signals, target=target, noise=noise)
 
 
-def _going_their_own_way(
-    found: Simulated, target: Target, measured: Measurement, without: Optimum, nudged: Closing
-) -> Closing:
+def _both(nudged: Closing, free: Closing) -> Closing:
     """What an effect closes by simulations that are `nudged`, if it does so too where nothing holds them on the
-    record's way."""
-    ends = (found.end_of(one) for one in (without, found.selection.best))
-    free = closing_of(target, *(found.simulator.free.channels(p, measured) for p in ends))
-    return nudged if free.due else replace(nudged, gain=min(nudged.gain, free.gain), growth=free.growth)
+    record's way; the signals are those of the `free` ones."""
+    if free.due:
+        return replace(nudged, without=free.without)
+    return replace(free, gain=min(nudged.gain, free.gain))
 
 
 def _closing_there(simulator: Simulator, target: Target, without: Array, with_all: Array) -> Closing:
