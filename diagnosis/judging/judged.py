@@ -213,8 +213,10 @@ def _closings(
         closing = closing_of(target, simulator.channels(optimum.p, measured), nudged)
         silent = not feels(target, closing.without, nudged)
         if simulator.nudges:
-            without = free.channels(found.end_of(optimum), measured)
-            closing = _both(closing, closing_of(target, without, signals))
+            # Alone, an effect must do better than the rig that was found without any, too.
+            others = [optimum, selection.bare] if len(selection.entered) == 1 else [optimum]
+            without = [free.channels(found.end_of(other), measured) for other in others]
+            closing = _both(closing, *(free_closing(target, one, signals) for one in without))
         lacking = inf if one.lacking and not apart else one.lacking
         silent = silent or (not closing.due and closing.gain > -GAIN)
         if parted and not one.lacking and silent:
@@ -226,12 +228,23 @@ def _closings(
     return Judged(measured, found, closings, nominal, plain, signals, target=target, noise=noise)
 
 
-def _both(nudged: Closing, free: Closing) -> Closing:
+def free_closing(target: Target, without: Mapping[str, Array], with_all: Mapping[str, Array]) -> Closing:
+    """What an effect closes by simulations that go their own way: some part of the gap, and of the whole as much. Where
+    flanks part, one part or another is closer by chance."""
+    closing = closing_of(target, without, with_all)
+    lost, kept = (target.energies(target.lines - target.gathered([one])) for one in (without, with_all))
+    size = target.sizes / target.of_channels(target.energies(target.lines) * target.sizes)
+    whole = float(np.sqrt((lost * size).sum() / max(((kept + target.noise) * size).sum(), 1e-300)))
+    return replace(closing, growth=min(closing.growth, whole))
+
+
+def _both(nudged: Closing, *free: Closing) -> Closing:
     """What an effect closes by simulations that are `nudged`, if it does so too where nothing holds them on the
     record's way; the signals are those of the `free` ones."""
-    if free.due:
-        return replace(nudged, without=free.without)
-    return replace(free, gain=min(nudged.gain, free.gain))
+    worst = min(free, key=lambda one: (one.due, one.gain))
+    if worst.due:
+        return replace(nudged, without=worst.without)
+    return replace(worst, gain=min(nudged.gain, worst.gain))
 
 
 def _closing_there(simulator: Simulator, target: Target, without: Array, with_all: Array) -> Closing:

@@ -104,6 +104,11 @@ class Target:
         found = np.bincount(self.of_line, np.abs(residual) ** 2, len(self.floors))
         return np.asarray(found / self.sizes)
 
+    def of_channels(self, values: Array) -> Array:
+        """Sums of values (blocks,) over all blocks of each one's channel (blocks,)."""
+        channels = np.array([block.channel for block in self.blocks])
+        return np.array([values[channels == one].sum() for one in channels])
+
     def nats(self, energies: Array) -> Array:
         """What mean squares (blocks,) cost a line [nats] (blocks,)."""
         return np.asarray(np.log1p(energies / self.floors))

@@ -14,7 +14,16 @@ from shared.fake_simulator import LINES, FakeSimulator, chosen, sensitivities, t
 from gearbench.diagnosis.account import sentence_of_effect
 from gearbench.diagnosis.effects.effect import Hypothesis, Wide
 from gearbench.diagnosis.judging import judged as module
-from gearbench.diagnosis.judging.judged import GAIN, GREATER, Judged, Sizes, judged_on, rms_closed
+from gearbench.diagnosis.judging.judged import (
+    GAIN,
+    GREATER,
+    Judged,
+    Sizes,
+    closing_of,
+    free_closing,
+    judged_on,
+    rms_closed,
+)
 from gearbench.diagnosis.output.selection import LIMIT, PROVISIONAL, Selection
 from gearbench.diagnosis.output.simulated import Simulated
 from gearbench.diagnosis.output.target import Target
@@ -227,3 +236,17 @@ def test_what_the_judged_record_does_not_feel_is_told_by_one_whose_flanks_part(
         closing = found.closings["friction"]
         assert closing.record == "light" and closing.growth > 0.4 / 0.02
         assert "on record light" in sentence_of_effect("friction", closing, 0.0)
+
+
+def test_free_simulations_must_close_a_tenth_of_the_whole_gap() -> None:
+    """A part is closer by chance: here that of ten lines of thirty, while the others are off as far as before."""
+    plain = target(noisy(BACKGROUND @ OTHER, 12))
+    held = OfLines(**{one.name: getattr(plain, one.name) for one in fields(plain)})
+    far = np.where(held.of_line == 0, 0.0, 5.0)
+    one, other = held.lines + far + 1.0, held.lines + far + np.where(held.of_line == 0, 0.1, 1.0)
+    part = closing_of(held, {"lines": one}, {"lines": other})
+    whole = free_closing(held, {"lines": one}, {"lines": other})
+    assert part.due and part.growth > 5.0
+    assert not whole.due and whole.gain == part.gain
+    near = {"lines": held.lines + 0.1}
+    assert free_closing(held, {"lines": held.lines + 1.0}, near).due
