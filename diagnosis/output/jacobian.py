@@ -45,6 +45,7 @@ Complex = NDArray[np.complex128]
 Flags = NDArray[np.bool_]
 Integers = NDArray[np.int64]
 
+U1 = NAMES.index("u1")
 # What holds the gears: by the difference between two rigs that are so far apart, in standard deviations as background.
 AROUND, APART = ("stiffness", "damping", "mass", "inertia", *BEARINGS.values(), *STRUCTURE), 1e-3
 # Moved and simulated, by this part of their standard deviation, where no difference between rigs says what they do: so
@@ -52,9 +53,9 @@ AROUND, APART = ("stiffness", "damping", "mass", "inertia", *BEARINGS.values(), 
 # coupling twists at frequencies that samples do not hold; the zero of the mesh phase turns friction round with it.
 FOLLOWED = DELAYS["angle_driven"]
 MOVED, STEP = (FRICTION, COMPLIANCE, *STRUCTURE, SEAT, LATE, FOLLOWED, PHASE), 0.05
-U1 = NAMES.index("u1")
-SHORT_STEP = 2e-3  # the same where flanks part: of a longer one an impact that is met otherwise makes a jump
-# Of those what hypotheses are weighed by, and what goes along with one: by a late angle the mesh is turned on as well.
+# The same part where flanks part: over a longer one an impact that is met otherwise makes a jump.
+SHORT_STEP = 2e-3
+# Of those moved what hypotheses are weighed by, and what goes along with one: a late angle turns the mesh on as well.
 WEIGHED = (FRICTION, COMPLIANCE, FOLLOWED, PHASE)
 
 
