@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from shared.small_case import small_case
 
 from gearbench.bench import BenchError, simulate
 from gearbench.bench.nonlinear.law_table import mesh_law
@@ -19,18 +20,13 @@ from gearbench.rig import (
     Crack,
     Damping,
     Drive,
-    Experiment,
     Friction,
-    Gear,
     Housing,
     Load,
     MeshCorrection,
-    Multisine,
     OutputShaft,
-    Rig,
     Ripple,
     Sensors,
-    Simulation,
     Support,
     Supports,
 )
@@ -46,31 +42,8 @@ def make_case(
     simulation: dict[str, Any] | None = None,
     **rig: Any,
 ) -> Case:
-    gear = {"module": 3e-3, "face_width": 0.02, "thinning": 30e-6}
-    support = Support(stiffness=1e8, damping=3e3)
-    values: dict[str, Any] = {
-        "driver": Gear(teeth=20, hub_radius=15e-3, inertia=1.5e-3, mass=2.0, **gear, **(driver or {})),
-        "driven": Gear(teeth=30, hub_radius=25e-3, inertia=3e-3, mass=3.0, **gear, **(driven or {})),
-        "support": Supports(driver=support, driven=support),
-        "damping": Damping(mesh_ratio=0.06),
-        **rig,
-    }
-    run: dict[str, Any] = {
-        "mesh_frequency": 200.0,  # 60 teeth, the hunting period, in 0.3 s
-        "torque_mean": 100.0,
-        "sampling_rate": RATE,
-        "samples_per_period": SAMPLES,
-        "periods": 2,
-        "seed": 3,
-        "multisine": Multisine(amplitude=20.0, band=(20.0, 2000.0), crest=2.2),
-        **(experiment or {}),
-    }
-    return Case(
-        name="test",
-        rig=Rig(**values),
-        experiment=Experiment(**run),
-        simulation=Simulation(model="lumped", stiffness_edge=0.1, **(simulation or {})),
-    )
+    values: dict[str, Any] = {"damping": Damping(mesh_ratio=0.06), **rig}
+    return small_case({"inertia": 1.5e-3} | (driver or {}), driven, experiment, simulation, **values)
 
 
 def supports(**driver: Any) -> Supports:

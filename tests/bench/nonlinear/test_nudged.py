@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from shared.small_case import small_case
 
 from gearbench.bench import simulate
 from gearbench.bench.nonlinear.replay import replay, steady_motion
@@ -15,15 +16,11 @@ from gearbench.rig import (
     Case,
     Coupling,
     Drive,
-    Experiment,
     Friction,
-    Gear,
     Load,
     Multisine,
     OutputShaft,
-    Rig,
     Sensors,
-    Simulation,
     Support,
     Supports,
 )
@@ -31,32 +28,19 @@ from gearbench.rig import (
 MESH = 4e8  # stiffness of the mesh, about [N/m]
 
 
-def make_case(swing: float, mean: float = 100.0, **rig: Any) -> Case:
-    gear = {"module": 3e-3, "face_width": 0.02, "thinning": 30e-6}
-    support = Support(stiffness=1e8, damping=3e3)
-    values: dict[str, Any] = {
-        "driver": Gear(teeth=20, hub_radius=15e-3, inertia=4e-4, mass=2.0, runout=6e-6, **gear),
-        "driven": Gear(teeth=30, hub_radius=25e-3, inertia=3e-3, mass=3.0, **gear),
-        "support": Supports(driver=support, driven=support),
-        "drive": Drive(coupling=Coupling(inertia=2e-3)),
-        "friction": Friction(coefficient=0.05),
-        **rig,
+def make_case(swing: float, **rig: Any) -> Case:
+    """A case whose torque swings by so much [N m]."""
+    experiment = {
+        "sampling_rate": 20480.0,
+        "samples_per_period": 6144,
+        "periods": 1,
+        "realisations": 1,
+        "settling_tolerance": 1e-9,
+        "settling_periods_max": 50,
+        "multisine": Multisine(amplitude=swing, band=(20.0, 2000.0), crest=2.2),
     }
-    experiment = Experiment(
-        mesh_frequency=200.0,
-        torque_mean=mean,
-        sampling_rate=20480.0,
-        samples_per_period=6144,
-        periods=1,
-        realisations=1,
-        seed=3,
-        settling_tolerance=1e-9,
-        settling_periods_max=50,
-        multisine=Multisine(amplitude=swing, band=(20.0, 2000.0), crest=2.2),
-    )
-    return Case(
-        name="test", rig=Rig(**values), experiment=experiment, simulation=Simulation(model="lumped", stiffness_edge=0.1)
-    )
+    rest = {"drive": Drive(coupling=Coupling(inertia=2e-3)), "friction": Friction(coefficient=0.05)} | rig
+    return small_case({"inertia": 4e-4, "runout": 6e-6}, experiment=experiment, **rest)
 
 
 # As stiff as the mesh where the driver and its rotor vibrate on it [N s/m].

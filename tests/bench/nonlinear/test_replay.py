@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from shared.small_case import small_case
 
 from gearbench.bench import BenchError, simulate
 from gearbench.bench.nonlinear.law_table import mesh_law
@@ -17,16 +18,9 @@ from gearbench.rig import (
     Coupling,
     Crack,
     Drive,
-    Experiment,
     Friction,
-    Gear,
-    Multisine,
-    Rig,
     Ripple,
     Sensors,
-    Simulation,
-    Support,
-    Supports,
 )
 
 SAMPLES, RATE = 1536, 5120.0
@@ -34,41 +28,18 @@ CHANNELS = ("torque_driver", "torque_driven", "angle_driver", "angle_driven", "y
 
 
 def make_case(**rig: Any) -> Case:
-    gear = {"module": 3e-3, "face_width": 0.02, "thinning": 30e-6}
-    support = Support(stiffness=1e8, damping=3e3)
     values: dict[str, Any] = {
-        "driver": Gear(
-            teeth=20,
-            hub_radius=15e-3,
-            inertia=4e-4,
-            mass=2.0,
-            runout=6e-6,
-            crack=Crack(tooth=4, stiffness_loss=0.4),
-            **gear,
-        ),
-        "driven": Gear(teeth=30, hub_radius=25e-3, inertia=3e-3, mass=3.0, pitch_error=(4e-6, *(0.0,) * 29), **gear),
-        "support": Supports(driver=support, driven=support),
         "drive": Drive(
             coupling=Coupling(inertia=2e-3, stiffness=3e4, damping=1.0),
             ripple=Ripple(orders=(7,), amplitude=(1.0,), phase=(0.4,)),
         ),
         "friction": Friction(coefficient=0.05),
-        **rig,
     }
-    experiment = Experiment(
-        mesh_frequency=200.0,
-        torque_mean=100.0,
-        sampling_rate=RATE,
-        samples_per_period=SAMPLES,
-        periods=2,
-        realisations=2,
-        seed=3,
-        settling_tolerance=1e-8,
-        settling_periods_max=50,
-        multisine=Multisine(amplitude=20.0, band=(20.0, 2000.0), crest=2.2),
-    )
-    return Case(
-        name="test", rig=Rig(**values), experiment=experiment, simulation=Simulation(model="lumped", stiffness_edge=0.1)
+    return small_case(
+        {"inertia": 4e-4, "runout": 6e-6, "crack": Crack(tooth=4, stiffness_loss=0.4)},
+        {"pitch_error": (4e-6, *(0.0,) * 29)},
+        {"realisations": 2, "settling_tolerance": 1e-8, "settling_periods_max": 50},
+        **values | rig,
     )
 
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from shared.small_case import small_case
 
 from gearbench.bench import BenchError, simulate
 from gearbench.bench.nonlinear.replay import replay
@@ -17,17 +18,12 @@ from gearbench.rig import (
     Case,
     Coupling,
     Drive,
-    Experiment,
     Friction,
-    Gear,
     Housing,
     Load,
     MeshCorrection,
-    Multisine,
     OutputShaft,
-    Rig,
     Sensors,
-    Simulation,
     Support,
     Supports,
 )
@@ -46,28 +42,8 @@ FULL: dict[str, Any] = {
 
 
 def make_case(experiment: dict[str, Any] | None = None, **rig: Any) -> Case:
-    gear = {"module": 3e-3, "face_width": 0.02, "thinning": 30e-6}
-    support = Support(stiffness=1e8, damping=3e3)
-    values: dict[str, Any] = {
-        "driver": Gear(teeth=20, hub_radius=15e-3, inertia=5e-4, mass=2.0, **gear),
-        "driven": Gear(teeth=30, hub_radius=25e-3, inertia=3e-3, mass=3.0, **gear),
-        "support": Supports(driver=support, driven=support),
-        **rig,
-    }
-    run: dict[str, Any] = {
-        "mesh_frequency": 200.0,
-        "torque_mean": 100.0,
-        "sampling_rate": RATE,
-        "samples_per_period": SAMPLES,
-        "periods": 2,
-        "seed": 3,
-        "settling_tolerance": 1e-7,
-        "settling_periods_max": 50,
-        "multisine": Multisine(amplitude=20.0, band=(20.0, 2000.0), crest=2.2),
-        **(experiment or {}),
-    }
-    simulation = Simulation(model="lumped", stiffness_edge=0.1)
-    return Case(name="test", rig=Rig(**values), experiment=Experiment(**run), simulation=simulation)
+    settling = {"settling_tolerance": 1e-7, "settling_periods_max": 50}
+    return small_case(experiment=settling | (experiment or {}), **rig)
 
 
 @pytest.mark.parametrize("share", [0.0, 0.4, 1.0])
