@@ -15,7 +15,7 @@ from gearbench.bench.nonlinear.fine import averaged, integrated, interpolated, p
 from gearbench.bench.nonlinear.pushing import Pushing, pushing, stepped
 from gearbench.bench.nonlinear.replay import Steady, resampled
 from gearbench.bench.record.sensors import shown_by
-from gearbench.lumped.nonlinear.coordinates import IN_MESH, NAMES
+from gearbench.lumped.nonlinear.coordinates import IN_MESH, LOAD, U1, U2, W
 from gearbench.lumped.nonlinear.law import MeshLaw
 from gearbench.lumped.nonlinear.model import NonLinear
 from gearbench.lumped.nonlinear.pressing import Pressed
@@ -35,8 +35,6 @@ STABLE = 1.8  # largest rate of a mode times the step: Runge-Kutta bears 2.8
 TRANSIENT = 1e-9
 IMPACTS = 4  # instants for each half step, over which flanks that part and meet are averaged
 TOGETHER = 96  # departures carried together: their states stay in the fastest memory
-
-U1, U2, W, LOAD = (NAMES.index(name) for name in ("u1", "u2", "w", "load"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,9 +217,10 @@ def along(steady: Steady) -> Along:
     motion = (integrated if times > 1 else interpolated)(steady, around.mesh, times * entries)
     found = Pushing(*(averaged(one, times) for one in pushing(steady, motion, substeps * times)))
     decay = max(model.slowest_decay(float(steady.drive.fine.mean())), 1e-9)
+    finer = stepped(steady, substeps)
     return Along(
         model=model,
-        phase=stepped(steady, substeps).phases(0, entries),
+        phase=finer.phases(0, entries),
         elastic=found.elastic,
         pairs=Pressed(found.pair_force, found.pair_tangent),
         rate=found.rate,
@@ -245,7 +244,7 @@ def along(steady: Steady) -> Along:
         turned=setup.departures(samples) * model.law.base_pitch,
         sampling_rate=setup.sampling_rate,
         instants=steady.given.instants,
-        led=stepped(steady, substeps).table_for(0, samples).led[:-1],
+        led=finer.led(0, entries),
     )
 
 

@@ -58,7 +58,7 @@ class Followed:
 
     def frequency(self, time: Array) -> Array:
         """Mesh frequency (m,) [Hz]."""
-        return np.asarray(self.cycles_per_sample * self.sampling_rate + self._at(time, 1))
+        return np.asarray(self.cycles_per_sample * self.sampling_rate + self.velocity(time))
 
     def velocity(self, time: Array) -> Array:
         """Rate (m,) [cycles/s] of the departure."""

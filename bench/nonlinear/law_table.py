@@ -25,7 +25,7 @@ from gearbench.geometry.tooth.profile import involute
 from gearbench.kernels.compiled import compiled
 from gearbench.lumped import mesh_stiffness
 from gearbench.lumped.nonlinear.forms import formed
-from gearbench.lumped.nonlinear.law import MeshLaw, approach_grid
+from gearbench.lumped.nonlinear.law import REFERENCE, MeshLaw, approach_grid
 from gearbench.lumped.stiffness.potential_energy import hertz_compliance, tooth_compliance
 from gearbench.rig import Gear, Rig, Simulation
 from gearbench.rig.neutral import is_formed, relieved_gear, without_reliefs
@@ -36,7 +36,6 @@ Integers = NDArray[np.int64]
 PHASES = 512
 NODES = 67
 LOAD_STEP = 2**0.5  # tables are solved up to the next power of this [N m], so that similar loads share them
-REFERENCE = 0.3  # of the largest load: where the shares of the pairs are taken
 OFFSETS = 4  # pairs looked at on either side of the one at the pitch point
 
 

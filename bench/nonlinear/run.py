@@ -133,14 +133,20 @@ class Setup:
                 varied=self._varied(start, entries),
             ),
         )
-        if self.guide is not None:
-            time = start / self.sampling_rate + np.arange(entries + 1.0) * (self.step / 2)
-            table = table._replace(led=self.model.law.base_pitch * self.guide.velocity(time))
+        table = table._replace(led=self.led(start, entries + 1))
         drift = self.model.rig.mesh.stiffness_drift
         if not drift:
             return table
         passed = (start + np.arange(entries + 1) / (2 * self.substeps)) / max(self.record_samples - 1, 1)
         return table._replace(gain=table.gain * (1.0 + drift * np.clip(passed, 0.0, 1.0)))
+
+    def led(self, start: int, entries: int) -> Array:
+        """Velocity (entries,) [m/s] that the driver is nudged towards at half steps from sample `start` on; empty where
+        it is not."""
+        if self.guide is None:
+            return np.empty(0)
+        time = start / self.sampling_rate + np.arange(float(entries)) * (self.step / 2)
+        return self.model.law.base_pitch * self.guide.velocity(time)
 
     def phases(self, start: int, entries: int) -> Array:
         """Mesh phase (entries,) [cycles] at half steps from sample `start` on."""

@@ -13,6 +13,7 @@ from gearbench.bench.refusals.effects import refuse_unknown
 from gearbench.bench.refusals.load_range import check_dte
 from gearbench.fem.limits import LOAD_RANGE
 from gearbench.geometry import Pair, pair
+from gearbench.lumped.nonlinear.coordinates import HOUSING, LOAD, U1, U2, Y1, Y2, W
 from gearbench.lumped.nonlinear.model import NonLinear, nonlinear_model
 from gearbench.lumped.nonlinear.pressing import pressed, travel_under
 from gearbench.lumped.nonlinear.rest import inverse_masses, mesh_direction
@@ -21,8 +22,6 @@ from gearbench.rig import Case
 from gearbench.rig.neutral import even_gear
 
 Array = NDArray[np.float64]
-
-_U1, _Y1, _Y2, _U2, _W, _LOAD, _HOUSING = range(7)  # among lumped.nonlinear.coordinates.NAMES
 
 STIFFEST = 20e9  # stiffness of the stiffest imaginable teeth per face width [N/m^2]
 
@@ -93,11 +92,11 @@ def _push(model: NonLinear) -> Array:
     balances that."""
     c, s = model.constants(), model.structure
     push = np.zeros(model.size)
-    push[_U1], push[_W] = c.rigid * c.inverse_u1, c.inverse_w
+    push[U1], push[W] = c.rigid * c.inverse_u1, c.inverse_w
     if s is None:
-        push[_U2] = -c.inverse_u2
+        push[U2] = -c.inverse_u2
     else:
-        push[_U2], push[_LOAD] = -s.follow * s.rigid_load * c.inverse_u2, -s.follow * s.inverse_load
+        push[U2], push[LOAD] = -s.follow * s.rigid_load * c.inverse_u2, -s.follow * s.inverse_load
     if model.rig.load.boundary == "inertia":
         # The force then is less than that of the driver's torque alone: the load's does not help it.
         one, two = turning_inertias(model.rig, pair(model.rig))
@@ -111,11 +110,11 @@ def _relative(model: NonLinear) -> Array:
     rows, moves = np.eye(model.size), inverse_masses(model.constants(), model.structure) > 0
     if not model.free:
         return np.asarray(rows[moves])
-    seen = [rows[_U1] - rows[_U2], rows[_Y1], rows[_Y2]]
-    if moves[_W]:
-        seen.append(rows[_W] - rows[_U1])
+    seen = [rows[U1] - rows[U2], rows[Y1], rows[Y2]]
+    if moves[W]:
+        seen.append(rows[W] - rows[U1])
     if model.structure is not None:
-        if moves[_LOAD]:
-            seen.append(rows[_U2] - rows[_LOAD])
-        seen += [rows[i] for i in range(_HOUSING, model.size) if moves[i]]
+        if moves[LOAD]:
+            seen.append(rows[U2] - rows[LOAD])
+        seen += [rows[i] for i in range(HOUSING, model.size) if moves[i]]
     return np.array(seen)

@@ -112,9 +112,8 @@ class Judged:
     def searched(self) -> float:
         """The same on the records that the selection was found from, whose channels are taken together."""
         simulator, best = self.found.simulator, self.found.selection.best
-        lines = best.lines
-        if simulator.nudges and (own := simulator.free.lines(self.found.end_of(best))) is not None:
-            lines = own
+        own = simulator.free.lines(self.found.end_of(best)) if simulator.nudges else None
+        lines = best.lines if own is None else own
         target, left, whole = simulator.target, dict[str, float](), dict[str, float]()
         rest = target.energies(target.lines - lines) - target.noise
         for block, energy, level, size in zip(
@@ -203,8 +202,8 @@ def _closings(
     simulator, selection = found.simulator, found.selection
     nudged = simulator.channels(selection.best.p, measured)
     # Sizes are those of simulations that go their own way.
-    free = simulator.free if simulator.nudges else simulator
-    signals = free.channels(found.end_of(selection.best), measured) if simulator.nudges else nudged
+    free = simulator.free
+    signals = nudged if free is simulator else free.channels(found.end_of(selection.best), measured)
     closings = {}
     # A record that had part in the search cannot make up for what it lacked.
     apart = not any(measured is searched for searched in simulator.target.measurements)

@@ -29,11 +29,11 @@ from gearbench.diagnosis.effects.torque_ripple import ORDERS
 from gearbench.diagnosis.forces.basis import on_path, waves
 from gearbench.diagnosis.output.contrast import CONTRAST, contrast_slope
 from gearbench.diagnosis.output.layout import Layout
-from gearbench.diagnosis.output.runout import in_mesh_of_runout, on_gears_of_runout
+from gearbench.diagnosis.output.runout import in_mesh_of_runout, lobes_of, on_gears_of_runout, turn_of
 from gearbench.diagnosis.output.structure import GAIN, LATE, LEAST_STEP, PHASE, SEAT, STRUCTURE
 from gearbench.diagnosis.output.target import Target
 from gearbench.diagnosis.output.viscous import LOADED, damping_reference
-from gearbench.lumped.nonlinear.coordinates import IN_MESH, NAMES
+from gearbench.lumped.nonlinear.coordinates import IN_MESH, U1
 from gearbench.lumped.nonlinear.sensitive import LEAST_LEVEL
 
 if TYPE_CHECKING:
@@ -45,7 +45,6 @@ Complex = NDArray[np.complex128]
 Flags = NDArray[np.bool_]
 Integers = NDArray[np.int64]
 
-U1 = NAMES.index("u1")
 # What holds the gears: by the difference between two rigs that are so far apart, in standard deviations as background.
 AROUND, APART = ("stiffness", "damping", "mass", "inertia", *BEARINGS.values(), *STRUCTURE), 1e-3
 # Moved and simulated, by this part of their standard deviation, where no difference between rigs says what they do: so
@@ -184,14 +183,9 @@ def _nudged(layout: Layout, along: Along, chosen: Flags) -> list[tuple[int, int,
     nudge, unknowns = along.model.nudge, layout.unknowns
     if not nudge:
         return []
-    delay, at = unknowns[DELAYS["angle_driver"]].start, unknowns[ENCODERS["driver"]].start
-    turn = 2 * np.pi * along.phase / layout.model.teeth[0]
-    parts = {
-        delay: along.rate_of(along.led[:, None])[:, 0],
-        at: -along.rate_of(np.cos(turn)[:, None])[:, 0],
-        at + 1: -along.rate_of(np.sin(turn)[:, None])[:, 0],
-    }
-    return [(index, U1, nudge * force) for index, force in parts.items() if chosen[index]]
+    indices = [*unknowns.at(DELAYS["angle_driver"]), *unknowns.at(ENCODERS["driver"])]
+    rates = along.rate_of(np.column_stack([along.led, -lobes_of(turn_of(along, 0))])).T
+    return [(int(one), U1, nudge * rate) for one, rate in zip(indices, rates, strict=True) if chosen[one]]
 
 
 def around_forces(along: Along, others: Sequence[Other]) -> list[tuple[int, int, Array]]:
@@ -233,7 +227,7 @@ def drive_forces(layout: Layout, along: Along, condition: str) -> tuple[Array, I
     names = list(layout.torque_mean)
     if condition not in names:
         return np.zeros((len(along.phase), 0)), np.zeros(0, dtype=int)
-    turn = 2 * np.pi * along.phase / layout.model.teeth[0]
+    turn = turn_of(along, 0)
     columns = [part(order * turn) for order in ORDERS for part in (np.cos, np.sin)]
     first = layout.unknowns[RIPPLE].start + names.index(condition) * 2 * len(ORDERS)
     return np.stack(columns, axis=1) / layout.model.base_radius[0], first + np.arange(2 * len(ORDERS))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.lumped.nonlinear.coordinates import NAMES
+from gearbench.lumped.nonlinear.coordinates import U1, U2, X1, X2, Y1, Y2
 from gearbench.lumped.nonlinear.ends import aside_of, ends_of, turned_by
 
 if TYPE_CHECKING:
@@ -16,15 +16,13 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-U1, Y1, Y2, U2, X1, X2 = (NAMES.index(name) for name in ("u1", "y1", "y2", "u2", "x1", "x2"))
-
 
 def in_mesh_of_runout(along: Along, side: int) -> Array:
     """Force (entries, 2) [N] in the mesh per unit of the cosine and the sine of the run-out of a gear (0: driver)."""
-    turn = _turn(along, side)
+    turn = turn_of(along, side)
     # Normals of working and back flanks are so much of the gear's rotation apart (`lumped.nonlinear.tables`).
     between = np.pi - 2 * along.model.working_pressure_angle
-    proud, back = _proud(turn), _proud(turn + (between, -between)[side])
+    proud, back = lobes_of(turn), lobes_of(turn + (between, -between)[side])
     turned = turned_by(along.phase, turn, side, ends_of(along.model)).T
     closed = sum(change * along.fine(on)[:, None] for on, change in _directions(along, side).items())
     return along.of_excess(proud + closed) + along.of_back_excess(back) + along.tangent.turning[:, None] * turned
@@ -39,7 +37,7 @@ def on_gears_of_runout(along: Along, side: int) -> dict[int, Array]:
 
 def _directions(along: Along, side: int) -> dict[int, Array]:
     """What coordinates that the run-out acts on contribute more to the deflection (entries, 2) per unit of both."""
-    model, aside = along.model, aside_of(_turn(along, side), side).T
+    model, aside = along.model, aside_of(turn_of(along, side), side).T
     tilt = aside / model.length_of_action
     out = {(U1, U2)[side]: (1.0, -1.0)[side] * aside / model.base_radii[side]}
     if model.slide:
@@ -49,12 +47,12 @@ def _directions(along: Along, side: int) -> dict[int, Array]:
     return out
 
 
-def _turn(along: Along, side: int) -> Array:
+def turn_of(along: Along, side: int) -> Array:
     """Rotation (entries,) [rad] of a gear."""
     rig = along.model.rig
     return 2 * np.pi * along.phase / (rig.driver, rig.driven)[side].teeth
 
 
-def _proud(turn: Array) -> Array:
+def lobes_of(turn: Array) -> Array:
     """Cosine and sine (entries, 2) of a gear's rotation [rad]."""
     return np.stack([np.cos(turn), np.sin(turn)], axis=1)

@@ -46,7 +46,7 @@ class Simulator:
     @property
     def free(self) -> Simulator:
         """The same without what nudges."""
-        return Simulator(self.layout, self.target, self.simulate)
+        return Simulator(self.layout, self.target, self.simulate) if self.nudges else self
 
     def lines(self, p: Array) -> Complex | None:
         """Simulated lines (K,) of unknowns (size,); None where no rig has them or it does not settle."""

@@ -35,6 +35,7 @@ class Further(NamedTuple):
 COORDINATES = len(Coordinates._fields)
 FURTHER = len(Further._fields)
 NAMES = (*Coordinates._fields, *Further._fields)
+U1, Y1, Y2, U2, W, LOAD, HOUSING, ROCKING, X1, X2 = range(len(NAMES))  # their numbers
 IN_MESH = -1  # instead of the number of a coordinate that a force acts on
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from gearbench.lumped.errors import LumpedError
 from gearbench.lumped.nonlinear.constants import Constants
-from gearbench.lumped.nonlinear.coordinates import COORDINATES, FURTHER
+from gearbench.lumped.nonlinear.coordinates import COORDINATES, FURTHER, U1
 from gearbench.lumped.nonlinear.structure import Structure
 from gearbench.rig import Support
 
@@ -189,7 +189,7 @@ def springs_and_dampers(c: Constants, s: Structure | None, tangents: tuple[float
     u1, _, _, u2, w = one[:COORDINATES]
     shaft = u1 - w
     springs, dampers = c.shaft_stiffness * np.outer(shaft, shaft), c.shaft_damping * np.outer(shaft, shaft)
-    dampers[0, 0] += c.nudge
+    dampers[U1, U1] += c.nudge
     if s is None:
         for row, k, d in ((1, tangents[0], c.damping1), (2, tangents[1], c.damping2)):
             springs[row, row] += k

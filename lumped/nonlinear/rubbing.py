@@ -5,13 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.lumped.nonlinear.coordinates import NAMES
+from gearbench.lumped.nonlinear.coordinates import U1, U2, X1, X2, Y1, Y2
 from gearbench.lumped.nonlinear.model import NonLinear
 
 Array = NDArray[np.float64]
-
-U1, Y1, Y2, U2 = (NAMES.index(name) for name in ("u1", "y1", "y2", "u2"))
-X1, X2 = (NAMES.index(name) for name in ("x1", "x2"))
 
 
 def rubbed_along(model: NonLinear, position: Array, pace: Array, rates: Array, mesh_frequency: float) -> Array:

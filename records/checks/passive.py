@@ -55,9 +55,7 @@ def force_feeds_the_rig(look: Look) -> list[Finding]:
     return [Finding(words, refused=certain, error=0.0 if certain else 1.0)]
 
 
-def _cosine(
-    look: Look, force: NDArray[np.float64], error: NDArray[np.float64], part: float = 1.0
-) -> float:
+def _cosine(look: Look, force: NDArray[np.float64], error: NDArray[np.float64], part: float = 1.0) -> float:
     """That of force and rate of an error over the excited lines, or a part of these, the lowest."""
     driving = look.spectrum(force)
     lines = np.flatnonzero(look.excited(force))

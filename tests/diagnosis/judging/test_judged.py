@@ -47,6 +47,9 @@ class Answering(FakeSimulator):
     nudges: dict[str, float] = field(default_factory=dict)
     free: Any = None
 
+    def __post_init__(self) -> None:
+        self.free = self.free or self
+
     def channels(self, p: np.ndarray, measured: Any) -> dict[str, np.ndarray]:
         return {"lines": p @ OTHER, "dte": np.zeros(8)}
 
