@@ -91,8 +91,9 @@ def _decided(
     if over > 1.0 and changing > known.changing and share < CLOSES:
         because = f"the force missing {at_place(place)} changes from one repetition to the next"
         return Decided("unknown", place, (), changing / known.changing, (because,))
-    # A record that had no part in the search may be off because the others do not determine the rig.
-    size = min(judged.remains, judged.searched) / known.structure
+    # A record that had no part in the search may be off because the others do not determine the rig; what their noise
+    # hides they do not speak of.
+    size = max(min(judged.remains, judged.searched), judged.hidden) / known.structure
     free = forces.best_free
     worth = max((one.log_bayes_factor for one in named), default=0.0)
     if named and free and share < CLOSES and size > VISIBLE:

@@ -105,23 +105,43 @@ class Judged:
     @property
     def remains(self) -> float:
         """The largest part of any channel's fluctuation that is left beyond noise."""
-        parts = (np.sqrt(max(s.final**2 - s.noise**2, 0.0)) / s.fluctuation for s in self.sizes.values())
-        return float(max(parts, default=0.0))
+        return max(self._remaining.values(), default=0.0)
 
-    @cached_property
+    @property
+    def _remaining(self) -> dict[str, float]:
+        """By channel the part of its fluctuation that is left beyond noise."""
+        return {
+            channel: float(np.sqrt(max(one.final**2 - one.noise**2, 0.0)) / one.fluctuation)
+            for channel, one in self.sizes.items()
+        }
+
+    @property
     def searched(self) -> float:
         """The same on the records that the selection was found from, whose channels are taken together."""
+        return max((left for left, _ in self._searched.values()), default=0.0)
+
+    @property
+    def hidden(self) -> float:
+        """The largest part of any channel's fluctuation that is left here and that the records of the search could not
+        have told from what changes in them."""
+        pairs = ((self._remaining.get(channel, 0.0), noise) for channel, (_, noise) in self._searched.items())
+        return max((min(pair) for pair in pairs), default=0.0)
+
+    @cached_property
+    def _searched(self) -> dict[str, tuple[float, float]]:
+        """By channel of the records of the search, all together: parts of its fluctuation that are left beyond noise,
+        and that are noise."""
         simulator, best = self.found.simulator, self.found.selection.best
         own = simulator.free.lines(self.found.end_of(best)) if simulator.nudges else None
         lines = best.lines if own is None else own
-        target, left, whole = simulator.target, dict[str, float](), dict[str, float]()
-        rest = target.energies(target.lines - lines) - target.noise
-        for block, energy, level, size in zip(
-            target.blocks, rest, target.energies(target.lines), target.sizes, strict=True
-        ):
-            left[block.channel] = left.get(block.channel, 0.0) + energy * size
-            whole[block.channel] = whole.get(block.channel, 0.0) + level * size
-        return max((float(np.sqrt(max(left[one], 0.0) / whole[one])) for one in left), default=0.0)
+        target = simulator.target
+        parts = (target.energies(target.lines - lines) - target.noise, target.noise, target.energies(target.lines))
+        out = {}
+        for channel in dict.fromkeys(block.channel for block in target.blocks):
+            mine = np.array([block.channel == channel for block in target.blocks])
+            left, noise, whole = (max(float((part * target.sizes)[mine].sum()), 0.0) for part in parts)
+            out[channel] = (float(np.sqrt(left / whole)), float(np.sqrt(noise / whole)))
+        return out
 
     def share(self, without: Mapping[str, Array]) -> float:
         """Part of the nominal gap, by energy and all channels in units of their fluctuation, that comes back in a rig

@@ -36,6 +36,7 @@ def decided(
     left: float = 0.05,
     remains: float = 0.05,
     searched: float | None = None,
+    hidden: float = 0.0,
     share: float = 0.2,
     free: float = 0.0,
     excess: np.ndarray = QUIET,
@@ -45,8 +46,8 @@ def decided(
     late: float = 0.0,
 ) -> Decided:
     """`worth` nats of friction (None: nothing was kept), which closes `share` of the gap; `left` of the nominal gap,
-    `remains` of a channel's fluctuation in the end, `searched` (None: as much) on the records of the search; the drive
-    acts `late` s, of sound rigs 1e-5."""
+    `remains` of a channel's fluctuation in the end, `searched` (None: as much) on the records of the search,
+    whose noise may hide `hidden` of it; the drive acts `late` s, of sound rigs 1e-5."""
     entered: tuple[Any, ...] = ()
     if worth is not None:
         entered = (SimpleNamespace(hypothesis=FRICTION, log_bayes_factor=worth),)
@@ -60,6 +61,7 @@ def decided(
         left=left,
         remains=remains,
         searched=remains if searched is None else searched,
+        hidden=hidden,
     )
     form = SimpleNamespace(hypothesis=Hypothesis("free drive", "drive", ()), log_bayes_factor=free)
     forces: Any = SimpleNamespace(best_free=form if free else None, tried=())
@@ -93,6 +95,12 @@ def test_records_that_are_explained_and_predict_no_other_do_not_determine_the_ri
     made = decided(None, **off, searched=0.2 * STRUCTURE)
     assert made.verdict == "none" and "do not determine the rig" in made.because[0]
     assert decided(None, **off, searched=1.1 * STRUCTURE).verdict == "unknown"
+
+
+def test_records_whose_noise_hides_what_is_left_say_nothing_for_a_sound_rig() -> None:
+    off = {"left": 1.1 * GREATER, "remains": 1.5 * STRUCTURE, "searched": 0.0}
+    assert decided(None, **off, hidden=0.9 * STRUCTURE).verdict == "none"
+    assert decided(None, **off, hidden=1.1 * STRUCTURE).verdict == "unknown"
 
 
 def test_a_place_that_stands_out_is_unknown_only_over_a_visible_remainder() -> None:

@@ -141,6 +141,14 @@ def test_what_is_left_of_the_records_of_the_search_is_that_of_their_lines(monkey
     object.__setattr__(target_of_search, "noise", target_of_search.energies(lines - best))
     again = replace(found)
     assert again.searched == 0.0
+    # As much as is left there is noise of the search; here the judged record's channels leave more, or less.
+    size = Sizes(fluctuation=1.0, nominal=1.0, plain=1.0, final=0.5, noise=0.3)
+    much, less = ({"dte": replace(size, final=final)} for final in (0.5, 0.3 + 1e-12))
+    noise = float(np.linalg.norm(lines - best) / np.linalg.norm(lines))
+    for sizes, hidden in ((much, noise), (less, 0.0), ({"y_driver": size}, 0.0)):
+        again = replace(found)
+        object.__setattr__(again, "sizes", sizes)
+        assert again.hidden == pytest.approx(hidden, abs=1e-5)
 
 
 def test_what_weak_evidence_lacks_is_made_up_for_on_the_judged_record(monkeypatch: pytest.MonkeyPatch) -> None:
