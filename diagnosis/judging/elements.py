@@ -24,6 +24,7 @@ from gearbench.diagnosis.output.fit import Optimum, Sensitivity, fit
 from gearbench.diagnosis.output.quadratic import quadratic_of
 from gearbench.diagnosis.output.simulator import Simulator
 from gearbench.diagnosis.output.viscous import LOADED
+from gearbench.diagnosis.replay.replays import Replay
 from gearbench.rig import Case
 
 Array = NDArray[np.float64]
@@ -86,12 +87,14 @@ def by_elements(judged: Judged, effects: bool, report: Report) -> ByElements:
     return ByElements({stage: case for stage, (case, _) in answers.items()}, signals, closings, best, lacks, said)
 
 
-def _simulate(resonance: float, carried: dict[str, Carried]) -> Callable[[Case, xr.Dataset], xr.Dataset]:
-    """`simulate(case, record)` by finite elements; what it carried over is put into `carried`."""
+def _simulate(resonance: float, carried: dict[str, Carried]) -> Replay:
+    """Replays by finite elements, which nothing nudges; what it carried over is put into `carried`."""
     # Its time loop is compiled on import, which not every user of this module wants.
     from gearbench.bench.replays.reduced import replay
 
-    def simulate(case: Case, record: xr.Dataset) -> xr.Dataset:
+    def simulate(case: Case, record: xr.Dataset, /, nudge: float = 0.0) -> xr.Dataset:
+        if nudge:
+            raise ValueError("finite elements cannot be nudged towards a record")
         one = on_elements(case, resonance)
         carried["; ".join((*one.lacks, *one.said))] = one
         return replay(one.case, record)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.intake.signals import measured_channels, noise_of_mean, simulated_channels
-from gearbench.diagnosis.output.simulator import Simulate
+from gearbench.diagnosis.replay.replays import Replay
 from gearbench.rig import Case
 
 Array = NDArray[np.float64]
@@ -24,7 +24,7 @@ GIVEN = ("torque_driver", "angle_driven")
 MOST = 4  # groups that repetitions are taken in: one replay less
 
 
-def noise_left(case: Case, measured: Measurement, simulate: Simulate) -> dict[str, Array]:
+def noise_left(case: Case, measured: Measurement, simulate: Replay) -> dict[str, Array]:
     """Channel -> (parts, N): independent parts of the noise of the mean measured minus the simulated channel, whose
     squares add up to its variance; none for a record of one repetition, and that of the channels alone where the case
     cannot be simulated."""
@@ -47,7 +47,7 @@ def noise_rms(parts: Array) -> float:
     return float(np.sqrt((parts**2).sum(axis=0).mean()))
 
 
-def _passed(case: Case, measured: Measurement, given: Mapping[str, Array], simulate: Simulate) -> dict[str, Array]:
+def _passed(case: Case, measured: Measurement, given: Mapping[str, Array], simulate: Replay) -> dict[str, Array]:
     """Channel -> (parts, N): what the simulated channels become for the noise in what is given."""
 
     def channels(record: xr.Dataset) -> dict[str, Array]:

@@ -27,9 +27,10 @@ from gearbench.diagnosis.output.layout import Layout, layout_of
 from gearbench.diagnosis.output.likely_teeth import with_likely_teeth, with_small_cracks
 from gearbench.diagnosis.output.passed_noise import noise_left
 from gearbench.diagnosis.output.selection import WORTH, Selection, Weighed, entering, select
-from gearbench.diagnosis.output.simulator import Simulate, Simulator
+from gearbench.diagnosis.output.simulator import Simulator
 from gearbench.diagnosis.output.structure import beginnings
 from gearbench.diagnosis.output.target import target_of
+from gearbench.diagnosis.replay.replays import Replay
 from gearbench.rig import Case
 
 Array = NDArray[np.float64]
@@ -88,7 +89,7 @@ def simulated(
     found: Search,
     measurements: Sequence[Measurement],
     nominal: Case,
-    simulate: Simulate,
+    simulate: Replay,
     without: Sequence[str] = (),
     report: Report = lambda step: None,
     *,
@@ -189,7 +190,7 @@ def _opened(simulator: Simulator, selection: Selection, start: Start, apart: boo
 
 
 def followable(
-    rigs: Sequence[Case], measurements: Sequence[Measurement], problem: Problem, simulate: Simulate
+    rigs: Sequence[Case], measurements: Sequence[Measurement], problem: Problem, simulate: Replay
 ) -> tuple[list[int], Mapping[str, float], frozenset[str]]:
     """Numbers of the records that a fit can follow, what nudges the driver in each that parts its flanks, by its name
     [N s/m], and the names of those that part for long: those whose flanks stay together on the first rig, else all,
@@ -213,7 +214,7 @@ def nudges_of(model: NominalModel, conditions: Sequence[Condition]) -> dict[str,
     return {one.name: float(np.sqrt(one.stiffness_level * mass)) for one in known}
 
 
-def smooth_records(rigs: Sequence[Case], measurements: Sequence[Measurement], simulate: Simulate) -> list[int]:
+def smooth_records(rigs: Sequence[Case], measurements: Sequence[Measurement], simulate: Replay) -> list[int]:
     """Numbers of the records whose flanks stay together on the first of the rigs, and where there is none, of those
     that part for little of their time: elsewhere small changes make jumps, so that no fit can follow them. Where there
     is none of these either the next rig is asked: a resonance of the first need not be the records'."""
@@ -226,7 +227,7 @@ def smooth_records(rigs: Sequence[Case], measurements: Sequence[Measurement], si
     return []
 
 
-def lost_contact(rig: Case, measurements: Sequence[Measurement], simulate: Simulate) -> list[float]:
+def lost_contact(rig: Case, measurements: Sequence[Measurement], simulate: Replay) -> list[float]:
     """Part of the time that the flanks of a rig are apart in each record; empty where it cannot be simulated in one of
     them, or one does not tell the mesh phase."""
     if not all(one.phase_known for one in measurements):

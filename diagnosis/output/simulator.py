@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from gearbench.bench.plan.workers import side_by_side
@@ -17,14 +16,13 @@ from gearbench.diagnosis.output.jacobian import MOVED, SHORT_STEP, STEP, Other, 
 from gearbench.diagnosis.output.layout import Layout
 from gearbench.diagnosis.output.structure import LEAST_STEP
 from gearbench.diagnosis.output.target import Target
-from gearbench.diagnosis.replay.replays import law_of
+from gearbench.diagnosis.replay.replays import Replay, law_of
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Flags = NDArray[np.bool_]
 Integers = NDArray[np.int64]
 Spectra = Mapping[str, NDArray[np.complexfloating[Any, Any]]]
-Simulate = Callable[..., xr.Dataset]
 
 
 @dataclass
@@ -34,7 +32,7 @@ class Simulator:
 
     layout: Layout
     target: Target
-    simulate: Simulate
+    simulate: Replay
     nudges: Mapping[str, float] = field(default_factory=dict)
     replays: int = 0
     _kept: dict[bytes, Complex] = field(default_factory=dict)
@@ -75,8 +73,8 @@ class Simulator:
     def channels(self, p: Array, measured: Measurement) -> dict[str, Array]:
         """Simulated channels of one record."""
         nudge = self.nudges.get(measured.name, 0.0)
-        told = (nudge,) if nudge else ()
-        replayed = self.simulate(self.layout.case(p, measured.name), measured.record, *told)
+        case = self.layout.case(p, measured.name)
+        replayed = self.simulate(case, measured.record, nudge) if nudge else self.simulate(case, measured.record)
         return simulated_channels(measured, replayed)
 
     def jacobian(self, p: Array, sd: Array, chosen: Flags, near: Complex | None = None) -> Complex | None:

@@ -16,8 +16,7 @@ from gearbench.diagnosis.forces.condition import Condition, prepare
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.output.layout import Layout, layout_of
 from gearbench.diagnosis.output.simulated import smooth_records
-from gearbench.diagnosis.output.simulator import Simulate
-from gearbench.diagnosis.replay.replays import replays_of
+from gearbench.diagnosis.replay.replays import Replay, replays_of
 from gearbench.rig import Case
 
 Report = Callable[[str], None]
@@ -31,7 +30,7 @@ class Planned:
     inputs: Inputs
     problem: Problem
     layout: Layout
-    simulate: Simulate
+    simulate: Replay
     smooth: tuple[int, ...]
 
     @property

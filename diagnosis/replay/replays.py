@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
+from typing import Protocol
 
 import numpy as np
 import xarray as xr
@@ -16,6 +17,13 @@ from gearbench.lumped.nonlinear.law import MeshLaw
 from gearbench.rig import Case
 
 LAWS = 8  # of different backlash or flanks whose secants are kept: most replays have the nominal ones
+
+
+class Replay(Protocol):
+    """One steady repetition of a case's rig under a record's torque, its driver nudged [N s/m] towards the motion that
+    the record has, if told to."""
+
+    def __call__(self, case: Case, record: xr.Dataset, /, nudge: float = 0.0) -> xr.Dataset: ...
 
 
 def law_of(sound: MeshLaw, case: Case) -> MeshLaw:
@@ -40,11 +48,11 @@ def _with_backlash(law: MeshLaw, backlash: float) -> MeshLaw:
     return replace(law, backlash=backlash)
 
 
-def replays(sound: MeshLaw) -> Callable[[Case, xr.Dataset], xr.Dataset]:
-    """`simulate(case, record)`: one steady repetition of the case's rig under the record's torque, on the non-linear
-    lumped model with this law of sound teeth. Rigs may differ in everything but the teeth that it was made for."""
+def replays(sound: MeshLaw) -> Replay:
+    """Replays on the non-linear lumped model with this law of sound teeth: rigs may differ in everything but the teeth
+    that it was made for."""
 
-    def simulate(case: Case, record: xr.Dataset, nudge: float = 0.0) -> xr.Dataset:
+    def simulate(case: Case, record: xr.Dataset, /, nudge: float = 0.0) -> xr.Dataset:
         # Its time loop is compiled on import, which not every user of this module wants.
         from gearbench.bench.nonlinear.replay import replay
 
@@ -53,7 +61,7 @@ def replays(sound: MeshLaw) -> Callable[[Case, xr.Dataset], xr.Dataset]:
     return simulate
 
 
-def replays_of(nominal: Case, measurements: Sequence[Measurement]) -> Callable[[Case, xr.Dataset], xr.Dataset]:
+def replays_of(nominal: Case, measurements: Sequence[Measurement]) -> Replay:
     """The replays of these measurements on the nominal rig's law."""
     from gearbench.bench.nonlinear.law_table import teeth_law
 

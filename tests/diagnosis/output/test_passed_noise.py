@@ -13,9 +13,8 @@ from gearbench.diagnosis.evidence.problem import problem_of
 from gearbench.diagnosis.intake.measurements import Measurement, measurement
 from gearbench.diagnosis.intake.signals import excited, measured_channels, noise_of_mean, simulated_channels
 from gearbench.diagnosis.output.passed_noise import noise_left, noise_rms
-from gearbench.diagnosis.output.simulator import Simulate
 from gearbench.diagnosis.output.target import BY_TEETH, INDEPENDENT, target_of
-from gearbench.diagnosis.replay.replays import replays
+from gearbench.diagnosis.replay.replays import Replay, replays
 from gearbench.rig import Case, read_case
 
 ANGLE, SWING = 1e-6, 3e-6  # rad, rms
@@ -61,7 +60,7 @@ def rig() -> Rig:
 
 
 @pytest.fixture(scope="module")
-def noisy(rig: Rig) -> tuple[Measurement, Simulate]:
+def noisy(rig: Rig) -> tuple[Measurement, Replay]:
     measured = rig.measured(ANGLE)
     return measured, replays(problem_of([measured], rig.case).model.sound)
 
@@ -75,7 +74,7 @@ def lines(measured: Measurement, parts: np.ndarray) -> tuple[np.ndarray, np.ndar
 
 
 def test_the_driven_inertia_makes_a_reaction_of_the_noise_of_its_angle(
-    rig: Rig, noisy: tuple[Measurement, Simulate]
+    rig: Rig, noisy: tuple[Measurement, Replay]
 ) -> None:
     measured, replayed = noisy
     left, _ = lines(measured, noise_left(rig.case, measured, replayed)["torque_driven"])
@@ -90,7 +89,7 @@ def test_the_driven_inertia_makes_a_reaction_of_the_noise_of_its_angle(
 
 
 @pytest.mark.parametrize("channel", ["dte", "y_driver", "y_driven", "torque_driven"])
-def test_residuals_scatter_as_it_says(rig: Rig, noisy: tuple[Measurement, Simulate], channel: str) -> None:
+def test_residuals_scatter_as_it_says(rig: Rig, noisy: tuple[Measurement, Replay], channel: str) -> None:
     """What noise changes of measured minus simulated, on another draw: that of the mean of two repetitions, of which
     the parts know the difference alone."""
     measured, replayed = noisy
@@ -101,7 +100,7 @@ def test_residuals_scatter_as_it_says(rig: Rig, noisy: tuple[Measurement, Simula
     assert np.abs(parts.sum(axis=0)).max() < 1e-6 * noise_rms(parts)
 
 
-def residual(rig: Rig, measured: Measurement, replayed: Simulate, channel: str) -> np.ndarray:
+def residual(rig: Rig, measured: Measurement, replayed: Replay, channel: str) -> np.ndarray:
     """Measured minus simulated (N,)."""
     simulated = simulated_channels(measured, replayed(rig.case, measured.record))
     return np.asarray(measured_channels(measured)[channel].mean(axis=0) - simulated[channel])
@@ -117,7 +116,7 @@ def test_records_without_noise_or_without_a_simulation_have_that_of_their_channe
 
 
 def test_a_target_has_the_noise_that_it_is_given_and_counts_lines_of_shafts_by_teeth(
-    rig: Rig, noisy: tuple[Measurement, Simulate]
+    rig: Rig, noisy: tuple[Measurement, Replay]
 ) -> None:
     measured, replayed = noisy
     problem = problem_of([measured], rig.case)
