@@ -34,9 +34,10 @@ from gearbench.diagnosis.judging.naming import drifts_of, effects_of, parameters
 from gearbench.diagnosis.judging.repeating import repeating, sentences_of_others
 from gearbench.diagnosis.odds import Calibration, effect_signs
 from gearbench.diagnosis.output.contrast import other_flanks
-from gearbench.diagnosis.output.selection import WORTH, Weighed, only, with_entered
+from gearbench.diagnosis.output.selection import only, with_entered
 from gearbench.diagnosis.output.simulated import Simulated, simulated
 from gearbench.diagnosis.output.structure import structure_found
+from gearbench.diagnosis.output.weighing import WORTH, Weighed
 from gearbench.diagnosis.population import POPULATION
 from gearbench.diagnosis.replay.gap import Simulate, gaps
 from gearbench.diagnosis.replay.replays import replays
@@ -112,7 +113,7 @@ def find_cause(
         return _by_forces_alone(problem, nominal, plain, result, decision, known, common)
     report("judging")
     searched = Searched(problem, nominal, tuple(measurements), result, fit, steady, unsteady, tuple(without))
-    return _by_simulation(searched, found, held_out, known, common)
+    return _by_simulation(searched, found, held_out, known, common, report)
 
 
 @dataclass(frozen=True)
@@ -131,11 +132,16 @@ class Searched:
 
 
 def _by_simulation(
-    of: Searched, found: Simulated, held_out: Measurement | None, known: Calibration, common: dict[str, Any]
+    of: Searched,
+    found: Simulated,
+    held_out: Measurement | None,
+    known: Calibration,
+    common: dict[str, Any],
+    report: Report,
 ) -> Finding:
     """The finding that simulation justifies."""
     entered = found.selection.entered
-    judged = judgement(of.problem, sized(seconded(found, of.result)), held_out, of.measurements)
+    judged = judgement(of.problem, sized(seconded(found, of.result)), held_out, of.measurements, report)
     band = of.problem.conditions[0].band
     changing = changing_of(judged, changing_parts(of.steady, band))
     doubts: tuple[str, ...] = ()
@@ -153,7 +159,7 @@ def _by_simulation(
         if doubtful is None:
             break
         doubts = (*doubts, sentence_of_doubt(doubtful, chances))
-        judged = judgement(of.problem, left_out(found, (doubtful,)), held_out, of.measurements)
+        judged = judgement(of.problem, left_out(found, (doubtful,)), held_out, of.measurements, report)
     kept = [one.hypothesis for one in decided.named]
     flanks = other_flanks(found.layout.unknowns, found.selection.best.p)
     common["indistinguishable"] = with_rivals(common["indistinguishable"], decided.named)
@@ -226,7 +232,7 @@ def left_out(found: Simulated, out: Sequence[Weighed]) -> Simulated:
         return found
     kept = [one for one in found.selection.entered if not any(one is other for other in out)]
     selection = only(found.simulator, found.selection, kept)
-    return replace(found, selection=selection, std=selection.best.std)
+    return replace(found, selection=selection, std=selection.best.std, out=(*found.out, *out))
 
 
 def seconded(found: Simulated, forces: Search) -> Simulated:
@@ -252,12 +258,16 @@ def with_rivals(groups: Sequence[tuple[str, ...]], named: Sequence[Weighed]) -> 
 
 
 def judgement(
-    problem: Problem, found: Simulated, held_out: Measurement | None, searched: Sequence[Measurement]
+    problem: Problem,
+    found: Simulated,
+    held_out: Measurement | None,
+    searched: Sequence[Measurement],
+    report: Report = lambda step: None,
 ) -> Judged:
     """What was found on the held-out record; without one that can be simulated, on the first record of the search."""
     judged = None
     if held_out is not None and held_out.phase_known:
-        judged = judged_on(problem, found, held_out, searched)
+        judged = judged_on(problem, found, held_out, searched, report)
     return judged or itself(problem, found)
 
 

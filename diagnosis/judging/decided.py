@@ -15,9 +15,9 @@ from gearbench.diagnosis.judging.drift import Drift
 from gearbench.diagnosis.judging.judged import GREATER, Judged
 from gearbench.diagnosis.judging.missing import Missing
 from gearbench.diagnosis.odds import Calibration
-from gearbench.diagnosis.output.selection import Weighed
 from gearbench.diagnosis.output.simulated import Simulated
 from gearbench.diagnosis.output.structure import lag_of_drive
+from gearbench.diagnosis.output.weighing import Weighed
 from gearbench.diagnosis.population import POPULATION
 from gearbench.diagnosis.verdict import Outcome
 from gearbench.diagnosis.words import percent

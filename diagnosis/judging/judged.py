@@ -8,7 +8,7 @@ band, or in one kind of line.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf
@@ -22,12 +22,14 @@ from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.intake.signals import measured_channels
 from gearbench.diagnosis.output.fit import Optimum
 from gearbench.diagnosis.output.passed_noise import noise_left, noise_rms
-from gearbench.diagnosis.output.selection import Weighed, only, taken_out
+from gearbench.diagnosis.output.selection import further, only, taken_out
 from gearbench.diagnosis.output.simulated import Simulated, nudges_of
 from gearbench.diagnosis.output.simulator import Simulator
 from gearbench.diagnosis.output.target import FITTED, Target, target_of
+from gearbench.diagnosis.output.weighing import Weighed
 
 Array = NDArray[np.float64]
+Report = Callable[[str], None]
 
 # By how much the gap must grow without an effect for it to be named.
 DUE = 1.1
@@ -167,11 +169,16 @@ class Sizes:
 
 
 def judged_on(
-    problem: Problem, found: Simulated, measured: Measurement, searched: Sequence[Measurement] = ()
+    problem: Problem,
+    found: Simulated,
+    measured: Measurement,
+    searched: Sequence[Measurement] = (),
+    report: Report = lambda step: None,
 ) -> Judged | None:
-    """The selection with only those effects that close a part of the gap of `measured`; None where the rig found cannot
-    answer that record. Those of the records `searched` whose flanks part, which the fit leaves out, judge what
-    `measured` does not feel, or feels too little of to speak for or against it."""
+    """The selection with only those effects that close a part of the gap of `measured`, and those whose place others
+    had that do not; None where the rig found cannot answer that record. Those of the records `searched` whose flanks
+    part, which the fit leaves out, judge what `measured` does not feel, or feels too little of to speak for or against
+    it."""
     band = problem.conditions[0].band
     noise = noise_left(found.layout.nominal, measured, found.simulator.simulate)
     condition = prepare(measured, problem.model, band)
@@ -183,18 +190,24 @@ def judged_on(
     rough = [one for one in searched if not any(one is own for own in smooth)]
     parted = [target_of([one], [prepare(one, problem.model, band)]) for one in rough]
     dropped: list[Weighed] = []
+    # A record that had part in the search cannot make up for what it lacked.
+    apart = not any(measured is searched for searched in smooth)
     while True:
         try:
             judged = _closings(found, target, measured, parted, noise)
         except ValueError:
             return None
         poor = [one for one in found.selection.entered if not _stays(judged, one)]
-        if not poor:
-            return replace(judged, dropped=tuple(dropped))
-        worst = min(poor, key=lambda one: judged.closings[one.hypothesis.name].gain)
-        kept = [one for one in found.selection.entered if one is not worst]
-        dropped.append(worst)
-        selection = only(found.simulator, found.selection, kept)
+        if poor:
+            worst = min(poor, key=lambda one: judged.closings[one.hypothesis.name].gain)
+            dropped.append(worst)
+            kept = [one for one in found.selection.entered if one is not worst]
+            selection = only(found.simulator, found.selection, kept)
+        else:
+            more = further(found.simulator, found.selection, (*found.out, *dropped), report, apart=apart)
+            if more is None:
+                return replace(judged, dropped=tuple(dropped))
+            selection = more
         found = replace(found, selection=selection, std=selection.best.std)
 
 

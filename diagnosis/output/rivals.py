@@ -14,7 +14,7 @@ from gearbench.diagnosis.output.fit import Optimum, fit
 from gearbench.diagnosis.output.simulator import Simulator
 
 if TYPE_CHECKING:
-    from gearbench.diagnosis.output.selection import Weighed
+    from gearbench.diagnosis.output.weighing import Weighed
 
 MOST_LEFT = 6.0  # nats still promised by fits that count for comparing them
 # Part of a rare effect's evidence that its usual counterpart must have: what both explain is nine tenths of it, and the

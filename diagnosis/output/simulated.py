@@ -26,10 +26,11 @@ from gearbench.diagnosis.output.fit import Optimum, fit_afresh
 from gearbench.diagnosis.output.layout import Layout, layout_of
 from gearbench.diagnosis.output.likely_teeth import with_likely_teeth, with_small_cracks
 from gearbench.diagnosis.output.passed_noise import noise_left
-from gearbench.diagnosis.output.selection import WORTH, Selection, Weighed, entering, select
+from gearbench.diagnosis.output.selection import Selection, select
 from gearbench.diagnosis.output.simulator import Simulator
 from gearbench.diagnosis.output.structure import beginnings
 from gearbench.diagnosis.output.target import target_of
+from gearbench.diagnosis.output.weighing import WORTH, Weighed, entering
 from gearbench.diagnosis.replay.replays import Replay
 from gearbench.rig import Case
 
@@ -54,6 +55,8 @@ class Simulated:
     std: Array  # (size,) of the unknowns at the optimum
     # Names of records whose motion need not repeat where nothing changes.
     restless: frozenset[str] = frozenset()
+    # Effects that entered and were left out again, not to be tried once more.
+    out: tuple[Weighed, ...] = ()
     _ends: dict[bytes, Array] = field(default_factory=dict)
 
     @property

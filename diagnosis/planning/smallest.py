@@ -22,7 +22,8 @@ from gearbench.diagnosis.evidence.calibration import LIMITS
 from gearbench.diagnosis.evidence.separable import APART
 from gearbench.diagnosis.judging.judged import DUE, GAIN, growth_of
 from gearbench.diagnosis.output.rivals import NEARLY
-from gearbench.diagnosis.output.selection import is_own, known_within, limit_of
+from gearbench.diagnosis.output.selection import known_within
+from gearbench.diagnosis.output.weighing import is_own, limit_of
 from gearbench.diagnosis.planning.information import Known, Without
 
 Array = NDArray[np.float64]

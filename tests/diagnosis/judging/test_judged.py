@@ -24,9 +24,11 @@ from gearbench.diagnosis.judging.judged import (
     judged_on,
     rms_closed,
 )
-from gearbench.diagnosis.output.selection import LIMIT, PROVISIONAL, Selection
+from gearbench.diagnosis.output import selection as selecting
+from gearbench.diagnosis.output.selection import Selection
 from gearbench.diagnosis.output.simulated import Simulated
 from gearbench.diagnosis.output.target import Target
+from gearbench.diagnosis.output.weighing import LIMIT, PROVISIONAL
 
 MATRIX, OTHER = sensitivities(3), sensitivities(4)  # the records of the search, and the judged one
 FRICTION = Hypothesis("friction", "mesh", (Wide("friction"),))
@@ -118,6 +120,13 @@ def test_an_effect_that_leaves_the_judged_record_as_it_was_is_not(monkeypatch: p
     assert abs(best[4]) < 0.05 and best[3] == pytest.approx(0.4, abs=0.05)
     none = judged({4: 0.3, 5: -0.2}, {}, monkeypatch)
     assert not none.found.selection.entered and none.found.selection.best is none.found.selection.base
+
+
+def test_what_had_no_place_beside_what_closes_nothing_is_kept_instead(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(selecting, "MOST", 1)
+    found = judged({3: 0.4, 4: 0.3, 5: -0.2}, {4: 0.3, 5: -0.2}, monkeypatch)
+    assert names(found.dropped) == ["friction"]
+    assert names(found.found.selection.entered) == ["torque-ripple"]
 
 
 def test_what_nudged_simulations_show_is_due_if_free_ones_show_it_too(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,9 +12,11 @@ from shared.fake_simulator import LINES, FakeSimulator, chosen, sensitivities, t
 from gearbench.diagnosis.effects.effect import Hypothesis, Wide
 from gearbench.diagnosis.forces.unknowns import group, unknowns_of
 from gearbench.diagnosis.output import selection as module
+from gearbench.diagnosis.output import weighing
 from gearbench.diagnosis.output.by_forces import Start
 from gearbench.diagnosis.output.rivals import compared, is_like, usual_of
-from gearbench.diagnosis.output.selection import LIMIT, Selection, Weighed, known_within
+from gearbench.diagnosis.output.selection import Selection, known_within
+from gearbench.diagnosis.output.weighing import LIMIT, Weighed
 
 MATRIX = sensitivities(3)
 FRICTION = Hypothesis("friction", "mesh", (Wide("friction"),))
@@ -78,6 +80,22 @@ def test_what_explains_the_records_as_well_is_a_rival_and_leaves_with_the_one_th
         assert named is not None and names(named) == [f"tooth-crack {other}"]
 
 
+def test_what_had_no_place_enters_when_another_is_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "MOST", 1)
+    true = np.array([0.08, -0.1, 0.02, 0.4, 0.3, -0.2, 0.0, 0.0])
+    simulator = FakeSimulator(lambda q: q @ MATRIX, target(true @ MATRIX))
+    found = chosen(simulator, LISTED, [np.zeros(8)], {})
+    assert found is not None and names(found) == ["friction"]
+    bare = module.only(simulator, found, [])  # type: ignore[arg-type]
+    assert module.further(simulator, bare, []) is None  # type: ignore[arg-type]
+    more = module.further(simulator, bare, found.entered)  # type: ignore[arg-type]
+    assert more is not None and names(more) == ["torque-ripple"]
+    # The friction is still in the lines.
+    assert more.best.p[4:6] == pytest.approx([0.3, -0.2], abs=0.1) and not more.bare.p[4:6].any()
+    # Nothing that is out is tried again, and what was worth nothing is not tried at all.
+    assert module.further(simulator, bare, (*found.entered, *more.entered)) is None  # type: ignore[arg-type]
+
+
 def test_a_rare_effect_gives_way_to_a_usual_one_that_explains_nearly_as_much() -> None:
     optimum = selected({3: 0.4}).best
     rare = Weighed(replace(FRICTION, usual=(("ripple",), -0.5)), 100.0, optimum)
@@ -117,14 +135,14 @@ def test_two_effects_enter_the_larger_first_and_each_is_needed() -> None:
 
 
 def test_a_fit_that_fails_costs_its_hypothesis_and_nothing_else(monkeypatch: pytest.MonkeyPatch) -> None:
-    refit = module._refit
+    refit = weighing._refit
 
     def failing(simulator: object, base: object, one: Hypothesis, *rest: object) -> object:
         if one is RIPPLE:
             raise np.linalg.LinAlgError("not positive definite")
         return refit(simulator, base, one, *rest)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(module, "_refit", failing)
+    monkeypatch.setattr(weighing, "_refit", failing)
     found = selected({3: 0.5, 4: 0.2, 5: -0.15})
     assert names(found) == ["friction"]
     assert next(one for one in found.weighed if one.hypothesis is RIPPLE).optimum is None
@@ -165,7 +183,7 @@ def test_a_start_keeps_what_only_its_own_rig_feels() -> None:
     near = module.fit_afresh(simulator, at_rest.p, at_rest.sd, renewals=0)
     assert near is not None and 2 not in near.sensitivity.quadratic.active
     start = Start(FRICTION, np.array([0, 0, 0.14, 0.37, 0, 0, 0, 0.0]), 30.0)
-    found = module._refit(simulator, near, FRICTION, np.zeros(len(near.sensitivity.quadratic.active)), start, 0)
+    found = weighing._refit(simulator, near, FRICTION, np.zeros(len(near.sensitivity.quadratic.active)), start, 0)
     assert found is not None and found.p[2:4] == pytest.approx([0.15, 0.4], abs=0.03)
 
 

@@ -9,9 +9,9 @@ from gearbench.cases import case_files
 from gearbench.diagnosis.effects.effect import Hypothesis
 from gearbench.diagnosis.effects.library import hypotheses
 from gearbench.diagnosis.output.quadratic import prior_cost
-from gearbench.diagnosis.output.selection import limit_of, relief
 from gearbench.diagnosis.output.simulator import Simulator
 from gearbench.diagnosis.output.target import target_of
+from gearbench.diagnosis.output.weighing import limit_of, relief
 from gearbench.diagnosis.planning.information import Known, known_of
 from gearbench.diagnosis.planning.planned import Planned, planned
 from gearbench.diagnosis.planning.smallest import View, direction, smallest, wide_prior

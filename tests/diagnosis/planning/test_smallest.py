@@ -15,7 +15,7 @@ from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
 from gearbench.diagnosis.effects.tooth_crack import TOOTH_CRACK
 from gearbench.diagnosis.effects.torque_ripple import TORQUE_RIPPLE
 from gearbench.diagnosis.output.quadratic import quadratic_of
-from gearbench.diagnosis.output.selection import LIMIT
+from gearbench.diagnosis.output.weighing import LIMIT
 from gearbench.diagnosis.planning.information import Blocks, Known, Without
 from gearbench.diagnosis.planning.smallest import View, apart_from, direction, largest, rivals_at, smallest, wide_prior
 
