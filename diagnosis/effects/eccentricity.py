@@ -18,6 +18,7 @@ from gearbench.diagnosis.effects.effect import (
     Wide,
     changed,
     of_gears,
+    twins_of,
 )
 from gearbench.diagnosis.effects.once_per_turn import once_of
 from gearbench.diagnosis.forces.condition import Condition
@@ -64,7 +65,10 @@ def unknowns(model: NominalModel, conditions: Sequence[Condition]) -> tuple[Grou
 def hypotheses(model: NominalModel) -> tuple[Hypothesis, ...]:
     """One gear of the two."""
     return tuple(
-        Hypothesis(f"eccentricity {side}", "mesh", (Wide(key),), (side,), len(KEYS)) for side, key in KEYS.items()
+        Hypothesis(
+            f"eccentricity {side}", "mesh", (Wide(key),), (side,), len(KEYS), twins=twins_of(KEYS, side, model.teeth)
+        )
+        for side, key in KEYS.items()
     )
 
 

@@ -59,6 +59,7 @@ class Hypothesis:
     many like it it was picked. Of those that differ by a tooth's number only one for each gear is `representative` of
     what forces can tell apart. A rare one is not named where a `usual` one like it explains the records nearly as well:
     keys of the unknowns of such, and how many times those of this one they are for the same transmission error.
+    `twins`: keys of the unknowns by which the other gear makes lines of the same frequencies.
     """
 
     name: str
@@ -68,6 +69,7 @@ class Hypothesis:
     choices: int = 1
     representative: bool = True
     usual: tuple[tuple[str, ...], float] | None = None
+    twins: tuple[str, ...] = ()
     effect: Effect | None = None
 
     def entries(self, unknowns: Unknowns) -> NDArray[np.int64]:
@@ -78,6 +80,10 @@ class Hypothesis:
         """Whether the other is a usual one like this rare one."""
         return self.usual is not None and any(wide.key in self.usual[0] for wide in other.wide)
 
+    def is_twin_of(self, other: Hypothesis) -> bool:
+        """Whether the other is the same in the other gear, and makes lines of the same frequencies."""
+        return all(wide.key in self.twins for wide in other.wide)
+
     def prior(self, unknowns: Unknowns) -> Array:
         """Prior standard deviations (size,) under this hypothesis."""
         return self.widened(unknowns, unknowns.prior())
@@ -85,6 +91,11 @@ class Hypothesis:
     def widened(self, unknowns: Unknowns, sd: Array) -> Array:
         """The prior `sd` (size,) with that of this hypothesis made wide."""
         return widened(unknowns, self.wide, sd)
+
+
+def twins_of(keys: Mapping[str, str], side: str, teeth: Sequence[int]) -> tuple[str, ...]:
+    """Keys by which the other gear turns as often: of `keys` by gear, none where the numbers of teeth differ."""
+    return tuple(key for other, key in keys.items() if other != side) if teeth[0] == teeth[1] else ()
 
 
 def widened(unknowns: Unknowns, wide: Sequence[Wide], sd: Array) -> Array:

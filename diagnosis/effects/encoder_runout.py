@@ -3,13 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.diagnosis.effects.eccentricity import KEYS as RUNOUTS
-from gearbench.diagnosis.effects.effect import SIDES, Added, Effect, Estimate, Fitted, Hypothesis, Wide, changed
+from gearbench.diagnosis.effects.effect import (
+    SIDES,
+    Added,
+    Effect,
+    Estimate,
+    Fitted,
+    Hypothesis,
+    Wide,
+    changed,
+    twins_of,
+)
 from gearbench.diagnosis.effects.once_per_turn import once_of
 from gearbench.diagnosis.forces.condition import Condition
 from gearbench.diagnosis.forces.nominal import NominalModel
@@ -47,7 +58,8 @@ def hypotheses(model: NominalModel) -> tuple[Hypothesis, ...]:
     out = []
     for side, key in KEYS.items():
         usual = (alike or (RUNOUTS[side],), -ADDS[side])
-        out.append(Hypothesis(f"encoder-runout {side}", "sensor", (Wide(key),), (side,), len(KEYS), False, usual))
+        one = Hypothesis(f"encoder-runout {side}", "sensor", (Wide(key),), (side,), len(KEYS), False, usual)
+        out.append(replace(one, twins=twins_of(KEYS, side, model.teeth)))
     return tuple(out)
 
 

@@ -16,6 +16,7 @@ from gearbench.diagnosis.effects.effect import (
     Wide,
     changed,
     of_gears,
+    twins_of,
 )
 from gearbench.diagnosis.forces.condition import Condition
 from gearbench.diagnosis.forces.nominal import NominalModel
@@ -43,7 +44,14 @@ def hypotheses(model: NominalModel) -> tuple[Hypothesis, ...]:
     """Either gear, or both."""
     chosen = {"driver": SIDES[:1], "driven": SIDES[1:], "both": SIDES}
     return tuple(
-        Hypothesis(f"pitch-error {name}", "mesh", tuple(Wide(KEYS[side]) for side in sides), sides, len(chosen))
+        Hypothesis(
+            f"pitch-error {name}",
+            "mesh",
+            tuple(Wide(KEYS[side]) for side in sides),
+            sides,
+            len(chosen),
+            twins=twins_of(KEYS, name, model.teeth) if name in SIDES else (),
+        )
         for name, sides in chosen.items()
     )
 

@@ -74,10 +74,13 @@ def rivals_of(winner: Weighed, weighed: Sequence[Weighed]) -> tuple[Hypothesis, 
 
 
 def _as_good(one: Weighed, winner: Weighed) -> bool:
-    """Whether one explains the records as another cause does."""
+    """Whether one explains the records as another cause does; of twins what tells them apart is a resonance, too."""
+    behind = APART
+    if one.hypothesis.is_twin_of(winner.hypothesis):
+        behind = max(behind, (1.0 - NEARLY) * winner.log_bayes_factor)
     return (
         one.optimum is not None
-        and one.log_bayes_factor > winner.log_bayes_factor - APART
+        and one.log_bayes_factor > winner.log_bayes_factor - behind
         and not is_same(one.hypothesis, winner.hypothesis)
         and not _same_cause(one.hypothesis, winner.hypothesis)
     )

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from shared.fake_simulator import LINES, FakeSimulator, chosen, sensitivities, target
 
-from gearbench.diagnosis.effects.effect import Hypothesis, Wide
+from gearbench.diagnosis.effects.effect import Hypothesis, Wide, twins_of
 from gearbench.diagnosis.forces.unknowns import group, unknowns_of
 from gearbench.diagnosis.output import selection as module
 from gearbench.diagnosis.output import weighing
 from gearbench.diagnosis.output.by_forces import Start
-from gearbench.diagnosis.output.rivals import compared, is_like, usual_of
+from gearbench.diagnosis.output.rivals import compared, is_like, rivals_of, usual_of
 from gearbench.diagnosis.output.selection import Selection, known_within
 from gearbench.diagnosis.output.weighing import LIMIT, Weighed
 
@@ -78,6 +78,16 @@ def test_what_explains_the_records_as_well_is_a_rival_and_leaves_with_the_one_th
         listed = (FRICTION, RIPPLE, *(replace(CRACKS[one], usual=rare.get(one)) for one in range(2)))
         named = chosen(simulator, listed, [np.zeros(8)], {})
         assert named is not None and names(named) == [f"tooth-crack {other}"]
+
+
+def test_of_gears_with_as_many_teeth_the_other_is_a_rival_unless_far_behind() -> None:
+    optimum = selected({3: 0.4}).best
+    winner = Weighed(replace(FRICTION, on=("driver",)), 100.0, optimum)
+    for nats, twins, rivals in (80.0, ("friction",), 1), (70.0, ("friction",), 0), (80.0, (), 0), (98.0, (), 1):
+        other = Weighed(replace(RIPPLE, on=("driven",), twins=twins), nats, optimum)
+        assert len(rivals_of(winner, [winner, other])) == rivals
+    assert twins_of({"driver": "one", "driven": "two"}, "driver", (30, 30)) == ("two",)
+    assert twins_of({"driver": "one", "driven": "two"}, "driver", (30, 31)) == ()
 
 
 def test_what_had_no_place_enters_when_another_is_out(monkeypatch: pytest.MonkeyPatch) -> None:
