@@ -16,8 +16,9 @@ from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
 from gearbench.diagnosis.effects.torque_ripple import KEY as RIPPLE
 from gearbench.diagnosis.output.beginning import Around, levelled, linear_cost, seen_by
 from gearbench.diagnosis.output.fit import Optimum, cost_of, fit, fit_afresh, gone_on
+from gearbench.diagnosis.output.hidden_housing import hidden_housings
 from gearbench.diagnosis.output.simulator import Simulator
-from gearbench.diagnosis.output.structure import SEAT, housings_below, otherwise
+from gearbench.diagnosis.output.structure import SEAT, otherwise
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -93,7 +94,7 @@ def _on_a_housing(simulator: Simulator, found: Optimum, report: Report) -> Optim
     has none."""
     alone = simulator.of_record(simulator.target.most_excited)
     report("simulating: sensors on a housing")
-    trials = housings_below(simulator.layout.unknowns, found.p)
+    trials = hidden_housings(alone, found.p)
     if not trials:
         return None
     begin = min(trials, key=lambda p: linear_cost(alone, p, found.sd))

@@ -79,7 +79,6 @@ NAMES = (
 )
 # Where a fit begins with them: below some per cent a rig does not show them.
 ACROSS_BEGIN, HOUSING_BEGIN = 0.15, 0.04
-BELOW_AT = tuple(np.linspace(-2.2, 0.6, 8))  # logarithms of a housing's frequency over the supports'
 
 
 def structure_groups(rig: Rig, model: NominalModel) -> list[Group]:
@@ -136,24 +135,6 @@ def housings(unknowns: Unknowns, p: Array) -> list[Array]:
     return out
 
 
-def housings_below(unknowns: Unknowns, p: Array) -> list[Array]:
-    """`p` (size,) with one motion of a housing that moves across the supports as well and on which the displacement
-    sensors stand: they see none of it, so that nothing but the transmission error shows where it resonates."""
-    out: list[Array] = []
-    if HOUSING not in unknowns.slices:
-        return out
-    plain, soft = seated(unknowns, p), p[unknowns[ACROSS]]
-    plain[unknowns[HOUSING]], plain[unknowns[OBLIQUE]] = 0.0, 0.0
-    plain[unknowns[ACROSS]] = np.where(soft > STIFFEST, soft, ACROSS_BEGIN)
-    signs = product((1.0, -1.0), repeat=2)
-    for motion, frequency, across in product(range(len(MOTIONS)), BELOW_AT, signs):
-        trial = with_motion(unknowns, plain, motion, frequency, HOUSING_BEGIN)
-        first = unknowns[OBLIQUE].start + len(SIDES) * motion
-        trial[first : first + len(SIDES)] = across
-        out.append(trial)
-    return out
-
-
 def with_motion(unknowns: Unknowns, p: Array, motion: int, frequency: float, compliance: float) -> Array:
     """`p` (size,) with a motion of the housing of that compliance and logarithm of the frequency, its shares equal."""
     out = p.copy()
@@ -193,8 +174,7 @@ def housing_of(
 ) -> Housing:
     """The housing of compliances (2,), frequencies and dampings (4,), shapes (2,), shares across (4,) and the sensors'
     seat (1,) as unknowns, one compliance at least above `NONE`."""
-    mean = 2.0 / (1.0 / model.stiffness[0] + 1.0 / model.stiffness[1])
-    pace = sqrt(mean / (0.5 * (model.mass[0] + model.mass[1])))
+    mean, pace = _mean(model), pace_of(model)
     motions = []
     for number in np.flatnonzero(compliance > NONE):
         frequency, damping = (float(value) for value in modes[2 * number : 2 * number + 2])
@@ -213,6 +193,16 @@ def housing_of(
         )
     rocking = Rocking(**motions[1]) if len(motions) > 1 else None
     return Housing(**motions[0], sensor_share=float(seat[0]), rocking=rocking)
+
+
+def pace_of(model: NominalModel) -> float:
+    """Angular frequency [rad/s] of a gear on its support, that of a housing is told by: of the means of both."""
+    return sqrt(_mean(model) / (0.5 * (model.mass[0] + model.mass[1])))
+
+
+def _mean(model: NominalModel) -> float:
+    """Stiffness [N/m] of the mean compliance of both supports."""
+    return 2.0 / (1.0 / model.stiffness[0] + 1.0 / model.stiffness[1])
 
 
 def seated(unknowns: Unknowns, p: Array) -> Array:
