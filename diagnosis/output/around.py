@@ -40,6 +40,7 @@ from gearbench.diagnosis.output.structure import (
     HOUSED,
     HOUSING,
     MOTIONS,
+    NONE,
     SEAT,
     seated,
     with_motion,
@@ -120,7 +121,7 @@ def _found(layout: Layout, lines: Sequence[Lines], cost: float, best: Array) -> 
     if not motions:
         return best
     # The mesh pushes both gears apart: a housing that moves along answers faintly, and is imitated from afar.
-    trials = [with_motion(unknowns, best, 0, at, HOUSING_FROM[-1]) for at in FAINT_AT]
+    trials = [with_motion(unknowns, best, 0, at, HOUSING_FROM[-1], 0) for at in FAINT_AT]
     tried = [_fitted(layout, lines, trial, (*KEYS, *HOUSED), LEVELS[1:], FAINT_EVALUATIONS) for trial in trials]
     value, p = min(tried, key=lambda one: one[0])
     return _fitted(layout, lines, p, (*KEYS, *HOUSED), LEVELS[1:])[1] if value < cost else best
@@ -147,10 +148,17 @@ def _crossing(unknowns: Unknowns, p: Array, side: int) -> list[Array]:
 
 
 def _moving(unknowns: Unknowns, p: Array, motion: int) -> list[Array]:
-    """`p` (size,) without a motion of the housing, then with it where it might resonate."""
+    """`p` (size,) without a motion of the housing, then with it where it might resonate, of either kind: one that is
+    not there yet where there is one, as what it is called where there are both."""
+    there = p[unknowns[HOUSING]] > NONE
+    alone, motion = not there.any(), motion if there.all() else int(np.argmin(there))
     without = p.copy()
     without[unknowns[HOUSING].start + motion] = 0.0
-    return [without, *(with_motion(unknowns, p, motion, at, part) for part, at in product(HOUSING_FROM, HOUSING_AT))]
+    trials = product(range(len(MOTIONS)), HOUSING_FROM, HOUSING_AT)
+    return [
+        without,
+        *(with_motion(unknowns, p, kind if alone else motion, at, part, kind) for kind, part, at in trials),
+    ]
 
 
 def _misfit(layout: Layout, lines: Sequence[Lines], p: Array) -> float:

@@ -9,7 +9,7 @@ lines, and only the best are simulated.
 
 from __future__ import annotations
 
-from itertools import permutations, product
+from itertools import product
 from math import exp, log, pi
 from typing import NamedTuple
 
@@ -65,9 +65,10 @@ class Lines(NamedTuple):
 
 
 class Resonance(NamedTuple):
-    """A motion of the housing, its shares across (2,), logarithm of its frequency, damping ratio and compliance."""
+    """A motion of the housing: its kind, shares across (2,), logarithm of its frequency, damping ratio and
+    compliance."""
 
-    motion: int
+    kind: int
     across: tuple[float, ...]
     at: float
     ratio: float
@@ -75,8 +76,8 @@ class Resonance(NamedTuple):
 
 
 def hidden_housings(simulator: Simulator, p: Array) -> list[Array]:
-    """`p` (size,) with sensors on a housing whose resonances explain the excited lines best: with one motion and with
-    both, the first of which is either; nothing where a rig has none to find, or no line is excited."""
+    """`p` (size,) with sensors on a housing whose resonances explain the excited lines best, one and two of them;
+    nothing where a rig has none to find, or no line is excited."""
     unknowns = simulator.layout.unknowns
     if HOUSING not in unknowns.slices:
         return []
@@ -86,17 +87,21 @@ def hidden_housings(simulator: Simulator, p: Array) -> list[Array]:
         return []
     left = (simulator.target.lines - here)[lines.at]
     shares = _shares(simulator, plain, here, lines)
-    pace, out = pace_of(simulator.layout.model), []
-    for order in permutations(range(len(MOTIONS))):
-        rest, trial = left, plain
-        for motion in order:
-            mine = {across: share for (one, across), share in shares.items() if one == motion}
-            if not mine:
-                break
-            found, rest = _best(mine, motion, rest, lines, pace)
-            trial = _with(unknowns, trial, found)
-            out.append(trial)
-    return out
+    if not shares:
+        return []
+    pace = pace_of(simulator.layout.model)
+    alone, rest = _best(shares, left, lines, pace)
+    pair, parts = [alone, alone], [left - rest, np.zeros_like(left)]
+    # Each beside the other, the new one first.
+    for number in (1, 0, 1):
+        beside = left - parts[1 - number]
+        pair[number], rest = _best(shares, beside, lines, pace)
+        parts[number] = beside - rest
+    one, two = (pair if pair[0].kind <= pair[1].kind else reversed(pair))
+    return [
+        _with(unknowns, plain, alone, alone.kind),
+        _with(unknowns, _with(unknowns, plain, one, 0), two, 1),
+    ]
 
 
 def excited_lines(target: Target) -> Lines | None:
@@ -121,15 +126,15 @@ def _without(unknowns: Unknowns, p: Array) -> Array:
 def _shares(
     simulator: Simulator, plain: Array, here: Complex, lines: Lines
 ) -> dict[tuple[int, tuple[float, ...]], Complex]:
-    """E (n,) by motion and shares across."""
+    """E (n,) by kind of motion and shares across."""
     unknowns, pace = simulator.layout.unknowns, pace_of(simulator.layout.model)
     answer = STIFF * _answer(lines.omega, pace * exp(STIFF_AT), HOUSING_RATIO)
     out = {}
-    for motion, across in product(range(len(MOTIONS)), product((1.0, -1.0), repeat=len(SIDES))):
-        trial = _with(unknowns, plain, Resonance(motion, across, STIFF_AT, HOUSING_RATIO, STIFF))
+    for kind, across in product(range(len(MOTIONS)), product((1.0, -1.0), repeat=len(SIDES))):
+        trial = _with(unknowns, plain, Resonance(kind, across, STIFF_AT, HOUSING_RATIO, STIFF), kind)
         moved = simulator.lines(trial)
         if moved is not None:
-            out[motion, across] = (moved - here)[lines.at] / answer
+            out[kind, across] = (moved - here)[lines.at] / answer
     return out
 
 
@@ -139,26 +144,26 @@ def _answer(omega: Array, own: float, ratio: float) -> Complex:
 
 
 def _best(
-    shares: dict[tuple[float, ...], Complex], motion: int, left: Complex, lines: Lines, pace: float
+    shares: dict[tuple[int, tuple[float, ...]], Complex], left: Complex, lines: Lines, pace: float
 ) -> tuple[Resonance, Complex]:
-    """The resonance of a motion that explains most of what is `left` (n,), and what it leaves."""
+    """The resonance that explains most of what is `left` (n,), and what it leaves."""
     parts = np.array(PARTS)[:, None]
     best: tuple[float, Resonance, Complex] | None = None
-    for (across, share), at, ratio in product(shares.items(), SOUGHT_AT, RATIOS):
+    for ((kind, across), share), at, ratio in product(shares.items(), SOUGHT_AT, RATIOS):
         rest = left - parts * share * _answer(lines.omega, pace * exp(at), ratio)
         costs = lines.costs(rest)
         number = int(np.argmin(costs))
         if best is None or costs[number] < best[0]:
-            found = Resonance(motion, across, float(at), ratio, PARTS[number])
+            found = Resonance(kind, across, float(at), ratio, PARTS[number])
             best = float(costs[number]), found, rest[number]
     assert best is not None
     return best[1], best[2]
 
 
-def _with(unknowns: Unknowns, p: Array, found: Resonance) -> Array:
-    """`p` (size,) with a resonance."""
-    out = with_motion(unknowns, p, found.motion, found.at, found.part)
-    out[unknowns[MODE].start + 2 * found.motion + 1] = log(found.ratio / HOUSING_RATIO)
-    first = unknowns[OBLIQUE].start + len(SIDES) * found.motion
+def _with(unknowns: Unknowns, p: Array, found: Resonance, motion: int) -> Array:
+    """`p` (size,) with a resonance as that motion of its housing."""
+    out = with_motion(unknowns, p, motion, found.at, found.part, found.kind)
+    out[unknowns[MODE].start + 2 * motion + 1] = log(found.ratio / HOUSING_RATIO)
+    first = unknowns[OBLIQUE].start + len(SIDES) * motion
     out[first : first + len(SIDES)] = found.across
     return out

@@ -84,7 +84,8 @@ def _from_around(simulator: Simulator, found: Optimum, around: Around | None, re
     report("simulating: the rig around its mesh")
     begin = levelled(simulator, seen, held, found.sd)
     best = fit_afresh(simulator, begin, found.sd, renewals=RENEWALS, chosen=chosen)
-    if best is None or best.cost > found.cost:
+    # What waits is missing in the other lines.
+    if best is None or linear_cost(simulator, best.p, found.sd) > linear_cost(simulator, found.p, found.sd):
         return None
     return fit_afresh(simulator, best.p, found.sd, renewals=RENEWALS)
 

@@ -36,10 +36,11 @@ DAMPED, DAMPED_SD, DAMPED_LARGEST = "across-damping", 0.5, 2.0
 # that of a gear on its support, and of its damping ratio over a twentieth.
 HOUSING, HOUSING_SD, HOUSING_LARGEST = "housing", 0.04, 0.5
 MODE, MODE_SD, MODE_LARGEST, HOUSING_RATIO = "housing-mode", 0.7, 2.0, 0.05
-# It moves along both supports, and it rocks, which is what the mesh pushes at. The angle whose cosine and sine are to
-# each other as the shares of driver's and driven support: an eighth of a turn where they are equal, and what departs.
+# It has two motions: as a rule it moves along both supports, and it rocks, which is what the mesh pushes at; but both
+# may be of one kind. The angle whose cosine and sine are to each other as the shares of driver's and driven support: an
+# eighth of a turn where they are equal, and what departs, by a quarter of one into the other kind.
 MOTIONS = ("along", "rocking")
-SHAPE, SHAPE_SD, SHAPE_LARGEST = "housing-shape", 0.4, pi / 4
+SHAPE, SHAPE_SD, SHAPE_LARGEST = "housing-shape", pi / 4, 3 * pi / 4
 EQUAL = (pi / 4, -pi / 4)
 # Shares across of either motion, over the root mean square of those along: few housings move along alone.
 OBLIQUE, OBLIQUE_SD, OBLIQUE_LARGEST = "housing-across", 0.5, 2.0
@@ -129,18 +130,19 @@ def housings(unknowns: Unknowns, p: Array) -> list[Array]:
     out = [p]
     if HOUSING not in unknowns.slices:
         return out
-    for motion, frequency in product(range(len(MOTIONS)), (-1.0, -0.5, 0.0, 0.5)):
+    for motion, kind, frequency in product(range(len(MOTIONS)), range(len(MOTIONS)), (-1.0, -0.5, 0.0, 0.5)):
         if p[unknowns[HOUSING]][motion] <= NONE:
-            out.append(with_motion(unknowns, p, motion, frequency, HOUSING_BEGIN))
+            out.append(with_motion(unknowns, p, motion, frequency, HOUSING_BEGIN, kind))
     return out
 
 
-def with_motion(unknowns: Unknowns, p: Array, motion: int, frequency: float, compliance: float) -> Array:
-    """`p` (size,) with a motion of the housing of that compliance and logarithm of the frequency, its shares equal."""
+def with_motion(unknowns: Unknowns, p: Array, motion: int, frequency: float, compliance: float, kind: int) -> Array:
+    """`p` (size,) with a motion of the housing of that compliance and logarithm of the frequency, of a kind (its number
+    among MOTIONS) and with equal shares."""
     out = p.copy()
     out[unknowns[HOUSING].start + motion] = compliance
     out[unknowns[MODE].start + 2 * motion] = frequency
-    out[unknowns[SHAPE].start + motion] = 0.0
+    out[unknowns[SHAPE].start + motion] = EQUAL[kind] - EQUAL[motion]
     return out
 
 
@@ -240,9 +242,16 @@ def structure_found(unknowns: Unknowns, p: Array, std: Array) -> tuple[Found, ..
             at = unknowns[key].start + index
             if abs(p[at]) > 2.0 * std[at] > 0.0:
                 reach = NINE_OF_TEN * std[at]
-                out.append(Found(name=_named(part, name), value=float(p[at]),
+                kind = kind_of(unknowns, p, index) if key == HOUSING else part
+                out.append(Found(name=_named(kind, name), value=float(p[at]),
                                  low=float(p[at] - reach), high=float(p[at] + reach), unit=unit))  # fmt: skip
     return tuple(out)
+
+
+def kind_of(unknowns: Unknowns, p: Array, motion: int) -> str:
+    """Which of MOTIONS a motion is by its shares."""
+    angle = EQUAL[motion] + float(p[unknowns[SHAPE]][motion])
+    return MOTIONS[0 if cos(angle) * sin(angle) > 0.0 else 1]
 
 
 def _named(part: str, name: str) -> str:

@@ -19,7 +19,7 @@ from gearbench.diagnosis.intake.measurements import measurement
 from gearbench.diagnosis.output.answering import left_over, left_over_moved, lines_of, slopes_of, system_of
 from gearbench.diagnosis.output.around import KEYS, MOVED, REACTION, around
 from gearbench.diagnosis.output.layout import Layout, layout_of
-from gearbench.diagnosis.output.structure import ACROSS, CROSS, HOUSED, HOUSING, MODE, SEAT, SHAPE
+from gearbench.diagnosis.output.structure import ACROSS, CROSS, HOUSED, HOUSING, MODE, SEAT, SHAPE, kind_of
 from gearbench.rig import read_case
 
 K1, K2, SOFTNESS, RATIO = 0.93e8, 1.08e8, 0.06, 0.05  # stiffness of the supports, compliance of the housing, damping
@@ -43,11 +43,12 @@ def recorded(
     seat: float = 0.0,
     parted: bool = False,
     coupling: tuple[float, float] | None = None,
+    more: tuple[float, tuple[float, float]] | None = None,
 ) -> Condition:
     """A condition whose rig has a housing of that logarithm of frequency (None: none), of which the supports make these
-    shares, a late sensor of the driver's displacement [s], displacement sensors that make a part `seat` of the
-    supports' motion, and any force in the mesh, `parted` half of the time; `coupling`: stiffness [N m/rad] and
-    damping of what is between rotor and driver."""
+    shares (`more`: both of another motion), a late sensor of the driver's displacement [s], displacement sensors that
+    make a part `seat` of the supports' motion, and any force in the mesh, `parted` half of the time; `coupling`:
+    stiffness [N m/rad] and damping of what is between rotor and driver."""
     m = layout.model
     rng = np.random.default_rng(3)
     omega = like.omega[: like.bins]
@@ -56,10 +57,7 @@ def recorded(
     if parted:
         force = np.fft.rfft(np.maximum(np.fft.irfft(force), 0.0))[: like.bins]
     mean = 2 / (1 / m.stiffness[0] + 1 / m.stiffness[1])
-    big = mean / SOFTNESS
-    heavy = np.exp(-2.0 * (frequency or 0.0)) * 0.5 * (m.mass[0] + m.mass[1]) * big / mean
-    damped = 2 * RATIO * np.sqrt(big * heavy)
-    s = 1j * omega
+    big, s = mean / SOFTNESS, 1j * omega
     mass = heavier * (m.inertia[0] + m.rotor) / m.base_radius[0] ** 2
     turning = (torque / m.base_radius[0] - force) / (mass * s**2 + (omega == 0))
     if coupling is not None:
@@ -69,21 +67,22 @@ def recorded(
         moving = driver * s**2 + passed * rotor * s**2 + (omega == 0)
         turning = (passed * torque / m.base_radius[0] - force) / moving
     one, two = (k + s * c for k, c in zip((K1, K2), m.damping, strict=True))
-    housing = big + s * damped + s**2 * heavy
-    a, b = shares
-    rows = np.array(
-        [
-            [m.mass[0] * s**2 + one, 0 * s, -a * one],
-            [0 * s, m.mass[1] * s**2 + two, -b * two],
-            [-a * one, -b * two, housing + a**2 * one + b**2 * two],
-        ]
-    )
-    push = np.array([-m.support_factor * force, m.support_factor * force, 0 * force])
-    if frequency is None:
-        y = np.array([push[0] / rows[0, 0], push[1] / rows[1, 1]])
-    else:
-        moved = np.linalg.solve(np.moveaxis(rows, 2, 0), push.T[..., None])[:, :, 0].T
-        y = moved[:2] - seat * np.outer(shares, moved[2])
+    motions = [(frequency, shares)] if frequency is not None else []
+    motions += [more] if more is not None else []
+    rows = np.zeros((2 + len(motions), 2 + len(motions), len(omega)), dtype=complex)
+    rows[0, 0], rows[1, 1] = m.mass[0] * s**2 + one, m.mass[1] * s**2 + two
+    for number, (at, (a, b)) in enumerate(motions, start=2):
+        heavy = np.exp(-2.0 * at) * 0.5 * (m.mass[0] + m.mass[1]) * big / mean
+        rows[number, number] += big + s * 2 * RATIO * np.sqrt(big * heavy) + s**2 * heavy
+        rows[0, number] = rows[number, 0] = -a * one
+        rows[1, number] = rows[number, 1] = -b * two
+        for other, (_, (c, d)) in enumerate(motions, start=2):
+            rows[number, other] += a * c * one + b * d * two
+    push = np.array([-m.support_factor * force, m.support_factor * force, *(0 * force for _ in motions)])
+    moved = np.linalg.solve(np.moveaxis(rows, 2, 0), push.T[..., None])[:, :, 0].T
+    y = moved[:2].copy()
+    for number, (_, both) in enumerate(motions, start=2):
+        y -= seat * np.outer(both, moved[number])
     # The driven gear turns with a load of ten times its inertia, of which it takes its own part of the force.
     driven = force * m.base_radius[1] ** 2 / (11 * m.inertia[1] * s**2 + (omega == 0))
     reaction = m.base_radius[1] * force - m.inertia[1] * s**2 * driven / m.base_radius[1]
@@ -123,6 +122,17 @@ def test_a_housing_that_rocks_is_found_a_late_sensor_and_inertia(rig: tuple[Layo
     assert found[unknowns[MODE]][2] == pytest.approx(0.3, abs=0.01)
     assert np.tan(found[unknowns[SHAPE]][1] - np.pi / 4) == pytest.approx(shares[1] / shares[0], abs=0.02)
     assert found[unknowns["delay-y_driver"]][0] == pytest.approx(late, rel=0.05)
+
+
+def test_a_housing_of_which_both_motions_rock_is_found(rig: tuple[Layout, Condition]) -> None:
+    layout, like = rig
+    record = recorded(layout, like, -0.9, shares=(1.0, -0.9), more=(0.2, (0.7, -1.0)))
+    found = around(layout, [record], np.zeros(layout.size))
+    assert found is not None
+    unknowns = layout.unknowns
+    assert sorted(found[unknowns[MODE]][[0, 2]]) == pytest.approx([-0.9, 0.2], abs=0.02)
+    assert kind_of(unknowns, found, 0) == kind_of(unknowns, found, 1) == "rocking"
+    assert found[unknowns["stiffness"]] == pytest.approx(np.log([K1, K2] / np.array(layout.model.stiffness)), abs=0.01)
 
 
 @pytest.mark.parametrize("parted", [False, True])

@@ -35,7 +35,7 @@ def bench() -> Bench:
     simulator = demonstration(Load(coupling=OutputShaft(stiffness=4e6, damping=50.0)))
     unknowns, p = simulator.layout.unknowns, np.zeros(simulator.layout.size)
     for motion, frequency in enumerate((0.3, -0.2)):
-        p = with_motion(unknowns, p, motion, frequency, 0.05)
+        p = with_motion(unknowns, p, motion, frequency, 0.05, motion)
     p[unknowns[ACROSS]], p[unknowns[CROSS]] = (0.2, 0.15), (0.1, -0.1)
     p[unknowns[BEARINGS["driver"]]], p[unknowns[LOADED]] = 0.2, 0.6
     return Bench(simulator, p, jacobian_at(simulator, p))
