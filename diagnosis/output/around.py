@@ -40,8 +40,8 @@ from gearbench.diagnosis.output.structure import (
     HOUSED,
     HOUSING,
     MOTIONS,
-    NONE,
     SEAT,
+    free_motions,
     seated,
     with_motion,
 )
@@ -148,17 +148,14 @@ def _crossing(unknowns: Unknowns, p: Array, side: int) -> list[Array]:
 
 
 def _moving(unknowns: Unknowns, p: Array, motion: int) -> list[Array]:
-    """`p` (size,) without a motion of the housing, then with it where it might resonate, of either kind: one that is
-    not there yet where there is one, as what it is called where there are both."""
-    there = p[unknowns[HOUSING]] > NONE
-    alone, motion = not there.any(), motion if there.all() else int(np.argmin(there))
-    without = p.copy()
-    without[unknowns[HOUSING].start + motion] = 0.0
-    trials = product(range(len(MOTIONS)), HOUSING_FROM, HOUSING_AT)
-    return [
-        without,
-        *(with_motion(unknowns, p, kind if alone else motion, at, part, kind) for kind, part, at in trials),
-    ]
+    """`p` (size,), then with a motion of the housing that is not there yet where it might resonate, of either kind; where
+    both are there, without and with `motion`."""
+    free, without = free_motions(unknowns, p), p.copy()
+    if not free:
+        free = [(motion, kind) for kind in range(len(MOTIONS))]
+        without[unknowns[HOUSING].start + motion] = 0.0
+    trials = product(free, HOUSING_FROM, HOUSING_AT)
+    return [without, *(with_motion(unknowns, p, number, at, part, kind) for (number, kind), part, at in trials)]
 
 
 def _misfit(layout: Layout, lines: Sequence[Lines], p: Array) -> float:

@@ -9,7 +9,6 @@ of the supports), so that priors hold for rigs of any size.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from itertools import product
 from math import cos, exp, pi, sin, sqrt
 
 import numpy as np
@@ -126,14 +125,21 @@ def otherwise(unknowns: Unknowns, p: Array) -> Array | None:
 
 
 def housings(unknowns: Unknowns, p: Array) -> list[Array]:
-    """`p` (size,), and the same with one more motion of the housing, at several frequencies."""
+    """`p` (size,), and the same with one more motion of the housing, of either kind at several frequencies."""
     out = [p]
     if HOUSING not in unknowns.slices:
         return out
-    for motion, kind, frequency in product(range(len(MOTIONS)), range(len(MOTIONS)), (-1.0, -0.5, 0.0, 0.5)):
-        if p[unknowns[HOUSING]][motion] <= NONE:
-            out.append(with_motion(unknowns, p, motion, frequency, HOUSING_BEGIN, kind))
+    for motion, kind in free_motions(unknowns, p):
+        out += [with_motion(unknowns, p, motion, at, HOUSING_BEGIN, kind) for at in (-1.0, -0.5, 0.0, 0.5)]
     return out
+
+
+def free_motions(unknowns: Unknowns, p: Array) -> list[tuple[int, int]]:
+    """Motions that `p` (size,) has not, each with the kinds that it may be of: as it is called where there is none."""
+    there = p[unknowns[HOUSING]] > NONE
+    if not there.any():
+        return [(kind, kind) for kind in range(len(MOTIONS))]
+    return [(int(motion), kind) for motion in np.flatnonzero(~there) for kind in range(len(MOTIONS))]
 
 
 def with_motion(unknowns: Unknowns, p: Array, motion: int, frequency: float, compliance: float, kind: int) -> Array:
