@@ -148,8 +148,8 @@ def _crossing(unknowns: Unknowns, p: Array, side: int) -> list[Array]:
 
 
 def _moving(unknowns: Unknowns, p: Array, motion: int) -> list[Array]:
-    """`p` (size,), then with a motion of the housing that is not there yet where it might resonate, of either kind; where
-    both are there, without and with `motion`."""
+    """`p` (size,), then with a motion of the housing that is not there yet where it might resonate, of either kind;
+    where both are there, without and with `motion`."""
     free, without = free_motions(unknowns, p), p.copy()
     if not free:
         free = [(motion, kind) for kind in range(len(MOTIONS))]
