@@ -16,8 +16,7 @@ from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.output.fit import sensitivity_of
 from gearbench.diagnosis.output.quadratic import Quadratic, quadratic_of
 from gearbench.diagnosis.output.selection import prior_of
-from gearbench.diagnosis.output.simulator import Simulator
-from gearbench.diagnosis.output.target import Target, target_of
+from gearbench.diagnosis.output.target import Target
 from gearbench.diagnosis.planning.planned import Planned
 
 Array = NDArray[np.float64]
@@ -84,7 +83,7 @@ class Known:
 
 def known_of(plan: Planned) -> Known:
     """Derivatives of all planned records at the nominal rig. Raises DiagnosisError where it cannot be simulated."""
-    simulator = Simulator(plan.layout, target_of(plan.fitted, plan.conditions), plan.simulate)
+    simulator = plan.simulator(plan.fitted, plan.conditions)
     unknowns = plan.layout.unknowns
     nothing = np.zeros(unknowns.size)
     found = sensitivity_of(simulator, nothing, unknowns.prior())
@@ -92,7 +91,7 @@ def known_of(plan: Planned) -> Known:
     # Ripple has unknowns for each condition of the search; the judged record's is like that of the first of them, whose
     # name it takes.
     alike = replace(one, name=plan.fitted[0].name)
-    other = Simulator(plan.layout, target_of([alike], [condition]), plan.simulate)
+    other = plan.simulator([alike], [condition])
     here, jacobian = other.lines(nothing), other.jacobian(nothing, unknowns.prior(), np.ones(unknowns.size, dtype=bool))
     if found is None or here is None or jacobian is None:
         raise DiagnosisError(

@@ -12,8 +12,6 @@ from gearbench.diagnosis.forces.condition import Condition
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.judging.judged import DUE, FELT, GAIN, growth_of
 from gearbench.diagnosis.output.simulated import SPACING
-from gearbench.diagnosis.output.simulator import Simulator
-from gearbench.diagnosis.output.target import target_of
 from gearbench.diagnosis.output.weighing import LIMIT
 from gearbench.diagnosis.planning.information import floors_of
 from gearbench.diagnosis.planning.planned import Planned
@@ -62,9 +60,9 @@ class _Changed:
     """How far some records change with the backlash."""
 
     def __init__(self, plan: Planned, of: list[tuple[Measurement, Condition]], left: float) -> None:
-        self.target = target_of([one for one, _ in of], [condition for _, condition in of])
+        self.simulator = plan.simulator([one for one, _ in of], [condition for _, condition in of])
+        self.target = self.simulator.target
         self.floors = floors_of(self.target, left=left)
-        self.simulator = Simulator(plan.layout, self.target, plan.simulate)
         self.at = plan.layout.unknowns[KEY].start
         self.nothing = np.zeros(plan.layout.size)
 

@@ -59,6 +59,13 @@ class Plan:
     advice: tuple[str, ...]
 
 
+HELD = (
+    "Flanks part in every record to search from: effects are told by simulations that are held to the driver's recorded"
+    " motion, and must close the gap without that too. A record under a heavier torque_mean_nm or a smaller multisine,"
+    " where flanks stay together, tells more surely."
+)
+
+
 def plan_of(case: Case, report: Report = lambda step: None) -> Plan:
     """What the conditions of a case can tell on its nominal rig. Raises BenchError or DiagnosisError, a sentence each,
     for a case that cannot be simulated or diagnosed."""
@@ -77,6 +84,7 @@ def plan_of(case: Case, report: Report = lambda step: None) -> Plan:
     more = _what_more_brings(case, plan, view, report) if is_poor(rows) else ()
     said = (
         *advice_of(inputs.measurements, inputs.held_out),
+        *((HELD,) if plan.nudges else ()),
         *said_of(ranked, groups, parting, inputs.judged.name),
         *more,
     )

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import xarray as xr
 
@@ -15,7 +15,9 @@ from gearbench.diagnosis.evidence.problem import Problem, problem_of
 from gearbench.diagnosis.forces.condition import Condition, prepare
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.output.layout import Layout, layout_of
-from gearbench.diagnosis.output.simulated import smooth_records
+from gearbench.diagnosis.output.simulated import followable
+from gearbench.diagnosis.output.simulator import Simulator
+from gearbench.diagnosis.output.target import target_of
 from gearbench.diagnosis.replay.replays import Replay, replays_of
 from gearbench.rig import Case
 
@@ -25,13 +27,19 @@ Report = Callable[[str], None]
 @dataclass(frozen=True)
 class Planned:
     """Records of the nominal rig, what a diagnosis would make of them before its search, and which of the
-    measurements are `smooth`: flanks stay together."""
+    measurements are `smooth`: flanks stay together, or where they do in none, `nudges` hold the driver [N s/m] to its
+    recorded motion, by the record's name."""
 
     inputs: Inputs
     problem: Problem
     layout: Layout
     simulate: Replay
     smooth: tuple[int, ...]
+    nudges: Mapping[str, float] = field(default_factory=dict)
+
+    def simulator(self, measurements: Sequence[Measurement], conditions: Sequence[Condition]) -> Simulator:
+        """Simulates the lines of measurements, which have those conditions."""
+        return Simulator(self.layout, target_of(measurements, conditions), self.simulate, self.nudges)
 
     @property
     def fitted(self) -> tuple[Measurement, ...]:
@@ -45,8 +53,9 @@ class Planned:
 
     @property
     def rough(self) -> tuple[int, ...]:
-        """The other measurements."""
-        return tuple(number for number in range(len(self.inputs.measurements)) if number not in self.smooth)
+        """The measurements whose flanks part."""
+        measurements = self.inputs.measurements
+        return tuple(n for n, one in enumerate(measurements) if n not in self.smooth or one.name in self.nudges)
 
     @property
     def judged(self) -> tuple[Measurement, Condition]:
@@ -66,15 +75,16 @@ def planned(case: Case, report: Report = lambda step: None, held_out: str | None
     report("taking them in")
     problem = problem_of(inputs.measurements, inputs.nominal)
     simulate = replays_of(inputs.nominal, inputs.all)
-    smooth = smooth_records([inputs.nominal], inputs.measurements, simulate)
+    smooth, nudges, _ = followable((inputs.nominal,), inputs.measurements, problem, simulate)
     if not smooth:
         raise DiagnosisError(
-            f"{nominal.name}: flanks part in all {len(inputs.measurements)} records to search from, where nothing can"
-            " be read off a derivative: plan one under a heavier torque_mean_nm or a smaller multisine"
+            f"{nominal.name}: flanks part in all {len(inputs.measurements)} records to search from, and no angle_driver"
+            " tells how the driver moves then: record it, or plan one under a heavier torque_mean_nm or a smaller"
+            " multisine"
         )
     # One tooth of each gear for all of them.
     layout = layout_of(inputs.nominal, problem.model, problem.conditions, (0, problem.model.teeth[0]))
-    return Planned(inputs, problem, layout, simulate, tuple(smooth))
+    return Planned(inputs, problem, layout, simulate, tuple(smooth), nudges)
 
 
 def _records(nominal: Case) -> list[xr.Dataset]:

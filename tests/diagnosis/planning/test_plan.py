@@ -67,3 +67,13 @@ def test_half_of_the_noise_tells_more_of_what_is_loud(made: tuple[Planned, Known
     quiet = View(known, (), quiet=0.25)
     grown = np.linalg.eigvalsh(quiet.information - view.information)
     assert grown.min() > -1e-6 * grown.max() and grown.max() > 0.0
+
+
+def test_a_plan_whose_flanks_part_in_every_record_tells_what_held_simulations_would() -> None:
+    swinging = read_case(case_files()["gap_demo"], ["experiment.multisine.amplitude_nm=130.0"])
+    plan = planned(swinging.under(swinging.conditions[0]))
+    names = [one.name for one in plan.inputs.measurements]
+    assert plan.fitted == plan.inputs.measurements and list(plan.nudges) == names
+    assert [plan.inputs.measurements[number].name for number in plan.rough] == names
+    found = smallest(View(known_of(plan), (chosen(plan, "friction"),)), 0)
+    assert found is not None
