@@ -232,7 +232,7 @@ def left_out(found: Simulated, out: Sequence[Weighed]) -> Simulated:
         return found
     kept = [one for one in found.selection.entered if not any(one is other for other in out)]
     selection = only(found.simulator, found.selection, kept)
-    return replace(found, selection=selection, std=selection.best.std, out=(*found.out, *out))
+    return replace(found.with_selection(selection), out=(*found.out, *out))
 
 
 def seconded(found: Simulated, forces: Search) -> Simulated:
@@ -242,8 +242,7 @@ def seconded(found: Simulated, forces: Search) -> Simulated:
         return found
     for one in found.selection.weighed:
         if one.hypothesis.name == best.hypothesis.name and one.optimum is not None and one.log_bayes_factor > WORTH:
-            selection = with_entered(found.simulator, found.selection, one)
-            return replace(found, selection=selection, std=selection.best.std)
+            return found.with_selection(with_entered(found.simulator, found.selection, one))
     return found
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -54,13 +53,19 @@ def hypotheses(model: NominalModel) -> tuple[Hypothesis, ...]:
     """One encoder of the two. To forces alone it looks like a gear's run-out, and represents nothing that they could
     tell apart; in simulation both differ by what inertias make of the latter, and gears stand out by more, as a
     rule. Of gears with as many teeth either one may look like either encoder."""
-    alike = tuple(RUNOUTS.values()) if model.teeth[0] == model.teeth[1] else ()
-    out = []
-    for side, key in KEYS.items():
-        usual = (alike or (RUNOUTS[side],), -ADDS[side])
-        one = Hypothesis(f"encoder-runout {side}", "sensor", (Wide(key),), (side,), len(KEYS), False, usual)
-        out.append(replace(one, twins=twins_of(KEYS, side, model.teeth)))
-    return tuple(out)
+    return tuple(
+        Hypothesis(
+            f"encoder-runout {side}",
+            "sensor",
+            (Wide(key),),
+            (side,),
+            len(KEYS),
+            representative=False,
+            usual=((RUNOUTS[side], *twins_of(RUNOUTS, side, model.teeth)), -ADDS[side]),
+            twins=twins_of(KEYS, side, model.teeth),
+        )
+        for side, key in KEYS.items()
+    )
 
 
 def add(rig: Rig, hypothesis: Hypothesis, fitted: Fitted) -> Added:

@@ -138,12 +138,9 @@ class Judged:
         lines = best.lines if own is None else own
         target = simulator.target
         parts = (target.energies(target.lines - lines) - target.noise, target.noise, target.energies(target.lines))
-        out = {}
-        for channel in dict.fromkeys(block.channel for block in target.blocks):
-            mine = np.array([block.channel == channel for block in target.blocks])
-            left, noise, whole = (max(float((part * target.sizes)[mine].sum()), 0.0) for part in parts)
-            out[channel] = (float(np.sqrt(left / whole)), float(np.sqrt(noise / whole)))
-        return out
+        left, noise, whole = (target.of_channels(part * target.sizes) for part in parts)
+        shares = zip(np.sqrt(np.maximum(left, 0.0) / whole), np.sqrt(noise / whole), strict=True)
+        return {block.channel: (float(a), float(b)) for block, (a, b) in zip(target.blocks, shares, strict=True)}
 
     def share(self, without: Mapping[str, Array]) -> float:
         """Part of the nominal gap, by energy and all channels in units of their fluctuation, that comes back in a rig
@@ -194,7 +191,7 @@ def judged_on(
     apart = not any(measured is searched for searched in smooth)
     while True:
         try:
-            judged = _closings(found, target, measured, parted, noise)
+            judged = _closings(found, target, measured, parted, noise, apart=apart)
         except ValueError:
             return None
         poor = [one for one in found.selection.entered if not _stays(judged, one)]
@@ -208,7 +205,7 @@ def judged_on(
             if more is None:
                 return replace(judged, dropped=tuple(dropped))
             selection = more
-        found = replace(found, selection=selection, std=selection.best.std)
+        found = found.with_selection(selection)
 
 
 def _stays(judged: Judged, one: Weighed) -> bool:
@@ -231,6 +228,8 @@ def _closings(
     measured: Measurement,
     parted: Sequence[Target],
     noise: Mapping[str, Array],
+    *,
+    apart: bool,
 ) -> Judged:
     simulator, selection = found.simulator, found.selection
     nudged = simulator.channels(selection.best.p, measured)
@@ -238,8 +237,6 @@ def _closings(
     free = simulator.free
     signals = nudged if free is simulator else free.channels(found.end_of(selection.best), measured)
     closings = {}
-    # A record that had part in the search cannot make up for what it lacked.
-    apart = not any(measured is searched for searched in simulator.target.measurements)
     for one in selection.entered:
         optimum = taken_out(simulator, selection, one)
         closing = closing_of(target, simulator.channels(optimum.p, measured), nudged)

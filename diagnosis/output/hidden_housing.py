@@ -9,6 +9,7 @@ lines, and only the best are simulated.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from itertools import product
 from math import exp, log, pi
 from typing import NamedTuple
@@ -37,31 +38,15 @@ from gearbench.diagnosis.output.target import Target
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-Integers = NDArray[np.int64]
+# E (K,) of lines by kind of motion and shares across.
+Shares = Mapping[tuple[int, tuple[float, ...]], Complex]
 
 # Of the motion that tells E: logarithm of its frequency over the supports', and its compliance.
 STIFF_AT, STIFF = 1.8, 0.01
 # Where resonances are looked for: logarithms of the frequency, damping ratios, and compliances over the supports'.
-SOUGHT_AT = tuple(np.linspace(-2.2, 1.0, 97))
+SOUGHT_AT = tuple(float(at) for at in np.linspace(-2.2, 1.0, 97))
 RATIOS = (0.02, 0.035, 0.06)
 PARTS = (0.003, 0.006, 0.012, 0.025, 0.05, 0.1)
-
-
-class Lines(NamedTuple):
-    """Excited lines, block after block: their numbers (n,) among those of a target, angular frequencies (n,) [rad/s],
-    and of the blocks where they begin, floors, independent counts and sizes (blocks,)."""
-
-    at: Integers
-    omega: Array
-    begin: Integers
-    floors: Array
-    counts: Array
-    sizes: Array
-
-    def costs(self, residual: Complex) -> Array:
-        """Nats (...) that residuals (..., n) cost."""
-        sums = np.add.reduceat(np.abs(residual) ** 2, self.begin, axis=-1)
-        return np.asarray((self.counts * np.log1p(sums / self.sizes / self.floors)).sum(axis=-1))
 
 
 class Resonance(NamedTuple):
@@ -78,24 +63,25 @@ class Resonance(NamedTuple):
 def hidden_housings(simulator: Simulator, p: Array) -> list[Array]:
     """`p` (size,) with sensors on a housing whose resonances explain the excited lines best, one and two of them;
     nothing where a rig has none to find, or no line is excited."""
-    unknowns = simulator.layout.unknowns
-    if HOUSING not in unknowns.slices:
+    unknowns, whole = simulator.layout.unknowns, simulator.target
+    if HOUSING not in unknowns.slices or not whole.excited.any():
         return []
-    plain, lines = _without(unknowns, p), excited_lines(simulator.target)
-    here = simulator.lines(plain)
-    if lines is None or here is None:
+    excited, plain = simulator.of_target(whole.of_lines(whole.excited[whole.of_line])), _without(unknowns, p)
+    target, here = excited.target, excited.lines(plain)
+    if here is None:
         return []
-    left = (simulator.target.lines - here)[lines.at]
-    shares = _shares(simulator, plain, here, lines)
+    over = _frequencies(target) / pace_of(simulator.layout.model)
+    shares = _shares(excited, plain, here, over)
     if not shares:
         return []
-    pace = pace_of(simulator.layout.model)
-    alone, rest = _best(shares, left, lines, pace)
+    answers = {(at, ratio): _answer(over, at, ratio) for at, ratio in product(SOUGHT_AT, RATIOS)}
+    left = target.lines - here
+    alone, rest = _best(target, shares, answers, left)
     pair, parts = [alone, alone], [left - rest, np.zeros_like(left)]
     # Each beside the other, the new one first.
     for number in (1, 0, 1):
         beside = left - parts[1 - number]
-        pair[number], rest = _best(shares, beside, lines, pace)
+        pair[number], rest = _best(target, shares, answers, beside)
         parts[number] = beside - rest
     one, two = (pair if pair[0].kind <= pair[1].kind else reversed(pair))
     return [
@@ -104,15 +90,9 @@ def hidden_housings(simulator: Simulator, p: Array) -> list[Array]:
     ]
 
 
-def excited_lines(target: Target) -> Lines | None:
-    """The excited lines of a target; None without any."""
-    omega = np.concatenate([2 * pi * frequencies(target.measurements[number])[bins] for number, _, bins in target.plan])
-    excited = np.array([block.kind == "excited" for block in target.blocks])
-    at = target.order[excited[target.of_line[target.order]]]
-    if not at.size:
-        return None
-    kept, begin = np.unique(target.of_line[at], return_index=True)
-    return Lines(at, omega[at], begin, target.floors[kept], target.counts[kept], target.sizes[kept])
+def _frequencies(target: Target) -> Array:
+    """Angular frequencies (K,) [rad/s] of the lines of a target."""
+    return np.concatenate([2 * pi * frequencies(target.measurements[number])[bins] for number, _, bins in target.plan])
 
 
 def _without(unknowns: Unknowns, p: Array) -> Array:
@@ -123,39 +103,36 @@ def _without(unknowns: Unknowns, p: Array) -> Array:
     return plain
 
 
-def _shares(
-    simulator: Simulator, plain: Array, here: Complex, lines: Lines
-) -> dict[tuple[int, tuple[float, ...]], Complex]:
-    """E (n,) by kind of motion and shares across."""
-    unknowns, pace = simulator.layout.unknowns, pace_of(simulator.layout.model)
-    answer = STIFF * _answer(lines.omega, pace * exp(STIFF_AT), HOUSING_RATIO)
-    out = {}
+def _shares(excited: Simulator, plain: Array, here: Complex, over: Array) -> Shares:
+    """E (K,) of the lines of a simulator, which are `here` those of `plain` and lie at the frequencies `over` those of
+    the supports (K,)."""
+    unknowns, answer, out = excited.layout.unknowns, STIFF * _answer(over, STIFF_AT, HOUSING_RATIO), {}
     for kind, across in product(range(len(MOTIONS)), product((1.0, -1.0), repeat=len(SIDES))):
         trial = _with(unknowns, plain, Resonance(kind, across, STIFF_AT, HOUSING_RATIO, STIFF), kind)
-        moved = simulator.lines(trial)
+        moved = excited.lines(trial)
         if moved is not None:
-            out[kind, across] = (moved - here)[lines.at] / answer
+            out[kind, across] = (moved - here) / answer
     return out
 
 
-def _answer(omega: Array, own: float, ratio: float) -> Complex:
-    r = omega / own
+def _answer(over: Array, at: float, ratio: float) -> Complex:
+    """g (K,) at frequencies `over` those of the supports (K,)."""
+    r = over / exp(at)
     return np.asarray(1.0 / (1.0 - r**2 + 2j * ratio * r))
 
 
 def _best(
-    shares: dict[tuple[int, tuple[float, ...]], Complex], left: Complex, lines: Lines, pace: float
+    target: Target, shares: Shares, answers: Mapping[tuple[float, float], Complex], left: Complex
 ) -> tuple[Resonance, Complex]:
-    """The resonance that explains most of what is `left` (n,), and what it leaves."""
-    parts = np.array(PARTS)[:, None]
+    """The resonance that explains most of what is `left` (K,) of the lines of a target, and what it leaves."""
     best: tuple[float, Resonance, Complex] | None = None
-    for ((kind, across), share), at, ratio in product(shares.items(), SOUGHT_AT, RATIOS):
-        rest = left - parts * share * _answer(lines.omega, pace * exp(at), ratio)
-        costs = lines.costs(rest)
-        number = int(np.argmin(costs))
-        if best is None or costs[number] < best[0]:
-            found = Resonance(kind, across, float(at), ratio, PARTS[number])
-            best = float(costs[number]), found, rest[number]
+    for ((kind, across), share), ((at, ratio), answer) in product(shares.items(), answers.items()):
+        made = share * answer
+        for part in PARTS:
+            rest = left - part * made
+            cost = target.cost(rest)
+            if best is None or cost < best[0]:
+                best = cost, Resonance(kind, across, at, ratio, part), rest
     assert best is not None
     return best[1], best[2]
 

@@ -67,8 +67,7 @@ def is_close(simulator: Simulator, found: Optimum) -> bool:
     much: a structure that is not there shows in the transmission error before it shows anywhere else."""
     target = simulator.target
     left = target.nats(target.energies(target.lines - found.lines)) - target.nats(target.noise)
-    answers = np.array([one.kind == "excited" for one in target.blocks])
-    return bool(np.median(left) < CLOSE and not (answers & (left > FAR)).any())
+    return bool(np.median(left) < CLOSE and not (target.excited & (left > FAR)).any())
 
 
 def _from_around(simulator: Simulator, found: Optimum, around: Around | None, report: Report) -> Optimum | None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,9 +11,7 @@ from gearbench.diagnosis.effects.effect import Hypothesis
 from gearbench.diagnosis.evidence.separable import APART
 from gearbench.diagnosis.output.fit import Optimum, fit
 from gearbench.diagnosis.output.simulator import Simulator
-
-if TYPE_CHECKING:
-    from gearbench.diagnosis.output.weighing import Weighed
+from gearbench.diagnosis.output.weighing import Weighed
 
 MOST_LEFT = 6.0  # nats still promised by fits that count for comparing them
 # Part of a rare effect's evidence that its usual counterpart must have: what both explain is nine tenths of it, and the

@@ -59,6 +59,10 @@ class Simulated:
     out: tuple[Weighed, ...] = ()
     _ends: dict[bytes, Array] = field(default_factory=dict)
 
+    def with_selection(self, selection: Selection) -> Simulated:
+        """The same with another selection."""
+        return replace(self, selection=selection, std=selection.best.std)
+
     @property
     def recalibrated(self) -> Case:
         """The nominal case at the optimum of the background alone, without any part of the effects that entered: what a

@@ -39,7 +39,11 @@ class Simulator:
 
     def of_record(self, number: int) -> Simulator:
         """The same for one record alone."""
-        return Simulator(self.layout, self.target.of_record(number), self.simulate, self.nudges)
+        return self.of_target(self.target.of_record(number))
+
+    def of_target(self, target: Target) -> Simulator:
+        """The same for other lines."""
+        return Simulator(self.layout, target, self.simulate, self.nudges)
 
     @property
     def free(self) -> Simulator:
@@ -73,9 +77,7 @@ class Simulator:
     def channels(self, p: Array, measured: Measurement) -> dict[str, Array]:
         """Simulated channels of one record."""
         nudge = self.nudges.get(measured.name, 0.0)
-        case = self.layout.case(p, measured.name)
-        replayed = self.simulate(case, measured.record, nudge) if nudge else self.simulate(case, measured.record)
-        return simulated_channels(measured, replayed)
+        return simulated_channels(measured, self.simulate(self.layout.case(p, measured.name), measured.record, nudge))
 
     def jacobian(self, p: Array, sd: Array, chosen: Flags, near: Complex | None = None) -> Complex | None:
         """Derivatives (size, K) of the lines by the chosen unknowns, zero for the others; None where `p` is no rig.

@@ -11,7 +11,7 @@ is at most 8, and of a shaft with many teeth half of these.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -83,13 +83,19 @@ class Target:
 
     def of_record(self, number: int) -> Target:
         """What is measured in one record alone."""
-        ends = np.cumsum([len(bins) for _, _, bins in self.plan])
-        kept = [one for one, (record, _, _) in enumerate(self.plan) if record == number]
-        inside = np.concatenate([np.arange(ends[one] - len(self.plan[one][2]), ends[one]) for one in kept])
+        mine = [np.full(len(bins), record == number) for record, _, bins in self.plan]
+        alone = self.of_lines(np.concatenate(mine))
+        plan = tuple((0, channel, bins) for _, channel, bins in alone.plan)
+        return replace(alone, measurements=(self.measurements[number],), plan=plan)
+
+    def of_lines(self, inside: Flags) -> Target:
+        """Those of the lines (K,) that are `inside`."""
+        flags = np.split(inside, np.cumsum([len(bins) for _, _, bins in self.plan])[:-1])
+        chosen = ((*one[:2], one[2][mine]) for one, mine in zip(self.plan, flags, strict=True))
         blocks, of_line = np.unique(self.of_line[inside], return_inverse=True)
         return Target(
-            (self.measurements[number],),
-            tuple((0, channel, bins) for _, channel, bins in (self.plan[one] for one in kept)),
+            self.measurements,
+            tuple(one for one in chosen if len(one[2])),
             self.lines[inside],
             of_line,
             tuple(self.blocks[block] for block in blocks),
@@ -117,19 +123,23 @@ class Target:
         """Nats that a residual costs."""
         return float(np.sum(self.counts * self.nats(self.energies(residual))))
 
+    @cached_property
+    def excited(self) -> Flags:
+        """Which blocks (blocks,) answer the excitation."""
+        return np.array([block.kind == "excited" for block in self.blocks])
+
     @property
     def most_excited(self) -> int:
         """Number of the record with the most excited lines."""
         names = list(dict.fromkeys(block.record for block in self.blocks))
         lines = np.zeros(len(names))
-        for block, size in zip(self.blocks, self.sizes, strict=True):
-            lines[names.index(block.record)] += size if block.kind == "excited" else 0.0
+        for block, size, excited in zip(self.blocks, self.sizes, self.excited, strict=True):
+            lines[names.index(block.record)] += size if excited else 0.0
         return int(np.argmax(lines))
 
     def excited_cost(self, residual: Complex) -> float:
         """Nats that a residual costs on the excited lines, or on all where nothing is excited."""
-        excited = np.array([block.kind == "excited" for block in self.blocks])
-        counts = np.where(excited, self.counts, 0.0) if excited.any() else self.counts
+        counts = np.where(self.excited, self.counts, 0.0) if self.excited.any() else self.counts
         return float(np.sum(counts * self.nats(self.energies(residual))))
 
 

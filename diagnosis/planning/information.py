@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from gearbench.diagnosis.errors import DiagnosisError
 from gearbench.diagnosis.forces.unknowns import Unknowns
+from gearbench.diagnosis.output.background import prior_of
 from gearbench.diagnosis.output.fit import sensitivity_of
 from gearbench.diagnosis.output.quadratic import Quadratic, quadratic_of
-from gearbench.diagnosis.output.selection import prior_of
 from gearbench.diagnosis.output.target import Target
 from gearbench.diagnosis.planning.planned import Planned
 

@@ -42,12 +42,17 @@ LEFT = VISIBLE * POPULATION.structure
 SHARPER = 100.0  # times the information: what no plan betters
 QUIET = 0.25  # of the noise's variance: four times the periods
 SPARED = ("y_driver", "y_driven", "torque_driven")  # channels that a diagnosis can do without
+HELD = (
+    "Flanks part in every record to search from: effects are told by simulations that are held to the driver's recorded"
+    " motion, and must close the gap without that too. A record under a heavier torque_mean_nm or a smaller multisine,"
+    " where flanks stay together, tells more surely."
+)
 
 
 @dataclass(frozen=True)
 class Plan:
     """What an experiment can tell. `left`: part of every block's level that the best rig is taken to leave; `records`
-    those of the search whose flanks stay together, `parting` those whose do not, `judged` the one held out or None."""
+    those of the search that are fitted, `parting` those whose flanks part, `judged` the one held out or None."""
 
     case: str
     left: float
@@ -57,13 +62,6 @@ class Plan:
     rows: tuple[Row, ...]
     groups: tuple[tuple[str, ...], ...]
     advice: tuple[str, ...]
-
-
-HELD = (
-    "Flanks part in every record to search from: effects are told by simulations that are held to the driver's recorded"
-    " motion, and must close the gap without that too. A record under a heavier torque_mean_nm or a smaller multisine,"
-    " where flanks stay together, tells more surely."
-)
 
 
 def plan_of(case: Case, report: Report = lambda step: None) -> Plan:

@@ -23,6 +23,13 @@ from gearbench.diagnosis.output.structure import (
 )
 
 
+def recorded(simulator: Simulator, p: np.ndarray) -> Simulator:
+    """The simulator of a record whose rig has the unknowns `p`."""
+    lines = simulator.lines(p)
+    assert lines is not None
+    return simulator.of_target(replace(simulator.target, lines=lines))
+
+
 def test_a_housing_under_the_sensors_is_told_by_the_transmission_error() -> None:
     """Of a rig on a housing that moves across, whose sensors go along with it, the trial that is alike is the best."""
     simulator = demonstration()
@@ -30,9 +37,7 @@ def test_a_housing_under_the_sensors_is_told_by_the_transmission_error() -> None
     keys, p = layout.unknowns, np.zeros(layout.size)
     p[keys[ACROSS]], p[keys[SEAT]] = (0.2, 0.15), 1.0
     p[keys[HOUSING]], p[keys[MODE]], p[keys[OBLIQUE]] = (0.0, 0.05), (0.0, 0.0, -1.1, 0.1), (0.0, 0.0, 1.1, -0.9)
-    lines = simulator.lines(p)
-    assert lines is not None
-    moving = Simulator(layout, replace(simulator.target, lines=lines), simulator.simulate)
+    moving = recorded(simulator, p)
     sd = keys.prior()
     best = min(hidden_housings(moving, np.zeros(layout.size)), key=lambda trial: linear_cost(moving, trial, sd))
     assert best[keys[SEAT]] == 1.0 and best[keys[HOUSING]][1] == pytest.approx(0.05, rel=0.6)
@@ -46,9 +51,7 @@ def test_two_resonances_of_one_kind_under_the_sensors_are_told_apart() -> None:
     keys, p = layout.unknowns, np.zeros(layout.size)
     p[keys[ACROSS]], p[keys[SEAT]], p[keys[OBLIQUE]] = (0.2, 0.15), 1.0, (-1.0, 1.0, 1.1, -0.9)
     p = with_motion(keys, with_motion(keys, p, 0, -0.3, 0.02, 1), 1, -1.1, 0.03, 1)
-    lines = simulator.lines(p)
-    assert lines is not None
-    moving = Simulator(layout, replace(simulator.target, lines=lines), simulator.simulate)
+    moving = recorded(simulator, p)
     plain = np.where(keys.of((HOUSING,)), 0.0, p)
     one, both = hidden_housings(moving, plain)
     assert sorted(both[keys[MODE]][[0, 2]]) == pytest.approx([-1.1, -0.3], abs=0.1)

@@ -10,9 +10,9 @@ from shared.simulated_lines import demonstration
 
 from gearbench.diagnosis.effects.profile_error import FLANKS, PROFILE_ERROR
 from gearbench.diagnosis.forces.basis import PLACES_ON_PATH
+from gearbench.diagnosis.output.background import prior_of
 from gearbench.diagnosis.output.contrast import BEYOND, CONTRAST, CONTRAST_SD, is_strange
 from gearbench.diagnosis.output.reshaped import has_shapes, reshaped
-from gearbench.diagnosis.output.selection import prior_of
 
 RELIEF = 18e-6
 

@@ -9,8 +9,6 @@ from gearbench.cases import case_files
 from gearbench.diagnosis.effects.effect import Hypothesis
 from gearbench.diagnosis.effects.library import hypotheses
 from gearbench.diagnosis.output.quadratic import prior_cost
-from gearbench.diagnosis.output.simulator import Simulator
-from gearbench.diagnosis.output.target import target_of
 from gearbench.diagnosis.output.weighing import limit_of, relief
 from gearbench.diagnosis.planning.information import Known, known_of
 from gearbench.diagnosis.planning.planned import Planned, planned
@@ -37,7 +35,7 @@ def test_an_effect_of_the_stated_size_is_what_a_record_calls_for(made: tuple[Pla
     one = chosen(plan, name)
     found = smallest(View(known, (one,)), 0)
     assert found is not None
-    simulator = Simulator(plan.layout, target_of(plan.fitted, plan.conditions), plan.simulate)
+    simulator = plan.simulator(plan.fitted, plan.conditions)
     nothing, unknowns = np.zeros(plan.layout.size), known.unknowns
     before, jacobian = simulator.lines(nothing), simulator.jacobian(nothing, unknowns.prior(), nothing == 0.0)
     assert before is not None and jacobian is not None
