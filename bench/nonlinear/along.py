@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil, log
@@ -15,7 +15,7 @@ from gearbench.bench.nonlinear.fine import averaged, integrated, interpolated, p
 from gearbench.bench.nonlinear.pushing import Pushing, pushing, stepped
 from gearbench.bench.nonlinear.replay import Steady, resampled
 from gearbench.bench.record.sensors import shown_by
-from gearbench.lumped.nonlinear.coordinates import IN_MESH, LOAD, U1, U2, W
+from gearbench.lumped.nonlinear.coordinates import IN_MESH, LOAD, U1, U2, Acting, W
 from gearbench.lumped.nonlinear.law import MeshLaw
 from gearbench.lumped.nonlinear.model import NonLinear
 from gearbench.lumped.nonlinear.pressing import Pressed
@@ -25,16 +25,12 @@ from gearbench.lumped.nonlinear.tangent import AT_ONCE, OVER_STEP, Tangent, depa
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Lines = NDArray[np.complex64]
-Integers = NDArray[np.int64]
-# Places (samples, n, columns) and forces (steps, columns) of `departures`, of one part of the columns after another.
-Departures = Sequence[tuple[NDArray[np.float32], NDArray[np.float32]]]
 
 MOST = 3  # steps per sample that suffice: the frequency of a mode at 0.2 of the sampling rate is then right to 3e-4
 STABLE = 1.8  # largest rate of a mode times the step: Runge-Kutta bears 2.8
 # Of its first size, that free vibrations keep when the first sample is taken: a mean is far larger than the lines.
 TRANSIENT = 1e-9
 IMPACTS = 4  # instants for each half step, over which flanks that part and meet are averaged
-TOGETHER = 96  # departures carried together: their states stay in the fastest memory
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,46 +74,43 @@ class Along:
         """The coordinate that the driver's torque acts on."""
         return W if self.model.elastic_shaft else U1
 
-    def answers(self, forces: NDArray[np.floating[Any]], on: Integers) -> dict[str, Lines]:
+    def answers(self, acting: Acting) -> dict[str, Lines]:
         """Half-spectra (columns, K), as of numpy's `rfft`, of what the channels change by, as the rig's sensors show
-        it, under forces (entries, columns) [N], each added in the mesh or on a coordinate, `on` (columns,): dte [m], rb
-        times angles [m], y [m], and the load's torque over the driven gear's base radius [N]."""
-        parts = np.array_split(np.arange(len(on)), max(ceil(len(on) / TOGETHER), 1))
+        it, by departures under forces: dte [m], rb times angles [m], y [m], and the load's torque over the driven
+        gear's base radius [N]."""
         weights = AT_ONCE if self.instants else OVER_STEP
-        found = [departures(self.tangent, forces[:, one], on[one], self.substeps, self.early, weights) for one in parts]
+        places, pushes = departures(self.tangent, acting, self.substeps, self.early, weights)
         rows = self.model.displacements
         wanted = {U1, U2, *(int(one) for row in rows for one in np.flatnonzero(row))}
         if self.model.rig.load.twists:
             wanted.add(LOAD)
-        lines = {one: np.concatenate([_spectrum(places[:, one, :].T) for places, _ in found]) for one in wanted}
+        lines = {one: _spectrum(places[:, one, :].T) for one in wanted}
         moved = {"angle_driver": lines[U1], "angle_driven": lines[U2]}
         for name, row in zip(("y_driver", "y_driven"), rows, strict=True):
             moved[name] = np.sum([np.float32(row[one]) * lines[int(one)] for one in np.flatnonzero(row)], axis=0)
-        moved["torque_driven"] = self._borne(found, lines, forces, on)
+        moved["torque_driven"] = self._borne(pushes, lines, acting)
         sensors, frequency = self.model.rig.sensors, self._omega / (2 * np.pi)
         response = {name: shown_by(sensors, name, frequency).astype(np.complex64) for name in moved}
-        seen = {name: change * response[name] for name, change in moved.items()}
+        seen: dict[str, Lines] = {name: change * response[name] for name, change in moved.items()}
         y = seen["y_driver"] - seen["y_driven"]
         seen["dte"] = seen["angle_driver"] - seen["angle_driven"] + np.float32(self.model.factor) * y
         return seen
 
-    def _borne(
-        self, found: Departures, lines: Mapping[int, Lines], forces: NDArray[np.floating[Any]], on: Integers
-    ) -> Lines:
+    def _borne(self, pushes: NDArray[np.float32], lines: Mapping[int, Lines], acting: Acting) -> Lines:
         """Half-spectra (columns, K) of the force [N] that the load bears at its base circle, from those of the
-        coordinates."""
+        coordinates and forces in the mesh (steps, columns)."""
         if self.model.rig.load.twists:
             shaft = self.model.structure
             assert shaft is not None  # who twists has one
             stiffness = shaft.load_stiffness + 1j * self._omega * shaft.load_damping
             reaction = stiffness.astype(np.complex64) * (lines[U2] - lines[LOAD])
         else:
-            borne = -(self.tangent.mesh[U2] + self.tangent.rubbed[::2, U2]).astype(found[0][1].dtype)
-            reaction = np.concatenate([self._shown((two * borne[:, None]).T) for _, two in found]) / self._smeared
+            borne = -(self.tangent.mesh[U2] + self.tangent.rubbed[::2, U2]).astype(pushes.dtype)
+            reaction = self._shown((pushes * borne[:, None]).T) / self._smeared
         # What pushes at an end that is held is borne there.
-        held = (on == LOAD) | ((on == U2) & (self.tangent.inverse[U2] == 0.0))
+        held = (acting.on == LOAD) | ((acting.on == U2) & (self.tangent.inverse[U2] == 0.0))
         if held.any():
-            reaction[held] += self._shown(forces[::2, held].T)
+            np.add.at(reaction, acting.of[held], self._shown(acting.values[::2, held].T))
         return reaction
 
     def _shown(self, stepped: NDArray[np.floating[Any]]) -> Lines:

@@ -76,33 +76,58 @@ class Slope(NamedTuple):
     late: Mapping[str, float]
 
 
-def left_over(layout: Layout, system: System, lines: Lines, level: float) -> Complex:
-    """What no force in the mesh explains of the channels (K * C,), over their noise and a part of their level."""
-    return left_over_moved(layout, system, (), lines, level)[0]
+class _Seen(NamedTuple):
+    """Lines at one level: weight of each (K, C), direction of the mesh's force (K, C), of length one, its `size`
+    (K, 1), what no drive explains (K, C), and the part of that along the direction (K, 1)."""
+
+    weight: Array
+    along: Complex
+    size: Array
+    seen: Complex
+    part: Complex
+
+    @property
+    def left(self) -> Complex:
+        """What no force in the mesh explains (K * C,)."""
+        return (self.seen - self.along * self.part).ravel()
+
+
+def left_over(layout: Layout, system: System, lines: Lines, levels: Sequence[float]) -> list[Complex]:
+    """What no force in the mesh explains of the channels (K * C,), over their noise and each of these parts of their
+    level."""
+    answer = _answers(layout, system, lines, _moved(system, lines))
+    return [_seen(layout, lines, answer, level).left for level in levels]
 
 
 def left_over_moved(
     layout: Layout, system: System, slopes: Sequence[Slope], lines: Lines, level: float
 ) -> tuple[Complex, Complex]:
-    """`left_over` and its derivatives (slopes, K * C)."""
+    """`left_over` at one level and its derivatives (slopes, K * C)."""
     moved = _moved(system, lines)
     answer = _answers(layout, system, lines, moved)
-    weight = 1.0 / np.sqrt(lines.noise + level**2 * lines.level)
-    force = (lines.torque / layout.model.base_radius[0])[:, None]
-    along, seen = answer[:, :, 0] * weight, (lines.channels - answer[:, :, 1] * force) * weight
-    size = np.linalg.norm(along, axis=1, keepdims=True)
-    along /= size
-    part = (along.conj() * seen).sum(axis=1, keepdims=True)
-    left = (seen - along * part).ravel()
-    if not slopes:
-        return left, np.zeros((0, left.size), dtype=complex)
+    here = _seen(layout, lines, answer, level)
+    weight, along, size, seen, part = here
     change = _changes(layout, system, slopes, lines, moved, answer)
     d_along = change[..., 0] * weight
-    d_seen = -change[..., 1] * force * weight
+    d_seen = -change[..., 1] * _driven(layout, lines) * weight
     d_along -= along * (along.conj() * d_along).real.sum(axis=2, keepdims=True)
     d_along /= size
     d_part = (d_along.conj() * seen + along.conj() * d_seen).sum(axis=2, keepdims=True)
-    return left, (d_seen - d_along * part - along * d_part).reshape(len(slopes), -1)
+    return here.left, (d_seen - d_along * part - along * d_part).reshape(len(slopes), -1)
+
+
+def _driven(layout: Layout, lines: Lines) -> Complex:
+    """Force (K, 1) [N] of the drive at the base circle."""
+    return (lines.torque / layout.model.base_radius[0])[:, None]
+
+
+def _seen(layout: Layout, lines: Lines, answer: Complex, level: float) -> _Seen:
+    """The lines beside the channels `answer` (K, C, 2)."""
+    weight = 1.0 / np.sqrt(lines.noise + level**2 * lines.level)
+    along, seen = answer[:, :, 0] * weight, (lines.channels - answer[:, :, 1] * _driven(layout, lines)) * weight
+    size = np.linalg.norm(along, axis=1, keepdims=True)
+    along /= size
+    return _Seen(weight, along, size, seen, (along.conj() * seen).sum(axis=1, keepdims=True))
 
 
 def system_of(layout: Layout, p: Array) -> System:
@@ -162,7 +187,10 @@ def _sensors(layout: Layout, p: Array) -> tuple[float, dict[str, float]]:
 
 def _stiffness(system: System, lines: Lines) -> Complex:
     omega = lines.omega[:, None, None]
-    return np.asarray(system.springs + 1j * omega * system.dampers - omega**2 * system.mass)
+    out = np.empty((len(omega), *system.springs.shape), dtype=complex)
+    out.real = system.springs - omega**2 * system.mass
+    out.imag = omega * system.dampers
+    return out
 
 
 def _moved(system: System, lines: Lines) -> Complex:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from gearbench.bench.plan.workers import side_by_side
 from gearbench.diagnosis.effects.coupling import KEY as COMPLIANCE
 from gearbench.diagnosis.effects.coupling import LOSS
 from gearbench.diagnosis.effects.effect import SIDES
@@ -89,7 +90,7 @@ def around(layout: Layout, conditions: Sequence[Condition], held: Array) -> Arra
         begun = [best]
         if HOUSING in unknowns.slices and not held[unknowns[SEAT]].any():
             begun.append(seated(unknowns, best))
-        rigs = [_found(layout, lines, cost, one) for one in begun]
+        rigs = side_by_side(lambda one: _found(layout, lines, cost, one), begun)
     except ValueError:  # no rig there
         return None
     return min(rigs, key=lambda p: _misfit(layout, lines, p) + prior_cost(p, _prior(unknowns, p)))
@@ -122,9 +123,10 @@ def _found(layout: Layout, lines: Sequence[Lines], cost: float, best: Array) -> 
         return best
     # The mesh pushes both gears apart: a housing that moves along answers faintly, and is imitated from afar.
     trials = [with_motion(unknowns, best, 0, at, HOUSING_FROM[-1], 0) for at in FAINT_AT]
-    tried = [_fitted(layout, lines, trial, (*KEYS, *HOUSED), LEVELS[1:], FAINT_EVALUATIONS) for trial in trials]
+    keys = (*KEYS, *HOUSED)
+    tried = side_by_side(lambda trial: _fitted(layout, lines, trial, keys, LEVELS[1:], FAINT_EVALUATIONS), trials)
     value, p = min(tried, key=lambda one: one[0])
-    return _fitted(layout, lines, p, (*KEYS, *HOUSED), LEVELS[1:])[1] if value < cost else best
+    return _fitted(layout, lines, p, keys, LEVELS[1:])[1] if value < cost else best
 
 
 def _looked(layout: Layout, lines: Sequence[Lines], p: Array, trials: Sequence[Array]) -> Array:
@@ -163,10 +165,9 @@ def _misfit(layout: Layout, lines: Sequence[Lines], p: Array) -> float:
     narrow one, which see a weak one."""
     system = system_of(layout, p)
     total = 0.0
-    for level in LEVELS:
-        for one in lines:
-            left = np.log1p(np.abs(left_over(layout, system, one, level)) ** 2)
-            total += level / LEVELS[0] * float(left.sum())
+    for one in lines:
+        for level, rest in zip(LEVELS, left_over(layout, system, one, LEVELS), strict=True):
+            total += level / LEVELS[0] * float(np.log1p(np.abs(rest) ** 2).sum())
     return total
 
 
@@ -199,7 +200,7 @@ def _fitted(
 
         def misfit(trial: Array, level: float = level) -> Array:
             system = system_of(layout, whole(trial))
-            left = real_parts(np.concatenate([left_over(layout, system, one, level) for one in lines]))
+            left = real_parts(np.concatenate([left_over(layout, system, one, (level,))[0] for one in lines]))
             # A line that nothing explains counts by the logarithm of its size.
             return np.concatenate([np.sign(left) * np.sqrt(np.log1p(left**2)), trial / sd])
 

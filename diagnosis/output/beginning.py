@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
+from gearbench.bench.plan.workers import side_by_side
 from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.output.fit import cost_of
 from gearbench.diagnosis.output.quadratic import prior_cost
@@ -64,18 +65,19 @@ def levelled(simulator: Simulator, seen: Array, p: Array, sd: Array) -> Array:
     known = _known(simulator, seen)
     # A support that stiffens resonates along where a gear across it would.
     trusted = [known, np.zeros_like(known)] if known.any() else [known]
-    return min((_levelled(simulator, seen, p, sd, one) for one in trusted), key=lambda one: one[0])[1]
+    found = side_by_side(lambda one: _levelled(simulator, seen, p, sd, one), trusted)
+    return min(found, key=lambda one: one[0])[1]
 
 
 def _levelled(simulator: Simulator, seen: Array, p: Array, sd: Array, known: Flags) -> tuple[float, Array]:
     """Linear cost and unknowns (size,), gears of which (2,) it is `known` how they yield across staying as seen."""
     trials = levels(simulator, seen, p, known)
-    costs = np.array([linear_cost(simulator, trial, sd) for trial in trials])
+    costs = np.array(side_by_side(lambda trial: linear_cost(simulator, trial, sd), trials))
     # The best of each stiffness across.
     rows = costs.reshape(-1, len(STIFFER))
     numbers = [len(STIFFER) * row + int(np.argmin(rows[row])) for row in np.argsort(rows.min(axis=1))[:VALLEYS]]
     soft = simulator.layout.unknowns[ACROSS].start + np.flatnonzero(~known)
-    found = [_followed(simulator, trials[number], soft, sd) for number in numbers]
+    found = side_by_side(lambda number: _followed(simulator, trials[number], soft, sd), numbers)
     return min(found, key=lambda one: one[0])
 
 

@@ -33,7 +33,7 @@ from gearbench.diagnosis.output.runout import in_mesh_of_runout, lobes_of, on_ge
 from gearbench.diagnosis.output.structure import GAIN, LATE, LEAST_STEP, PHASE, SEAT, STRUCTURE
 from gearbench.diagnosis.output.target import Target
 from gearbench.diagnosis.output.viscous import LOADED, damping_reference
-from gearbench.lumped.nonlinear.coordinates import IN_MESH, U1
+from gearbench.lumped.nonlinear.coordinates import IN_MESH, U1, Acting
 from gearbench.lumped.nonlinear.sensitive import LEAST_LEVEL
 
 if TYPE_CHECKING:
@@ -67,12 +67,10 @@ class Other(NamedTuple):
 
 
 class Forces(NamedTuple):
-    """Forces (entries, columns) [N] per unit of unknowns, these unknowns' indices (columns,), and what each force acts
-    on (columns,): a coordinate or the mesh."""
+    """Forces [N] per unit of unknowns, a departure each, and these unknowns' indices (departures,)."""
 
-    values: NDArray[np.float32]
+    acting: Acting
     at: Integers
-    on: Integers
 
 
 def forces_of(
@@ -86,11 +84,9 @@ def forces_of(
     used = chosen[on_drive]
     parts += [drive[:, used], *(force[:, None] for _, _, force in held)]
     values = np.empty((len(along.phase), sum(one.shape[1] for one in parts)), np.float32)
-    return Forces(
-        np.concatenate(parts, axis=1, out=values),
-        np.array([*in_mesh, *on_drive[used], *(index for index, _, _ in held)], dtype=np.int64),
-        np.array([*[IN_MESH] * len(in_mesh), *[along.drive] * int(used.sum()), *(on for _, on, _ in held)]),
-    )
+    at, of = np.unique([*in_mesh, *on_drive[used], *(index for index, _, _ in held)], return_inverse=True)
+    on = np.array([*[IN_MESH] * len(in_mesh), *[along.drive] * int(used.sum()), *(on for _, on, _ in held)])
+    return Forces(Acting(np.concatenate(parts, axis=1, out=values), on, of), at)
 
 
 def mesh_forces(layout: Layout, p: Array, along: Along, chosen: Flags) -> tuple[list[Array], Integers]:

@@ -150,7 +150,7 @@ class Simulator:
             steady = steady_motion(case, measured.record, law, nudge=nudge)
             tangent = along(steady)
             forces = forces_of(self.layout, p, tangent, measured.name, chosen, others)
-            answers = tangent.answers(forces.values, forces.on)
+            answers = tangent.answers(forces.acting)
             answers["torque_driven"] *= self.layout.model.base_radius[1]
             seen = simulated_channels(measured, seen_of(case, steady))
             sensed = sensor_columns(self.layout, self.target, number, seen)

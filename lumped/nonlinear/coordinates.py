@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 
 class Coordinates(NamedTuple):
@@ -37,6 +38,15 @@ FURTHER = len(Further._fields)
 NAMES = (*Coordinates._fields, *Further._fields)
 U1, Y1, Y2, U2, W, LOAD, HOUSING, ROCKING, X1, X2 = range(len(NAMES))  # their numbers
 IN_MESH = -1  # instead of the number of a coordinate that a force acts on
+
+
+class Acting(NamedTuple):
+    """Forces (entries, forces) [N], each `on` (forces,) one coordinate, its number, or `IN_MESH`, and part of the
+    departure `of` (forces,); departures are numbered from 0 on."""
+
+    values: NDArray[np.floating[Any]]
+    on: Integers
+    of: Integers
 
 
 def leaning_of(base_radii: tuple[float, float], tangential: bool) -> float:

@@ -3,12 +3,12 @@ one coordinate, does to every coordinate.
 
 Along a given motion the mesh is a spring k(t) and a damper c(t), so that departures q obey
 
-    M q'' + C q' + K q = -(m + r(t)) (k(t) m.q + c(t) m.q' + w(t) n.q + f(t)) - sum b_i s_i(t) b_i.q + d g(t)
+    M q'' + C q' + K q = -(m + r(t)) (k(t) m.q + c(t) m.q' + w(t) n.q + f(t)) - sum b_i s_i(t) b_i.q + g(t)
 
 with m what each coordinate contributes to the deflection, n to the phase of the mesh, which the force grows with by
 w(t), b_i likewise that of a support whose stiffness departs by
 s_i(t) from the mean one, f(t) the force that a change of the rig adds in the mesh at
-unchanged motion, and g(t) that on one coordinate d: a support, the driver, its shaft. r(t) is the friction that comes
+unchanged motion, and g(t) those on coordinates: a support, the driver, its shaft. r(t) is the friction that comes
 with a normal force (`rubbing`); that its levers change with the departures, as sliding turns round, is left out. Many
 departures are carried at once by the classical Runge-Kutta method, in single precision, which leaves 1e-6 of the
 largest departure.
@@ -16,13 +16,14 @@ largest departure.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from math import ceil
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.kernels.compiled import ROUNDING, compiled
-from gearbench.lumped.nonlinear.coordinates import IN_MESH
+from gearbench.lumped.nonlinear.coordinates import IN_MESH, Acting
 
 Array = NDArray[np.float64]
 Single = NDArray[np.float32]
@@ -30,6 +31,7 @@ Integers = NDArray[np.int64]
 
 # A plain 0.5 would be of double precision, and what it is multiplied with.
 HALF, SIXTH, TWO = np.float32(0.5), np.float32(1 / 6), np.float32(2.0)
+PIECE = 32  # departures that compiled loops take in one piece
 # Of a step's four stages in the mesh force that is told of it.
 AT_ONCE, OVER_STEP = (1.0, 0.0, 0.0, 0.0), (1 / 6, 1 / 3, 1 / 3, 1 / 6)
 
@@ -57,42 +59,42 @@ class Tangent(NamedTuple):
 
 
 def departures(
-    tangent: Tangent, forces: NDArray[np.floating[Any]], on: Integers, substeps: int, early: int,
+    tangent: Tangent, acting: Acting, substeps: int, early: int,
     weights: tuple[float, float, float, float] = AT_ONCE,
 ) -> tuple[Single, Single]:  # fmt: skip
-    """Departures (samples, n, columns) of the coordinates [m] and (steps, columns) of the mesh force [N] under forces
-    (entries, columns) [N], each in the mesh or on one coordinate, `on` (columns,): its number or `IN_MESH`; `early`
-    steps before the first sample begin at rest. The mesh force is that at the beginning of each step, or with the
-    `weights` OVER_STEP the mean over it.
+    """Departures (samples, n, columns) of the coordinates [m] and (steps, columns) of the mesh force [N] under forces;
+    `early` steps before the first sample begin at rest. The mesh force is that at the beginning of each step, or with
+    the `weights` OVER_STEP the mean over it.
     """
-    entries, columns = forces.shape
+    entries, columns = len(acting.values), int(acting.of.max(initial=-1)) + 1
     size = len(tangent.inverse)
     samples = entries // (2 * substeps)
-    places, pushes = np.empty((samples, size, columns), np.float32), np.zeros((entries // 2, columns), np.float32)
+    padded = ceil(columns / PIECE) * PIECE
+    places, pushes = np.empty((samples, size, padded), np.float32), np.zeros((entries // 2, padded), np.float32)
     inverse = tangent.inverse[:, None]
-    in_mesh = on == IN_MESH
-    direction = np.where(in_mesh, 0.0, inverse * (np.arange(size)[:, None] == on))
     values = (
-        -inverse * tangent.springs, -inverse * tangent.dampers, tangent.mesh,
-        -tangent.inverse * (tangent.mesh + tangent.rubbed),
-        direction, in_mesh, tangent.stiffness, tangent.damping, forces, tangent.bearings,
-        -inverse.T * tangent.bearings, tangent.stiffer, tangent.turned_on, tangent.turning,
+        -inverse * tangent.springs, -inverse * tangent.dampers, tangent.inverse, tangent.mesh,
+        -tangent.inverse * (tangent.mesh + tangent.rubbed), tangent.stiffness, tangent.damping, acting.values,
+        tangent.bearings, -inverse.T * tangent.bearings, tangent.stiffer, tangent.turned_on, tangent.turning,
     )  # fmt: skip
     single = (np.ascontiguousarray(one, np.float32) for one in values)
-    _run(*single, np.float32(tangent.step), substeps, early, np.array(weights, np.float32), places, pushes)
-    return places, pushes
+    _run(*single, acting.on, acting.of, np.float32(tangent.step), substeps, early, np.array(weights, np.float32),
+         places, pushes)  # fmt: skip
+    return places[..., :columns], pushes[:, :columns]
 
 
 @compiled(fastmath=ROUNDING)
 def _rates(
-    q: Single, v: Single, springs: Single, dampers: Single, mesh: Single, pushed: Single, direction: Single,
-    in_mesh: Single, k: np.float32, c: np.float32, force: Single, bearings: Single, held: Single, stiffer: Single,
-    turned: Single, w: np.float32, out: Single, push: Single,
+    q: Single, v: Single, springs: Single, dampers: Single, inverse: Single, mesh: Single, pushed: Single,
+    k: np.float32, c: np.float32, force: Single, bearings: Single, held: Single, stiffer: Single, turned: Single,
+    w: np.float32, on: Integers, of: Integers, out: Single, push: Single,
 ) -> None:  # fmt: skip
     """Accelerations `out` (n, columns) and the force `push` (columns,) in the mesh."""
     size, columns = q.shape
-    for p in range(columns):
-        push[p] = in_mesh[p] * force[p]
+    push[:] = 0.0
+    for number in range(len(on)):
+        if on[number] == IN_MESH:
+            push[of[number]] += force[number]
     for i in range(size):
         if mesh[i] != 0.0:
             spring, damper = mesh[i] * k + turned[i] * w, mesh[i] * c
@@ -100,11 +102,14 @@ def _rates(
                 push[p] += spring * q[i, p] + damper * v[i, p]
     for i in range(size):
         for p in range(columns):
-            out[i, p] = pushed[i] * push[p] + direction[i, p] * force[p]
+            out[i, p] = pushed[i] * push[p]
         for j in range(size):
             if springs[i, j] != 0.0 or dampers[i, j] != 0.0:
                 for p in range(columns):
                     out[i, p] += springs[i, j] * q[j, p] + dampers[i, j] * v[j, p]
+    for number in range(len(on)):
+        if on[number] != IN_MESH:
+            out[on[number], of[number]] += inverse[on[number]] * force[number]
     for b in range(len(bearings)):
         for i in range(size):
             for j in range(size):
@@ -123,14 +128,13 @@ def _gather(push: Single, weight: np.float32, number: int, pushes: Single) -> No
 
 @compiled(fastmath=ROUNDING)
 def _run(
-    springs: Single, dampers: Single, mesh: Single, pushed: Single, direction: Single, in_mesh: Single,
-    stiffness: Single, damping: Single, forces: Single, bearings: Single, held: Single, stiffer: Single,
-    turned: Single, turning: Single, h: np.float32, substeps: int, early: int, weights: Single, places: Single,
+    springs: Single, dampers: Single, inverse: Single, mesh: Single, pushed: Single, stiffness: Single,
+    damping: Single, forces: Single, bearings: Single, held: Single, stiffer: Single, turned: Single, turning: Single,
+    on: Integers, of: Integers, h: np.float32, substeps: int, early: int, weights: Single, places: Single,
     pushes: Single,
 ) -> None:  # fmt: skip
     """Fill places and pushes."""
-    entries, columns = forces.shape
-    size = len(mesh)
+    entries, size, columns = len(forces), len(mesh), pushes.shape[1]
     q, v = np.zeros((size, columns), np.float32), np.zeros((size, columns), np.float32)
     q2, v2, v3, v4 = np.empty_like(q), np.empty_like(q), np.empty_like(q), np.empty_like(q)
     a1, a2, a3, a4 = np.empty_like(q), np.empty_like(q), np.empty_like(q), np.empty_like(q)
@@ -139,8 +143,8 @@ def _run(
     for number in range(-early, steps):
         i = (2 * number) % entries
         middle, after = i + 1, (i + 2) % entries
-        _rates(q, v, springs, dampers, mesh, pushed[i], direction, in_mesh, stiffness[i], damping[i],
-               forces[i], bearings, held, stiffer[i], turned, turning[i], a1, push)  # fmt: skip
+        _rates(q, v, springs, dampers, inverse, mesh, pushed[i], stiffness[i], damping[i],
+               forces[i], bearings, held, stiffer[i], turned, turning[i], on, of, a1, push)  # fmt: skip
         if number >= 0 and number % substeps == 0:
             sample = number // substeps
             for c in range(size):
@@ -151,22 +155,22 @@ def _run(
             for p in range(columns):
                 q2[c, p] = q[c, p] + HALF * h * v[c, p]
                 v2[c, p] = v[c, p] + HALF * h * a1[c, p]
-        _rates(q2, v2, springs, dampers, mesh, pushed[middle], direction, in_mesh, stiffness[middle], damping[middle],
-               forces[middle], bearings, held, stiffer[middle], turned, turning[middle], a2, push)  # fmt: skip
+        _rates(q2, v2, springs, dampers, inverse, mesh, pushed[middle], stiffness[middle], damping[middle],
+               forces[middle], bearings, held, stiffer[middle], turned, turning[middle], on, of, a2, push)  # fmt: skip
         _gather(push, weights[1], number, pushes)
         for c in range(size):
             for p in range(columns):
                 q2[c, p] = q[c, p] + HALF * h * v2[c, p]
                 v3[c, p] = v[c, p] + HALF * h * a2[c, p]
-        _rates(q2, v3, springs, dampers, mesh, pushed[middle], direction, in_mesh, stiffness[middle], damping[middle],
-               forces[middle], bearings, held, stiffer[middle], turned, turning[middle], a3, push)  # fmt: skip
+        _rates(q2, v3, springs, dampers, inverse, mesh, pushed[middle], stiffness[middle], damping[middle],
+               forces[middle], bearings, held, stiffer[middle], turned, turning[middle], on, of, a3, push)  # fmt: skip
         _gather(push, weights[2], number, pushes)
         for c in range(size):
             for p in range(columns):
                 q2[c, p] = q[c, p] + h * v3[c, p]
                 v4[c, p] = v[c, p] + h * a3[c, p]
-        _rates(q2, v4, springs, dampers, mesh, pushed[after], direction, in_mesh, stiffness[after], damping[after],
-               forces[after], bearings, held, stiffer[after], turned, turning[after], a4, push)  # fmt: skip
+        _rates(q2, v4, springs, dampers, inverse, mesh, pushed[after], stiffness[after], damping[after],
+               forces[after], bearings, held, stiffer[after], turned, turning[after], on, of, a4, push)  # fmt: skip
         _gather(push, weights[3], number, pushes)
         for c in range(size):
             for p in range(columns):

@@ -11,7 +11,7 @@ from gearbench.bench.nonlinear.along import Along, along
 from gearbench.bench.nonlinear.law_table import mesh_law
 from gearbench.bench.nonlinear.replay import Steady, steady_motion
 from gearbench.cases import case_files
-from gearbench.lumped.nonlinear.coordinates import IN_MESH
+from gearbench.lumped.nonlinear.coordinates import IN_MESH, Acting
 from gearbench.lumped.nonlinear.step import columns
 from gearbench.rig import read_case
 
@@ -22,7 +22,7 @@ SMALL = 1e-7  # [m]
 
 def signals(tangent: Along, force: Array, on: int) -> dict[str, Array]:
     """The tangent's answers as signals (1, samples)."""
-    lines = tangent.answers(force, np.array([on]))
+    lines = tangent.answers(Acting(force, np.array([on]), np.array([0])))
     return {name: np.fft.irfft(one, len(tangent.places), axis=1) for name, one in lines.items()}
 
 

@@ -202,6 +202,6 @@ def test_derivatives_are_those_of_differences(rig: tuple[Layout, Condition], lev
     assert (np.abs(found).max(axis=1) > 0.0).sum() > 20
     for index, width, slope in zip(at, sd, found, strict=True):
         step = 1e-5 * width * (np.arange(unknowns.size) == index)
-        high, low = (left_over(layout, system_of(layout, one), lines, level) for one in (p + step, p - step))
+        high, low = (left_over(layout, system_of(layout, one), lines, (level,))[0] for one in (p + step, p - step))
         wanted = (high - low) / (2e-5 * width)
         assert np.abs(slope - wanted).max() <= 1e-3 * np.abs(wanted).max()

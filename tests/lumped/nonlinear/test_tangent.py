@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gearbench.lumped.nonlinear.coordinates import IN_MESH
+from gearbench.lumped.nonlinear.coordinates import IN_MESH, Acting
 from gearbench.lumped.nonlinear.tangent import Tangent, departures
 
 MASS, STIFFNESS, DAMPING = 2.0, 3e6, 400.0  # of the oscillator; the mesh has a third of the stiffness
@@ -39,7 +39,7 @@ def test_an_oscillator_answers_as_its_receptance_says(on_drive: bool) -> None:
     time = np.arange(2 * SUBSTEPS * SAMPLES) * tangent.step / 2
     forces = np.stack([np.cos(rate * time), 5.0 * np.sin(rate * time)], axis=1)
     on = np.full(2, 0 if on_drive else IN_MESH)
-    places, pushes = departures(tangent, forces, on, SUBSTEPS, 5 * SUBSTEPS * SAMPLES)
+    places, pushes = departures(tangent, Acting(forces, on, np.arange(2)), SUBSTEPS, 5 * SUBSTEPS * SAMPLES)
     receptance = 1 / (STIFFNESS - rate**2 * MASS + 1j * rate * DAMPING)
     sign = 1.0 if on_drive else -1.0
     at, steps = time[:: 2 * SUBSTEPS], time[::2]
@@ -49,3 +49,14 @@ def test_an_oscillator_answers_as_its_receptance_says(on_drive: bool) -> None:
         push = (STIFFNESS + 1j * rate * DAMPING) / 3 * sign * receptance + (0.0 if on_drive else 1.0)
         mesh = push * amplitude * np.exp(1j * rate * steps)
         assert pushes[:, column] == pytest.approx(mesh.real, abs=1e-4 * np.abs(mesh).max())
+
+
+def test_forces_of_one_departure_add_up() -> None:
+    """One on the mass, one in the mesh, which pushes the other way: half of what it does is left."""
+    tangent, rate = oscillator(1 / 3)
+    wave = np.cos(rate * np.arange(2 * SUBSTEPS * SAMPLES) * tangent.step / 2)
+    forces = np.stack([wave, 0.5 * wave, wave], axis=1)
+    on, early = np.array([0, IN_MESH, 0]), 5 * SUBSTEPS * SAMPLES
+    places, pushes = departures(tangent, Acting(forces, on, np.array([1, 1, 0])), SUBSTEPS, early)
+    assert places[:, 0, 1] == pytest.approx(0.5 * places[:, 0, 0], abs=2e-5 * float(np.abs(places).max()))
+    assert pushes[:, 1] == pytest.approx(0.5 * pushes[:, 0] + 0.5 * wave[::2], abs=2e-5 * float(np.abs(pushes).max()))
