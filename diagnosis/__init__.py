@@ -2,9 +2,11 @@
 
 `intake`: records become measurements, checked against the nominal rig. `forces`: the force missing from each equation
 of motion, and how it depends on the unknowns. `effects`: the library, an effect a file. `evidence`: hypotheses, their
-evidence, the search among them. `replay`: rigs simulated under the records' own torque: gap, gap budget. `output`: rigs
-fitted to the records as they are simulated. `judging`: what was found held against a record that had no part in it,
-which decides. `planning`: what planned records would tell, before anything is measured.
+evidence, the search among them. `replay`: rigs simulated under the records' own torque: gap, gap budget. `structure`:
+what a rig has that no nominal case gives. `simulation`: simulated lines of all records and their derivatives.
+`fitting`: rigs fitted to the records as they are simulated. `selection`: which effects they call for. `judging`: what
+was found held against a record that had no part in it, which decides. `planning`: what planned records would tell,
+before anything is measured.
 """
 
 from gearbench.diagnosis.diagnosis import Diagnosis, diagnose

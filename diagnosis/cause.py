@@ -33,14 +33,14 @@ from gearbench.diagnosis.judging.missing import Missing, missing_forces, nothing
 from gearbench.diagnosis.judging.naming import drifts_of, effects_of, parameters_of
 from gearbench.diagnosis.judging.repeating import repeating, sentences_of_others
 from gearbench.diagnosis.odds import Calibration, effect_signs
-from gearbench.diagnosis.output.contrast import other_flanks
-from gearbench.diagnosis.output.selection import only, with_entered
-from gearbench.diagnosis.output.simulated import Simulated, simulated
-from gearbench.diagnosis.output.structure import structure_found
-from gearbench.diagnosis.output.weighing import WORTH, Weighed
 from gearbench.diagnosis.population import POPULATION
 from gearbench.diagnosis.replay.gap import Simulate, gaps
 from gearbench.diagnosis.replay.replays import replays
+from gearbench.diagnosis.selection.selection import only, with_entered
+from gearbench.diagnosis.selection.simulated import Simulated, simulated
+from gearbench.diagnosis.selection.weighing import WORTH, Weighed
+from gearbench.diagnosis.structure.contrast import other_flanks
+from gearbench.diagnosis.structure.structure import structure_found
 from gearbench.diagnosis.verdict import Candidate, Effect, Found, Outcome, Share
 from gearbench.rig import Case
 from gearbench.rig.contract import Place, rank_of

@@ -43,7 +43,10 @@ ROOMS: dict[str, tuple[str, ...]] = {
         *("results", "study"),
     ),
     "identification": ("excitation", "spectra", "lpm", "smooth", "truth", "response", "feedback", "nonlinear"),
-    "diagnosis": ("intake", "forces", "effects", "evidence", "replay", "output", "judging", "planning"),
+    "diagnosis": (
+        *("intake", "forces", "effects", "evidence", "replay", "structure", "simulation", "fitting", "selection"),
+        *("judging", "planning"),
+    ),
     "challenge": ("truth", "making", "scoring"),
     "app": ("shell", "words", "figures", "report", "commands"),
 }

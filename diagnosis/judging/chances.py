@@ -10,7 +10,7 @@ from gearbench.diagnosis.effects.temperature_drift import TEMPERATURE_DRIFT
 from gearbench.diagnosis.judging.decided import Decided
 from gearbench.diagnosis.judging.judged import Judged
 from gearbench.diagnosis.odds import Calibration, effect_signs
-from gearbench.diagnosis.output.weighing import Weighed
+from gearbench.diagnosis.selection.weighing import Weighed
 from gearbench.diagnosis.words import percent
 
 LIKELY = 0.5  # an effect is named that is more likely at work than not

@@ -15,10 +15,10 @@ from gearbench.diagnosis.judging.drift import Drift
 from gearbench.diagnosis.judging.judged import GREATER, Judged
 from gearbench.diagnosis.judging.missing import Missing
 from gearbench.diagnosis.odds import Calibration
-from gearbench.diagnosis.output.simulated import Simulated
-from gearbench.diagnosis.output.structure import lag_of_drive
-from gearbench.diagnosis.output.weighing import Weighed
 from gearbench.diagnosis.population import POPULATION
+from gearbench.diagnosis.selection.simulated import Simulated
+from gearbench.diagnosis.selection.weighing import Weighed
+from gearbench.diagnosis.structure.structure import lag_of_drive
 from gearbench.diagnosis.verdict import Outcome
 from gearbench.diagnosis.words import percent
 from gearbench.rig.contract import Place

@@ -16,8 +16,8 @@ from gearbench.diagnosis.effects.effect import SIDES, SUPPORT_PLACES
 from gearbench.diagnosis.forces.steadiness import COLOURED, scatter_of
 from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.intake.signals import measured_channels
-from gearbench.diagnosis.output.simulated import Simulated
-from gearbench.diagnosis.output.target import INDEPENDENT
+from gearbench.diagnosis.selection.simulated import Simulated
+from gearbench.diagnosis.simulation.target import INDEPENDENT
 from gearbench.rig.contract import Place
 
 Array = NDArray[np.float64]

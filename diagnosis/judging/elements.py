@@ -18,13 +18,13 @@ from numpy.typing import NDArray
 from gearbench.bench.replays.carried import Carried, on_elements
 from gearbench.diagnosis.effects.backlash import KEY as BACKLASH
 from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
+from gearbench.diagnosis.fitting.fit import Optimum, Sensitivity, fit
 from gearbench.diagnosis.intake.signals import simulated_channels
 from gearbench.diagnosis.judging.judged import Closing, Judged, closing_of
-from gearbench.diagnosis.output.fit import Optimum, Sensitivity, fit
-from gearbench.diagnosis.output.quadratic import quadratic_of
-from gearbench.diagnosis.output.simulator import Simulator
-from gearbench.diagnosis.output.viscous import LOADED
 from gearbench.diagnosis.replay.replays import Replay
+from gearbench.diagnosis.simulation.quadratic import quadratic_of
+from gearbench.diagnosis.simulation.simulator import Simulator
+from gearbench.diagnosis.structure.viscous import LOADED
 from gearbench.rig import Case
 
 Array = NDArray[np.float64]

@@ -17,16 +17,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.diagnosis.evidence.problem import Problem
+from gearbench.diagnosis.fitting.fit import Optimum
 from gearbench.diagnosis.forces.condition import prepare
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.intake.signals import measured_channels
-from gearbench.diagnosis.output.fit import Optimum
-from gearbench.diagnosis.output.passed_noise import noise_left, noise_rms
-from gearbench.diagnosis.output.selection import further, only, taken_out
-from gearbench.diagnosis.output.simulated import Simulated, nudges_of
-from gearbench.diagnosis.output.simulator import Simulator
-from gearbench.diagnosis.output.target import FITTED, Target, target_of
-from gearbench.diagnosis.output.weighing import Weighed
+from gearbench.diagnosis.selection.selection import further, only, taken_out
+from gearbench.diagnosis.selection.simulated import Simulated, nudges_of
+from gearbench.diagnosis.selection.weighing import Weighed
+from gearbench.diagnosis.simulation.passed_noise import noise_left, noise_rms
+from gearbench.diagnosis.simulation.simulator import Simulator
+from gearbench.diagnosis.simulation.target import FITTED, Target, target_of
 
 Array = NDArray[np.float64]
 Report = Callable[[str], None]

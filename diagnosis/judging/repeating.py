@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 from gearbench.diagnosis.forces.steadiness import SLOW, changing_parts
 from gearbench.diagnosis.intake.measurements import Measurement
-from gearbench.diagnosis.output.simulated import Simulated
+from gearbench.diagnosis.selection.simulated import Simulated
 from gearbench.diagnosis.words import percent
 
 

@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.diagnosis.errors import DiagnosisError
+from gearbench.diagnosis.fitting.background import prior_of
+from gearbench.diagnosis.fitting.fit import sensitivity_of
 from gearbench.diagnosis.forces.unknowns import Unknowns
-from gearbench.diagnosis.output.background import prior_of
-from gearbench.diagnosis.output.fit import sensitivity_of
-from gearbench.diagnosis.output.quadratic import Quadratic, quadratic_of
-from gearbench.diagnosis.output.target import Target
 from gearbench.diagnosis.planning.planned import Planned
+from gearbench.diagnosis.simulation.quadratic import Quadratic, quadratic_of
+from gearbench.diagnosis.simulation.target import Target
 
 Array = NDArray[np.float64]
 

@@ -11,10 +11,10 @@ from gearbench.diagnosis.evidence.calibration import LIMITS
 from gearbench.diagnosis.forces.condition import Condition
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.judging.judged import DUE, FELT, GAIN, growth_of
-from gearbench.diagnosis.output.simulated import SPACING
-from gearbench.diagnosis.output.weighing import LIMIT
 from gearbench.diagnosis.planning.information import floors_of
 from gearbench.diagnosis.planning.planned import Planned
+from gearbench.diagnosis.selection.simulated import SPACING
+from gearbench.diagnosis.selection.weighing import LIMIT
 
 Array = NDArray[np.float64]
 

@@ -22,7 +22,6 @@ from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
 from gearbench.diagnosis.errors import DiagnosisError
 from gearbench.diagnosis.evidence.separable import groups_of
 from gearbench.diagnosis.judging.decided import VISIBLE
-from gearbench.diagnosis.output.layout import Layout
 from gearbench.diagnosis.planning.added import larger_plans
 from gearbench.diagnosis.planning.information import Known, Without, known_of
 from gearbench.diagnosis.planning.opened import MOST, smallest_backlash
@@ -31,6 +30,7 @@ from gearbench.diagnosis.planning.row import BOTH, LONGER, Cost, Row
 from gearbench.diagnosis.planning.smallest import View, apart_from, direction, largest, rivals_at, smallest
 from gearbench.diagnosis.planning.worth import is_poor, said_of, sentence_of_more, words_of_effect
 from gearbench.diagnosis.population import POPULATION
+from gearbench.diagnosis.structure.layout import Layout
 from gearbench.rig import Case
 from gearbench.rig.contract import rank_of
 

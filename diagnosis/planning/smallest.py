@@ -21,10 +21,10 @@ from gearbench.diagnosis.effects.effect import Hypothesis
 from gearbench.diagnosis.evidence.calibration import LIMITS
 from gearbench.diagnosis.evidence.separable import APART
 from gearbench.diagnosis.judging.judged import DUE, GAIN, growth_of
-from gearbench.diagnosis.output.rivals import NEARLY
-from gearbench.diagnosis.output.selection import known_within
-from gearbench.diagnosis.output.weighing import is_own, limit_of
 from gearbench.diagnosis.planning.information import Known, Without
+from gearbench.diagnosis.selection.rivals import NEARLY
+from gearbench.diagnosis.selection.selection import known_within
+from gearbench.diagnosis.selection.weighing import is_own, limit_of
 
 Array = NDArray[np.float64]
 

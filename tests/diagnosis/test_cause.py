@@ -15,7 +15,7 @@ from gearbench.diagnosis.effects.eccentricity import ECCENTRICITY
 from gearbench.diagnosis.effects.effect import Hypothesis
 from gearbench.diagnosis.effects.encoder_runout import ENCODER_RUNOUT
 from gearbench.diagnosis.intake.measurements import measurement
-from gearbench.diagnosis.output.weighing import Weighed
+from gearbench.diagnosis.selection.weighing import Weighed
 from gearbench.rig import read_case
 
 RIPPLE = {"orders": "[6, 12]", "amplitude_nm": "[1.5, 0.8]", "phase_deg": "[30, -60]"}

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 
 from gearbench.diagnosis.effects.effect import Hypothesis
+from gearbench.diagnosis.fitting.background import background
+from gearbench.diagnosis.fitting.beginning import Around
 from gearbench.diagnosis.forces.unknowns import Unknowns, group, unknowns_of
-from gearbench.diagnosis.output.background import background
-from gearbench.diagnosis.output.beginning import Around
-from gearbench.diagnosis.output.by_forces import Start, begun_by_forces
-from gearbench.diagnosis.output.selection import Selection, select
-from gearbench.diagnosis.output.target import Block, Target
+from gearbench.diagnosis.selection.by_forces import Start, begun_by_forces
+from gearbench.diagnosis.selection.selection import Selection, select
+from gearbench.diagnosis.simulation.target import Block, Target
 
 LINES, BLOCKS = 60, 6
 

@@ -8,10 +8,10 @@ from gearbench.bench import simulate
 from gearbench.cases import case_files
 from gearbench.diagnosis.evidence.problem import problem_of
 from gearbench.diagnosis.intake.measurements import measurement
-from gearbench.diagnosis.output.layout import layout_of
-from gearbench.diagnosis.output.simulator import Simulator
-from gearbench.diagnosis.output.target import target_of
 from gearbench.diagnosis.replay.replays import replays
+from gearbench.diagnosis.simulation.simulator import Simulator
+from gearbench.diagnosis.simulation.target import target_of
+from gearbench.diagnosis.structure.layout import layout_of
 from gearbench.rig import Load, read_case
 
 

@@ -18,8 +18,8 @@ from gearbench.diagnosis.forces.unknowns import group, unknowns_of
 from gearbench.diagnosis.judging.decided import GREATER, VISIBLE, Decided, decide_simulated, unexplained
 from gearbench.diagnosis.judging.drift import Drift
 from gearbench.diagnosis.judging.missing import OUTSTANDING, Missing
-from gearbench.diagnosis.output.structure import LATE
 from gearbench.diagnosis.population import POPULATION
+from gearbench.diagnosis.structure.structure import LATE
 from gearbench.diagnosis.verdict import Outcome
 
 EFFECT = next(one for one in LIBRARY if one.name == "friction")

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from shared.fake_simulator import FakeSimulator, sensitivities, target
 
+from gearbench.diagnosis.fitting.fit import fit, sensitivity_of
 from gearbench.diagnosis.judging.elements import refitted
-from gearbench.diagnosis.output.fit import fit, sensitivity_of
 
 LUMPED = sensitivities(3)
 # The other model answers by a fifth otherwise.

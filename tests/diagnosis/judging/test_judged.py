@@ -24,11 +24,11 @@ from gearbench.diagnosis.judging.judged import (
     judged_on,
     rms_closed,
 )
-from gearbench.diagnosis.output import selection as selecting
-from gearbench.diagnosis.output.selection import Selection
-from gearbench.diagnosis.output.simulated import Simulated
-from gearbench.diagnosis.output.target import Target
-from gearbench.diagnosis.output.weighing import LIMIT, PROVISIONAL
+from gearbench.diagnosis.selection import selection as selecting
+from gearbench.diagnosis.selection.selection import Selection
+from gearbench.diagnosis.selection.simulated import Simulated
+from gearbench.diagnosis.selection.weighing import LIMIT, PROVISIONAL
+from gearbench.diagnosis.simulation.target import Target
 
 MATRIX, OTHER = sensitivities(3), sensitivities(4)  # the records of the search, and the judged one
 FRICTION = Hypothesis("friction", "mesh", (Wide("friction"),))

@@ -14,10 +14,10 @@ from gearbench.diagnosis.effects.friction import FRICTION
 from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
 from gearbench.diagnosis.effects.tooth_crack import TOOTH_CRACK
 from gearbench.diagnosis.effects.torque_ripple import TORQUE_RIPPLE
-from gearbench.diagnosis.output.quadratic import quadratic_of
-from gearbench.diagnosis.output.weighing import LIMIT
 from gearbench.diagnosis.planning.information import Blocks, Known, Without
 from gearbench.diagnosis.planning.smallest import View, apart_from, direction, largest, rivals_at, smallest, wide_prior
+from gearbench.diagnosis.selection.weighing import LIMIT
+from gearbench.diagnosis.simulation.quadratic import quadratic_of
 
 NO_MODEL = cast(Any, None)
 HYPOTHESES = (*FRICTION.hypotheses(NO_MODEL), *TORQUE_RIPPLE.hypotheses(NO_MODEL))

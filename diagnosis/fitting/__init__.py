@@ -1,0 +1,1 @@
+"""Rigs fitted to the records as they are simulated, all unknowns together, from where their structure is found."""

@@ -1,0 +1,234 @@
+"""Output-error fit: all unknowns moved together to where the simulation comes closest, under one set of priors.
+
+Gauss-Newton on `quadratic`, whose steps are simulated: a step that does not lower the cost is halved, then tried
+without what the rig does not feel yet, then the Jacobian is renewed where the unknowns are by now; it is done when no
+step promises half a nat.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.diagnosis.effects.profile_error import FLANKS
+from gearbench.diagnosis.forces.unknowns import Unknowns
+from gearbench.diagnosis.simulation.quadratic import Quadratic, prior_cost, quadratic_of
+from gearbench.diagnosis.simulation.simulator import Simulator
+from gearbench.diagnosis.structure.structure import LEAST_STEP
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Flags = NDArray[np.bool_]
+
+GAIN = 0.5  # nats that are worth a step
+POOR = 0.25  # part of what a step promised, below which the Jacobian is renewed
+LITTLE = 0.01  # the same, below which another renewal is of no use
+ANEW = 3.0  # nats that a renewal must have brought for another one
+HALVINGS = 3
+STEPS = 25
+# Standard deviations that a step may move any unknown by where no part of a longer one is of use: a kink in one of them
+# bends the whole step. Each is tried once, as the next is shorter.
+REACHES = (1.0, 0.3, 0.1, 0.03, 0.01)
+SETTLED = 25.0  # nats that another step may promise: a fit that is close enough not to be gone on with
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """A Jacobian (size, K) and the quadratic that it makes."""
+
+    jacobian: Complex
+    quadratic: Quadratic
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """Unknowns `p` (size,) under priors `sd` (size,), their simulated lines, cost with and without the prior, log
+    evidence, posterior covariance of the active unknowns, nats that another step promises, and the sensitivities last
+    used, about this residual."""
+
+    p: Array
+    sd: Array
+    lines: Complex
+    cost: float
+    misfit: float
+    evidence: float
+    left: float
+    sensitivity: Sensitivity
+
+    @property
+    def std(self) -> Array:
+        """Posterior standard deviations (size,); of what these records do not show, those of the prior."""
+        quadratic = self.sensitivity.quadratic
+        width = self.sd[quadratic.active]
+        free = width > 0.0
+        scale = width[free]
+        information = quadratic.information(np.zeros(len(quadratic.active)))
+        matrix = information[np.ix_(free, free)] * scale[:, None] * scale[None, :] + np.eye(len(scale))
+        out = self.sd.copy()
+        out[quadratic.active[free]] = scale * np.sqrt(np.diag(np.linalg.inv(matrix)))
+        return out
+
+
+def sensitivity_of(
+    simulator: Simulator, p: Array, sd: Array, chosen: Flags | None = None, near: Complex | None = None
+) -> Sensitivity | None:
+    """Sensitivities of the chosen unknowns (size,; None: all) at `p`, moved by parts of `sd`, or as they were `near` by
+    (size, K); None where no rig is there."""
+    chosen = np.ones(p.size, dtype=bool) if chosen is None else chosen
+    lines = simulator.lines(p)
+    jacobian = simulator.jacobian(p, sd, chosen, near) if lines is not None else None
+    if lines is None or jacobian is None:
+        return None
+    return _about(simulator, lines, jacobian)
+
+
+def _about(simulator: Simulator, lines: Complex, jacobian: Complex) -> Sensitivity:
+    """Sensitivities (size, K) about simulated lines (K,)."""
+    active = np.flatnonzero(np.abs(jacobian).max(axis=1) > 0.0)
+    return Sensitivity(jacobian, quadratic_of(simulator.target, simulator.target.lines - lines, jacobian, active))
+
+
+def refreshed(simulator: Simulator, found: Optimum, chosen: Flags) -> Optimum:
+    """The optimum with derivatives by the chosen unknowns (size,), which have to be moved and simulated, taken anew
+    where it is: the others' are renewed as a fit goes on, those are not."""
+    renewed = simulator.moved(found.p, simulator.layout.unknowns.prior(), chosen)
+    if renewed is None:
+        return found
+    jacobian = np.where(chosen[:, None], renewed, found.sensitivity.jacobian)
+    return _optimum(simulator, found.p, found.sd, found.cost, _about(simulator, found.lines, jacobian))
+
+
+def gone_on(
+    simulator: Simulator, found: Optimum, renewals: int, tell: Callable[[], None] = lambda: None
+) -> Optimum:
+    """The optimum, fitted on where another step still promises much, which is told."""
+    if found.left <= SETTLED:
+        return found
+    tell()
+    return fit(simulator, found.p, found.sd, found.sensitivity, renewals=renewals) or found
+
+
+def cost_of(simulator: Simulator, p: Array, sd: Array) -> float:
+    """Cost of unknowns under priors; infinite where no rig has them."""
+    lines = simulator.lines(p)
+    if lines is None:
+        return np.inf
+    return simulator.target.cost(simulator.target.lines - lines) + prior_cost(p, sd)
+
+
+def _stepped(
+    simulator: Simulator, p: Array, sd: Array, active: NDArray[np.int64], step: Array, cost: float, halvings: int
+) -> tuple[Array, float]:
+    """`p` (size,) after as much of the step of its active unknowns as lowers the cost, and that cost; itself where
+    nothing does."""
+    for halving in range(halvings + 1):
+        trial = p.copy()
+        trial[active] += 0.5**halving * step
+        value = cost_of(simulator, trial, sd)
+        if value < cost:
+            return trial, value
+    return p, cost
+
+
+def _standing(unknowns: Unknowns, p: Array) -> tuple[Array, Array]:
+    """Bounds (size,) between which what a rig does not feel yet stands still: its derivative is that of a jump, and a
+    step shorter than that promises what it does not keep."""
+    low, high = unknowns.bounds()
+    for key, least in LEAST_STEP.items():
+        at = unknowns.at(key)
+        at = at[(p[at] >= 0.0) & (p[at] < least)]
+        low[at] = high[at] = p[at]
+    return low, high
+
+
+def _within(bounds: tuple[Array, Array], p: Array, sd: Array, reach: float) -> tuple[Array, Array]:
+    """The bounds (size,), and within them so many standard deviations about `p` (size,)."""
+    low, high = bounds
+    return np.maximum(low, p - reach * sd), np.minimum(high, p + reach * sd)
+
+
+def _unseen(unknowns: Unknowns, sensitivity: Sensitivity) -> Flags:
+    """Which unknowns (size,) these records do not show. Flanks that stand back behind all contact are not felt, but
+    would be if they came forward."""
+    out = np.isin(np.arange(unknowns.size), sensitivity.quadratic.active, invert=True)
+    if FLANKS in unknowns.slices:
+        out[unknowns[FLANKS]] = False
+    return out
+
+
+def fit_afresh(
+    simulator: Simulator, p: Array, sd: Array, *, renewals: int, chosen: Flags | None = None
+) -> Optimum | None:
+    """As `fit`, with derivatives by the chosen unknowns (None: all) taken at `p` (size,)."""
+    first = sensitivity_of(simulator, p, simulator.layout.unknowns.prior(), chosen)
+    return fit(simulator, p, sd, first, renewals=renewals, chosen=chosen) if first else None
+
+
+def fit(
+    simulator: Simulator,
+    p: Array,
+    sd: Array,
+    sensitivity: Sensitivity,
+    *,
+    renewals: int = 0,
+    chosen: Flags | None = None,
+) -> Optimum | None:
+    """The optimum under the prior `sd` (size,) near `p` (size,), with at most so many renewals of the Jacobian of the
+    chosen unknowns (None: all); None where `p` is no rig."""
+    target, bounds = simulator.target, simulator.layout.unknowns.bounds()
+    p = np.clip(p, *bounds)
+    # What these records do not show is left at nothing.
+    p[_unseen(simulator.layout.unknowns, sensitivity)] = 0.0
+    cost = cost_of(simulator, p, sd)
+    if not np.isfinite(cost):
+        return None
+    fresh = False
+    for _ in range(STEPS):
+        lines = simulator.lines(p)
+        assert lines is not None
+        near = sensitivity.quadratic.moved(target.lines - lines)
+        before = cost
+        standing = _standing(simulator.layout.unknowns, p)
+        short = [(_within(standing, p, sd, reach), 0) for reach in REACHES]
+        for limits, halvings in ((bounds, HALVINGS), (standing, HALVINGS), *short):
+            step, promised, _ = near.best(p, sd, limits)
+            if cost - promised > GAIN:
+                p, cost = _stepped(simulator, p, sd, near.active, step, cost, halvings)
+            if cost < before:
+                break
+        gain, hoped = before - cost, before - promised
+        if gain < max(GAIN, POOR * hoped):
+            # A rig that bends gives little of what is promised, but does so again from there.
+            if renewals == 0 or (fresh and gain < max(ANEW, LITTLE * hoped)):
+                break
+            renewed = sensitivity_of(simulator, p, np.where(sd > 0, sd, 1.0), chosen, sensitivity.jacobian)
+            if renewed is None:
+                break
+            sensitivity, renewals, fresh = renewed, renewals - 1, True
+            continue
+        fresh = False
+    lines = simulator.lines(p)
+    assert lines is not None
+    near = sensitivity.quadratic.moved(target.lines - lines)
+    return _optimum(simulator, p, sd, cost, Sensitivity(sensitivity.jacobian, near))
+
+
+def _optimum(simulator: Simulator, p: Array, sd: Array, cost: float, sensitivity: Sensitivity) -> Optimum:
+    """Unknowns of a rig that cost so many nats under a prior, with the sensitivities about their own residual."""
+    lines, near = simulator.lines(p), sensitivity.quadratic
+    assert lines is not None
+    _, promised, _ = near.best(p, sd, _standing(simulator.layout.unknowns, p))
+    here = near.information(np.zeros(len(near.active)))
+    return Optimum(
+        p=p,
+        sd=sd,
+        lines=lines,
+        cost=cost,
+        misfit=cost - prior_cost(p, sd),
+        evidence=near.evidence(cost, here, sd),
+        left=cost - promised,
+        sensitivity=sensitivity,
+    )

@@ -1,0 +1,119 @@
+"""The structure of a rig begun again where a fit was led astray: beside resonances that are not where they are in the
+rig every way is uphill."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.diagnosis.effects.eccentricity import KEYS as RUNOUTS
+from gearbench.diagnosis.effects.encoder_runout import KEYS as ENCODERS
+from gearbench.diagnosis.effects.pitch_error import KEYS as PITCHES
+from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
+from gearbench.diagnosis.effects.torque_ripple import KEY as RIPPLE
+from gearbench.diagnosis.fitting.beginning import Around, levelled, linear_cost, seen_by
+from gearbench.diagnosis.fitting.fit import Optimum, cost_of, fit, fit_afresh, gone_on
+from gearbench.diagnosis.fitting.hidden_housing import hidden_housings
+from gearbench.diagnosis.simulation.simulator import Simulator
+from gearbench.diagnosis.structure.structure import SEAT, otherwise
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Report = Callable[[str], None]
+
+RENEWALS = 3
+# Nats an independent line that are left, in the median block, below which no other structure is tried.
+CLOSE = 0.2
+# The same of a block that answers the excitation, above which it is nearly all unexplained.
+FAR = 5.0
+# Cost of the nominal rig over that of a fit up to which another fit is begun there: mesh, offsets and flanks trade
+# along long valleys, and a rig without any of that can lie below their floors.
+NEAR = 1.5
+# What moves the rotation's lines alone: it waits until the structure is found.
+ROTATION = (*RUNOUTS.values(), *PITCHES.values(), CRACK, RIPPLE, *ENCODERS.values())
+
+
+def restructured(simulator: Simulator, found: Optimum, around: Around | None, report: Report) -> Optimum:
+    """The optimum begun again with a structure that its fit could not walk to, where that comes closer; `around` finds
+    a part of it (None: nothing does)."""
+    if not is_close(simulator, found):
+        found = better(found, _from_around(simulator, found, around, report))
+    if not is_close(simulator, found):
+        found = better(found, _on_a_housing(simulator, found, report))
+    if not is_close(simulator, found):
+        found = better(found, _otherwise(simulator, found, report))
+    return found
+
+
+def begun_at_nominal(simulator: Simulator, found: Optimum, kept: Flags) -> Optimum:
+    """The optimum, or the one of more evidence that is found from the nominal rig with only the unknowns `kept` (size,)
+    as they are, where that is nearly as close to the records."""
+    p = np.where(kept, found.p, 0.0)
+    if cost_of(simulator, p, found.sd) > NEAR * found.cost:
+        return found
+    return better(found, fit(simulator, p, found.sd, found.sensitivity, renewals=1))
+
+
+def better(found: Optimum, other: Optimum | None) -> Optimum:
+    """The one of more evidence."""
+    return other if other is not None and other.evidence > found.evidence else found
+
+
+def is_close(simulator: Simulator, found: Optimum) -> bool:
+    """Whether the median block is left with little beside its noise, and no block that answers the excitation with
+    much: a structure that is not there shows in the transmission error before it shows anywhere else."""
+    target = simulator.target
+    left = target.nats(target.energies(target.lines - found.lines)) - target.nats(target.noise)
+    return bool(np.median(left) < CLOSE and not (target.excited & (left > FAR)).any())
+
+
+def _from_around(simulator: Simulator, found: Optimum, around: Around | None, report: Report) -> Optimum | None:
+    """The fit begun with what the records show of the rig around its mesh, beside the effects that were widened."""
+    unknowns = simulator.layout.unknowns
+    widened = found.sd > unknowns.prior()
+    chosen = widened | ~unknowns.of(ROTATION)
+    # Effects stay; what was fitted around the wrong structure goes.
+    held = np.where(widened | unknowns.of((SEAT,)), found.p, 0.0)
+    seen = seen_by(around, unknowns, held)
+    if seen is None:
+        return None
+    report("simulating: the rig around its mesh")
+    begin = levelled(simulator, seen, held, found.sd)
+    best = fit_afresh(simulator, begin, found.sd, renewals=RENEWALS, chosen=chosen)
+    # What waits is missing in the other lines.
+    if best is None or linear_cost(simulator, best.p, found.sd) > linear_cost(simulator, found.p, found.sd):
+        return None
+    return fit_afresh(simulator, best.p, found.sd, renewals=RENEWALS)
+
+
+def _on_a_housing(simulator: Simulator, found: Optimum, report: Report) -> Optimum | None:
+    """The fit begun with sensors on a housing that moves across, the one nearest to the excited lines; None where a rig
+    has none."""
+    alone = simulator.of_record(simulator.target.most_excited)
+    report("simulating: sensors on a housing")
+    trials = hidden_housings(alone, found.p)
+    if not trials:
+        return None
+    begin = min(trials, key=lambda p: linear_cost(alone, p, found.sd))
+    again = fit_afresh(simulator, begin, found.sd, renewals=RENEWALS)
+    if again is None or again.evidence <= found.evidence:
+        return again
+    return gone_on(simulator, again, RENEWALS)
+
+
+def _otherwise(simulator: Simulator, found: Optimum, report: Report) -> Optimum | None:
+    """The fit begun with one part of the structure otherwise.
+
+    Beginnings are chosen by their cost before any fit: beside the gap of a large effect they all cost the same.
+    """
+    p = otherwise(simulator.layout.unknowns, found.p)
+    if p is None:
+        return None
+    report("simulating: another structure")
+    again = fit_afresh(simulator, p, found.sd, renewals=RENEWALS)
+    if again is None or again.evidence <= found.evidence:
+        return again
+    return gone_on(simulator, again, RENEWALS, partial(report, "simulating: another structure, further"))

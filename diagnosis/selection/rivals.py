@@ -1,0 +1,105 @@
+"""What explains the records as well as the hypothesis that is ahead: its rivals, and which of them all is named."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from gearbench.diagnosis.effects.effect import Hypothesis
+from gearbench.diagnosis.evidence.separable import APART
+from gearbench.diagnosis.fitting.fit import Optimum, fit
+from gearbench.diagnosis.selection.weighing import Weighed
+from gearbench.diagnosis.simulation.simulator import Simulator
+
+MOST_LEFT = 6.0  # nats still promised by fits that count for comparing them
+# Part of a rare effect's evidence that its usual counterpart must have: what both explain is nine tenths of it, and the
+# rest is told by resonances that no model has to the per cent.
+NEARLY = 0.75
+RENEWALS = 1
+
+
+def usual_of(weighed: Sequence[Weighed]) -> Weighed | None:
+    """The best of those weighed; in place of a rare one its usual counterpart where that explains the records nearly as
+    well. None of none."""
+    if not weighed:
+        return None
+    best = weighed[0]
+    usual = next((one for one in weighed if _is_usual(one, best) and one.optimum is not None), None)
+    if usual is None:
+        return best
+    needed = min(NEARLY * best.log_bayes_factor, best.log_bayes_factor - APART - _left(usual, best))
+    return usual if usual.log_bayes_factor > needed else best
+
+
+def compared(simulator: Simulator, base: Optimum, weighed: Sequence[Weighed]) -> list[Weighed]:
+    """Those weighed beside `base`, the best first; where a rare one is ahead its usual counterparts are fitted again
+    from where that one got, with what it explains handed over."""
+    if not weighed:
+        return []
+    best = weighed[0]
+    again = (_handed_over(simulator, base, best, one) if _is_usual(one, best) else one for one in weighed)
+    return sorted(again, key=lambda one: -one.log_bayes_factor)
+
+
+def _handed_over(simulator: Simulator, base: Optimum, rare: Weighed, usual: Weighed) -> Weighed:
+    """The usual one, or where it explains more its fit from where the rare one got."""
+    if rare.optimum is None or rare.hypothesis.usual is None:
+        return usual
+    unknowns, p = simulator.layout.unknowns, rare.optimum.p.copy()
+    own = rare.hypothesis.entries(unknowns)
+    p[usual.hypothesis.entries(unknowns)] += rare.hypothesis.usual[1] * p[own]
+    p[own] = 0.0
+    sd = usual.hypothesis.widened(unknowns, base.sd)
+    found = fit(simulator, p, sd, rare.optimum.sensitivity, renewals=RENEWALS)
+    if found is None:
+        return usual
+    factor = found.evidence - base.evidence - float(np.log(usual.hypothesis.choices))
+    return usual if factor <= usual.log_bayes_factor else replace(usual, log_bayes_factor=factor, optimum=found)
+
+
+def _is_usual(one: Weighed, rare: Weighed) -> bool:
+    """Whether one is a usual counterpart of another, rare one."""
+    return one is not rare and rare.hypothesis.gives_way_to(one.hypothesis)
+
+
+def rivals_of(winner: Weighed, weighed: Sequence[Weighed]) -> tuple[Hypothesis, ...]:
+    """Those of the hypotheses weighed beside the winner that explain the records as well, by other unknowns, and are
+    another cause to look for."""
+    return tuple(one.hypothesis for one in weighed if _as_good(one, winner))
+
+
+def _as_good(one: Weighed, winner: Weighed) -> bool:
+    """Whether one explains the records as another cause does; of twins what tells them apart is a resonance, too."""
+    behind = APART
+    if one.hypothesis.is_twin_of(winner.hypothesis):
+        behind = max(behind, (1.0 - NEARLY) * winner.log_bayes_factor)
+    return (
+        one.optimum is not None
+        and one.log_bayes_factor > winner.log_bayes_factor - behind
+        and not is_same(one.hypothesis, winner.hypothesis)
+        and not _same_cause(one.hypothesis, winner.hypothesis)
+    )
+
+
+def _left(*weighed: Weighed) -> float:
+    """The most that any of their fits still promises [nats]."""
+    return min(max((one.optimum.left for one in weighed if one.optimum), default=0.0), MOST_LEFT)
+
+
+def is_same(one: Hypothesis, other: Hypothesis) -> bool:
+    """Whether two hypotheses move the same unknowns."""
+    return any(a.key == b.key and (a.at is None or b.at is None or a.at == b.at) for a in one.wide for b in other.wide)
+
+
+def is_like(one: Hypothesis, entered: Hypothesis) -> bool:
+    """Whether one has nothing to add to what entered: the same unknowns, or those of its rare counterpart, which would
+    share between them what either explains."""
+    return is_same(one, entered) or one.gives_way_to(entered)
+
+
+def _same_cause(one: Hypothesis, other: Hypothesis) -> bool:
+    """Whether two hypotheses are an effect in the same part, by other unknowns: not one tooth or another."""
+    whole = all(wide.at is None for wide in (*one.wide, *other.wide))
+    return whole and one.effect == other.effect and one.on == other.on

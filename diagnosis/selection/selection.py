@@ -1,0 +1,238 @@
+"""Which effects the records call for: forward one by one, backward what the others make needless.
+
+At the optimum of the background (`background`) the quadratic weighs every hypothesis; the few of most evidence, by it
+or by the force residuals, are simulated to convergence. The best one enters when its evidence clears the limit, and the
+others are weighed again beside it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.diagnosis.effects.effect import BEYOND, Hypothesis
+from gearbench.diagnosis.fitting.background import prior_of
+from gearbench.diagnosis.fitting.beginning import Around
+from gearbench.diagnosis.fitting.fit import Optimum, fit, fit_afresh, gone_on, refreshed
+from gearbench.diagnosis.fitting.reshaped import has_shapes
+from gearbench.diagnosis.fitting.restructured import begun_at_nominal, is_close, restructured
+from gearbench.diagnosis.forces.unknowns import Unknowns
+from gearbench.diagnosis.selection.by_forces import Start
+from gearbench.diagnosis.selection.rivals import compared, is_like, rivals_of, usual_of
+from gearbench.diagnosis.selection.weighing import Weighed, entering, is_own, weigh
+from gearbench.diagnosis.simulation.jacobian import WEIGHED
+from gearbench.diagnosis.simulation.simulator import Simulator
+
+Array = NDArray[np.float64]
+Report = Callable[[str], None]
+
+NOTHING = 1e-3  # of a number's nominal value: as good as none
+MOST = 3  # effects
+# Renewals of the Jacobian of what entered in the end, whose structure has been found beside a gap that the effects now
+# close.
+RENEWALS_LAST = 2
+# Of what all is weighed over, where derivatives that were not renewed on the way led its fit astray.
+RENEWALS_FRESH = 3
+
+
+@dataclass(frozen=True)
+class Selection:
+    """The background's optimum, the same without any part of what entered, that with all effects that entered, these in
+    the order of entering with the evidence that each would take away, and all that was weighed over the background, the
+    best first."""
+
+    base: Optimum
+    bare: Optimum
+    best: Optimum
+    entered: tuple[Weighed, ...]
+    weighed: tuple[Weighed, ...]
+
+
+def select(
+    simulator: Simulator,
+    base: Optimum,
+    hypotheses: Sequence[Hypothesis],
+    starts: Mapping[str, Start],
+    report: Report = lambda step: None,
+    around: Around | None = None,
+    *,
+    apart: bool = False,
+) -> Selection:
+    """The effects of the hypotheses that the records call for beside the background's optimum `base`; `starts`: by a
+    hypothesis' name; `around`: the rig around its mesh, as the records show it; `apart`: a record that has no part in
+    this judges what enters."""
+    unknowns = simulator.layout.unknowns
+    if not is_close(simulator, base):
+        base = refreshed(simulator, base, unknowns.of(WEIGHED))
+    base = gone_on(simulator, base, RENEWALS_FRESH)
+    best, entered, weighed = _forward(simulator, base, [], hypotheses, starts, report, apart=apart)
+    best, kept = _needed(simulator, best, entered, apart)
+    if kept:
+        best = gone_on(simulator, best, RENEWALS_LAST, partial(report, "simulating: all together"))
+        best = restructured(simulator, best, around, report)
+        report("simulating: all together, from the nominal rig")
+        best = begun_at_nominal(simulator, best, _entries(unknowns, kept))
+    bare = _without(simulator, base, kept)
+    return Selection(base, bare, best, kept, tuple(weighed))
+
+
+def further(
+    simulator: Simulator,
+    selection: Selection,
+    out: Sequence[Weighed],
+    report: Report = lambda step: None,
+    *,
+    apart: bool = False,
+) -> Selection | None:
+    """The selection with what the records call for besides when these effects are `out`, which had the place of others;
+    None where nothing more enters."""
+    tried = [one.hypothesis for one in (*selection.entered, *out)]
+    left = [one for one in selection.weighed if not any(is_like(one.hypothesis, other) for other in tried)]
+    if not out or not any(entering(simulator.layout.unknowns, one, apart) for one in left):
+        return None
+    rest = [one.hypothesis for one in left]
+    best = fit_afresh(simulator, selection.best.p, selection.best.sd, renewals=0) or selection.best
+    starts = _found(selection.weighed)
+    best, entered, _ = _forward(simulator, best, selection.entered, rest, starts, report, apart=apart)
+    if len(entered) == len(selection.entered):
+        return None
+    best, kept = _needed(simulator, best, entered, apart)
+    best = gone_on(simulator, best, RENEWALS_LAST, partial(report, "simulating: all together"))
+    bare = _without(simulator, selection.base, kept)
+    return replace(selection, bare=bare, best=best, entered=kept)
+
+
+def _forward(
+    simulator: Simulator,
+    best: Optimum,
+    beside: Sequence[Weighed],
+    hypotheses: Sequence[Hypothesis],
+    starts: Mapping[str, Start],
+    report: Report,
+    *,
+    apart: bool,
+) -> tuple[Optimum, list[Weighed], list[Weighed]]:
+    """The optimum with what enters one by one beside what did before, all that entered, and all that was weighed
+    first."""
+    unknowns, entered, first = simulator.layout.unknowns, list(beside), list[Weighed]()
+    while len(entered) < MOST:
+        taken = [one.hypothesis for one in entered]
+        rest = [one for one in hypotheses if not any(is_like(one, other) for other in taken)]
+        found = compared(simulator, best, weigh(simulator, best, rest, starts, report, reshape=not entered))
+        if not first:
+            first, starts = found, {**starts, **_shaped(found)}
+        winner = usual_of(found)
+        winner = entering(unknowns, winner, apart) if winner else None
+        if winner is None or winner.optimum is None:
+            break
+        entered.append(replace(winner, rivals=rivals_of(winner, found)))
+        best = winner.optimum
+        best = fit_afresh(simulator, best.p, best.sd, renewals=0) or best
+    return best, entered, first
+
+
+def _entries(unknowns: Unknowns, effects: Sequence[Weighed]) -> NDArray[np.bool_]:
+    """Which unknowns (size,) are those of these effects."""
+    out = np.zeros(unknowns.size, dtype=bool)
+    for one in effects:
+        out[one.hypothesis.entries(unknowns)] = True
+    return out
+
+
+def _shaped(weighed: Sequence[Weighed]) -> dict[str, Start]:
+    """Where hypotheses that have shapes to begin from got, to begin from beside an effect."""
+    return _found([one for one in weighed if has_shapes(one.hypothesis)])
+
+
+def _found(weighed: Sequence[Weighed]) -> dict[str, Start]:
+    """Where hypotheses that were simulated got, to begin from again."""
+    return {
+        one.hypothesis.name: Start(one.hypothesis, one.optimum.p, one.log_bayes_factor)
+        for one in weighed
+        if one.optimum is not None
+    }
+
+
+def with_entered(simulator: Simulator, selection: Selection, one: Weighed) -> Selection:
+    """The selection with an effect entered that was weighed and simulated but did not clear the limit."""
+    assert one.optimum is not None
+    bare = _without(simulator, selection.base, [one])
+    return replace(selection, bare=bare, best=one.optimum, entered=(one,))
+
+
+def only(simulator: Simulator, selection: Selection, kept: Sequence[Weighed]) -> Selection:
+    """The selection with only these of the effects that entered: the others go back to a background's size."""
+    base, unknowns = selection.base, simulator.layout.unknowns
+    if not kept:
+        return replace(selection, bare=base, best=base, entered=())
+    sd = base.sd
+    for one in kept:
+        sd = one.hypothesis.widened(unknowns, sd)
+    p, near = selection.best.p, selection.best.sensitivity
+    p = np.where(sd > 0.0, np.clip(p, -3.0 * sd, 3.0 * sd), 0.0)
+    best = fit(simulator, p, sd, near) or selection.best
+    bare = _without(simulator, base, kept)
+    return replace(selection, bare=bare, best=best, entered=tuple(kept))
+
+
+def taken_out(simulator: Simulator, selection: Selection, effect: Weighed) -> Optimum:
+    """The optimum without any part of one of the effects that entered, or of its rivals.
+
+    The rig, its structure and the other effects that entered are fitted again; what a good rig has of all others stays
+    as it is: pitch errors that take the shape of the run-out left out would make it seem to close nothing.
+    """
+    unknowns = simulator.layout.unknowns
+    held = np.zeros(unknowns.size, dtype=bool)
+    for group in unknowns.groups:
+        held[unknowns[group.key]] = (group.wide > group.sd).any()
+    for one in selection.entered:
+        held[one.hypothesis.entries(unknowns)] = False
+    base = replace(selection.best, sd=np.where(held, 0.0, selection.best.sd))
+    return _without(simulator, base, [effect])
+
+
+def _without(simulator: Simulator, base: Optimum, effects: Sequence[Weighed]) -> Optimum:
+    """The background's optimum with the unknowns of these effects and their rivals held at zero, and numbers of the
+    nominal rig where its uncertainty ends, within which recalibration moves them; itself where that is no rig."""
+    sd, p, unknowns = base.sd.copy(), base.p.copy(), simulator.layout.unknowns
+    for wide in (wide for one in effects for cause in one.causes for wide in cause.wide):
+        at = wide.entries(unknowns)
+        low, high = (0.0, 0.0) if is_own(unknowns, wide) else known_within(unknowns.prior()[at])
+        sd[at], p[at] = 0.0, np.clip(p[at], low, high)
+    return (fit(simulator, p, sd, base.sensitivity) or base) if effects else base
+
+
+def known_within(sd: Array) -> tuple[Array, Array]:
+    """Least and largest logarithm of a number over its nominal value within BEYOND of its standard deviations (relative
+    ones): of a number known to a third of itself or worse, nothing is too small."""
+    edge = BEYOND * sd
+    return np.log(np.maximum(1.0 - edge, NOTHING)), edge
+
+
+def _needed(
+    simulator: Simulator, best: Optimum, entered: Sequence[Weighed], apart: bool
+) -> tuple[Optimum, tuple[Weighed, ...]]:
+    """The optimum without what the other effects make needless, and each effect that stays with what it is worth."""
+    unknowns, kept = simulator.layout.unknowns, list[Weighed | None]()
+    for one in entered:
+        sd = best.sd.copy()
+        at = one.hypothesis.entries(unknowns)
+        sd[at] = prior_of(simulator, unknowns.prior())[at]
+        p = np.where((sd > 0.0) | (best.sd == 0.0), best.p, 0.0)
+        quadratic = best.sensitivity.quadratic
+        _, cost, information = quadratic.best(best.p, sd, _bounds_at(unknowns, p, best.p, sd))
+        worth = best.evidence - quadratic.evidence(cost, information, sd)
+        now = replace(one, log_bayes_factor=float(worth) if len(entered) > 1 else one.log_bayes_factor)
+        kept.append(entering(unknowns, now, apart))
+    return best, tuple(one for one in kept if one is not None)
+
+
+def _bounds_at(unknowns: Unknowns, wanted: Array, here: Array, sd: Array) -> tuple[Array, Array]:
+    """Bounds that hold at `wanted` what has no prior."""
+    low, high = unknowns.bounds()
+    fixed = (sd == 0.0) & (wanted != here)
+    return np.where(fixed, wanted, low), np.where(fixed, wanted, high)

@@ -1,0 +1,280 @@
+"""From the search by forces to what simulation makes of it: which records, where to begin, what is weighed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.diagnosis.effects.backlash import KEY as BACKLASH
+from gearbench.diagnosis.effects.effect import Hypothesis
+from gearbench.diagnosis.effects.library import hypotheses as library
+from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
+from gearbench.diagnosis.evidence.prediction import predicted_factors
+from gearbench.diagnosis.evidence.problem import Problem
+from gearbench.diagnosis.evidence.search import Search
+from gearbench.diagnosis.fitting.around import around
+from gearbench.diagnosis.fitting.background import background
+from gearbench.diagnosis.fitting.fit import Optimum, fit_afresh
+from gearbench.diagnosis.fitting.likely_teeth import with_likely_teeth, with_small_cracks
+from gearbench.diagnosis.forces.condition import Condition
+from gearbench.diagnosis.forces.nominal import NominalModel
+from gearbench.diagnosis.forces.unknowns import Unknowns
+from gearbench.diagnosis.intake.measurements import Measurement
+from gearbench.diagnosis.replay.replays import Replay
+from gearbench.diagnosis.selection.by_forces import Start, begun_by_forces
+from gearbench.diagnosis.selection.selection import Selection, select
+from gearbench.diagnosis.selection.weighing import WORTH, Weighed, entering
+from gearbench.diagnosis.simulation.passed_noise import noise_left
+from gearbench.diagnosis.simulation.simulator import Simulator
+from gearbench.diagnosis.simulation.target import target_of
+from gearbench.diagnosis.structure.layout import Layout, layout_of
+from gearbench.diagnosis.structure.structure import beginnings
+from gearbench.rig import Case
+
+Array = NDArray[np.float64]
+Report = Callable[[str], None]
+
+# Part of the time without contact from which a record is too rough to follow downhill: small changes make jumps.
+LOSING = 0.01
+# The same where no record is smoother: impacts that are few and repeat bend a fit without breaking it.
+LOSING_MORE = 0.1
+SPACING = 0.15  # of the backlash, between the values that are tried
+CRACKED = 2  # teeth that may be cracked: those that the force residuals rank first
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """What simulation found: the effects that entered, the unknowns' layout and the simulator."""
+
+    layout: Layout
+    simulator: Simulator
+    selection: Selection
+    std: Array  # (size,) of the unknowns at the optimum
+    # Names of records whose motion need not repeat where nothing changes.
+    restless: frozenset[str] = frozenset()
+    # Effects that entered and were left out again, not to be tried once more.
+    out: tuple[Weighed, ...] = ()
+    _ends: dict[bytes, Array] = field(default_factory=dict)
+
+    def with_selection(self, selection: Selection) -> Simulated:
+        """The same with another selection."""
+        return replace(self, selection=selection, std=selection.best.std)
+
+    @property
+    def recalibrated(self) -> Case:
+        """The nominal case at the optimum of the background alone, without any part of the effects that entered: what a
+        good rig has of them would else take their place in the gap."""
+        return self.layout.case(self.end_of(self.selection.bare))
+
+    @property
+    def without_any(self) -> Case:
+        """The nominal case at the optimum of the background."""
+        return self.layout.case(self.end_of(self.selection.base))
+
+    @property
+    def with_effects(self) -> Case | None:
+        """The case at the optimum with all effects that entered; None without any."""
+        return self.layout.case(self.end_of(self.selection.best)) if self.selection.entered else None
+
+    def end_of(self, optimum: Optimum) -> Array:
+        """Unknowns (size,) of an optimum, fitted on without what nudges: gaps are those of simulations that go their
+        own way."""
+        if not self.simulator.nudges:
+            return optimum.p
+        key = optimum.p.tobytes()
+        if key not in self._ends:
+            found = fit_afresh(self.simulator.free, optimum.p, optimum.sd, renewals=1)
+            self._ends[key] = found.p if found is not None else optimum.p
+        return self._ends[key]
+
+
+def simulated(
+    problem: Problem,
+    found: Search,
+    measurements: Sequence[Measurement],
+    nominal: Case,
+    simulate: Replay,
+    without: Sequence[str] = (),
+    report: Report = lambda step: None,
+    *,
+    apart: bool = False,
+) -> Simulated | None:
+    """Which effects the records call for, by simulation; None where the nominal rig cannot be simulated at all, records
+    do not tell the mesh phase, or flanks part in all of them, on the nominal rig and on that of the force residuals.
+    `apart`: another record judges what enters."""
+    layout = layout_of(nominal, problem.model, problem.conditions, ())
+    by_forces = carried_over(layout, problem.unknowns, found.base.p)
+    smooth, nudges, restless = followable((nominal, layout.case(by_forces)), measurements, problem, simulate)
+    if not smooth:
+        return None
+    listed = library(problem.model, without)
+    cracks = [one for one in listed if one.wide[0].key == CRACK]
+    chosen = [measurements[number] for number in smooth]
+    conditions = [problem.conditions[number] for number in smooth]
+    noises = [noise_left(layout.case(np.zeros(layout.size), one.name), one, simulate) for one in chosen]
+    simulator = Simulator(layout, target_of(chosen, conditions, noises), simulate, nudges)
+
+    def seen(held: Array) -> Array | None:
+        # What acts in the mesh may be anything, an impact too.
+        return around(layout, problem.conditions, held)
+
+    base = background(simulator, _beginnings(layout, by_forces), seen, report)
+    if base is None:
+        return None
+    ranked = _cracked_by_forces(problem, found, cracks) if cracks else []
+    simulator = replace(simulator, layout=replace(layout, teeth=tuple(ranked)))
+    starts = _starts(layout, problem.unknowns, found, listed)
+    for teeth_first in (True, False):
+        if cracks:
+            simulator, base = with_likely_teeth(simulator, base, ranked)
+            base = with_small_cracks(simulator, base)
+        if teeth_first:
+            here = base
+            base, starts = begun_by_forces(simulator, base, _weighed(listed, simulator.layout), starts, seen, report)
+            if base is here:
+                break
+    layout = simulator.layout
+    weighed = _weighed(listed, layout)
+    selection = select(simulator, base, weighed, starts, report, seen, apart=apart)
+    std = selection.best.std
+    rough = [number for number, one in enumerate(measurements) if number not in smooth or one.name in nudges]
+    start = starts.get("backlash")
+    if rough and start is not None and start.log_bayes_factor > WORTH:
+        report("simulating: backlash")
+        target = target_of(
+            [measurements[number] for number in rough], [problem.conditions[number] for number in rough]
+        )
+        nudging = nudges_of(problem.model, [problem.conditions[number] for number in rough])
+        opened = _opened(Simulator(layout, target, simulate, nudging), selection, start, apart)
+        if opened is not None:
+            selection = opened
+            std[layout.unknowns[BACKLASH]] = SPACING * selection.best.p[layout.unknowns[BACKLASH]]
+    return Simulated(layout, simulator, selection, std, restless)
+
+
+def _weighed(listed: Sequence[Hypothesis], layout: Layout) -> list[Hypothesis]:
+    """Those listed whose teeth may be cracked."""
+    return [one for one in listed if one.wide[0].key != CRACK or one.wide[0].at in layout.teeth]
+
+
+def _cracked_by_forces(problem: Problem, found: Search, cracks: Sequence[Hypothesis]) -> list[int]:
+    """Teeth that the force residuals rank first."""
+    ranked = np.argsort(-predicted_factors(found.base, problem.unknowns, cracks))[:CRACKED]
+    return [at for at in (cracks[number].wide[0].at for number in ranked) if at is not None]
+
+
+def _opened(simulator: Simulator, selection: Selection, start: Start, apart: bool) -> Selection | None:
+    """The selection with backlash, if the records whose flanks part call for it: followed downhill they would lead
+    astray, so that backlash alone is tried there, around where the force residuals have it."""
+    unknowns = simulator.layout.unknowns
+    at, wide = unknowns[BACKLASH].start, unknowns.group(BACKLASH).wide[0]
+    costs: dict[float, float] = {}
+    for factor in (0.0, *(1.0 + SPACING * step for step in range(-2, 3))):
+        p = selection.best.p.copy()
+        p[at] = factor * start.p[at]
+        lines = simulator.lines(p)
+        if lines is not None:
+            costs[factor] = simulator.target.cost(simulator.target.lines - lines) + 0.5 * (p[at] / wide) ** 2
+    if 0.0 not in costs or len(costs) < 2:
+        return None
+    best = min(costs, key=lambda factor: costs[factor])
+    value = best * start.p[at]
+    occam = float(np.log(wide / max(SPACING * abs(value), 1e-300)))
+    worth = costs[0.0] - costs[best] - max(occam, 0.0)
+    p = selection.best.p.copy()
+    p[at] = value
+    optimum = replace(selection.best, p=p)
+    found = Weighed(start.hypothesis, worth, optimum)
+    weighed = tuple(sorted((*selection.weighed, found), key=lambda one: -one.log_bayes_factor))
+    entered_now = entering(unknowns, found, apart)
+    if entered_now is None:
+        return replace(selection, weighed=weighed)
+    entered = tuple(sorted((*selection.entered, entered_now), key=lambda one: -one.log_bayes_factor))
+    return replace(selection, best=optimum, entered=entered, weighed=weighed)
+
+
+def followable(
+    rigs: Sequence[Case], measurements: Sequence[Measurement], problem: Problem, simulate: Replay
+) -> tuple[list[int], Mapping[str, float], frozenset[str]]:
+    """Numbers of the records that a fit can follow, what nudges the driver in each that parts its flanks, by its name
+    [N s/m], and the names of those that part for long: those whose flanks stay together on the first rig, else all,
+    nudged."""
+    lost = lost_contact(rigs[0], measurements, simulate)
+    smooth = [number for number, part in enumerate(lost) if part < LOSING]
+    if smooth:
+        return smooth, {}, frozenset()
+    nudges = nudges_of(problem.model, problem.conditions)
+    if not lost or len(nudges) < len(measurements):
+        return smooth_records(rigs, measurements, simulate), {}, frozenset()
+    restless = {one.name for one, part in zip(measurements, lost, strict=True) if part >= LOSING_MORE}
+    return list(range(len(measurements))), nudges, frozenset(restless)
+
+
+def nudges_of(model: NominalModel, conditions: Sequence[Condition]) -> dict[str, float]:
+    """Damper [N s/m] between the driver and its motion as each condition's record has it, by its name: as stiff as the
+    mesh where the driver vibrates on it."""
+    mass = (model.inertia[0] + model.rotor) / model.base_radius[0] ** 2
+    known = [one for one in conditions if "angle_driver" in one.spectra]
+    return {one.name: float(np.sqrt(one.stiffness_level * mass)) for one in known}
+
+
+def smooth_records(rigs: Sequence[Case], measurements: Sequence[Measurement], simulate: Replay) -> list[int]:
+    """Numbers of the records whose flanks stay together on the first of the rigs, and where there is none, of those
+    that part for little of their time: elsewhere small changes make jumps, so that no fit can follow them. Where there
+    is none of these either the next rig is asked: a resonance of the first need not be the records'."""
+    for rig in rigs:
+        lost = lost_contact(rig, measurements, simulate)
+        for limit in (LOSING, LOSING_MORE):
+            smooth = [number for number, part in enumerate(lost) if part < limit]
+            if smooth:
+                return smooth
+    return []
+
+
+def lost_contact(rig: Case, measurements: Sequence[Measurement], simulate: Replay) -> list[float]:
+    """Part of the time that the flanks of a rig are apart in each record; empty where it cannot be simulated in one of
+    them, or one does not tell the mesh phase."""
+    if not all(one.phase_known for one in measurements):
+        return []
+    lost = []
+    for one in measurements:
+        try:
+            steady = simulate(rig, one.record)
+        except ValueError:
+            return []
+        samples = max(int(np.prod(steady["time"].shape)), 1)
+        lost.append(float(steady.attrs.get("contact_lost_samples", 0)) / samples)
+    return lost
+
+
+def carried_over(layout: Layout, unknowns: Unknowns, p: Array) -> Array:
+    """Unknowns of the force residuals (size,) as those of a layout; no tooth is cracked."""
+    out = np.zeros(layout.size)
+    for one in layout.unknowns.groups:
+        if one.key in unknowns.slices and one.key != CRACK:
+            out[layout.unknowns[one.key]] = p[unknowns[one.key]]
+    return out
+
+
+def _beginnings(layout: Layout, by_forces: Array) -> list[Array]:
+    """Where to begin without an effect: the nominal rig, and the force residuals' one without and with structure."""
+    return [np.zeros(layout.size), *beginnings(layout.unknowns, by_forces)]
+
+
+def _starts(
+    layout: Layout, unknowns: Unknowns, found: Search, weighed: Sequence[Hypothesis]
+) -> Mapping[str, Start]:
+    names = {one.name: one for one in weighed}
+    out = {}
+    for one in found.tried:
+        if one.fit is None or one.hypothesis.name not in names:
+            continue
+        p = carried_over(layout, unknowns, one.fit.p)
+        at = one.hypothesis.wide[0].at
+        if one.hypothesis.wide[0].key == CRACK and at is not None:
+            p[layout.unknowns[CRACK].start + at] = max(float(one.fit.p[unknowns[CRACK].start + at]), 0.0)
+        out[one.hypothesis.name] = Start(names[one.hypothesis.name], p, one.log_bayes_factor)
+    return out

@@ -1,0 +1,190 @@
+"""How much each hypothesis is worth beside what a fit holds: promised by the quadratic, the likeliest simulated."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.bench.plan.workers import side_by_side
+from gearbench.diagnosis.effects.effect import Hypothesis, Wide
+from gearbench.diagnosis.fitting.fit import GAIN, Optimum, cost_of, fit, fit_afresh
+from gearbench.diagnosis.fitting.reshaped import has_shapes, reshaped
+from gearbench.diagnosis.fitting.restructured import better
+from gearbench.diagnosis.forces.unknowns import Unknowns
+from gearbench.diagnosis.selection.by_forces import Start
+from gearbench.diagnosis.simulation.jacobian import FOLLOWED
+from gearbench.diagnosis.simulation.simulator import Simulator
+from gearbench.diagnosis.structure.contrast import is_strange
+
+Array = NDArray[np.float64]
+Report = Callable[[str], None]
+
+LIMIT = 8.0  # nats from which an effect enters
+# Of a number of the nominal rig, whose stated uncertainty is the measure: four of its standard deviations are worth no
+# more than this and a prior's width, and only beyond three it is named at all.
+LIMIT_NUMBER = 3.0
+# Of a delay of the driven angle, which replays are given: it shows by little but the mesh phase, whose zero is free,
+# and sound rigs of the calibration family had up to 9.4.
+LIMIT_GIVEN = 12.0
+# Nats from which an effect enters to be held against a record that had no part in the search: what it lacks up to its
+# limit must be made up for there.
+PROVISIONAL = 4.0
+TRIED = 4  # hypotheses that are simulated, at each step
+BY_FORCES = 2  # of them at least, by the force residuals' ranking
+LOOKED_AT = 8  # hypotheses whose quadratic is followed to its minimum
+WORTH = 2.0  # nats promised from which a hypothesis is simulated
+RENEWALS = 1  # of the Jacobian, for each promising hypothesis
+
+
+@dataclass(frozen=True)
+class Weighed:
+    """A hypothesis, its log Bayes factor over what was there before it, its optimum (None: by the quadratic), and of
+    one that entered the `rivals` that explain the records as well and the nats that it is `lacking` up to its limit."""
+
+    hypothesis: Hypothesis
+    log_bayes_factor: float
+    optimum: Optimum | None
+    rivals: tuple[Hypothesis, ...] = ()
+    lacking: float = 0.0
+
+    @property
+    def causes(self) -> tuple[Hypothesis, ...]:
+        """The hypothesis and its rivals."""
+        return (self.hypothesis, *self.rivals)
+
+
+def weigh(
+    simulator: Simulator,
+    base: Optimum,
+    hypotheses: Sequence[Hypothesis],
+    starts: Mapping[str, Start],
+    report: Report = lambda step: None,
+    *,
+    reshape: bool = True,
+) -> list[Weighed]:
+    """All hypotheses beside what `base` holds, the best first: the most promising simulated, those that have shapes to
+    begin from also from these (`reshape`)."""
+    unknowns, quadratic = simulator.layout.unknowns, base.sensitivity.quadratic
+    # What moves nothing in these records cannot be weighed by them.
+    hypotheses = [one for one in hypotheses if np.isin(one.entries(unknowns), quadratic.active).any()]
+    promised = []
+    first = first_look(base, hypotheses, unknowns)
+    likely = set(np.argsort(-first)[:LOOKED_AT])
+    for number, one in enumerate(hypotheses):
+        if number not in likely and one.name not in starts:
+            promised.append((min(float(first[number]), 0.0), one, np.zeros(len(quadratic.active))))
+            continue
+        sd = one.widened(unknowns, base.sd)
+        step, cost, information = quadratic.best(base.p, sd, unknowns.bounds())
+        evidence = quadratic.evidence(cost, information, sd) - base.evidence - np.log(one.choices)
+        there = base.p.copy()
+        there[quadratic.active] += step
+        promised.append((min(float(evidence), relief(unknowns, base.sd, one, there, sd)), one, step))
+    promised.sort(key=lambda item: -item[0])
+    ranked = [one.name for _, one, _ in promised]
+    by_force = sorted((s for s in starts.values() if s.hypothesis.name in ranked), key=lambda s: -s.log_bayes_factor)
+    names = [s.hypothesis.name for s in by_force[:BY_FORCES] if s.log_bayes_factor > WORTH]
+    names = list(dict.fromkeys([*names, *(one.name for value, one, _ in promised[:TRIED] if value > WORTH)]))[:TRIED]
+    shaped = [one.name for one in hypotheses if has_shapes(one)] if reshape and is_strange(unknowns, base.p) else []
+    names += [name for name in shaped if name not in names]
+
+    def weighed(item: tuple[float, Hypothesis, Array]) -> Weighed:
+        value, one, step = item
+        if one.name not in names:
+            return Weighed(one, min(value, 0.0), None)
+        report(f"simulating: {one.name}")
+        # What any further step from there promises says nothing for this one.
+        renewals = RENEWALS if value - base.left > LIMIT else 0
+        try:
+            optimum = _refit(simulator, base, one, step, starts.get(one.name), renewals)
+            if one.name in shaped:
+                other = reshaped(simulator, one, one.widened(unknowns, base.sd))
+                optimum = other if optimum is None else better(optimum, other)
+        except ValueError:  # a fit that leads nowhere costs its hypothesis, not the verdict
+            optimum = None
+        if optimum is None:
+            return Weighed(one, min(value, 0.0), None)
+        factor = optimum.evidence - base.evidence - float(np.log(one.choices))
+        return Weighed(one, min(factor, relief(unknowns, base.sd, one, optimum.p, optimum.sd)), optimum)
+
+    out = side_by_side(weighed, promised)
+    return sorted(out, key=lambda one: -one.log_bayes_factor)
+
+
+def first_look(base: Optimum, hypotheses: Sequence[Hypothesis], unknowns: Unknowns) -> Array:
+    """Log Bayes factors (hypotheses,) under the weights that the blocks have at `base`: what one step would gain."""
+    quadratic = base.sensitivity.quadratic
+    nothing = np.zeros(len(quadratic.active))
+    information, weights = quadratic.information(nothing), quadratic.weights(nothing)
+    here = base.p[quadratic.active]
+    slope = weights @ quadratic.slopes + information @ here
+
+    def evidence(sd: Array) -> float:
+        width = sd[quadratic.active]
+        scale = width[width > 0.0]
+        inside = np.ix_(width > 0.0, width > 0.0)
+        root = np.linalg.cholesky(information[inside] * scale[:, None] * scale[None, :] + np.eye(len(scale)))
+        half = np.linalg.solve(root, scale * slope[width > 0.0])
+        return 0.5 * float(half @ half) - float(np.log(np.diag(root)).sum())
+
+    plain = evidence(base.sd)
+    found = [evidence(one.widened(unknowns, base.sd)) - plain - np.log(one.choices) for one in hypotheses]
+    return np.array(found)
+
+
+def _refit(
+    simulator: Simulator, base: Optimum, one: Hypothesis, step: Array, start: Start | None, renewals: int
+) -> Optimum | None:
+    unknowns, active = simulator.layout.unknowns, base.sensitivity.quadratic.active
+    sd = one.widened(unknowns, base.sd)
+    linear, alone = base.p.copy(), base.p.copy()
+    linear[active] += step
+    entries = one.entries(unknowns)
+    alone[entries] = linear[entries]
+    trials, there = [linear, alone, base.p], None
+    if start is not None:
+        own = base.p.copy()
+        own[entries] = start.p[entries]
+        there = np.where(sd > 0.0, np.clip(start.p, *unknowns.bounds()), 0.0)
+        trials += [own, there]
+    seen = np.isin(np.arange(unknowns.size), active)
+    costs = [cost_of(simulator, np.where(seen, np.clip(p, *unknowns.bounds()), 0.0), sd) for p in trials]
+    # A rig that has what the background lacks feels unknowns that this does not: a coupling its loss.
+    if there is not None and cost_of(simulator, there, sd) < min(costs) - GAIN:
+        return fit_afresh(simulator, there, sd, renewals=renewals)
+    begin = trials[int(np.argmin(costs))]
+    return fit(simulator, begin, sd, base.sensitivity, renewals=renewals)
+
+
+def relief(unknowns: Unknowns, narrow: Array, hypothesis: Hypothesis, p: Array, sd: Array) -> float:
+    """What widening its own prior from `narrow` to `sd` (size,) can add to the evidence at most where the unknowns are
+    `p` (size,) (`evidence.search`); no limit for what the background holds at zero."""
+    at = hypothesis.entries(unknowns)
+    if not narrow[at].all():
+        return np.inf
+    return 0.5 * float((p[at] ** 2 * (narrow[at] ** -2.0 - sd[at] ** -2.0)).sum())
+
+
+def entering(unknowns: Unknowns, one: Weighed, apart: bool) -> Weighed | None:
+    """What was weighed, if it enters, with what it lacks; where a record that had no part in it judges (`apart`) less
+    evidence is enough."""
+    limit = limit_of(unknowns, one.hypothesis)
+    if one.log_bayes_factor < (min(limit, PROVISIONAL) if apart else limit):
+        return None
+    return replace(one, lacking=max(limit - one.log_bayes_factor, 0.0))
+
+
+def limit_of(unknowns: Unknowns, one: Hypothesis) -> float:
+    """Nats from which a hypothesis enters where no other record speaks."""
+    if any(wide.key == FOLLOWED for wide in one.wide):
+        return LIMIT_GIVEN
+    return LIMIT if any(is_own(unknowns, wide) for wide in one.wide) else LIMIT_NUMBER
+
+
+def is_own(unknowns: Unknowns, wide: Wide) -> bool:
+    """Whether a prior belongs to the effect's own unknowns, and not to a number of the nominal rig."""
+    group = unknowns.group(wide.key)
+    return bool((group.wide > group.sd).any())

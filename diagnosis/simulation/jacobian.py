@@ -1,0 +1,259 @@
+"""Derivatives of all simulated lines by all unknowns, at one rig.
+
+What teeth, the mesh's series, run-out and ripple do, and what holds the gears, is a small force at an unchanged
+motion, carried through the rig's tangent (`bench.nonlinear.along`), many at once. Delays, gains and encoders act on the
+channels alone. The rest (friction, the delay of the driven angle, structure that the rig does not have yet) is moved a
+little and simulated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.diagnosis.effects.bearing_nonlinearity import KEYS as BEARINGS
+from gearbench.diagnosis.effects.coupling import KEY as COMPLIANCE
+from gearbench.diagnosis.effects.eccentricity import KEYS as RUNOUTS
+from gearbench.diagnosis.effects.encoder_runout import ADDS
+from gearbench.diagnosis.effects.encoder_runout import KEYS as ENCODERS
+from gearbench.diagnosis.effects.friction import KEY as FRICTION
+from gearbench.diagnosis.effects.pitch_error import KEYS as PITCHES
+from gearbench.diagnosis.effects.profile_error import FLANKS
+from gearbench.diagnosis.effects.sensor_delay import KEYS as DELAYS
+from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
+from gearbench.diagnosis.effects.torque_ripple import KEY as RIPPLE
+from gearbench.diagnosis.effects.torque_ripple import ORDERS
+from gearbench.diagnosis.forces.basis import on_path, waves
+from gearbench.diagnosis.simulation.runout import in_mesh_of_runout, lobes_of, on_gears_of_runout, turn_of
+from gearbench.diagnosis.simulation.target import Target
+from gearbench.diagnosis.structure.contrast import CONTRAST, contrast_slope
+from gearbench.diagnosis.structure.layout import Layout
+from gearbench.diagnosis.structure.structure import GAIN, LATE, LEAST_STEP, PHASE, SEAT, STRUCTURE
+from gearbench.diagnosis.structure.viscous import LOADED, damping_reference
+from gearbench.lumped.nonlinear.coordinates import IN_MESH, U1, Acting
+from gearbench.lumped.nonlinear.sensitive import LEAST_LEVEL
+
+if TYPE_CHECKING:
+    from gearbench.bench.nonlinear.along import Along
+    from gearbench.lumped.nonlinear.model import NonLinear
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Flags = NDArray[np.bool_]
+Integers = NDArray[np.int64]
+
+# What holds the gears: by the difference between two rigs that are so far apart, in standard deviations as background.
+AROUND, APART = ("stiffness", "damping", "mass", "inertia", *BEARINGS.values(), *STRUCTURE), 1e-3
+# Moved and simulated, by this part of their standard deviation, where no difference between rigs says what they do: so
+# are the lag of the drive and the delay of the driven angle, since a replay is given both channels. A compliant
+# coupling twists at frequencies that samples do not hold; the zero of the mesh phase turns friction round with it.
+FOLLOWED = DELAYS["angle_driven"]
+MOVED, STEP = (FRICTION, COMPLIANCE, *STRUCTURE, SEAT, LATE, FOLLOWED, PHASE), 0.05
+# The same part where flanks part: over a longer one an impact that is met otherwise makes a jump.
+SHORT_STEP = 2e-3
+# Of those moved what hypotheses are weighed by, and what goes along with one: a late angle turns the mesh on as well.
+WEIGHED = (FRICTION, COMPLIANCE, FOLLOWED, PHASE)
+
+
+class Other(NamedTuple):
+    """A rig in which one unknown, by its number, is larger by `step`."""
+
+    number: int
+    step: float
+    model: NonLinear
+
+
+class Forces(NamedTuple):
+    """Forces [N] per unit of unknowns, a departure each, and these unknowns' indices (departures,)."""
+
+    acting: Acting
+    at: Integers
+
+
+def forces_of(
+    layout: Layout, p: Array, along: Along, condition: str, chosen: Flags, others: Sequence[Other]
+) -> Forces:
+    """All forces that stand for the chosen unknowns (size,) along a motion of a record, of the rig of `p` (size,); what
+    holds the gears by `others`."""
+    parts, in_mesh = mesh_forces(layout, p, along, chosen)
+    drive, on_drive = drive_forces(layout, along, condition)
+    held = [*_leaning_forces(layout, along, chosen), *around_forces(along, others), *_nudged(layout, along, chosen)]
+    used = chosen[on_drive]
+    parts += [drive[:, used], *(force[:, None] for _, _, force in held)]
+    values = np.empty((len(along.phase), sum(one.shape[1] for one in parts)), np.float32)
+    at, of = np.unique([*in_mesh, *on_drive[used], *(index for index, _, _ in held)], return_inverse=True)
+    on = np.array([*[IN_MESH] * len(in_mesh), *[along.drive] * int(used.sum()), *(on for _, on, _ in held)])
+    return Forces(Acting(np.concatenate(parts, axis=1, out=values), on, of), at)
+
+
+def mesh_forces(layout: Layout, p: Array, along: Along, chosen: Flags) -> tuple[list[Array], Integers]:
+    """Forces (entries, n) [N] per unit of the chosen unknowns (size,) that act in the mesh, group by group, and the
+    unknowns' indices."""
+    unknowns, law, phase = layout.unknowns, along.law, along.phase
+    z1, z2 = layout.model.teeth
+    parts: list[Array] = []
+    at: list[int] = []
+
+    def put(key: str, columns: Array) -> None:
+        indices = unknowns.at(key)
+        keep = chosen[indices]
+        parts.append(columns[:, keep])
+        at.extend(indices[keep])
+
+    numbers, bending = law.pairs(phase)[0], law.bending_of(phase)
+    wave = waves(phase).T
+    damped = (along.tangent.damping * along.rate)[:, None]
+    loaded = along.model.rig.damping
+    stiffer = along.elastic[:, None] + (0.5 + loaded.mesh_exponent) * damped
+    put("scale", stiffer)
+    if LOADED in unknowns.slices:
+        about = damping_reference(loaded, layout.model)
+        pressed = np.maximum(np.abs(along.elastic) / about, LEAST_LEVEL)
+        put(LOADED, damped * np.log(pressed)[:, None])
+    put("mesh-ratio", damped)
+    mesh = along.model.rig.mesh
+    put("curvature", stiffer * along.level[:, None] + 0.5 / (1.0 + mesh.exponent) * damped)
+    series = 1.0 + _series_at(mesh.stiffness_cos, mesh.stiffness_sin, phase)
+    put(CONTRAST, stiffer * contrast_slope(layout.tangents, float(p[unknowns[CONTRAST]][0]), along.sharing)[:, None])
+    put("shape", stiffer * (wave / series[:, None]))
+    put("offset", along.of_excess(np.ones((len(phase), 1))))
+    put("profile", along.of_excess(wave))
+    put(FLANKS, _of_flanks(along, numbers, layout.model.path))
+    for side, key in enumerate(RUNOUTS.values()):
+        put(key, in_mesh_of_runout(along, side))
+    for side, key in enumerate(PITCHES.values()):
+        tooth = numbers % (z1, z2)[side]
+        indices = unknowns.at(key)
+        if chosen[indices].any():
+            put(key, _by_tooth(tooth, along.pair_stiffness, (z1, z2)[side]))
+    soft = []
+    for one in layout.teeth:
+        side, number = (0, one) if one < z1 else (1, one - z1)
+        meant = numbers % (z1, z2)[side] == number
+        soft.append(-(meant * along.pairs.force * bending[..., side]).sum(axis=1))
+    if soft:
+        indices = unknowns[CRACK].start + np.array(layout.teeth)
+        keep = chosen[indices]
+        parts.append(np.stack(soft, axis=1)[:, keep])
+        at.extend(indices[keep])
+    return parts, np.array(at)
+
+
+def _series_at(cosine: Sequence[float], sine: Sequence[float], phase: Array) -> Array:
+    """A series in the mesh phase, of amplitudes at the orders 1, 2, .., at phases (n,) [cycles]."""
+    turns = 2 * np.pi * np.arange(1, len(cosine) + 1)[:, None] * phase
+    return np.asarray(np.asarray(cosine) @ np.cos(turns) + np.asarray(sine) @ np.sin(turns))
+
+
+def _of_flanks(along: Along, numbers: NDArray[np.int64], path: tuple[float, float]) -> Array:
+    """Force (entries, places) [N] per unit of excess at places along the path of contact, of the pairs `numbers`
+    (entries, n_o) that touch."""
+    shape = on_path(along.phase[:, None] - numbers, path)
+    return np.asarray((shape * along.form_stiffness).sum(axis=-1).T)
+
+
+def _by_tooth(tooth: NDArray[np.int64], stiffness: Array, count: int) -> Array:
+    """Stiffness (entries, count) [N/m] that each tooth of a gear has in the mesh."""
+    out = np.zeros((len(tooth), count))
+    rows = np.arange(len(tooth))
+    for column in range(tooth.shape[1]):
+        out[rows, tooth[:, column]] += stiffness[:, column]
+    return out
+
+
+def _leaning_forces(layout: Layout, along: Along, chosen: Flags) -> list[tuple[int, int, Array]]:
+    """Those of chosen run-outs on the gears, as `around_forces`."""
+    out = []
+    for side, key in enumerate(RUNOUTS.values()):
+        indices = layout.unknowns.at(key)
+        for on, force in on_gears_of_runout(along, side).items() if chosen[indices].any() else ():
+            out += [(int(one), on, force[:, part]) for part, one in enumerate(indices) if chosen[one]]
+    return out
+
+
+def _nudged(layout: Layout, along: Along, chosen: Flags) -> list[tuple[int, int, Array]]:
+    """What the driver's sensor changes of the motion that it is nudged towards, as `around_forces`."""
+    nudge, unknowns = along.model.nudge, layout.unknowns
+    if not nudge:
+        return []
+    indices = [*unknowns.at(DELAYS["angle_driver"]), *unknowns.at(ENCODERS["driver"])]
+    rates = along.rate_of(np.column_stack([along.led, -lobes_of(turn_of(along, 0))])).T
+    return [(int(one), U1, nudge * rate) for one, rate in zip(indices, rates, strict=True) if chosen[one]]
+
+
+def around_forces(along: Along, others: Sequence[Other]) -> list[tuple[int, int, Array]]:
+    """Index of the unknown, coordinate or mesh, and force (entries,) [N] per unit of what holds the gears."""
+    out = []
+    for one in others:
+        out += [(one.number, on, force / one.step) for on, force in along.turned_into(one.model).items()]
+    return out
+
+
+def others_of(layout: Layout, p: Array, sd: Array, chosen: Flags) -> list[Other]:
+    """The rigs around `p` (size,) in each of which one chosen unknown of what holds the gears is moved, by a part of
+    its `sd` (size,), as far as they have the same coordinates as that of `p` and it has what is moved."""
+    # Its time loop is compiled on import, which not every user of this module wants.
+    from gearbench.lumped.nonlinear.model import nonlinear_model
+
+    def model(values: Array) -> NonLinear:
+        return nonlinear_model(layout.case(values).rig, layout.meshing, layout.model.law)
+
+    unknowns, here = layout.unknowns, model(p)
+    low, high = unknowns.bounds()
+    out = []
+    for key in AROUND:
+        for index in unknowns.at(key):
+            absent = 0.0 <= p[index] < LEAST_STEP.get(key, 0.0)
+            if absent or not chosen[index] or sd[index] <= 0.0:
+                continue
+            step = APART * sd[index]
+            moved = p.copy()
+            moved[index] += step if p[index] + step <= high[index] else -step
+            if low[index] <= moved[index] and (other := model(moved)).like(here):
+                out.append(Other(int(index), float(moved[index] - p[index]), other))
+    return out
+
+
+def drive_forces(layout: Layout, along: Along, condition: str) -> tuple[Array, Integers]:
+    """Force (entries, columns) [N] on the driver's shaft per unit of ripple, and the unknowns' indices; none for a
+    record that is no condition."""
+    names = list(layout.torque_mean)
+    if condition not in names:
+        return np.zeros((len(along.phase), 0)), np.zeros(0, dtype=int)
+    turn = turn_of(along, 0)
+    columns = [part(order * turn) for order in ORDERS for part in (np.cos, np.sin)]
+    first = layout.unknowns[RIPPLE].start + names.index(condition) * 2 * len(ORDERS)
+    return np.stack(columns, axis=1) / layout.model.base_radius[0], first + np.arange(2 * len(ORDERS))
+
+
+def sensor_columns(
+    layout: Layout, target: Target, number: int, channels: Mapping[str, Array]
+) -> dict[int, dict[str, Complex]]:
+    """Half-spectra (K,) of the changes of the channels (N,) of a record per unit of the unknowns of its sensors, by
+    their index.
+
+    That the gear turns otherwise where the driven angle's run-out is another shakes the rig a hundred times less.
+    """
+    unknowns, one = layout.unknowns, target.measurements[number]
+    samples = one.phase.size
+    omega = 2 * np.pi * np.fft.rfftfreq(samples, 1 / one.sampling_rate)
+    g = layout.model.support_factor
+    into = {"angle_driver": 1.0, "y_driver": g, "y_driven": -g}
+    zero = np.zeros(omega.size, dtype=complex)
+    found: dict[int, dict[str, Complex]] = {}
+    for channel, key in DELAYS.items():
+        if channel not in channels or key == FOLLOWED:
+            continue
+        late = -1j * omega * np.fft.rfft(channels[channel])
+        found[unknowns[key].start] = {channel: late, "dte": into[channel] * late}
+    if "torque_driven" in channels:
+        found[unknowns[GAIN].start] = {"torque_driven": np.fft.rfft(channels["torque_driven"])}
+    for (side, key), teeth in zip(ENCODERS.items(), layout.model.teeth, strict=True):
+        turn = 2 * np.pi * one.phase / teeth
+        for part, wave in enumerate((np.cos, np.sin)):
+            lines = np.fft.rfft(wave(turn))
+            found[unknowns[key].start + part] = {f"angle_{side}": lines, "dte": ADDS[side] * lines}
+    return {index: {name: parts.get(name, zero) for name in channels} for index, parts in found.items()}

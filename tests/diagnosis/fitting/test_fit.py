@@ -1,0 +1,138 @@
+"""Output-error fit on lines that depend on unknowns by a formula: it comes back to where they were made."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from shared.fake_simulator import LINES, FakeSimulator, sensitivities, target, unknowns
+
+from gearbench.diagnosis.fitting.fit import Sensitivity, fit, refreshed, sensitivity_of
+from gearbench.diagnosis.simulation.quadratic import prior_cost, quadratic_of
+
+MATRIX = sensitivities()
+TRUE = np.array([0.12, -0.08, 0.05, 0.3, 0.0, 0.0, 0.0, 0.0])
+SD = np.array([0.1, 0.1, 0.1, 0.5, 0.01, 0.01, 0.0, 0.0])
+ALL = np.ones(8, dtype=bool)
+
+
+def curved(p: np.ndarray) -> np.ndarray:
+    """Lines that are no linear function of the unknowns."""
+    return p @ MATRIX + 0.8 * p[3] ** 2 * MATRIX[0] + 0.5 * np.sin(4 * p[1]) * MATRIX[1]
+
+
+def noise(size: float) -> np.ndarray:
+    rng = np.random.default_rng(7)
+    return size * (rng.standard_normal(LINES) + 1j * rng.standard_normal(LINES))
+
+
+def test_it_converges_to_the_rig_that_made_the_records() -> None:
+    simulator = FakeSimulator(curved, target(curved(TRUE) + noise(1e-3)))
+    first = sensitivity_of(simulator, np.zeros(8), SD)
+    assert first is not None
+    best = fit(simulator, np.zeros(8), SD, first, renewals=4)
+    assert best is not None and best.left < 0.5
+    assert best.p == pytest.approx(TRUE, abs=2e-3)
+    assert best.cost == pytest.approx(best.misfit + prior_cost(best.p, SD))
+    # The covariance is that of least squares under the weights of the blocks.
+    weights = best.sensitivity.quadratic.weights(np.zeros(8))[simulator.target.of_line]
+    derivative = simulator.jacobian(best.p, SD, ALL)
+    assert derivative is not None
+    curvature = ((derivative.conj() * weights) @ derivative.T).real[:6, :6] + np.diag(SD[:6] ** -2)
+    assert best.std[:6] == pytest.approx(np.sqrt(np.diag(np.linalg.inv(curvature))), rel=0.02)
+    assert not best.std[6:].any()
+
+
+def test_a_step_to_where_no_rig_is_is_shortened() -> None:
+    simulator = FakeSimulator(curved, target(curved(TRUE) + noise(1e-3)), largest=0.31)
+    first = sensitivity_of(simulator, np.zeros(8), SD)
+    assert first is not None
+    best = fit(simulator, np.zeros(8), SD, first, renewals=4)
+    assert best is not None and np.abs(best.p).max() <= 0.31
+    assert best.cost < 0.6 * simulator.target.cost(simulator.target.lines)
+    assert fit(simulator, np.full(8, 1.0), SD, first, renewals=1) is None
+
+
+def test_unknowns_without_a_prior_stay_and_bounds_hold() -> None:
+    true = TRUE.copy()
+    true[6] = -0.2  # a tooth cannot gain stiffness
+    simulator = FakeSimulator(lambda p: p @ MATRIX, target(true @ MATRIX))
+    first = sensitivity_of(simulator, np.zeros(8), np.ones(8))
+    assert first is not None
+    sd = SD.copy()
+    assert fit(simulator, np.zeros(8), sd, first, renewals=0).p[6] == 0.0  # type: ignore[union-attr]
+    sd[6] = 0.35
+    assert fit(simulator, np.zeros(8), sd, first, renewals=0).p[6] >= 0.0  # type: ignore[union-attr]
+    assert unknowns().group("crack").low == 0.0
+
+
+def test_what_the_records_do_not_show_is_known_as_before() -> None:
+    blind = MATRIX.copy()
+    blind[4] = 0.0
+    simulator = FakeSimulator(lambda p: p @ blind, target(TRUE @ blind + noise(1e-3)))
+    first = sensitivity_of(simulator, np.zeros(8), SD)
+    assert first is not None
+    best = fit(simulator, np.zeros(8), SD, first, renewals=1)
+    assert best is not None and best.p[4] == 0.0
+    assert best.std[4] == SD[4] and 0.0 < best.std[0] < SD[0]
+
+
+class Jumping(FakeSimulator):
+    """Feels friction from 0.2 on; the derivative is that of the jump there."""
+
+    def jacobian(self, p: np.ndarray, sd: np.ndarray, chosen: np.ndarray, near: np.ndarray | None = None) -> np.ndarray:
+        return np.where(chosen[:, None], ALIKE, 0.0)
+
+
+ALIKE = MATRIX.copy()
+ALIKE[3] = MATRIX[0] + 2.0 * MATRIX[1]  # what the first unknown does, once the second takes back the rest
+
+
+def test_what_is_not_felt_yet_does_not_stand_in_the_way(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A jump and the second unknown promise cheaply what the first one can do alone: with bounds that do not hold it
+    the fit stays where it begins."""
+    monkeypatch.setattr("gearbench.diagnosis.fitting.fit.LEAST_STEP", {"friction": 0.2})
+    simulator = Jumping(lambda p: np.where(np.arange(8) == 3, p * (p >= 0.2), p) @ ALIKE, target(0.12 * MATRIX[0]))
+    sd = np.array([0.02, *SD[1:]])
+    first = sensitivity_of(simulator, np.zeros(8), sd)
+    assert first is not None
+    best = fit(simulator, np.zeros(8), sd, first, renewals=2)
+    assert best is not None and best.left < 0.5
+    assert best.p[0] == pytest.approx(0.12, abs=2e-3)
+
+
+def test_a_valley_that_bends_is_followed_to_its_end() -> None:
+    """Renewed derivatives give a small part of what they promise where a valley bends, and do so again from there."""
+
+    def bent(p: np.ndarray) -> np.ndarray:
+        return p @ MATRIX + 2.0 * p[0] ** 2 * MATRIX[1]
+
+    true = np.array([0.5, 0.0, 0.05, 0.3, 0.0, 0.0, 0.0, 0.0])
+    begin = np.array([-0.5, -0.5, 0.05, 0.3, 0.0, 0.0, 0.0, 0.0])
+    wide = np.where(SD > 0.0, 10.0, 0.0)
+    simulator = FakeSimulator(bent, target(bent(true) + noise(1e-3)))
+    first = sensitivity_of(simulator, begin, wide)
+    assert first is not None
+    best = fit(simulator, begin, wide, first, renewals=20)
+    assert best is not None and best.left < 0.5
+    assert best.p == pytest.approx(true, abs=5e-3)
+
+
+def test_derivatives_that_stayed_behind_are_taken_anew() -> None:
+    """A fit led astray by one that is wrong by a half stops short; with it taken anew it arrives."""
+    simulator = FakeSimulator(curved, target(curved(TRUE) + noise(1e-3)))
+    fresh = sensitivity_of(simulator, np.zeros(8), SD)
+    assert fresh is not None
+    stale = fresh.jacobian.copy()
+    stale[3] = 0.5 * stale[3] + MATRIX[5]
+    active = fresh.quadratic.active
+    wrong = quadratic_of(simulator.target, simulator.target.lines - curved(np.zeros(8)), stale, active)
+    stuck = fit(simulator, np.zeros(8), SD, Sensitivity(stale, wrong))
+    assert stuck is not None and abs(stuck.p[3] - TRUE[3]) > 0.02
+    here = refreshed(simulator, stuck, np.arange(8) == 3)
+    assert here.cost == stuck.cost and (here.p == stuck.p).all()
+    derivative = simulator.jacobian(stuck.p, SD, ALL)
+    assert derivative is not None
+    assert here.sensitivity.jacobian[3] == pytest.approx(derivative[3])
+    assert (here.sensitivity.jacobian[:3] == stale[:3]).all()
+    best = fit(simulator, here.p, SD, here.sensitivity, renewals=2)
+    assert best is not None and best.p == pytest.approx(TRUE, abs=2e-3)

@@ -1,0 +1,69 @@
+"""Housings on which the displacement sensors stand, looked for by the excited lines of a demonstration's record."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from shared.simulated_lines import demonstration
+
+from gearbench.diagnosis.fitting.beginning import linear_cost
+from gearbench.diagnosis.fitting.hidden_housing import hidden_housings
+from gearbench.diagnosis.simulation.simulator import Simulator
+from gearbench.diagnosis.structure.structure import (
+    ACROSS,
+    HOUSING,
+    MODE,
+    OBLIQUE,
+    SEAT,
+    kind_of,
+    structure_found,
+    with_motion,
+)
+
+
+def recorded(simulator: Simulator, p: np.ndarray) -> Simulator:
+    """The simulator of a record whose rig has the unknowns `p`."""
+    lines = simulator.lines(p)
+    assert lines is not None
+    return simulator.of_target(replace(simulator.target, lines=lines))
+
+
+def test_a_housing_under_the_sensors_is_told_by_the_transmission_error() -> None:
+    """Of a rig on a housing that moves across, whose sensors go along with it, the trial that is alike is the best."""
+    simulator = demonstration()
+    layout = simulator.layout
+    keys, p = layout.unknowns, np.zeros(layout.size)
+    p[keys[ACROSS]], p[keys[SEAT]] = (0.2, 0.15), 1.0
+    p[keys[HOUSING]], p[keys[MODE]], p[keys[OBLIQUE]] = (0.0, 0.05), (0.0, 0.0, -1.1, 0.1), (0.0, 0.0, 1.1, -0.9)
+    moving = recorded(simulator, p)
+    sd = keys.prior()
+    best = min(hidden_housings(moving, np.zeros(layout.size)), key=lambda trial: linear_cost(moving, trial, sd))
+    assert best[keys[SEAT]] == 1.0 and best[keys[HOUSING]][1] == pytest.approx(0.05, rel=0.6)
+    assert best[keys[MODE]][2] == pytest.approx(-1.1, abs=0.1)
+    assert (np.sign(best[keys[OBLIQUE]][2:]) == (1.0, -1.0)).all()
+
+
+def test_two_resonances_of_one_kind_under_the_sensors_are_told_apart() -> None:
+    simulator = demonstration()
+    layout = simulator.layout
+    keys, p = layout.unknowns, np.zeros(layout.size)
+    p[keys[ACROSS]], p[keys[SEAT]], p[keys[OBLIQUE]] = (0.2, 0.15), 1.0, (-1.0, 1.0, 1.1, -0.9)
+    p = with_motion(keys, with_motion(keys, p, 0, -0.3, 0.02, 1), 1, -1.1, 0.03, 1)
+    moving = recorded(simulator, p)
+    plain = np.where(keys.of((HOUSING,)), 0.0, p)
+    one, both = hidden_housings(moving, plain)
+    assert sorted(both[keys[MODE]][[0, 2]]) == pytest.approx([-1.1, -0.3], abs=0.1)
+    assert kind_of(keys, both, 0) == kind_of(keys, both, 1) == "rocking"
+    costs = [linear_cost(moving, trial, keys.prior()) for trial in (plain, one, both)]
+    assert costs == sorted(costs, reverse=True)
+
+
+def test_what_is_told_of_a_housing_goes_by_its_shares() -> None:
+    keys = demonstration().layout.unknowns
+    p = with_motion(keys, with_motion(keys, np.zeros(keys.size), 0, 0.2, 0.05, 1), 1, -0.4, 0.08, 0)
+    told = structure_found(keys, p, np.full(keys.size, 0.01))
+    by_name = {one.name: one.value for one in told if one.name.startswith("housing")}
+    words = "housing compliance over the supports', where it"
+    assert by_name == {f"{words} rocks": pytest.approx(0.05), f"{words} moves along": pytest.approx(0.08)}

@@ -1,0 +1,269 @@
+"""Forward and backward selection on lines made by hand: what was put in enters, nothing else does."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from shared.fake_simulator import LINES, FakeSimulator, chosen, sensitivities, target
+
+from gearbench.diagnosis.effects.effect import Hypothesis, Wide, twins_of
+from gearbench.diagnosis.forces.unknowns import group, unknowns_of
+from gearbench.diagnosis.selection import selection as module
+from gearbench.diagnosis.selection import weighing
+from gearbench.diagnosis.selection.by_forces import Start
+from gearbench.diagnosis.selection.rivals import compared, is_like, rivals_of, usual_of
+from gearbench.diagnosis.selection.selection import Selection, known_within
+from gearbench.diagnosis.selection.weighing import LIMIT, Weighed
+
+MATRIX = sensitivities(3)
+FRICTION = Hypothesis("friction", "mesh", (Wide("friction"),))
+RIPPLE = Hypothesis("torque-ripple", "drive", (Wide("ripple"),))
+CRACKS = tuple(Hypothesis(f"tooth-crack {i}", "mesh", (Wide("crack", i),), choices=2) for i in range(2))
+LISTED = (FRICTION, RIPPLE, *CRACKS)
+
+
+def selected(true: dict[int, float], starts: dict[str, Start] | None = None) -> Selection:
+    p = np.array([0.08, -0.1, 0.02, 0.004, -0.005, 0.006, 0.0, 0.0])
+    for number, value in true.items():
+        p[number] = value
+    rng = np.random.default_rng(11)
+    lines = p @ MATRIX + 0.02 * (rng.standard_normal(LINES) + 1j * rng.standard_normal(LINES))
+    simulator = FakeSimulator(lambda q: q @ MATRIX, target(lines))
+    found = chosen(simulator, LISTED, [np.zeros(8)], starts or {})
+    assert found is not None
+    return found
+
+
+def names(found: Selection) -> list[str]:
+    return [one.hypothesis.name for one in found.entered]
+
+
+def test_a_rig_with_a_good_rigs_share_of_everything_needs_nothing() -> None:
+    found = selected({})
+    assert names(found) == [] and found.best is found.base
+    assert all(one.log_bayes_factor < LIMIT for one in found.weighed)
+
+
+@pytest.mark.parametrize(("number", "value", "name"), [(3, 0.4, "friction"), (7, 0.3, "tooth-crack 1")])
+def test_one_effect_enters_with_its_size(number: int, value: float, name: str) -> None:
+    found = selected({number: value})
+    assert names(found) == [name]
+    assert found.best.p[number] == pytest.approx(value, abs=4 * found.best.std[number])
+    assert found.weighed[0].hypothesis.name == name
+    assert found.best.misfit < found.base.misfit - LIMIT
+    # Recalibrated without it: nothing of it is left, though a good rig might have a little.
+    assert found.bare.p[number] == 0.0 and found.base.p[3] != 0.0
+    assert found.bare.misfit > found.best.misfit + LIMIT
+
+
+def test_what_explains_the_records_as_well_is_a_rival_and_leaves_with_the_one_that_is_named() -> None:
+    """Two teeth whose cracks do the same: each alone explains it, and a good rig's share of the other is no reason to
+    find that the background alone closes the gap."""
+    alike = MATRIX.copy()
+    alike[7] = alike[6]
+    true = np.array([0.08, -0.1, 0.02, 0.0, 0.0, 0.0, 0.3, 0.0])
+    simulator = FakeSimulator(lambda q: q @ alike, target(true @ alike))
+    found = chosen(simulator, LISTED, [np.zeros(8)], {})
+    assert found is not None
+    (one,) = found.entered
+    assert {one.hypothesis.name, *(other.name for other in one.rivals)} == {"tooth-crack 0", "tooth-crack 1"}
+    assert found.bare.p[6] == found.bare.p[7] == 0.0
+    assert not any(other.rivals for other in selected({7: 0.3}).entered)
+    # Of the two the usual one is named, whichever explains a little more.
+    for number, other in (0, 1), (1, 0):
+        rare = {number: (("crack",), 1.0)}
+        listed = (FRICTION, RIPPLE, *(replace(CRACKS[one], usual=rare.get(one)) for one in range(2)))
+        named = chosen(simulator, listed, [np.zeros(8)], {})
+        assert named is not None and names(named) == [f"tooth-crack {other}"]
+
+
+def test_of_gears_with_as_many_teeth_the_other_is_a_rival_unless_far_behind() -> None:
+    optimum = selected({3: 0.4}).best
+    winner = Weighed(replace(FRICTION, on=("driver",)), 100.0, optimum)
+    for nats, twins, rivals in (80.0, ("friction",), 1), (70.0, ("friction",), 0), (80.0, (), 0), (98.0, (), 1):
+        other = Weighed(replace(RIPPLE, on=("driven",), twins=twins), nats, optimum)
+        assert len(rivals_of(winner, [winner, other])) == rivals
+    assert twins_of({"driver": "one", "driven": "two"}, "driver", (30, 30)) == ("two",)
+    assert twins_of({"driver": "one", "driven": "two"}, "driver", (30, 31)) == ()
+
+
+def test_what_had_no_place_enters_when_another_is_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "MOST", 1)
+    true = np.array([0.08, -0.1, 0.02, 0.4, 0.3, -0.2, 0.0, 0.0])
+    simulator = FakeSimulator(lambda q: q @ MATRIX, target(true @ MATRIX))
+    found = chosen(simulator, LISTED, [np.zeros(8)], {})
+    assert found is not None and names(found) == ["friction"]
+    bare = module.only(simulator, found, [])  # type: ignore[arg-type]
+    assert module.further(simulator, bare, []) is None  # type: ignore[arg-type]
+    more = module.further(simulator, bare, found.entered)  # type: ignore[arg-type]
+    assert more is not None and names(more) == ["torque-ripple"]
+    # The friction is still in the lines.
+    assert more.best.p[4:6] == pytest.approx([0.3, -0.2], abs=0.1) and not more.bare.p[4:6].any()
+    # Nothing that is out is tried again, and what was worth nothing is not tried at all.
+    assert module.further(simulator, bare, (*found.entered, *more.entered)) is None  # type: ignore[arg-type]
+
+
+def test_a_rare_effect_gives_way_to_a_usual_one_that_explains_nearly_as_much() -> None:
+    optimum = selected({3: 0.4}).best
+    rare = Weighed(replace(FRICTION, usual=(("ripple",), -0.5)), 100.0, optimum)
+    assert usual_of((rare, Weighed(RIPPLE, 80.0, None))) is rare
+    for nats, named in (80.0, "torque-ripple"), (70.0, "friction"):
+        found = usual_of((rare, Weighed(CRACKS[0], 99.0, optimum), Weighed(RIPPLE, nats, optimum)))
+        assert found is not None and found.hypothesis.name == named
+    assert usual_of(()) is None
+    # Beside the usual one the rare one is not weighed again.
+    assert is_like(rare.hypothesis, RIPPLE) and not is_like(RIPPLE, rare.hypothesis) and is_like(RIPPLE, RIPPLE)
+    assert not is_like(rare.hypothesis, CRACKS[0])
+
+
+def test_the_usual_one_is_fitted_from_where_the_rare_one_got() -> None:
+    """A second tooth whose crack does half of what the first one's does; its own fit had stopped short."""
+    alike = MATRIX.copy()
+    alike[7] = 0.5 * alike[6]
+    simulator = FakeSimulator(lambda q: q @ alike, target(0.2 * alike[6] + 0.08 * alike[0]))
+    simulator.jacobian = lambda p, sd, chosen, near=None: alike  # type: ignore[method-assign, assignment]
+    found = chosen(simulator, (CRACKS[0],), [np.zeros(8)], {})
+    assert found is not None and names(found) == ["tooth-crack 0"]
+    first = Weighed(replace(CRACKS[0], usual=(("crack",), 2.0)), 1e6, found.best)
+    one, other = compared(simulator, found.base, [first, Weighed(CRACKS[1], 2.0, None)])
+    assert one.optimum is found.best and other.hypothesis.name == "tooth-crack 1"
+    assert other.optimum is not None and other.optimum.p[6] == pytest.approx(0.0, abs=0.02)
+    assert other.optimum.p[7] == pytest.approx(0.4, abs=0.05) and other.log_bayes_factor > LIMIT
+    # Nothing is handed over where the one ahead is usual.
+    plain = [replace(first, hypothesis=CRACKS[0]), Weighed(CRACKS[1], 2.0, None)]
+    assert compared(simulator, found.base, plain) == plain
+
+
+def test_two_effects_enter_the_larger_first_and_each_is_needed() -> None:
+    found = selected({3: 0.5, 4: 0.2, 5: -0.15})
+    assert names(found) == ["friction", "torque-ripple"]
+    assert found.best.p[[3, 4, 5]] == pytest.approx([0.5, 0.2, -0.15], abs=0.03)
+    assert all(one.log_bayes_factor > LIMIT for one in found.entered)
+
+
+def test_a_fit_that_fails_costs_its_hypothesis_and_nothing_else(monkeypatch: pytest.MonkeyPatch) -> None:
+    refit = weighing._refit
+
+    def failing(simulator: object, base: object, one: Hypothesis, *rest: object) -> object:
+        if one is RIPPLE:
+            raise np.linalg.LinAlgError("not positive definite")
+        return refit(simulator, base, one, *rest)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(weighing, "_refit", failing)
+    found = selected({3: 0.5, 4: 0.2, 5: -0.15})
+    assert names(found) == ["friction"]
+    assert next(one for one in found.weighed if one.hypothesis is RIPPLE).optimum is None
+
+
+def test_a_start_of_the_force_residuals_is_tried_even_if_the_quadratic_does_not_see_it() -> None:
+    # From zero this effect does nothing to first order.
+    def lines_of(p: np.ndarray) -> np.ndarray:
+        return p[:3] @ MATRIX[:3] + 20 * p[3] ** 2 * MATRIX[3]
+
+    true = np.array([0.05, 0, 0, 0.4, 0, 0, 0, 0])
+    simulator = FakeSimulator(lines_of, target(lines_of(true)))
+    simulator.jacobian = lambda p, sd, chosen, near=None: np.where(  # type: ignore[method-assign, assignment]
+        np.arange(8)[:, None] == 3, 40 * (p[3] + 1e-3) * MATRIX, np.where(np.arange(8)[:, None] < 3, MATRIX, 0)
+    )
+    start = Start(FRICTION, np.array([0, 0, 0, 0.35, 0, 0, 0, 0.0]), 30.0)
+    found = chosen(simulator, (FRICTION,), [np.zeros(8)], {"friction": start})
+    assert found is not None and names(found) == ["friction"]
+    assert found.best.p[3] == pytest.approx(0.4, abs=0.02)
+
+
+def test_a_start_keeps_what_only_its_own_rig_feels() -> None:
+    """What the third unknown changes shows beside the effect alone, as the loss of a coupling does: without it the
+    effect's own rig is farther from the records than the background."""
+
+    def parts(p: np.ndarray) -> np.ndarray:
+        return np.array([p[0], p[1], 40 * p[3] * p[2], p[3], 0, 0, 0, 0])
+
+    def jacobian(p: np.ndarray, sd: object, chosen: object, near: object = None) -> np.ndarray:
+        return np.array([(parts(p + 1e-6 * one) - parts(p)) / 1e-6 for one in np.eye(8)]) @ MATRIX
+
+    true = np.array([0.05, 0, 0.15, 0.4, 0, 0, 0, 0])
+    simulator = FakeSimulator(lambda p: parts(p) @ MATRIX, target(parts(true) @ MATRIX))
+    simulator.jacobian = jacobian  # type: ignore[method-assign, assignment]
+    base = chosen(simulator, (), [np.zeros(8)], {})
+    assert base is not None
+    at_rest = replace(base.base, p=base.base.p * (np.arange(8) < 2))
+    near = module.fit_afresh(simulator, at_rest.p, at_rest.sd, renewals=0)
+    assert near is not None and 2 not in near.sensitivity.quadratic.active
+    start = Start(FRICTION, np.array([0, 0, 0.14, 0.37, 0, 0, 0, 0.0]), 30.0)
+    found = weighing._refit(simulator, near, FRICTION, np.zeros(len(near.sensitivity.quadratic.active)), start, 0)
+    assert found is not None and found.p[2:4] == pytest.approx([0.15, 0.4], abs=0.03)
+
+
+def test_structure_beyond_a_hill_is_found_by_beginning_again() -> None:
+    """A little yielding across makes it worse, what the rig has makes it right: no fit gets there from rigid."""
+    unknowns = unknowns_of(
+        [
+            group("stiffness", "1", ("driver", "driven", "more"), 0.1, slot="stiffness"),
+            group("friction", "1", ("coefficient",), 0.01, 0.5, slot="friction"),
+            group("across", "1", ("driver", "driven"), 0.15, slot="structure", low=0.0, high=1.0),
+            group("crack", "1", 2, 0.02, 0.35, slot="loss", low=0.0),
+        ],
+        2,
+    )
+
+    def lines_of(p: np.ndarray) -> np.ndarray:
+        across = p[4:6]
+        return np.concatenate([p[:4], 10 * (across**2 - 0.08 * across), p[6:]]) @ MATRIX
+
+    true = np.array([0.08, -0.1, 0.02, 0.4, 0.23, 0.21, 0.0, 0.0])
+    rng = np.random.default_rng(11)
+    lines = lines_of(true) + 0.02 * (rng.standard_normal(LINES) + 1j * rng.standard_normal(LINES))
+    simulator = FakeSimulator(lines_of, target(lines), layout=SimpleNamespace(unknowns=unknowns))
+    found = chosen(simulator, (FRICTION,), [np.zeros(8)], {})
+    assert found is not None and names(found) == ["friction"]
+    assert found.best.p[[3, 4, 5]] == pytest.approx([0.4, 0.23, 0.21], abs=0.01)
+
+
+def test_structure_that_the_rig_shows_around_its_mesh_is_begun_from() -> None:
+    """A resonance far from where the fit begins: downhill leads the other way, what is read of the rig leads there."""
+    unknowns = unknowns_of(
+        [
+            group("stiffness", "1", ("driver", "driven"), 0.1, slot="stiffness"),
+            group("scale", "1", ("mesh",), 0.06, slot="scale"),
+            group("housing-mode", "1", ("frequency",), 0.7, slot="structure", high=0.0),
+            group("across", "1", ("driver", "driven"), 0.15, slot="structure", low=0.0, high=1.0),
+            group("cross", "1", ("driver", "driven"), 0.1, slot="structure"),
+            group("friction", "1", ("coefficient",), 0.01, 0.5, slot="friction"),
+            group("crack", "1", 2, 0.02, 0.35, slot="loss", low=0.0),
+        ],
+        2,
+    )
+
+    def lines_of(p: np.ndarray) -> np.ndarray:
+        """Uphill from 0 to -0.4, as the rig has it at -1."""
+        bent = p.copy()
+        bent[3] = p[3] * (p[3] + 0.8)
+        return np.concatenate([bent, np.zeros(len(MATRIX))])[: len(MATRIX)] @ MATRIX
+
+    true = np.array([0.08, -0.1, 0.02, -1.0, 0.23, 0.21, 0.0, 0.0, 0.0, 0.0, 0.0])
+    lines = lines_of(true)
+    simulator = FakeSimulator(lines_of, target(lines), layout=SimpleNamespace(unknowns=unknowns))
+
+    def read(held: np.ndarray) -> np.ndarray:
+        out = held.copy()
+        out[[0, 1, 3]] = true[[0, 1, 3]] + 0.01
+        return out
+
+    without, found = (chosen(simulator, (), [np.zeros(11)], {}, around=around) for around in (None, read))
+    assert without is not None and abs(without.base.p[3] + 1.0) > 0.3
+    assert found is not None
+    assert found.base.p[[0, 1, 2, 3]] == pytest.approx(true[:4], abs=0.01)
+
+
+def test_no_rig_at_the_start_is_no_selection() -> None:
+    simulator = FakeSimulator(lambda q: q @ MATRIX, target(MATRIX[0]), largest=0.1)
+    assert chosen(simulator, LISTED, [np.ones(8)], {}) is None
+
+
+def test_a_number_known_to_a_third_or_worse_may_be_nothing() -> None:
+    low, high = known_within(np.array([0.1, 0.4]))
+    assert np.exp(low[0]) == pytest.approx(0.7) and np.exp(low[1]) < 0.01
+    np.testing.assert_allclose(high, [0.3, 1.2])
