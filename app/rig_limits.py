@@ -43,7 +43,7 @@ def limits_of(
     from gearbench.commands.measured.challenge import read
     from gearbench.diagnosis.odds import Known, calibrated
     from gearbench.diagnosis.population import POPULATION
-    from gearbench.diagnosis.verdict import parse_verdict
+    from gearbench.diagnosis.verdict_file import parse_verdict
     from gearbench.kernels.folders import cache_folder
     from gearbench.rig import dump_case
 

@@ -15,7 +15,7 @@ from pathlib import Path
 from gearbench.challenge.answers import read_answers
 from gearbench.diagnosis.odds import WIDTHS, Known, Odds, calibrated, nothing_known
 from gearbench.diagnosis.population import POPULATION
-from gearbench.diagnosis.verdict import read_verdict
+from gearbench.diagnosis.verdict_file import read_verdict
 
 
 def known_in(folder: Path, answers: Path) -> list[Known]:

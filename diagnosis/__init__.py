@@ -11,6 +11,7 @@ before anything is measured.
 
 from gearbench.diagnosis.diagnosis import Diagnosis, diagnose
 from gearbench.diagnosis.errors import DiagnosisError
-from gearbench.diagnosis.verdict import Verdict, read_verdict, verdict_json
+from gearbench.diagnosis.verdict import Verdict
+from gearbench.diagnosis.verdict_file import read_verdict, verdict_json
 
 __all__ = ["Diagnosis", "DiagnosisError", "Verdict", "diagnose", "read_verdict", "verdict_json"]

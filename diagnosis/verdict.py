@@ -1,26 +1,16 @@
-"""The verdict of a diagnosis and its file, verdict.json (schema "gearbench-verdict/2").
-
-Values are frozen and complete: what is not known is null, never a made-up number. Other programs write such files
-too, so reading checks everything and says what is wrong in one sentence. Files of version 1 are read as well: their
-verdict "effect" is "effects" now, and their standard deviations are intervals.
-"""
+"""The verdict of a diagnosis (schema "gearbench-verdict/2"): frozen and complete values. What is not known is null,
+never a made-up number."""
 
 from __future__ import annotations
 
-import difflib
-import json
-from collections.abc import Iterable, Mapping
-from pathlib import Path
-from typing import Annotated, Any, Literal, NoReturn, get_args
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from gearbench.diagnosis.errors import DiagnosisError
-from gearbench.files import write_text
 from gearbench.rig.contract import Place
 
 SCHEMA: Literal["gearbench-verdict/2"] = "gearbench-verdict/2"
-FORMER = "gearbench-verdict/1"
 
 Outcome = Literal["effects", "none", "unknown"]
 Kind = Literal["channel", "band", "class", "phase", "tooth", "place", "condition"]
@@ -30,15 +20,13 @@ KINDS: tuple[str, ...] = get_args(Kind)
 ROUNDING = 1e-6
 # Half of an interval that holds nine of ten, in standard deviations.
 NINE_OF_TEN = 1.6448536269514722
-# A verdict is a page of text; a file beyond this size [bytes] is something else.
-LARGEST_FILE = 2**24
 
 Name = Annotated[str, Field(min_length=1, max_length=200)]
 Probability = Annotated[float, Field(ge=0.0, le=1.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
 
 
-class _Value(BaseModel):
+class Value(BaseModel):
     """Frozen, closed to unknown keys, finite numbers only, no text taken for a number."""
 
     model_config = ConfigDict(
@@ -46,7 +34,7 @@ class _Value(BaseModel):
     )
 
 
-class Probabilities(_Value):
+class Probabilities(Value):
     """How likely an effect of the library, none, or something unknown is at work; they add up to 1."""
 
     effect: Probability
@@ -61,7 +49,7 @@ class Probabilities(_Value):
         return self
 
 
-class Parameter(_Value):
+class Parameter(Value):
     """Estimate of one parameter of an effect, with the interval that holds it with a probability of 90 %, in `unit`."""
 
     value: float
@@ -97,7 +85,7 @@ class Parameter(_Value):
         return (self.high - self.low) / (2 * NINE_OF_TEN)
 
 
-class Range(_Value):
+class Range(Value):
     """A value between its lowest and highest likely one; in the file the list [value, low, high]."""
 
     value: NotNegative
@@ -120,7 +108,7 @@ class Range(_Value):
         return self
 
 
-class Effect(_Value):
+class Effect(Value):
     """An effect found at work, how likely it is, and its parameters by name.
 
     `share`: part of the nominal rig's gap that comes back when this effect alone is taken out and all else is fitted
@@ -136,7 +124,7 @@ class Effect(_Value):
     closes: dict[Name, Range] = {}
 
 
-class Candidate(_Value):
+class Candidate(Value):
     """One hypothesis: its effects (none: the nominal rig with its uncertainties), its log evidence relative to any
     common constant, and its relative gap on the held-out record (null: not computed)."""
 
@@ -145,7 +133,7 @@ class Candidate(_Value):
     held_out: NotNegative | None = None
 
 
-class Share(_Value):
+class Share(Value):
     """A part of the gap: `share` of the whole of its kind, beside the share that needs no cause.
 
     `floor_noise` is what measurement noise explains (null: one period, so unknown), `floor_nominal` what the
@@ -161,7 +149,7 @@ class Share(_Value):
     floor_nominal: NotNegative | None = None
 
 
-class Gap(_Value):
+class Gap(Value):
     """Rms of measured minus simulated in one channel and band of a record, from nominal rig to floor.
 
     `with_effect` is null when no effect was added, `floor` when the noise is unknown (a single period). Band
@@ -191,7 +179,7 @@ class Gap(_Value):
         return self
 
 
-class Part(_Value):
+class Part(Value):
     """A part of the gap, explained or left: rms `size` in one channel and band (the missing force of one equation:
     channel "force") in `unit`, um, N m or N, with its 90 % interval; `place` where it arises; `share` of that channel's
     whole nominal gap, by energy; `floors`: multiples of the measurement noise there (null: unknown)."""
@@ -214,7 +202,7 @@ class Part(_Value):
         return data
 
 
-class Found(_Value):
+class Found(Value):
     """A number of the rig's structure that no nominal case gives, as it was found: housing, shafts, gains."""
 
     name: Name
@@ -224,7 +212,7 @@ class Found(_Value):
     unit: str
 
 
-class Confirmation(_Value):
+class Confirmation(Value):
     """How a named effect stands by finite elements: whether it is due there by the same rule, the largest factor by
     which the gap of some part grows without it, nats that the judged record is more likely with it, and its parameters
     as they are fitted there."""
@@ -236,7 +224,7 @@ class Confirmation(_Value):
     parameters: dict[Name, Parameter] = {}
 
 
-class Confirmed(_Value):
+class Confirmed(Value):
     """What the reduced finite-element model says: the gap as in `gap`, the rigs fitted again by it, what it says of
     each named effect, keys of the rig that it leaves out (`lacks`), and why in sentences. No gap: it could not
     answer."""
@@ -248,12 +236,13 @@ class Confirmed(_Value):
     because: tuple[str, ...] = ()
 
 
-class Verdict(_Value):
+class Verdict(Value):
     """What a diagnosis hands back; the fields are those of verdict.json. `signs`: what its probabilities were read
     from, all without dimension: independent "lines", the largest sign of something "unknown" over its limit, parts of
-    the gap and of a channel's fluctuation that remain ("left", "remains"; "searched": on the records of the search),
-    what changes between repetitions over the gap ("changing"), and how far places stand out over what the population's
-    sound rigs leave ("over mesh", ...). `calibrated_on`: rigs behind all that. `confirmed`: by finite elements."""
+    the gap and of a channel's fluctuation that remain ("left", "remains"; "searched": on the records of the search,
+    "hidden": what their noise may hide of it), what changes between repetitions over the gap ("changing"), and how far
+    places stand out over what the population's sound rigs leave ("over mesh", ...). `calibrated_on`: rigs behind all
+    that. `confirmed`: by finite elements."""
 
     schema_: Literal["gearbench-verdict/2"] = Field(SCHEMA, alias="schema")
     verdict: Outcome
@@ -286,115 +275,3 @@ class Verdict(_Value):
             if names.count(name) > 1:
                 raise ValueError(f'effects names "{name}" {names.count(name)} times, must once')
         return self
-
-
-def verdict_json(verdict: Verdict) -> str:
-    """The text of verdict.json: indented, keys in the order of the fields, ranges as lists."""
-    tree = verdict.model_dump(mode="json", by_alias=True)
-    for gap in (*tree["gap"], *(tree["confirmed"] or {}).get("gap", ())):
-        for name in ("nominal", "recalibrated", "with_effect", "floor"):
-            if gap[name] is not None:
-                gap[name] = list(gap[name].values())
-    for effect in tree["effects"]:
-        effect["closes"] = {channel: list(size.values()) for channel, size in effect["closes"].items()}
-    return json.dumps(tree, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
-
-
-def write_verdict(verdict: Verdict, path: str | Path) -> None:
-    """Write verdict.json, replacing `path` in one step. Raises FileError."""
-    write_text(path, verdict_json(verdict))
-
-
-def read_verdict(path: str | Path) -> Verdict:
-    """Read and check a verdict of any program. Raises DiagnosisError: one sentence with file, key and limit."""
-    source = Path(path)
-    if not source.is_file():
-        raise DiagnosisError(f"verdict {source} does not exist")
-    if source.stat().st_size > LARGEST_FILE:
-        raise DiagnosisError(f"verdict {source} has {source.stat().st_size} bytes, at most {LARGEST_FILE}")
-    try:
-        return parse_verdict(source.read_text(encoding="utf-8"))
-    except UnicodeDecodeError:
-        raise DiagnosisError(f"verdict {source} is not UTF-8 text") from None
-    except DiagnosisError as error:
-        raise DiagnosisError(f"verdict {source}: {error}") from None
-
-
-def parse_verdict(text: str) -> Verdict:
-    """The verdict in a JSON text. Raises DiagnosisError: one sentence with key and limit."""
-    try:
-        tree = json.loads(text, parse_constant=_not_finite, object_pairs_hook=_once)
-    except json.JSONDecodeError as error:
-        raise DiagnosisError(f"no JSON at line {error.lineno}, column {error.colno}: {error.msg}") from None
-    except DiagnosisError:
-        raise
-    except ValueError as error:
-        raise DiagnosisError(f"no usable JSON: {error}") from None
-    except RecursionError:
-        raise DiagnosisError("JSON nested too deeply for a verdict") from None
-    if not isinstance(tree, dict):
-        raise DiagnosisError("a verdict is a JSON object with keys in braces")
-    if tree.get("schema") == FORMER:
-        told = tree.get("verdict")
-        tree = {**tree, "schema": SCHEMA, "verdict": "effects" if told == "effect" else told}
-    if tree.get("schema") != SCHEMA:
-        raise DiagnosisError(f'schema is {json.dumps(tree.get("schema"))}, but a verdict has "{SCHEMA}"')
-    try:
-        return Verdict.model_validate_json(json.dumps(tree))
-    except ValidationError as error:
-        raise DiagnosisError(_sentence(error)) from None
-
-
-def _not_finite(word: str) -> NoReturn:
-    raise DiagnosisError(f"holds {word}, but numbers must be finite (use null for what is unknown)")
-
-
-def _once(pairs: Iterable[tuple[str, Any]]) -> dict[str, Any]:
-    tree: dict[str, Any] = {}
-    for key, value in pairs:
-        if key in tree:
-            raise DiagnosisError(f'key "{key}" stands twice in the same object')
-        tree[key] = value
-    return tree
-
-
-def _sentence(error: ValidationError) -> str:
-    """One sentence from what pydantic found: the first defect, with its dotted key."""
-    first = error.errors()[0]
-    where = ".".join(str(part) for part in first["loc"] if part != "schema_")
-    kind, context = first["type"], first.get("ctx", {})
-    if kind == "missing":
-        return f"key {where} is missing"
-    if kind == "extra_forbidden":
-        return f"key {where} is unknown{_nearest(first['loc'])}"
-    if kind == "literal_error":
-        return f"{where} must be one of {context['expected']}"
-    if kind == "value_error":
-        words = str(first["msg"]).removeprefix("Value error, ")
-        return f"{where}: {words}" if where else words
-    words = str(first["msg"]).removeprefix("Input ")
-    return f"{where} {words[:1].lower()}{words[1:]}"
-
-
-# Which values the keys of a verdict hold, for the nearest key to a misspelt one.
-_BELOW: dict[str, type[_Value]] = {
-    "probability": Probabilities,
-    "effects": Effect,
-    "parameters": Parameter,
-    "candidates": Candidate,
-    "where": Share,
-    "gap": Gap,
-    "explained": Part,
-    "remainder": Part,
-    "structure": Found,
-    "confirmed": Confirmed,
-}
-
-
-def _nearest(location: tuple[int | str, ...]) -> str:
-    model: type[_Value] = Verdict
-    for part in location[:-1]:
-        model = _BELOW.get(str(part), model)
-    known = [field.alias or name for name, field in model.model_fields.items()]
-    near = difflib.get_close_matches(str(location[-1]), known, n=1)
-    return f"; did you mean {near[0]}?" if near else f"; keys are {', '.join(known)}"

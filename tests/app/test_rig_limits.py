@@ -12,7 +12,8 @@ from gearbench.bench import simulate
 from gearbench.challenge.making.around import mix_of
 from gearbench.diagnosis.diagnosis import Inputs, take_in
 from gearbench.diagnosis.population import POPULATION
-from gearbench.diagnosis.verdict import Candidate, Probabilities, Verdict, write_verdict
+from gearbench.diagnosis.verdict import Candidate, Probabilities, Verdict
+from gearbench.diagnosis.verdict_file import write_verdict
 from gearbench.records import read_record
 from gearbench.rig import read_case
 from gearbench.rig_limits import SEED, limits_of, noise_of

@@ -17,7 +17,8 @@ from gearbench.diagnosis.effects.friction import FRICTION
 from gearbench.diagnosis.intake.signals import measured_channels
 from gearbench.diagnosis.judging.elements import ByElements
 from gearbench.diagnosis.judging.judged import Closing
-from gearbench.diagnosis.verdict import Confirmed, Effect, Probabilities, Verdict, parse_verdict, verdict_json
+from gearbench.diagnosis.verdict import Confirmed, Effect, Probabilities, Verdict
+from gearbench.diagnosis.verdict_file import parse_verdict, verdict_json
 from gearbench.diagnosis.words import length
 
 HYPOTHESIS = Hypothesis("friction", "mesh", (Wide("friction"),), effect=FRICTION)

@@ -32,7 +32,8 @@ from gearbench.challenge.scoring.judge import score_folder
 from gearbench.commands.house.checks import Check, Got
 from gearbench.commands.measured.challenge import read
 from gearbench.diagnosis import diagnosis as job
-from gearbench.diagnosis.verdict import Verdict, read_verdict, write_verdict
+from gearbench.diagnosis.verdict import Verdict
+from gearbench.diagnosis.verdict_file import read_verdict, write_verdict
 from gearbench.files import FileError
 
 KILLS = 2  # of each example, before it is taken up

@@ -110,7 +110,7 @@ def read(path: Path) -> Mapping[str, Any]:
     """A verdict, checked, as plain values. Raises DiagnosisError."""
     import json
 
-    from gearbench.diagnosis.verdict import read_verdict, verdict_json
+    from gearbench.diagnosis.verdict_file import read_verdict, verdict_json
 
     verdict: Mapping[str, Any] = json.loads(verdict_json(read_verdict(path)))
     return verdict
@@ -119,7 +119,7 @@ def read(path: Path) -> Mapping[str, Any]:
 def diagnose_case(records: Sequence[Path], nominal: Path, folder: Path, without: Sequence[str]) -> str | None:
     """Diagnose one case and write its verdict; one sentence instead when it cannot be diagnosed."""
     from gearbench.diagnosis import diagnose
-    from gearbench.diagnosis.verdict import write_verdict
+    from gearbench.diagnosis.verdict_file import write_verdict
     from gearbench.rig import read_case
     from gearbench.shell.failure import user_errors
 

@@ -109,7 +109,7 @@ def diagnosis_in(
 ) -> Diagnosis:
     """The diagnosis that an earlier run left in the folder; else made, and written to it."""
     from gearbench.diagnosis.diagnosis import Diagnosis, diagnosed
-    from gearbench.diagnosis.verdict import read_verdict, verdict_json
+    from gearbench.diagnosis.verdict_file import read_verdict, verdict_json
     from gearbench.rig import read_case
 
     if all(output.has(name) for name in ("verdict.json", "recalibrated.toml", "updated.toml")):

@@ -12,7 +12,8 @@ from gearbench.challenge.making import cases as making
 from gearbench.cli import run_command_line
 from gearbench.commands.measured.challenge import read
 from gearbench.diagnosis.errors import DiagnosisError
-from gearbench.diagnosis.verdict import Effect, Parameter, Probabilities, Verdict, write_verdict
+from gearbench.diagnosis.verdict import Effect, Parameter, Probabilities, Verdict
+from gearbench.diagnosis.verdict_file import write_verdict
 from gearbench.rig import dump_case
 
 FRICTION = Verdict(

@@ -20,7 +20,8 @@ from gearbench.bench.results.compare_records import differences
 from gearbench.cli import run_command_line
 from gearbench.diagnosis import diagnosis as job
 from gearbench.diagnosis.diagnosis import take_in
-from gearbench.diagnosis.verdict import Confirmation, Confirmed, read_verdict
+from gearbench.diagnosis.verdict import Confirmation, Confirmed
+from gearbench.diagnosis.verdict_file import read_verdict
 from gearbench.records import read_record
 from gearbench.report.html import bar, items, page, table, text
 from gearbench.rig import Case, read_case

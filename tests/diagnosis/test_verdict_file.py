@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from gearbench.diagnosis import verdict as module
+from gearbench.diagnosis import verdict_file as module
 from gearbench.diagnosis.errors import DiagnosisError
 from gearbench.diagnosis.verdict import (
     Candidate,
@@ -22,11 +22,8 @@ from gearbench.diagnosis.verdict import (
     Range,
     Share,
     Verdict,
-    parse_verdict,
-    read_verdict,
-    verdict_json,
-    write_verdict,
 )
+from gearbench.diagnosis.verdict_file import parse_verdict, read_verdict, verdict_json, write_verdict
 from gearbench.files import FileError
 
 # As another program would write it from the specification.
