@@ -153,7 +153,8 @@ def _by_simulation(
         drift = None if TEMPERATURE_DRIFT.name in of.without else drift_of(found)
         decided = decide_simulated(judged, of.result, missing, of.unsteady, changing, known=known, drift=drift)
         signs |= {"lines": float(found.simulator.target.counts.sum()), "unknown": decided.sign, "left": judged.left,
-                  "remains": judged.remains, "searched": judged.searched, "changing": changing}  # fmt: skip
+                  "remains": judged.remains, "searched": judged.searched, "hidden": judged.hidden,
+                  "changing": changing}  # fmt: skip
         chances = chances_of(judged, decided, known, signs["lines"], (*entered, *judged.dropped))
         doubtful = unlikely(decided, chances)
         if doubtful is None:

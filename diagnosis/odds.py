@@ -164,14 +164,20 @@ def calibrated(
     limits = {"structure": prior.structure, "changing": prior.changing}
     outstanding = dict(prior.outstanding)
     if sound:
-        limits = {name: _limit(limits[name], [one[key] for one in sound]) for name, key in
-                  (("structure", "remains"), ("changing", "changing"))}  # fmt: skip
+        seen = {"structure": [_unexplained(one) for one in sound], "changing": [one["changing"] for one in sound]}
+        limits = {name: _limit(limits[name], seen[name]) for name in limits}
         places = [key.removeprefix("over ") for key in sound[0] if key.startswith("over ")]
         outstanding = {
             place: _limit(prior.outstanding.get(place, 1.0), [one[f"over {place}"] for one in sound])
             for place in places
         }
     return Calibration(source, effect, unknown, len(told), **limits, outstanding=outstanding)
+
+
+def _unexplained(signs: Mapping[str, float]) -> float:
+    """The largest part of a channel's fluctuation that is left on the judged record, as far as the records of the
+    search show it or their noise hides it; what is not told counts as shown."""
+    return max(min(signs["remains"], signs.get("searched", signs["remains"])), signs.get("hidden", 0.0))
 
 
 def _limit(before: float, seen: Sequence[float]) -> float:

@@ -32,5 +32,5 @@ UNKNOWN = Odds(
 # 0.006, a support that drifts by 4 % 0.08. Of a channel's fluctuation sound rigs leave up to 0.18 and not much
 # at one place.
 POPULATION = Calibration(
-    source="population", effect=EFFECT, unknown=UNKNOWN, rigs=101, structure=0.2, changing=0.03
+    source="population", effect=EFFECT, unknown=UNKNOWN, rigs=101, structure=0.08, changing=0.03
 )

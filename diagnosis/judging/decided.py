@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,12 +26,16 @@ from gearbench.rig.contract import Place
 
 Array = NDArray[np.float64]
 
-# Of what sound rigs leave of a channel's fluctuation at most: from there on a place can stand out, and a form without a
-# name outbid an effect.
+# Of what sound rigs leave of a channel's fluctuation at most: from there on a place can stand out.
 VISIBLE = 0.5
+# The same from which something is unknown whatever part of the gap it is: no rig without it is found that far off.
+PLAIN = 1.5
 # Part of the nominal gap that the named effects must close for content that changes, or a form without a name, not to
 # outbid them.
 CLOSES = 0.5
+# Of the place that stands out most, what the next one may reach for it to be told, and over what sound rigs leave, what
+# it must reach itself.
+TOLD, FAINT = 0.5, 0.2
 # Over what sound rigs have: a lag of the drive's torque from which something is between its sensor and the rotor.
 LATE_LIMIT = 3.0
 
@@ -83,41 +88,80 @@ def _decided(
     known: Calibration,
 ) -> Decided:  # fmt: skip
     """The decision without a drift."""
-    selection = judged.found.selection
-    named = selection.entered
+    named = judged.found.selection.entered
     share = max((judged.share(judged.closings[one.hypothesis.name].without) for one in named), default=0.0)
     place, over = worst(unsteady, limits.unsteady)
     aside = (_changes(place, changing),) if over > 1.0 else ()
     if over > 1.0 and changing > known.changing and share < CLOSES:
         because = f"the force missing {at_place(place)} changes from one repetition to the next"
         return Decided("unknown", place, (), changing / known.changing, (because,))
+    left = _left_of(judged, missing, known)
+    if not named:
+        made = _without(judged, missing, left, known)
+        return replace(made, because=(*made.because, *aside)) if made.verdict == "none" else made
+    doubt = _outbid(forces, named, limits) if share < CLOSES and left.size > 1.0 else None
+    if doubt is not None:
+        return doubt
+    if judged.left > 1.0 and left.size > 1.0:
+        return Decided("unknown", _leading(missing), (), left.sign, (_astray(judged, named),))
+    because = "simulated with it, the rig comes closer to the records than any rig without an effect"
+    return Decided("effects", named[0].hypothesis.place, named, left.sign, (because, *aside))
+
+
+class _Left(NamedTuple):
+    """What is left over what sound rigs leave: `size` of the largest part of a channel's fluctuation, as far as both
+    judged record and search show it or the latter's noise hides it; `shown`, the same but for what is hidden; `seen`:
+    at the place that stands out, as far as a remainder is there to be seen; `sign`, the largest, each over its
+    limit."""
+
+    size: float
+    shown: float
+    seen: float
+    sign: float
+
+
+def _left_of(judged: Judged, missing: Missing, known: Calibration) -> _Left:
     # A record that had no part in the search may be off because the others do not determine the rig; what their noise
     # hides they do not speak of.
-    size = max(min(judged.remains, judged.searched), judged.hidden) / known.structure
+    shown = min(judged.remains, judged.searched) / known.structure
+    size = max(shown, judged.hidden / known.structure)
+    seen = min(outstanding(missing)[1], size / VISIBLE)
+    return _Left(size, shown, seen, max(min(judged.left / GREATER, size), seen, shown / PLAIN))
+
+
+def _outbid(forces: Search, named: tuple[Weighed, ...], limits: Limits) -> Decided | None:
+    """What a form without a name that explains the records clearly better than what is named says."""
     free = forces.best_free
-    worth = max((one.log_bayes_factor for one in named), default=0.0)
-    if named and free and share < CLOSES and size > VISIBLE:
-        needed = limits.competitor_factor * max(worth, _by_force(forces, named)) + limits.competitor_offset
-        if free.log_bayes_factor > needed:
-            place = free.hypothesis.place
-            because = f"a force {at_place(place)} without any given form explains the records clearly better"
-            return Decided("unknown", place, (), free.log_bayes_factor / needed, (because,))
-    place, over = outstanding(missing)
-    seen = min(over, size / VISIBLE)
-    sign = max(min(judged.left / GREATER, size), seen)
-    if named:
-        because = "simulated with it, the rig comes closer to the records than any rig without an effect"
-        return Decided("effects", named[0].hypothesis.place, named, sign, (because, *aside))
-    if size > 1.0 and judged.left > GREATER:
+    if not free:
+        return None
+    worth = max(one.log_bayes_factor for one in named)
+    needed = limits.competitor_factor * max(worth, _by_force(forces, named)) + limits.competitor_offset
+    if free.log_bayes_factor <= needed:
+        return None
+    place = free.hypothesis.place
+    because = f"a force {at_place(place)} without any given form explains the records clearly better"
+    return Decided("unknown", place, (), free.log_bayes_factor / needed, (because,))
+
+
+def _without(judged: Judged, missing: Missing, left: _Left, known: Calibration) -> Decided:
+    """The decision where no effect is named."""
+    if left.size > 1.0 and judged.left > GREATER:
         because = "no effect of the library closes the gap, and the greater part of it stays"
-        return Decided("unknown", place if over > 1.0 else "none", (), sign, (because,))
-    if seen > 1.0:
+        return Decided("unknown", _leading(missing), (), left.sign, (because,))
+    if left.shown > PLAIN:
+        because = (
+            f"{percent(left.shown * known.structure)} of a channel's fluctuation stays, where sound rigs leave"
+            f" {percent(known.structure)} at most, and no effect of the library explains it"
+        )
+        return Decided("unknown", _leading(missing), (), left.sign, (because,))
+    if left.seen > 1.0:
+        place, _ = outstanding(missing)
         because = f"a force {at_place(place)} remains that no effect of the library explains"
-        return Decided("unknown", place, (), sign, (because,))
-    late, sound = lag_of_drive(judged.found.layout.unknowns, selection.best.p)
+        return Decided("unknown", place, (), left.sign, (because,))
+    late, sound = lag_of_drive(judged.found.layout.unknowns, judged.found.selection.best.p)
     if abs(late) > LATE_LIMIT * sound:
-        return Decided("unknown", "drive", (), max(sign, abs(late) / (LATE_LIMIT * sound)), (_late(late),))
-    return Decided("none", "none", (), sign, (_nothing(judged, known), *aside))
+        return Decided("unknown", "drive", (), max(left.sign, abs(late) / (LATE_LIMIT * sound)), (_late(late),))
+    return Decided("none", "none", (), left.sign, (_nothing(judged, known),))
 
 
 def _nothing(judged: Judged, known: Calibration) -> str:
@@ -133,6 +177,15 @@ def _nothing(judged: Judged, known: Calibration) -> str:
     return because + (
         f"what remains, at most {percent(judged.remains)} of any channel's fluctuation, is"
         f" {sound if small else 'the smaller part of the gap'}"
+    )
+
+
+def _astray(judged: Judged, named: tuple[Weighed, ...]) -> str:
+    """That the rig that was found with effects is further from the judged record than the nominal one."""
+    nouns = [one.hypothesis.effect.noun for one in named if one.hypothesis.effect is not None]
+    return (
+        f"the rig that was found, with {' and '.join(nouns)}, leaves {percent(judged.left)} of the nominal rig's gap in"
+        " the judged record, more than there was: what the records of the search say does not hold there"
     )
 
 
@@ -157,6 +210,13 @@ def outstanding(missing: Missing) -> tuple[Place, float]:
     """The place at which most is missing over what sound rigs leave there, and that ratio."""
     most = int(np.argmax(missing.over))
     return PLACES[most], float(missing.over[most])
+
+
+def _leading(missing: Missing) -> Place:
+    """The place that stands out over what sound rigs leave, or does so far more than any other; none without one."""
+    place, over = outstanding(missing)
+    alone = over > FAINT and float(np.sort(missing.over)[-2]) < TOLD * over
+    return place if over > 1.0 or alone else "none"
 
 
 def size_needed(one: Weighed, limits: Limits) -> float:

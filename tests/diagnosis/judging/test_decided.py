@@ -15,12 +15,13 @@ from gearbench.diagnosis.evidence.calibration import LIMITS
 from gearbench.diagnosis.evidence.decision import Decision
 from gearbench.diagnosis.forces.equations import PLACES
 from gearbench.diagnosis.forces.unknowns import group, unknowns_of
-from gearbench.diagnosis.judging.decided import GREATER, VISIBLE, Decided, decide_simulated, unexplained
+from gearbench.diagnosis.judging.decided import GREATER, PLAIN, VISIBLE, Decided, decide_simulated, unexplained
 from gearbench.diagnosis.judging.drift import Drift
 from gearbench.diagnosis.judging.missing import OUTSTANDING, Missing
 from gearbench.diagnosis.population import POPULATION
 from gearbench.diagnosis.structure.structure import LATE
 from gearbench.diagnosis.verdict import Outcome
+from gearbench.diagnosis.words import percent
 
 EFFECT = next(one for one in LIBRARY if one.name == "friction")
 FRICTION = Hypothesis("friction", "mesh", (Wide("friction"),), effect=EFFECT)
@@ -90,6 +91,16 @@ def test_the_greater_part_unexplained_is_unknown_unless_any_rig_leaves_as_much()
     assert decided(None, **(much | {"remains": 0.9 * STRUCTURE})).verdict == "none"
 
 
+def test_a_rig_further_from_the_judged_record_than_the_nominal_one_names_nothing() -> None:
+    off = {"left": 1.3, "remains": 1.1 * STRUCTURE}
+    made = decided(40.0, **off)
+    assert (made.verdict, made.named) == ("unknown", ()) and made.sign > 1.0
+    assert "friction" in made.because[0] and "130 %" in made.because[0]
+    assert decided(40.0, **(off | {"left": 0.9})).verdict == "effects"
+    # What any rig leaves is no cause for doubt.
+    assert decided(40.0, **(off | {"remains": 0.9 * STRUCTURE})).verdict == "effects"
+
+
 def test_records_that_are_explained_and_predict_no_other_do_not_determine_the_rig() -> None:
     off = {"left": 1.1 * GREATER, "remains": 1.5 * STRUCTURE}
     made = decided(None, **off, searched=0.2 * STRUCTURE)
@@ -121,18 +132,38 @@ def test_a_drive_that_acts_long_after_its_torque_is_measured_is_something_unknow
 
 def test_the_sign_of_something_unknown_follows_the_remainder() -> None:
     stands = [at(0, factor * OUTSTANDING["drive"]) for factor in (0.5, 1.1, 8.0)]
-    signs = [decided(None, remains=9 * STRUCTURE, excess=one).sign for one in stands]
-    assert signs == pytest.approx([0.5, 1.1, 8.0])
+    signs = [decided(None, remains=1.2 * STRUCTURE, excess=one).sign for one in stands]
+    assert signs == pytest.approx([1.2 / PLAIN, 1.1, 1.2 / VISIBLE])
+    assert decided(None, remains=3.0 * STRUCTURE).sign == pytest.approx(3.0 / PLAIN)
+
+
+def test_far_more_than_any_sound_rig_leaves_is_unknown_whatever_part_of_the_gap_it_is() -> None:
+    far = 1.1 * PLAIN * STRUCTURE
+    made = decided(None, left=0.1, remains=far, excess=at(4, 0.3 * OUTSTANDING["mesh"]))
+    assert (made.verdict, made.place) == ("unknown", "mesh") and percent(STRUCTURE) in made.because[0]
+    assert decided(None, left=0.1, remains=far).place == "none"
+    assert decided(None, left=0.1, remains=far, searched=0.9 * PLAIN * STRUCTURE).verdict == "none"
+    # Noise of the search that may hide as much does not show it.
+    assert decided(None, left=0.1, remains=far, searched=0.0, hidden=far).verdict == "none"
+    assert decided(40.0, left=0.1, remains=far).verdict == "effects"
+
+
+def test_a_place_is_told_that_stands_out_far_more_than_any_other() -> None:
+    much: dict[str, Any] = {"left": 1.1 * GREATER, "remains": 1.1 * STRUCTURE}
+    faint = at(4, 0.5 * OUTSTANDING["mesh"])
+    assert decided(None, **much, excess=faint).place == "mesh"
+    assert decided(None, **much, excess=faint + at(0, 0.3 * OUTSTANDING["drive"])).place == "none"
+    assert decided(None, **much, excess=0.3 * faint).place == "none"
 
 
 def test_a_form_without_a_name_outbids_only_an_effect_that_leaves_the_gap() -> None:
-    seen = 1.1 * VISIBLE * STRUCTURE
+    seen = 1.1 * STRUCTURE
     assert decided(40.0, free=90.0, remains=seen).verdict == "unknown"
     assert decided(40.0, free=70.0, remains=seen).verdict == "effects"
     assert decided(40.0, share=0.8, free=900.0, remains=seen).verdict == "effects"
     assert decided(None, free=900.0, remains=seen).verdict == "none"
     # Where nothing that can be seen is left a form without a name has nothing to explain.
-    assert decided(40.0, free=900.0, remains=0.9 * VISIBLE * STRUCTURE).verdict == "effects"
+    assert decided(40.0, free=900.0, remains=0.9 * STRUCTURE).verdict == "effects"
 
 
 def test_what_changes_counts_by_its_part_of_the_gap() -> None:
