@@ -176,8 +176,8 @@ def calibrated(
 
 def _unexplained(signs: Mapping[str, float]) -> float:
     """The largest part of a channel's fluctuation that is left on the judged record, as far as the records of the
-    search show it or their noise hides it; what is not told counts as shown."""
-    return max(min(signs["remains"], signs.get("searched", signs["remains"])), signs.get("hidden", 0.0))
+    search show it; where they are not told they count as showing all of it."""
+    return min(signs["remains"], signs.get("searched", signs["remains"]))
 
 
 def _limit(before: float, seen: Sequence[float]) -> float:

@@ -30,6 +30,8 @@ Array = NDArray[np.float64]
 VISIBLE = 0.5
 # The same from which something is unknown whatever part of the gap it is: no rig without it is found that far off.
 PLAIN = 1.5
+# Noise of the search's records, of a channel's fluctuation, from which they do not speak of what is left elsewhere.
+HIDING = 0.2
 # Part of the nominal gap that the named effects must close for content that changes, or a form without a name, not to
 # outbid them.
 CLOSES = 0.5
@@ -124,7 +126,7 @@ def _left_of(judged: Judged, missing: Missing, known: Calibration) -> _Left:
     # A record that had no part in the search may be off because the others do not determine the rig; what their noise
     # hides they do not speak of.
     shown = min(judged.remains, judged.searched) / known.structure
-    size = max(shown, judged.hidden / known.structure)
+    size = max(shown, judged.hidden / HIDING)
     seen = min(outstanding(missing)[1], size / VISIBLE)
     return _Left(size, shown, seen, max(min(judged.left / GREATER, size), seen, shown / PLAIN))
 

@@ -95,8 +95,7 @@ def test_limits_of_a_rig_are_what_its_sound_rigs_leave() -> None:
     assert made.structure == pytest.approx(MARGIN * 0.2) and made.changing == pytest.approx(MARGIN * 0.04)
     assert made.outstanding == pytest.approx({"drive": MARGIN * 2.0})
     # Few rigs do not lower a limit by more than half, and without a sound one it stays.
-    noisy = known("none", remains=0.3, searched=0.0, hidden=0.1)
-    elsewhere = [known("none", remains=0.9, searched=0.2, hidden=0.1), noisy]
+    elsewhere = [known("none", remains=0.9, searched=0.2), known("none", remains=0.3, searched=0.0)]
     assert calibrated(BLANK, elsewhere).structure == pytest.approx(MARGIN * 0.2)
     calm = calibrated(BLANK, [known("none", remains=0.0, changing=0.0, **{"over drive": 0.0})])
     assert (calm.structure, calm.changing) == (0.5 * BLANK.structure, 0.5 * BLANK.changing)

@@ -15,7 +15,7 @@ from gearbench.diagnosis.evidence.calibration import LIMITS
 from gearbench.diagnosis.evidence.decision import Decision
 from gearbench.diagnosis.forces.equations import PLACES
 from gearbench.diagnosis.forces.unknowns import group, unknowns_of
-from gearbench.diagnosis.judging.decided import GREATER, PLAIN, VISIBLE, Decided, decide_simulated, unexplained
+from gearbench.diagnosis.judging.decided import GREATER, HIDING, PLAIN, VISIBLE, Decided, decide_simulated, unexplained
 from gearbench.diagnosis.judging.drift import Drift
 from gearbench.diagnosis.judging.missing import OUTSTANDING, Missing
 from gearbench.diagnosis.population import POPULATION
@@ -109,9 +109,9 @@ def test_records_that_are_explained_and_predict_no_other_do_not_determine_the_ri
 
 
 def test_records_whose_noise_hides_what_is_left_say_nothing_for_a_sound_rig() -> None:
-    off = {"left": 1.1 * GREATER, "remains": 1.5 * STRUCTURE, "searched": 0.0}
-    assert decided(None, **off, hidden=0.9 * STRUCTURE).verdict == "none"
-    assert decided(None, **off, hidden=1.1 * STRUCTURE).verdict == "unknown"
+    off = {"left": 1.1 * GREATER, "remains": 1.5 * HIDING, "searched": 0.0}
+    assert decided(None, **off, hidden=0.9 * HIDING).verdict == "none"
+    assert decided(None, **off, hidden=1.1 * HIDING).verdict == "unknown"
 
 
 def test_a_place_that_stands_out_is_unknown_only_over_a_visible_remainder() -> None:
