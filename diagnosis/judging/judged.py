@@ -23,7 +23,7 @@ from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.intake.signals import measured_channels
 from gearbench.diagnosis.selection.selection import further, only, taken_out
 from gearbench.diagnosis.selection.simulated import Simulated, nudges_of
-from gearbench.diagnosis.selection.weighing import Weighed
+from gearbench.diagnosis.selection.weighing import Weighed, is_own
 from gearbench.diagnosis.simulation.passed_noise import noise_left, noise_rms
 from gearbench.diagnosis.simulation.simulator import Simulator
 from gearbench.diagnosis.simulation.target import FITTED, Target, target_of
@@ -153,6 +153,11 @@ class Judged:
         return float(np.clip(back / gap, 0.0, 1.0)) if gap > 0.0 else 0.0
 
 
+    def grown(self, without: Mapping[str, Array]) -> float:
+        """Factor by which all that is left grows in a rig with those signals, rms over rms."""
+        return float(np.sqrt(1.0 + self.share(without) / max(self.left, 1e-300) ** 2))
+
+
 @dataclass(frozen=True)
 class Sizes:
     """Rms of one channel on the judged record, without means: its own, of the gap of the nominal rig, of the one
@@ -209,8 +214,13 @@ def judged_on(
 
 
 def _stays(judged: Judged, one: Weighed) -> bool:
-    """Whether an effect is due; weak evidence is nothing to go by where the greater part is not explained."""
-    closing = judged.closings[one.hypothesis.name]
+    """Whether an effect is due; weak evidence is nothing to go by where the greater part is not explained. A number of
+    the nominal rig, which recalibration moves anyway, must make a difference to the whole: some part of it is closer by
+    what else it makes up for."""
+    closing, unknowns = judged.closings[one.hypothesis.name], judged.found.layout.unknowns
+    own = any(is_own(unknowns, wide) for wide in one.hypothesis.wide)
+    if not own and judged.grown(closing.without) < DUE:
+        return False
     return closing.due and not (closing.lacking and judged.left > GREATER)
 
 

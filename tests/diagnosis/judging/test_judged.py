@@ -69,6 +69,7 @@ def judged(
     apart: bool = False,
     left: float = 0.05,
     free: Any = None,
+    weighed: Sequence[Hypothesis] = (FRICTION, RIPPLE),
 ) -> Judged:
     """Effects of these sizes in the records of the search, and in the judged one, which is waited for (`apart`); so
     much of the nominal gap is `left`; what simulates without what nudges, if it is nudged, is `free`."""
@@ -84,7 +85,7 @@ def judged(
         monkeypatch.setattr(module, "nudges_of", lambda model, conditions: {})
         monkeypatch.setattr(Simulated, "end_of", lambda found, optimum: optimum.p)
     simulator.layout.size, simulator.layout.nominal = 8, None
-    selection = chosen(simulator, (FRICTION, RIPPLE), [np.zeros(8)], {}, apart=apart)
+    selection = chosen(simulator, weighed, [np.zeros(8)], {}, apart=apart)
     assert isinstance(selection, Selection)
     plain = target(noisy(q @ OTHER, 12))
     held = OfLines(**{one.name: getattr(plain, one.name) for one in fields(plain)})
@@ -120,6 +121,18 @@ def test_an_effect_that_leaves_the_judged_record_as_it_was_is_not(monkeypatch: p
     assert abs(best[4]) < 0.05 and best[3] == pytest.approx(0.4, abs=0.05)
     none = judged({4: 0.3, 5: -0.2}, {}, monkeypatch)
     assert not none.found.selection.entered and none.found.selection.best is none.found.selection.base
+
+
+@pytest.mark.parametrize(("grown", "named"), [(1.2, ["support"]), (1.05, [])])
+def test_a_number_of_the_nominal_rig_must_make_a_difference_to_the_whole(
+    grown: float, named: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Judged, "grown", lambda judged, without: grown)
+    stiffer = Hypothesis("support", "driver-support", (Wide("stiffness", 0, 0.7),))
+    found = judged({0: 0.9}, {0: 0.9}, monkeypatch, weighed=(stiffer,))
+    assert names(found.found.selection.entered) == named
+    # What a rig has of its own is judged by any part of the gap.
+    assert names(judged({3: 0.4}, {3: 0.4}, monkeypatch).found.selection.entered) == ["friction"]
 
 
 def test_what_had_no_place_beside_what_closes_nothing_is_kept_instead(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -207,6 +220,8 @@ def test_parts_of_the_gap_are_energies_beyond_noise_in_units_of_each_channel(mon
     assert made.share(nominal) == pytest.approx(1 - 0.2**2)
     assert made.share(half) == pytest.approx(0.5 * (0.4**2 - 0.1**2) / 0.5**2, rel=0.05)
     assert made.share(final) == 0.0
+    assert made.grown(half) == pytest.approx(np.sqrt((0.4**2 + 0.1**2) / (2 * 0.1**2)), rel=0.05)
+    assert made.grown(final) == 1.0
     value, low, high = rms_closed(None, "dte", half["dte"], final["dte"])  # type: ignore[arg-type]
     assert low < value < high < 1.1 * value and value == pytest.approx(np.sqrt(0.15) * gap["dte"].std(), rel=1e-6)
 
