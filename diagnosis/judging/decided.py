@@ -91,7 +91,8 @@ def _decided(
 ) -> Decided:  # fmt: skip
     """The decision without a drift."""
     named = judged.found.selection.entered
-    share = max((judged.share(judged.closings[one.hypothesis.name].without) for one in named), default=0.0)
+    shares = [judged.share(judged.closings[one.hypothesis.name].without) for one in named]
+    share = max(shares, default=0.0)
     place, over = worst(unsteady, limits.unsteady)
     aside = (_changes(place, changing),) if over > 1.0 else ()
     if over > 1.0 and changing > known.changing and share < CLOSES:
@@ -106,6 +107,8 @@ def _decided(
         return doubt
     if judged.left > 1.0 and left.size > 1.0:
         return Decided("unknown", _leading(missing), (), left.sign, (_astray(judged, named),))
+    if left.shown > PLAIN and left.seen > 1.0 and sum(shares) < judged.left**2:
+        return Decided("unknown", _leading(missing), (), left.sign, (_made_up(missing, named),))
     because = "simulated with it, the rig comes closer to the records than any rig without an effect"
     return Decided("effects", named[0].hypothesis.place, named, left.sign, (because, *aside))
 
@@ -182,11 +185,23 @@ def _nothing(judged: Judged, known: Calibration) -> str:
     )
 
 
+def _nouns(named: tuple[Weighed, ...]) -> str:
+    return " and ".join(one.hypothesis.effect.noun for one in named if one.hypothesis.effect is not None)
+
+
+def _made_up(missing: Missing, named: tuple[Weighed, ...]) -> str:
+    """That what was found closes less of the gap than what stays, at a place that stands out."""
+    place, _ = outstanding(missing)
+    return (
+        f"a force {at_place(place)} remains that no effect of the library explains, and more of the gap with it than"
+        f" {_nouns(named)} would close, which may only make up for it"
+    )
+
+
 def _astray(judged: Judged, named: tuple[Weighed, ...]) -> str:
     """That the rig that was found with effects is further from the judged record than the nominal one."""
-    nouns = [one.hypothesis.effect.noun for one in named if one.hypothesis.effect is not None]
     return (
-        f"the rig that was found, with {' and '.join(nouns)}, leaves {percent(judged.left)} of the nominal rig's gap in"
+        f"the rig that was found, with {_nouns(named)}, leaves {percent(judged.left)} of the nominal rig's gap in"
         " the judged record, more than there was: what the records of the search say does not hold there"
     )
 

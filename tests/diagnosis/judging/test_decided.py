@@ -78,7 +78,7 @@ def at(number: int, value: float) -> np.ndarray:
 def test_what_was_kept_is_named_at_its_place_even_if_a_remainder_stays() -> None:
     made = decided(40.0)
     assert (made.verdict, made.place) == ("effects", "mesh")
-    made = decided(40.0, left=0.9, remains=5 * STRUCTURE, excess=at(0, 50.0))
+    made = decided(40.0, left=0.9, remains=5 * STRUCTURE, excess=at(0, 50.0), share=0.85)
     assert made.verdict == "effects" and made.sign > 1.0
     assert decided(None).verdict == "none"
 
@@ -99,6 +99,15 @@ def test_a_rig_further_from_the_judged_record_than_the_nominal_one_names_nothing
     assert decided(40.0, **(off | {"left": 0.9})).verdict == "effects"
     # What any rig leaves is no cause for doubt.
     assert decided(40.0, **(off | {"remains": 0.9 * STRUCTURE})).verdict == "effects"
+
+
+def test_an_effect_that_closes_less_than_what_stands_out_elsewhere_only_makes_up_for_it() -> None:
+    far: dict[str, Any] = {"left": 0.5, "remains": 1.1 * PLAIN * STRUCTURE, "excess": at(0, 3 * OUTSTANDING["drive"])}
+    made = decided(40.0, share=0.2, **far)
+    assert (made.verdict, made.place, made.named) == ("unknown", "drive", ()) and "friction" in made.because[0]
+    assert decided(40.0, share=0.3, **far).verdict == "effects"
+    assert decided(40.0, share=0.2, **(far | {"remains": 0.9 * PLAIN * STRUCTURE})).verdict == "effects"
+    assert decided(40.0, share=0.2, **(far | {"excess": QUIET})).verdict == "effects"
 
 
 def test_records_that_are_explained_and_predict_no_other_do_not_determine_the_rig() -> None:
