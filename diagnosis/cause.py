@@ -141,7 +141,7 @@ def _by_simulation(
 ) -> Finding:
     """The finding that simulation justifies."""
     entered = found.selection.entered
-    judged = judgement(of.problem, sized(seconded(found, of.result)), held_out, of.measurements, report)
+    judged = _judged(of, sized(seconded(found, of.result)), held_out, report)
     band = of.problem.conditions[0].band
     changing = changing_of(judged, changing_parts(of.steady, band))
     doubts: tuple[str, ...] = ()
@@ -160,7 +160,7 @@ def _by_simulation(
         if doubtful is None:
             break
         doubts = (*doubts, sentence_of_doubt(doubtful, chances))
-        judged = judgement(of.problem, left_out(found, (doubtful,)), held_out, of.measurements, report)
+        judged = _judged(of, left_out(found, (doubtful,)), held_out, report)
     kept = [one.hypothesis for one in decided.named]
     flanks = other_flanks(found.layout.unknowns, found.selection.best.p)
     common["indistinguishable"] = with_rivals(common["indistinguishable"], decided.named)
@@ -189,6 +189,15 @@ def _by_simulation(
         judged=judged,
         **common,
     )
+
+
+def _judged(of: Searched, found: Simulated, held_out: Measurement | None, report: Report) -> Judged:
+    """What was found on the judged record, but for effects of which a sound rig has as much: some enter there only."""
+    while True:
+        judged = judgement(of.problem, found, held_out, of.measurements, report)
+        found = sized(judged.found)
+        if found is judged.found:
+            return judged
 
 
 def _missing(of: Searched, found: Simulated) -> Missing:
