@@ -15,6 +15,9 @@ LIMIT = -0.1
 # Part of the excited lines, the lowest, in which a channel that is late still moves with the torque: it turns the
 # highest ones first, a sign all of them.
 LOW = 1 / 3
+# Longest delay of an angle [shortest excited periods] that may explain a mean and lines that oppose the torque, and how
+# much longer it may be than what brings the mean to zero: the deflection under the mean torque is there too.
+TURNED, BEYOND = 1 / 3, 1.5
 
 
 def force_feeds_the_rig(look: Look) -> list[Finding]:
@@ -42,6 +45,14 @@ def force_feeds_the_rig(look: Look) -> list[Finding]:
         return []
     low = _cosine(look, force, error, LOW)
     moves = f"the {name} move against the torque that shakes them"
+    delay = _late_angle(look, force, rolled) if rolled is not None and opposed else 0.0
+    if delay > 0.0:
+        words = (
+            f"{moves}, in the mean too: the cosine between force and rate is {cosine:.2f} (limit {LIMIT:g}); the"
+            f" driver's angle late by {1e6 * delay:.3g} us or more, or the driven gear's early, explains both: are they"
+            " of two devices?"
+        )
+        return [Finding(words, refused=False, error=1.0)]
     if certain and low > 0.0:
         words = (
             f"{moves} at the upper excited lines, at the lower ones with it: the cosine between force and rate is"
@@ -63,6 +74,28 @@ def _cosine(look: Look, force: NDArray[np.float64], error: NDArray[np.float64], 
     driving, rate = driving[lines], (1j * look.omega * look.spectrum(error))[lines]
     size = float(np.linalg.norm(driving) * np.linalg.norm(rate))
     return float(np.vdot(driving, rate).real) / size if size > 0 else 0.0
+
+
+def _late_angle(look: Look, force: NDArray[np.float64], rolled: NDArray[np.float64]) -> float:
+    """By how much [s] the driver's angle must lag at least for a mean of rb1 theta1 - rb2 theta2 that opposes the
+    torque, 0 where the lines of a record of that delay would still move against the torque, or none so short would do.
+
+    A gear that turns gets ahead of an angle that is late, by its speed times the delay; a reversed sign or an exchange
+    of channels takes no more than the deflection, a delay far too short to turn the lines.
+    """
+    radius, omega = look.number("base_radius_driver"), 2 * np.pi * np.fft.rfftfreq(look.samples, 1 / look.rate)
+    angle, speed = look.channel("angle_driver"), look.speed("driver")
+    if radius is None or angle is None or not speed > 0:
+        return 0.0
+    least = -float(rolled.mean()) * float(np.sign(force.mean())) / (radius * speed)
+    if not 0.0 < least * look.omega[look.excited(force)][-1] / (2 * np.pi) < TURNED:
+        return 0.0
+    swing = np.fft.rfft(angle - speed * np.arange(angle.size) / look.rate)
+    for delay in least * np.linspace(1.0, BEYOND, 6):
+        ahead = radius * np.fft.irfft(swing * np.expm1(1j * omega * delay), angle.size)
+        if min(_cosine(look, force, rolled + ahead, part) for part in (1.0, LOW)) >= LIMIT:
+            return float(least)
+    return 0.0
 
 
 def _rolled(look: Look) -> NDArray[np.float64] | None:

@@ -63,3 +63,30 @@ def test_a_late_angle_turns_the_highest_lines_first_and_a_sign_all(
     assert "shifted in time" in found.sentence
     (found,) = force_feeds_the_rig(Look(late(0.0, -1.0)))
     assert found.refused
+
+
+def test_a_late_angle_opposes_in_the_mean_too(record: xr.Dataset, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the rate is a quarter of a period behind the torque, as of a gear that only its inertia holds, a late angle
+    opposes the torque on all lines; by its speed it falls behind the driven gear too. Else the mean tells a sign."""
+    monkeypatch.setattr(passive, "clocks_agree", lambda look: [])
+    one, two = (record.attrs[f"base_radius_{gear}"] for gear in ("driver", "driven"))
+    look, count = Look(record), record.sizes["time"]
+    assert look.force is not None
+    omega = 2 * np.pi * np.fft.rfftfreq(count, 1 / record.sampling_rate)
+    delay = 0.3 * 2 * np.pi / look.omega[look.excited(look.force)][-1]
+    rolling = np.zeros(omega.size, dtype=complex)
+    rolling[1:] = -np.fft.rfft(look.force)[1:] / omega[1:] * np.exp(-1j * omega[1:] * delay)
+    swing = np.fft.irfft(rolling, count)
+
+    def with_mean(mean: float) -> Look:
+        rolled = mean + 1e-6 * swing / swing.std()
+        return Look(
+            record.assign(angle_driver=((two * record.angle_driven + rolled) / one).assign_attrs(units="rad"))
+        )
+
+    behind = -one * look.speed("driver") * delay
+    (found,) = force_feeds_the_rig(with_mean(behind + 2e-6))
+    assert not found.refused
+    assert "late by" in found.sentence
+    (found,) = force_feeds_the_rig(with_mean(3.0 * behind))
+    assert found.refused
