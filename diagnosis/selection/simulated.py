@@ -25,6 +25,7 @@ from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.replay.replays import Replay
 from gearbench.diagnosis.selection.by_forces import Start, begun_by_forces
+from gearbench.diagnosis.selection.by_losses import with_losses
 from gearbench.diagnosis.selection.selection import Selection, select
 from gearbench.diagnosis.selection.weighing import WORTH, Weighed, entering
 from gearbench.diagnosis.simulation.passed_noise import noise_left
@@ -126,7 +127,7 @@ def simulated(
         return None
     ranked = _cracked_by_forces(problem, found, cracks) if cracks else []
     simulator = replace(simulator, layout=replace(layout, teeth=tuple(ranked)))
-    starts = _starts(layout, problem.unknowns, found, listed)
+    starts = with_losses(simulator, base, listed, _starts(layout, problem.unknowns, found, listed), report)
     for teeth_first in (True, False):
         if cracks:
             simulator, base = with_likely_teeth(simulator, base, ranked)
