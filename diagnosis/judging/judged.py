@@ -24,7 +24,7 @@ from gearbench.diagnosis.intake.signals import measured_channels
 from gearbench.diagnosis.selection.selection import further, only, taken_out
 from gearbench.diagnosis.selection.simulated import Simulated, nudges_of
 from gearbench.diagnosis.selection.weighing import Weighed, is_own
-from gearbench.diagnosis.simulation.passed_noise import noise_left, noise_rms
+from gearbench.diagnosis.simulation.passed_noise import noise_left
 from gearbench.diagnosis.simulation.simulator import Simulator
 from gearbench.diagnosis.simulation.target import FITTED, Target, target_of
 
@@ -89,10 +89,16 @@ class Judged:
             if channel not in FITTED or channel not in self.signals:
                 continue
             mean = repetitions.mean(axis=0)
-            noise = noise_rms(self.noise[channel]) if channel in self.noise else 0.0
-            nominal, plain, final = (_rms(mean - one[channel]) for one in (self.nominal, self.plain, self.signals))
-            out[channel] = Sizes(_rms(mean), nominal, plain, final, noise)
+            noise = self._rms(self.noise[channel]) if channel in self.noise else 0.0
+            nominal, plain, final = (self._rms(mean - one[channel]) for one in (self.nominal, self.plain, self.signals))
+            out[channel] = Sizes(self._rms(mean), nominal, plain, final, noise)
         return out
+
+    def _rms(self, values: Array) -> float:
+        """Rms of a signal (N,), or of parts (parts, N) that add up by their squares, up to the highest line that the
+        search sees: beyond the excitation nothing determines the rig."""
+        top = max((int(bins.max()) for _, _, bins in self.target.plan), default=0) if self.target else None
+        return max(float(np.sqrt(sum(_energy(one)[:top].sum() for one in np.atleast_2d(values)))), 1e-300)
 
     @property
     def left(self) -> float:
@@ -149,7 +155,7 @@ class Judged:
         for channel, one in self.sizes.items():
             mean = measured_channels(self.measured)[channel].mean(axis=0)
             gap += max(one.nominal**2 - one.noise**2, 0.0) / one.fluctuation**2
-            back += (_rms(mean - without[channel]) ** 2 - one.final**2) / one.fluctuation**2
+            back += (self._rms(mean - without[channel]) ** 2 - one.final**2) / one.fluctuation**2
         return float(np.clip(back / gap, 0.0, 1.0)) if gap > 0.0 else 0.0
 
 
@@ -160,8 +166,8 @@ class Judged:
 
 @dataclass(frozen=True)
 class Sizes:
-    """Rms of one channel on the judged record, without means: its own, of the gap of the nominal rig, of the one
-    without any effect and of the final one, and of the noise."""
+    """Rms of one channel on the judged record, without means, up to the end of the excitation: its own, of the gap of
+    the nominal rig, of the one without any effect and of the final one, and of the noise."""
 
     fluctuation: float
     nominal: float
@@ -335,10 +341,6 @@ def rms_closed(measured: Measurement, channel: str, without: Array, with_all: Ar
     total, spread = float(energy.sum()), 1.6449 * float(np.sqrt(0.5 * (energy**2).sum()))
     value, low, high = (float(np.sqrt(max(one, 0.0))) for one in (total, total - spread, total + spread))
     return value, low, high
-
-
-def _rms(values: Array) -> float:
-    return max(float(np.std(values)), 1e-300)
 
 
 def _energy(values: Array) -> Array:

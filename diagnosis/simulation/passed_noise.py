@@ -42,11 +42,6 @@ def noise_left(case: Case, measured: Measurement, simulate: Replay) -> dict[str,
     return {name: values - passed[name] if name in passed else values for name, values in parts.items()}
 
 
-def noise_rms(parts: Array) -> float:
-    """Rms of a noise of which these are the parts (parts, N)."""
-    return float(np.sqrt((parts**2).sum(axis=0).mean()))
-
-
 def _passed(case: Case, measured: Measurement, given: Mapping[str, Array], simulate: Replay) -> dict[str, Array]:
     """Channel -> (parts, N): what the simulated channels become for the noise in what is given."""
 
