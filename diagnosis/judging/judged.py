@@ -97,7 +97,7 @@ class Judged:
     def _rms(self, values: Array) -> float:
         """Rms of a signal (N,), or of parts (parts, N) that add up by their squares, up to the highest line that the
         search sees: beyond the excitation nothing determines the rig."""
-        top = max((int(bins.max()) for _, _, bins in self.target.plan), default=0) if self.target else None
+        top = max((int(bins.max()) for _, _, bins in self.target.plan), default=None) if self.target else None
         return max(float(np.sqrt(sum(_energy(one)[:top].sum() for one in np.atleast_2d(values)))), 1e-300)
 
     @property

@@ -226,6 +226,27 @@ def test_parts_of_the_gap_are_energies_beyond_noise_in_units_of_each_channel(mon
     assert low < value < high < 1.1 * value and value == pytest.approx(np.sqrt(0.15) * gap["dte"].std(), rel=1e-6)
 
 
+def test_beyond_the_lines_of_the_search_nothing_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A resonance above the excitation is no part of the gap, nor of what a channel fluctuates by."""
+    wave = np.exp(2j * np.pi * np.arange(64)[:, None] * np.arange(32) / 64).real
+    mean = 3.0 + 2.0 * wave[:, 4] + wave[:, 20]
+    monkeypatch.setattr(module, "measured_channels", lambda one: {"dte": mean[None]})
+    made = Judged(
+        None,  # type: ignore[arg-type]
+        None,  # type: ignore[arg-type]
+        {},
+        {"dte": 0.0 * mean},
+        {"dte": mean - wave[:, 5]},
+        {"dte": mean - 0.2 * wave[:, 5] - wave[:, 20] - 1.0},
+        target=replace(target(np.zeros(LINES)), plan=((0, "dte", np.arange(1, 9)),)),
+        noise={"dte": np.stack([0.1 * wave[:, 3], 0.1 * wave[:, 6], wave[:, 30]], axis=0)},
+    )
+    sizes = made.sizes["dte"]
+    assert (sizes.fluctuation, sizes.nominal) == pytest.approx((np.sqrt(2.0), np.sqrt(2.0)))
+    assert (sizes.plain, sizes.final, sizes.noise) == pytest.approx((np.sqrt(0.5), 0.2 * np.sqrt(0.5), 0.1))
+
+
+
 class Blind(Answering):
     """A judged record that does not feel friction, and one whose flanks part, which the fit leaves out."""
 
