@@ -13,10 +13,11 @@ from gearbench.bench.refusals.stated import check_springs, check_stated
 from gearbench.bench.replays.carried import damped_alike, mesh_damped_alike
 from gearbench.diagnosis.account import parts_of, sentences_of_gap
 from gearbench.diagnosis.advice import advice_of
-from gearbench.diagnosis.cause import Finding, find_cause
+from gearbench.diagnosis.cause import find_cause
 from gearbench.diagnosis.confirmed import advice_on, confirmed_by_elements
 from gearbench.diagnosis.effects.library import CHANGING, LIBRARY
 from gearbench.diagnosis.errors import DiagnosisError
+from gearbench.diagnosis.finding import Finding
 from gearbench.diagnosis.forces.nominal import resonance_of
 from gearbench.diagnosis.intake.measurements import Measurement, held_out_of, intake
 from gearbench.diagnosis.intake.signals import simulated_channels

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from math import radians
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -12,11 +10,11 @@ import pytest
 from gearbench.bench import simulate
 from gearbench.bench.nonlinear.replay import replay
 from gearbench.cases import case_files
-from gearbench.diagnosis import cause
-from gearbench.diagnosis.cause import find_cause, with_rivals
+from gearbench.diagnosis.cause import find_cause
 from gearbench.diagnosis.effects.eccentricity import ECCENTRICITY
 from gearbench.diagnosis.effects.effect import Hypothesis
 from gearbench.diagnosis.effects.encoder_runout import ENCODER_RUNOUT
+from gearbench.diagnosis.found_by_simulation import with_rivals
 from gearbench.diagnosis.intake.measurements import measurement
 from gearbench.diagnosis.selection.weighing import Weighed
 from gearbench.rig import read_case
@@ -73,21 +71,3 @@ def test_a_named_effect_and_its_rivals_are_a_group() -> None:
     assert with_rivals(groups, [Weighed(named, 30.0, None, (rival,))]) == (*groups, both)
     assert with_rivals((*groups, both), [Weighed(named, 30.0, None, (rival,))]) == (*groups, both)
     assert with_rivals(groups, [Weighed(named, 30.0, None)]) == groups
-
-
-def test_what_enters_on_the_judged_record_alone_must_be_large_enough_too(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A crack of which sound rigs have as much, in the place of another effect that was too small."""
-    entering: list[list[str]] = [["small crack"], ["run-out"]]
-
-    def judgement(problem: Any, found: Any, held_out: Any, searched: Any, report: Any) -> Any:
-        return SimpleNamespace(found=SimpleNamespace(entered=[*found.entered, *(entering.pop(0) if entering else [])]))
-
-    def sized(found: Any) -> Any:
-        kept = [one for one in found.entered if not one.startswith("small")]
-        return found if kept == found.entered else SimpleNamespace(entered=kept)
-
-    monkeypatch.setattr(cause, "judgement", judgement)
-    monkeypatch.setattr(cause, "sized", sized)
-    of: Any = SimpleNamespace(problem=None, measurements=())
-    found: Any = SimpleNamespace(entered=[])
-    assert cause._judged(of, found, None, lambda step: None).found.entered == ["run-out"]

@@ -1,0 +1,197 @@
+"""The finding that simulation justifies: what is named, what it closes, what stays."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.diagnosis.account import places_of, sentence_of_effect, sentence_of_rivals
+from gearbench.diagnosis.effects.effect import Hypothesis
+from gearbench.diagnosis.effects.temperature_drift import TEMPERATURE_DRIFT
+from gearbench.diagnosis.evidence.fit import Fit
+from gearbench.diagnosis.evidence.problem import Problem
+from gearbench.diagnosis.evidence.search import Search, missing_by_equation
+from gearbench.diagnosis.finding import Finding
+from gearbench.diagnosis.forces.equations import PLACES
+from gearbench.diagnosis.forces.steadiness import changing_parts
+from gearbench.diagnosis.intake.measurements import Measurement
+from gearbench.diagnosis.intake.signals import measured_channels
+from gearbench.diagnosis.judging.chances import chances_of, sentence_of_doubt, unlikely
+from gearbench.diagnosis.judging.decided import decide_simulated
+from gearbench.diagnosis.judging.drift import drift_of
+from gearbench.diagnosis.judging.judged import Judged
+from gearbench.diagnosis.judging.missing import Missing, missing_forces, nothing_missing
+from gearbench.diagnosis.judging.naming import drifts_of, effects_of
+from gearbench.diagnosis.judging.repeating import sentences_of_others
+from gearbench.diagnosis.judging.sifted import judged_of_size, left_out, seconded, sized
+from gearbench.diagnosis.odds import Calibration
+from gearbench.diagnosis.selection.simulated import Simulated
+from gearbench.diagnosis.selection.weighing import Weighed
+from gearbench.diagnosis.structure.contrast import other_flanks
+from gearbench.diagnosis.structure.structure import structure_found
+from gearbench.diagnosis.verdict import Candidate
+from gearbench.rig import Case
+from gearbench.rig.contract import rank_of
+
+Array = NDArray[np.float64]
+Report = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Searched:
+    """What the search by forces had and found: `fit` is the best effect's, else the background's; `unsteady`
+    (equations + 1,) the excess scatter between repetitions of the records `steady`, `without` the effects left out."""
+
+    problem: Problem
+    nominal: Case
+    measurements: tuple[Measurement, ...]
+    result: Search
+    fit: Fit
+    steady: tuple[Measurement, ...]
+    unsteady: Array
+    without: tuple[str, ...] = ()
+
+
+def by_simulation(
+    of: Searched,
+    found: Simulated,
+    held_out: Measurement | None,
+    known: Calibration,
+    common: dict[str, Any],
+    report: Report,
+) -> Finding:
+    """The finding that simulation justifies."""
+    entered = found.selection.entered
+    judged = judged_of_size(of.problem, sized(seconded(found, of.result)), held_out, of.measurements, report)
+    band = of.problem.conditions[0].band
+    changing = changing_of(judged, changing_parts(of.steady, band))
+    doubts: tuple[str, ...] = ()
+    while True:
+        found = judged.found
+        missing = _missing(of, found)
+        signs = {f"over {place}": float(over) for place, over in zip(PLACES, missing.over, strict=True)}
+        missing = replace(missing, factors=np.array([known.outstanding.get(place, 1.0) for place in PLACES]))
+        drift = None if TEMPERATURE_DRIFT.name in of.without else drift_of(found)
+        decided = decide_simulated(judged, of.result, missing, of.unsteady, changing, known=known, drift=drift)
+        signs |= {"lines": float(found.simulator.target.counts.sum()), "unknown": decided.sign, "left": judged.left,
+                  "remains": judged.remains, "searched": judged.searched, "hidden": judged.hidden,
+                  "changing": changing}  # fmt: skip
+        chances = chances_of(judged, decided, known, signs["lines"], (*entered, *judged.dropped))
+        doubtful = unlikely(decided, chances)
+        if doubtful is None:
+            break
+        doubts = (*doubts, sentence_of_doubt(doubtful, chances))
+        judged = judged_of_size(of.problem, left_out(found, (doubtful,)), held_out, of.measurements, report)
+    kept = [one.hypothesis for one in decided.named]
+    flanks = other_flanks(found.layout.unknowns, found.selection.best.p)
+    common["indistinguishable"] = with_rivals(common["indistinguishable"], decided.named)
+    return Finding(
+        verdict=decided.verdict,
+        probability=known.probabilities(chances.best, decided.sign),
+        signs=signs,
+        effects=(*effects_of(judged, decided, chances), *drifts_of(decided, changing, chances)),
+        candidates=_candidates(found, held_out if held_out is not None and held_out.phase_known else None),
+        place=decided.place,
+        where=places_of(judged, kept, missing),
+        recalibrated=found.recalibrated if kept else found.without_any,
+        with_effect=found.with_effects if decided.named else None,
+        because=(*decided.because, *_why(judged, kept), *doubts, *flanks,
+                 *sentences_of_others(of.measurements, of.steady, band)),
+        structure=structure_found(found.layout.unknowns, found.selection.best.p, found.std),
+        missing=missing,
+        places=tuple(one.place for one in kept),
+        audits={
+            "unsteady": tuple(of.unsteady),
+            "missing": tuple(missing.excess),
+            "silent": tuple(missing.silent),
+            "changing": (changing,),
+            "left": (judged.left, judged.remains),
+        },
+        judged=judged,
+        **common,
+    )
+
+
+def _missing(of: Searched, found: Simulated) -> Missing:
+    """The forces that the rig found lacks, with what the force residuals' fit leaves, a line."""
+    best_p, smooth = found.end_of(found.selection.best), found.simulator.target.measurements
+    try:
+        missing = missing_forces(
+            of.problem,
+            of.nominal,
+            smooth,
+            lambda one: found.simulator.simulate(found.layout.case(best_p, one.name), one.record),
+        )
+    except ValueError:  # an audit that cannot be made costs the place of the remainder, not the verdict
+        missing = nothing_missing()
+    lines = sum(float(blocks.count.sum()) for blocks in of.problem.blocks)
+    return replace(missing, silent=missing_by_equation(of.problem, of.fit) / lines)
+
+
+def with_rivals(groups: Sequence[tuple[str, ...]], named: Sequence[Weighed]) -> tuple[tuple[str, ...], ...]:
+    """Groups of effects that records cannot tell apart, with each named effect and its rivals in one of them."""
+    joined = list(groups)
+    for one in named:
+        names = {cause.effect.name for cause in one.causes if cause.effect is not None}
+        if len(names) > 1 and not any(names <= set(group) for group in joined):
+            joined.append(tuple(sorted(names, key=rank_of)))
+    return tuple(joined)
+
+
+def changing_of(judged: Judged, parts: Mapping[str, float]) -> float:
+    """The largest rms of what changes between repetitions over that of the nominal gap."""
+    sizes = judged.sizes
+    return max((parts[c] * one.fluctuation / one.nominal for c, one in sizes.items() if c in parts), default=0.0)
+
+
+def _why(judged: Judged, kept: Sequence[Hypothesis]) -> tuple[str, ...]:
+    """What each named effect closes, and what closes nothing."""
+    said = []
+    for one in kept:
+        assert one.effect is not None
+        closing = judged.closings[one.name]
+        said.append(sentence_of_effect(one.effect.noun, closing, judged.share(closing.without)))
+    said += [sentence_of_rivals(one.causes) for one in judged.found.selection.entered if one.rivals]
+    for weighed in judged.dropped:
+        assert weighed.hypothesis.effect is not None
+        noun = weighed.hypothesis.effect.noun
+        said.append(f"The records of the search speak for {noun}, but the judged record's gap stays as it was with it")
+    return tuple(said)
+
+
+def _candidates(found: Simulated, judged: Measurement | None) -> tuple[Candidate, ...]:
+    """The best hypothesis of each effect, the background alone, and what is named together, with the relative gap that
+    each leaves on the held-out record. Evidence is that over the background alone, or beside what else is named where
+    only that shows an effect."""
+    selection = found.selection
+    measured = measured_channels(judged)["dte"].mean(axis=0) if judged is not None else None
+
+    def left(p: Array | None) -> float | None:
+        if judged is None or measured is None or p is None:
+            return None
+        try:
+            rest = measured - found.simulator.free.channels(p, judged)["dte"]
+        except ValueError:
+            return None
+        return float(np.std(rest) / np.std(measured))
+
+    best: dict[tuple[str, ...], tuple[float, Array | None]] = {(): (0.0, selection.base.p)}
+    for one in selection.weighed:  # the best first
+        assert one.hypothesis.effect is not None
+        p = one.optimum.p if one.optimum and one.log_bayes_factor > 0.0 else None
+        best.setdefault((one.hypothesis.effect.name,), (one.log_bayes_factor, p))
+    for one in selection.entered:
+        assert one.hypothesis.effect is not None
+        alone, p = best.get((one.hypothesis.effect.name,), (-np.inf, None))
+        best[(one.hypothesis.effect.name,)] = (max(alone, one.log_bayes_factor), p)
+    names = tuple(dict.fromkeys(one.hypothesis.effect.name for one in selection.entered if one.hypothesis.effect))
+    if len(names) > 1:
+        best[names] = (selection.best.evidence - selection.base.evidence, selection.best.p)
+    listed = [
+        Candidate(effects=effects, log_evidence=float(value), held_out=left(p)) for effects, (value, p) in best.items()
+    ]
+    return tuple(sorted(listed, key=lambda candidate: -candidate.log_evidence))
