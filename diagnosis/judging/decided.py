@@ -17,6 +17,7 @@ from gearbench.diagnosis.judging.judged import GREATER, Judged
 from gearbench.diagnosis.judging.missing import Missing
 from gearbench.diagnosis.odds import Calibration
 from gearbench.diagnosis.population import POPULATION
+from gearbench.diagnosis.selection.needed import size_of
 from gearbench.diagnosis.selection.simulated import Simulated
 from gearbench.diagnosis.selection.weighing import Weighed
 from gearbench.diagnosis.structure.structure import lag_of_drive
@@ -247,7 +248,7 @@ def relative_size(found: Simulated, one: Weighed) -> float:
     unknowns, best = found.layout.unknowns, found.selection.best
     at = one.hypothesis.entries(unknowns)
     told = np.clip(1.0 - (found.std[at] / np.maximum(best.sd[at], 1e-300)) ** 2, 1e-6, 1.0)
-    return float(np.sqrt(np.average((best.p[at] / unknowns.prior()[at]) ** 2, weights=told)))
+    return size_of(unknowns, one.hypothesis, best.p, told)
 
 
 def _by_force(forces: Search, named: tuple[Weighed, ...]) -> float:

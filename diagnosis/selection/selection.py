@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.diagnosis.effects.effect import BEYOND, Hypothesis
-from gearbench.diagnosis.fitting.background import prior_of
 from gearbench.diagnosis.fitting.beginning import Around
 from gearbench.diagnosis.fitting.fit import Optimum, fit, fit_afresh, gone_on, refreshed
 from gearbench.diagnosis.fitting.reshaped import has_shapes
 from gearbench.diagnosis.fitting.restructured import begun_at_nominal, is_close, restructured
 from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.selection.by_forces import Start
+from gearbench.diagnosis.selection.needed import beside, held_against_background, needed
 from gearbench.diagnosis.selection.rivals import compared, is_like, rivals_of, usual_of
 from gearbench.diagnosis.selection.weighing import Weighed, entering, is_own, weigh
 from gearbench.diagnosis.simulation.jacobian import WEIGHED
@@ -70,12 +70,13 @@ def select(
         base = refreshed(simulator, base, unknowns.of(WEIGHED))
     base = gone_on(simulator, base, RENEWALS_FRESH)
     best, entered, weighed = _forward(simulator, base, [], hypotheses, starts, report, apart=apart)
-    best, kept = _needed(simulator, best, entered, apart)
+    kept = needed(simulator, best, entered, apart)
     if kept:
         best = gone_on(simulator, best, RENEWALS_LAST, partial(report, "simulating: all together"))
         best = restructured(simulator, best, around, report)
         report("simulating: all together, from the nominal rig")
         best = begun_at_nominal(simulator, best, _entries(unknowns, kept))
+        base, best, kept = held_against_background(simulator, base, best, kept, report, apart=apart)
     bare = _without(simulator, base, kept)
     return Selection(base, bare, best, kept, tuple(weighed))
 
@@ -100,10 +101,10 @@ def further(
     best, entered, _ = _forward(simulator, best, selection.entered, rest, starts, report, apart=apart)
     if len(entered) == len(selection.entered):
         return None
-    best, kept = _needed(simulator, best, entered, apart)
+    kept = needed(simulator, best, entered, apart)
     best = gone_on(simulator, best, RENEWALS_LAST, partial(report, "simulating: all together"))
-    bare = _without(simulator, selection.base, kept)
-    return replace(selection, bare=bare, best=best, entered=kept)
+    base, best, kept = held_against_background(simulator, selection.base, best, kept, report, apart=apart)
+    return replace(selection, base=base, bare=_without(simulator, base, kept), best=best, entered=kept)
 
 
 def _forward(
@@ -166,15 +167,10 @@ def with_entered(simulator: Simulator, selection: Selection, one: Weighed) -> Se
 
 def only(simulator: Simulator, selection: Selection, kept: Sequence[Weighed]) -> Selection:
     """The selection with only these of the effects that entered: the others go back to a background's size."""
-    base, unknowns = selection.base, simulator.layout.unknowns
+    base = selection.base
     if not kept:
         return replace(selection, bare=base, best=base, entered=())
-    sd = base.sd
-    for one in kept:
-        sd = one.hypothesis.widened(unknowns, sd)
-    p, near = selection.best.p, selection.best.sensitivity
-    p = np.where(sd > 0.0, np.clip(p, -3.0 * sd, 3.0 * sd), 0.0)
-    best = fit(simulator, p, sd, near) or selection.best
+    best = beside(simulator, base, selection.best, kept) or selection.best
     bare = _without(simulator, base, kept)
     return replace(selection, bare=bare, best=best, entered=tuple(kept))
 
@@ -211,28 +207,3 @@ def known_within(sd: Array) -> tuple[Array, Array]:
     ones): of a number known to a third of itself or worse, nothing is too small."""
     edge = BEYOND * sd
     return np.log(np.maximum(1.0 - edge, NOTHING)), edge
-
-
-def _needed(
-    simulator: Simulator, best: Optimum, entered: Sequence[Weighed], apart: bool
-) -> tuple[Optimum, tuple[Weighed, ...]]:
-    """The optimum without what the other effects make needless, and each effect that stays with what it is worth."""
-    unknowns, kept = simulator.layout.unknowns, list[Weighed | None]()
-    for one in entered:
-        sd = best.sd.copy()
-        at = one.hypothesis.entries(unknowns)
-        sd[at] = prior_of(simulator, unknowns.prior())[at]
-        p = np.where((sd > 0.0) | (best.sd == 0.0), best.p, 0.0)
-        quadratic = best.sensitivity.quadratic
-        _, cost, information = quadratic.best(best.p, sd, _bounds_at(unknowns, p, best.p, sd))
-        worth = best.evidence - quadratic.evidence(cost, information, sd)
-        now = replace(one, log_bayes_factor=float(worth) if len(entered) > 1 else one.log_bayes_factor)
-        kept.append(entering(unknowns, now, apart))
-    return best, tuple(one for one in kept if one is not None)
-
-
-def _bounds_at(unknowns: Unknowns, wanted: Array, here: Array, sd: Array) -> tuple[Array, Array]:
-    """Bounds that hold at `wanted` what has no prior."""
-    low, high = unknowns.bounds()
-    fixed = (sd == 0.0) & (wanted != here)
-    return np.where(fixed, wanted, low), np.where(fixed, wanted, high)

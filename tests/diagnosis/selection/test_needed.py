@@ -1,0 +1,99 @@
+"""What a rig with no more of an effect than a good one explains as well does not need it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from shared.fake_simulator import LINES, FakeSimulator, sensitivities, target, unknowns
+
+from gearbench.diagnosis.effects.effect import Hypothesis, Wide
+from gearbench.diagnosis.effects.profile_error import FLANKS
+from gearbench.diagnosis.fitting.background import prior_of
+from gearbench.diagnosis.fitting.fit import Optimum, fit_afresh
+from gearbench.diagnosis.forces.unknowns import group, unknowns_of
+from gearbench.diagnosis.selection.needed import CLEAR, held_against_background, size_of
+from gearbench.diagnosis.selection.weighing import LIMIT, PROVISIONAL, Weighed
+
+MATRIX = sensitivities(3)
+FRICTION = Hypothesis("friction", "mesh", (Wide("friction"),))
+RIPPLE = Hypothesis("torque-ripple", "drive", (Wide("ripple"),))
+
+
+def rig(friction: float, *ripple: float) -> FakeSimulator:
+    """Ripple that it has is seen 300 times as clearly."""
+    p = np.array([0.08, -0.1, 0.02, friction, *(ripple or (0.0, 0.0)), 0.0, 0.0])
+    of = np.diag([1.0, 1.0, 1.0, 1.0, *([300.0] * 2 if ripple else [1.0] * 2), 1.0, 1.0]) @ MATRIX
+    rng = np.random.default_rng(11)
+    noise = 0.02 * (rng.standard_normal(LINES) + 1j * rng.standard_normal(LINES))
+    return FakeSimulator(lambda q: q @ of, target(p @ of + noise))
+
+
+def fitted(simulator: FakeSimulator, *wide: Hypothesis) -> Optimum:
+    sd = prior_of(simulator, unknowns().prior())  # type: ignore[arg-type]
+    for one in wide:
+        sd = one.widened(unknowns(), sd)
+    found = fit_afresh(simulator, np.zeros(8), sd, renewals=4)  # type: ignore[arg-type]
+    assert found is not None
+    return found
+
+
+def held(simulator: FakeSimulator, base: Optimum, best: Optimum, *entered: Weighed) -> tuple[Optimum, list[str]]:
+    _, found, stay = held_against_background(simulator, base, best, entered, apart=False)  # type: ignore[arg-type]
+    return found, [one.hypothesis.name for one in stay]
+
+
+def test_what_entered_because_a_fit_was_on_its_way_leaves() -> None:
+    """The background's fit stopped at the nominal rig; beside friction, of which there is none, it went on."""
+    simulator = rig(0.0)
+    base, best = fitted(simulator), fitted(simulator, FRICTION)
+    stopped = replace(base, p=np.zeros(8), evidence=base.evidence - 30.0)
+    entered = Weighed(FRICTION, best.evidence - stopped.evidence, best)
+    assert LIMIT < entered.log_bayes_factor < CLEAR
+    again, found, stay = held_against_background(
+        simulator, stopped, best, (entered,), apart=False  # type: ignore[arg-type]
+    )
+    assert stay == () and found.evidence == pytest.approx(base.evidence, abs=0.1)
+    # What was found on the way is the background's.
+    assert again.evidence == found.evidence
+    clear = replace(entered, log_bayes_factor=CLEAR)
+    assert held(simulator, stopped, best, clear) == (best, ["friction"])
+
+
+def test_what_is_there_stays_and_is_worth_what_a_fit_without_it_lacks() -> None:
+    simulator = rig(0.3, 0.2, 0.0)
+    best = fitted(simulator, FRICTION, RIPPLE)
+    entered = (Weighed(FRICTION, 20.0, best), Weighed(RIPPLE, 10.0, best))
+    _, found, stay = held_against_background(
+        simulator, fitted(simulator), best, entered, apart=False  # type: ignore[arg-type]
+    )
+    assert found is best and [one.hypothesis.name for one in stay] == ["friction", "torque-ripple"]
+    without = fitted(simulator, RIPPLE)
+    assert stay[0].log_bayes_factor == pytest.approx(best.evidence - without.evidence, rel=0.05)
+
+
+@pytest.mark.parametrize(("deviations", "stays"), [(3.7, False), (4.5, True)])
+def test_what_the_background_explains_as_well_must_be_far_larger(deviations: float, stays: bool) -> None:
+    """Lines that leave no doubt: the prior alone speaks, and a good rig may have a little more than its share."""
+    size = 0.01 * deviations
+    simulator = rig(0.0, size, size)
+    best = fitted(simulator, RIPPLE)
+    assert best.p[4:6] == pytest.approx([size, size], rel=0.01)
+    base = fitted(simulator)
+    assert base.misfit - best.misfit < 1.0 and best.evidence - base.evidence > PROVISIONAL
+    _, found, stay = held_against_background(
+        simulator, base, best, (Weighed(RIPPLE, 10.0, best),), apart=True  # type: ignore[arg-type]
+    )
+    assert [one.hypothesis.name for one in stay] == (["torque-ripple"] if stays else [])
+    assert (found is best) == stays
+
+
+def test_flanks_that_stand_back_everywhere_have_no_error_of_form() -> None:
+    places = 5
+    here = unknowns_of([group(FLANKS, "m", places, 0.2, 1.2, slot="excess")], 2)
+    flanks = Hypothesis("profile-error flanks", "mesh", (Wide(FLANKS),))
+    form = np.array([0.4, -0.4, 0.0, 0.4, -0.4])
+    assert size_of(here, flanks, form - 3.0) == pytest.approx(np.sqrt(0.8) * 2.0)
+    told = np.array([1.0, 1.0, 0.0, 0.0, 0.0])
+    assert size_of(here, flanks, form - 3.0, told) == pytest.approx(2.0)
