@@ -59,8 +59,11 @@ def static_nonlinear(case: Case, loads: Loads, phase: Array) -> xr.Dataset:
     )
 
 
-def linearised_matrices(case: Case, meshing: Pair, phases: int) -> tuple[Array, Array, Array]:
-    """A (phases, n, n), B (n,), C (n,) of small vibrations about rest under the mean torque: F to DTE, teeth sound.
+def linearised_matrices(
+    case: Case, meshing: Pair, phases: int, first: float = 0.0
+) -> tuple[Array, Array, Array]:
+    """A (phases, n, n), B (n,), C (n,) of small vibrations about rest under the mean torque: F to DTE, teeth sound, at
+    phases that are evenly spread from the `first` [cycles].
 
     States: relative displacements that the rig's springs see, then their rates; the motion of both gears together,
     which changes nothing, is left out.
@@ -71,7 +74,7 @@ def linearised_matrices(case: Case, meshing: Pair, phases: int) -> tuple[Array, 
     law = mesh_law(rig, case.simulation, 2 * case.experiment.torque_mean)
     model = nonlinear_model(rig, meshing, law)
     twisted = model.twisted_on(force)
-    table = tables(model, Motion(cycles=1.0, entries=phases, step=1.0, first_phase=twisted))
+    table = tables(model, Motion(cycles=1.0, entries=phases, step=1.0, first_phase=twisted + first))
     at = instants(model, table, -1)
     tangent = pressed(model.law, at, travel_under(model.law, at, np.array(force))).tangent
     seen = _relative(model)

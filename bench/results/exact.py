@@ -37,8 +37,10 @@ def lumped_periodic_system(case: Case) -> PeriodicSystem:
         # Imported on use: it brings in the mesher.
         from gearbench.bench.nonlinear.static import linearised_matrices
 
-        a, b, c = linearised_matrices(case, meshing, FEWEST_PHASES)
-        return PeriodicSystem(plan.mesh_period, a, b, c)
+        smooth = case.simulation.mesh_stiffness == "finite-element" or case.simulation.stiffness_edge > 0.0
+        phases = FEWEST_PHASES if smooth else MOST_PHASES
+        matrices = linearised_matrices(case, meshing, phases, 0.0 if smooth else 0.5 / phases)
+        return _between(plan.mesh_period, matrices, smooth)
     return periodic_system(lumped_model(case.rig, meshing, case.simulation), plan.mesh_period)
 
 
@@ -46,5 +48,10 @@ def periodic_system(model: Lumped, mesh_period: float) -> PeriodicSystem:
     """A lumped model that meshes with the given period [s] as a periodic system from F [N] to DTE [m]."""
     edge = float(getattr(model.stiffness, "edge", 0.0))
     phases = MOST_PHASES if edge == 0.0 else int(np.clip(POINTS_PER_EDGE / edge, FEWEST_PHASES, MOST_PHASES))
-    a, b, c = periodic_matrices(model, phases)
-    return PeriodicSystem(mesh_period, a, b, c, interpolation="trigonometric" if edge else "piecewise")
+    return _between(mesh_period, periodic_matrices(model, phases, 0.0 if edge else 0.5 / phases), edge > 0.0)
+
+
+def _between(mesh_period: float, matrices: tuple[Array, Array, Array], smooth: bool) -> PeriodicSystem:
+    """The periodic system of matrices on an even grid of phases, from 0 on where it is smooth. A piece of another is
+    that of its middle: of its beginning it would lag by half a piece."""
+    return PeriodicSystem(mesh_period, *matrices, interpolation="trigonometric" if smooth else "piecewise")

@@ -125,15 +125,15 @@ class Lumped:
         return float(-self._frozen_eigenvalues().real.max())
 
 
-def periodic_matrices(model: Lumped, phases: int) -> tuple[Array, Array, Array]:
-    """A (phases, 6, 6), B (6,), C (6,) of state' = A state + B F, dte = C state, on the phases 0,
-    1/phases, ...
+def periodic_matrices(model: Lumped, phases: int, first: float = 0.0) -> tuple[Array, Array, Array]:
+    """A (phases, 6, 6), B (6,), C (6,) of state' = A state + B F, dte = C state, on the phases `first`,
+    `first` + 1/phases, ... [cycles]
 
     Switches of k narrower than two grid intervals are widened to that, so that their instants are kept.
     The static transmission error is not part of it: it adds a response of its own and leaves the transfer
     from F to dte unchanged.
     """
-    k = model.stiffness.at(np.arange(phases) / phases, finest=2.0 / phases)
+    k = model.stiffness.at(first + np.arange(phases) / phases, finest=2.0 / phases)
     return model.state_matrix(k), model.input_vector, model.output_vector
 
 
