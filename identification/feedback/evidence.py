@@ -64,13 +64,28 @@ class Evident:
     @staticmethod
     def of(error: Marginal, precision: Floats, noise: float) -> Evident:
         """Of the `error` (A,) of the amplitudes."""
-        lower = np.linalg.cholesky(error.gram / noise + np.diag(precision))
+        lower = _root(error.gram / noise + np.diag(precision))
         a = cho_solve((lower, True), error.right / noise)
         inverse = solve_triangular(lower, np.eye(a.size), lower=True)
         volume = 2 * float(np.sum(np.log(np.diagonal(lower)))) - float(np.sum(np.log(precision)))
         unlikely = error.error(a) / noise + float(a @ (precision * a))
         value = error.count * float(np.log(noise)) + unlikely + volume
         return Evident(a, precision, noise, 1.0 - precision * np.sum(inverse**2, axis=0), value)
+
+
+def _root(total: Floats) -> Floats:
+    """Cholesky factor (A, A) of a symmetric matrix of positive diagonal. One that rounding has left indefinite, as that
+    of a record without noise is, counts as far as its largest eigenvalue, balanced, tells of others."""
+    scale = np.sqrt(np.diagonal(total))
+    balanced = total / np.outer(scale, scale)
+    try:
+        return np.asarray(scale[:, None] * np.linalg.cholesky(balanced))
+    except np.linalg.LinAlgError:
+        values, vectors = np.linalg.eigh(0.5 * (balanced + balanced.T))
+        firm = np.maximum(values, EXACT * values[-1])
+        # A triangle whose square is V diag(firm) V^T.
+        upper = np.linalg.qr(np.sqrt(firm)[:, None] * vectors.T, mode="r")
+        return np.asarray(scale[:, None] * (upper * np.sign(np.diagonal(upper))[:, None]).T)
 
 
 def evident(error: Marginal, shapes: Shapes, first: Floats, rounds: int) -> Evident:
