@@ -297,7 +297,6 @@ def _spectra(case: Case, htf: CubicSpline) -> tuple[Spectra, float, float]:
     )
     samples = repeats * experiment.samples_per_period
     highest = (samples - 1) // 2
-    filtered = case.rig.sensors.filter is not None
     shape = experiment.realisations, highest + 1
     force, dte = np.zeros(shape, dtype=complex), np.zeros(shape, dtype=complex)
     peak = rms = 0.0
@@ -311,9 +310,8 @@ def _spectra(case: Case, htf: CubicSpline) -> tuple[Spectra, float, float]:
     spacing = experiment.sampling_rate / samples
     response = htf(driven * spacing)
     for branch in range(-BRANCHES, BRANCHES + 1):
-        rows = driven + branch * d
-        if not filtered:  # what lies beyond half the sampling rate is seen mirrored
-            rows = (rows + samples // 2) % samples - samples // 2
+        # What lies beyond half the sampling rate is seen mirrored: records are filtered once they are sampled.
+        rows = (driven + branch * d + samples // 2) % samples - samples // 2
         part = response[branch + BRANCHES] * force[:, driven]
         above, below = (rows > 0) & (rows <= highest), (rows < 0) & (rows >= -highest)
         dte[:, rows[above]] += part[:, above]

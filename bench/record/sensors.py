@@ -6,13 +6,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
-from math import pi
 from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.bench.errors import BenchError
+from gearbench.records.antialias import butterworth, butterworth_delay
 from gearbench.rig import Rig, Sensors
 
 Array = NDArray[np.float64]
@@ -70,26 +70,19 @@ def answered(swing: Array, response: NDArray[np.complex128]) -> Array:
 
 
 def filter_response(frequency: NDArray[np.floating[Any]], corner: float) -> NDArray[np.complex128]:
-    """Response (n,) of the anti-alias filter at frequencies (n,) [Hz], its corner in Hz: an analogue low-pass, 3 dB
-    down at the corner (Butterworth, Wireless Engineer 7, 1930)."""
-    poles = _poles(corner)
-    return np.asarray(np.prod(-poles / (2j * pi * np.asarray(frequency)[..., None] - poles), axis=-1))
+    """Response (n,) of the anti-alias filter at frequencies (n,) [Hz], its corner in Hz."""
+    return butterworth(frequency, corner, FILTER_ORDER)
 
 
 def filter_delay(corner: float) -> float:
     """Delay [s] of the anti-alias filter far below its corner [Hz]."""
-    return float((-1.0 / _poles(corner)).real.sum())
+    return butterworth_delay(corner, FILTER_ORDER)
 
 
 def lag(sensors: Sensors, channel: str) -> float:
     """By how much [s] a channel shows a steady motion late: its delay and that of the anti-alias filter."""
     delay = float(getattr(sensors, f"delay_{channel}"))
     return delay + (filter_delay(sensors.filter) if sensors.filter is not None else 0.0)
-
-
-def _poles(corner: float) -> NDArray[np.complex128]:
-    number = np.arange(FILTER_ORDER)
-    return np.asarray(2 * pi * corner * np.exp(1j * pi * (2 * number + 1 + FILTER_ORDER) / (2 * FILTER_ORDER)))
 
 
 def imposed(recorded: Array, sensors: Sensors, sampling_rate: float) -> Array:

@@ -17,6 +17,7 @@ from scipy.interpolate import make_lsq_spline
 from gearbench.identification.spectra.excited import excited_lines
 from gearbench.identification.spectra.joint import Floats, Spectra, SpectraError
 from gearbench.identification.spectra.transmission_error import dte, force
+from gearbench.records.antialias import common_lag
 from gearbench.records.even_speed import departure, mesh_phase
 
 # Departure of the mesh phase from constant speed [cycles] from which on a record counts as of varying speed, and beyond
@@ -66,6 +67,9 @@ def excited_rows(records: Sequence[xr.Dataset]) -> tuple[list[tuple[Floats, Floa
         phase = mesh_phase(record)
         if phase is None or not (np.diff(phase, axis=1) > 0).all():
             raise SpectraError("a varying speed needs a mesh_phase that rises from sample to sample in every record")
+        lag = common_lag(record)
+        if lag is not None:
+            phase = np.array([_earlier(row, lag.delay * rate) for row in phase])
         rows += zip(dte(record).values, force(record).values, phase, strict=True)
     passed = min(float(row[2][-1] - row[2][0]) for row in rows) * size / (size - 1)
     if passed < FEWEST:
@@ -100,6 +104,13 @@ def course_spectra(records: Sequence[xr.Dataset], sidebands: int | None = None) 
     )
     swing = driving - driving.mean(axis=1, keepdims=True)
     return spectra, Course(swing, cycles, np.array([_speed(row) * size - d for row in cycles]), lowest, excited)
+
+
+def _earlier(cycles: Floats, samples: float) -> Floats:
+    """The mesh phase (N,) that many samples earlier, at the first speed before the record."""
+    steps = np.arange(cycles.size) - samples
+    before = np.minimum(steps, 0.0) * (cycles[1] - cycles[0])
+    return np.asarray(np.interp(steps, np.arange(cycles.size), cycles) + before)
 
 
 def _speed(cycles: Floats) -> Floats:

@@ -20,12 +20,15 @@ from gearbench.identification.spectra.joint import (
     period_spectra,
 )
 from gearbench.identification.spectra.transmission_error import AngleOnlyWarning, dte, force
+from gearbench.records.antialias import Lag, common_lag
 
 # Largest departure of the mesh phase from a straight line [cycles] that is passed over.
 PHASE_WANDER = 2e-3
 # Largest drift of the mesh phase against the mesh period over a record [cycles].
 DRIFT = 0.3
 SAME = 1e-9
+# Part of a line that a filter must leave for the line to be of use.
+PASSED = 0.5
 
 
 @dataclass(frozen=True)
@@ -55,20 +58,23 @@ def record_spectra(
     last = (top if top is not None else band[1]) * sampling.joint / sampling.rate
     highest = min(nyquist, int(1.25 * last) + sidebands * sampling.mesh_lines)
     spacing = sampling.rate / sampling.joint
+    lags = [common_lag(record) for record in records]
+    highest = min([highest, *(_passed(lag, spacing, highest) for lag in lags if lag is not None)])
     lines = np.arange(max(1, int(band[0] / spacing)), min(highest, int(band[1] / spacing)) + 1)
     forces, responses, phases, noises, steady = [], [], [], [], []
     angles = False
-    for record in records:
+    for record, lag in zip(records, lags, strict=True):
+        unfiltered = 1.0 if lag is None else 1.0 / lag.response(spacing * np.arange(highest + 1))
         phases.append(_start_phases(record, 1.0 / (sampling.mesh_lines * spacing), notes))
         settled = _declared_steady(record)
         for driving, error, alone in _signals(record, notes):
             angles |= alone
-            forces.append(period_spectra(driving, sampling.joint, highest)[0])
+            forces.append(period_spectra(driving, sampling.joint, highest)[0] * unfiltered)
             response, blocks, noise = period_spectra(error, sampling.joint, highest)
-            responses.append(response)
+            responses.append(response * unfiltered)
             steady.append(settled or is_steady(blocks, lines))
             if noise is not None:
-                noises.append(noise)
+                noises.append(noise * np.abs(unfiltered) ** 2)
     spectra = Spectra(
         np.array(forces),
         np.array(responses),
@@ -83,6 +89,12 @@ def record_spectra(
         sampling.joint,
     )
     return spectra, band, list(dict.fromkeys(notes))
+
+
+def _passed(lag: Lag, spacing: float, highest: int) -> int:
+    """The highest line of which a filter has left PASSED at least."""
+    left = np.abs(lag.response(spacing * np.arange(highest + 1))) >= PASSED
+    return int(np.flatnonzero(left)[-1])
 
 
 def _signals(record: xr.Dataset, notes: list[str]) -> Iterator[tuple[Floats, Floats, bool]]:

@@ -25,6 +25,7 @@ SIGNS = {"driver": -1.0, "driven": 1.0}
 # Motion of a centre, over that of the flanks, below which it is held: what moves there is a rigid support.
 # A y that is recorded 1e6 times too small is above it.
 STILL = 1e-7
+NOTHING = 1e-300  # N; accounts of no force agree
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +59,7 @@ class Accounts:
         if relation[1] in self.gears:
             second = self._parts(relation[1], channels)
             scale = 0.5 * (_size(first, turn) + _size(second, turn))
-            return _size(first - second, turn) / scale
+            return _size(first - second, turn) / np.maximum(scale, NOTHING)
         gear = relation[1].removeprefix("y_")
         basis = self._bases[gear]
         if relation[1] in channels:  # a turned y is a force turned the other way: Re(turn* F b*) = Re(turn F* b)
@@ -66,7 +67,7 @@ class Accounts:
         else:
             inside = (first[0] @ basis).real + (turn @ (first[1][:, None] * basis)).real
         total = _size(first, turn)
-        return np.asarray(np.sqrt(np.maximum(total**2 - (inside**2).sum(axis=1), 0.0)) / total)
+        return np.asarray(np.sqrt(np.maximum(total**2 - (inside**2).sum(axis=1), 0.0)) / np.maximum(total, NOTHING))
 
     def support(self, gear: str, centre: str) -> tuple[Array, Array, float]:
         """k, c, m (3,) of a centre's support [N/m, N s/m, kg] by least squares, the part of the force's rms that each

@@ -82,8 +82,8 @@ def sentences(found: Design) -> list[str]:
         f" {found.bandwidth:.3g} Hz of bandwidth: {found.branches} branches a side, {found.needed:.3g} s of distinct"
         " excitation",
         f"at {found.snr_db:g} dB, {found.identified[0]:g}-{found.identified[1]:g} Hz:"
-        f" {found.method} ({_in_words(found.window)}) would err by {found.actual:.1%}, and expect of itself"
-        f" {found.expected:.1%}",
+        f" {found.method} ({_in_words(found.window)}) would err by {100 * found.actual:.2g}%, and expect of itself"
+        f" {100 * found.expected:.2g}%",
         *_of_prescribed(found),
     ]
 
@@ -107,7 +107,7 @@ def _of_prescribed(found: Design) -> list[str]:
     cause, _ = limit_and_advice(found.account)
     if found.free is None:
         return [f"prescribed {given}: {size}; what limits is {cause}; nothing else fits the record"]
-    free = f"{found.free.method} ({_in_words(found.free.window)}) would err by {found.free.actual:.1%}"
+    free = f"{found.free.method} ({_in_words(found.free.window)}) would err by {100 * found.free.actual:.2g}%"
     if found.free.actual < GAIN * found.actual:
         return [f"prescribed {given}: not enough, {size}; what limits is {cause}; left to choose, {free}"]
     return [f"prescribed {given}: as good as the record allows, {size}; what limits is {cause}; left to choose, {free}"]

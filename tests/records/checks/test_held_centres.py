@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import gearbench as gb
 from gearbench.records import RecordError
 from gearbench.records.checks import check_record
+from gearbench.records.checks.mesh_force import Accounts
 
 CASE = """
 [rig.driver]
@@ -42,3 +44,11 @@ def test_a_displacement_in_the_wrong_unit_is_no_held_centre() -> None:
     y = record["y_driver"]
     with pytest.raises(RecordError, match="y_driver moves"):
         check_record(record.assign(y_driver=(y.dims, 1e-6 * y.values, y.attrs)))
+
+
+def test_accounts_of_no_force_agree_without_a_warning(recwarn: pytest.WarningsRecorder) -> None:
+    nothing = np.zeros(5, dtype=complex)
+    gears = {gear: {f"torque_{gear}": nothing} for gear in ("driver", "driven")}
+    accounts = Accounts(gears, {"driver": np.ones(5, dtype=complex)}, np.arange(1.0, 6.0))
+    assert [float(accounts.misfit(one)[0]) for one in accounts.relations()] == [0.0, 0.0, 0.0]
+    assert not recwarn.list
