@@ -90,7 +90,8 @@ def _tell(summary: Mapping[str, Any], out: Path) -> None:
     mode = f"first mode {low:.4g}-{high:.4g} Hz" if isfinite(low) else "no mode in the identified band"
     typer.echo(
         f"{out}: {mode}; {summary['unknowns']} unknowns, {summary['equations']} equations"
-        f"{' a window' if 'window' in summary else ''}; expected error of the ITF {100 * summary['expected_error']:.2g}%"
+        f"{' a window' if 'window' in summary else ''}; expected error of the ITF"
+        f" {100 * summary['expected_error']:.2g}%"
     )
     if summary.get("mesh_basis") == "zones":
         first, second = summary["switch_phases"]
