@@ -87,7 +87,10 @@ class Simulated:
             return optimum.p
         key = optimum.p.tobytes()
         if key not in self._ends:
-            found = fit_afresh(self.simulator.free, optimum.p, optimum.sd, renewals=1)
+            try:
+                found = fit_afresh(self.simulator.free, optimum.p, optimum.sd, renewals=1)
+            except ValueError:  # a fit that leads nowhere from where it was nudged to
+                found = None
             self._ends[key] = found.p if found is not None else optimum.p
         return self._ends[key]
 

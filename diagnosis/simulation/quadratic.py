@@ -104,7 +104,7 @@ class Quadratic:
             inside = information[free]
             matrix = inside[:, free] * scale[:, None] * scale[None, :] + np.eye(len(scale))
             pull = (slope[free] - inside[:, ~free] @ step[~free]) * scale - here[free] / scale
-            step[free] = scale * cho_solve(cho_factor(matrix, lower=True), pull)
+            step[free] = scale * _solution(matrix, pull)
             outside = free & ((step < low) | (step > high))
             if not outside.any():
                 return step
@@ -119,6 +119,15 @@ class Quadratic:
         scale = width[free]
         matrix = information[np.ix_(free, free)] * scale[:, None] * scale[None, :] + np.eye(int(free.sum()))
         return -cost - 0.5 * float(np.linalg.slogdet(matrix)[1])
+
+
+def _solution(matrix: Array, pull: Array) -> Array:
+    """Of symmetric equations (n, n) whose eigenvalues are one at least; where they are so large that rounding has left
+    some below nothing, the shortest one."""
+    try:
+        return np.asarray(cho_solve(cho_factor(matrix, lower=True), pull))
+    except np.linalg.LinAlgError:
+        return np.asarray(np.linalg.lstsq(matrix, pull)[0])
 
 
 def quadratic_of(target: Target, residual: Complex, jacobian: Complex, active: NDArray[np.int64]) -> Quadratic:

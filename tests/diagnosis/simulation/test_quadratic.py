@@ -82,3 +82,15 @@ def test_what_has_no_prior_goes_where_its_bounds_are() -> None:
     assert cost == pytest.approx(where.cost(RESIDUAL - step @ MATRIX) + 0.5 * float((step[sd > 0] ** 2).sum()) / 0.25)
     stays, least, _ = quadratic.best(p, sd, FREE)
     assert stays[3] == 0.0 and cost > least + 5.0
+
+
+def test_derivatives_too_large_for_their_equations_cost_no_fit() -> None:
+    """Where flanks part, eight unknowns do two things far more strongly than any prior holds them."""
+    huge = 1e12 * (np.random.default_rng(2).standard_normal((8, 2)) @ MATRIX[:2])
+    quadratic = quadratic_of(target(RESIDUAL), RESIDUAL, huge, np.arange(8))
+    sd = np.full(8, 0.5)
+    width = 0.25 * quadratic.information(np.zeros(8)) + np.eye(8)
+    with pytest.raises(np.linalg.LinAlgError):
+        np.linalg.cholesky(width)
+    step, cost, _ = quadratic.best(np.zeros(8), sd, FREE)
+    assert np.isfinite(step).all() and cost < target(RESIDUAL).cost(RESIDUAL)
