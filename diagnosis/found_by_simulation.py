@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import sqrt
 from typing import Any
 
 import numpy as np
@@ -23,7 +24,7 @@ from gearbench.diagnosis.intake.signals import measured_channels
 from gearbench.diagnosis.judging.chances import chances_of, sentence_of_doubt, unlikely
 from gearbench.diagnosis.judging.decided import decide_simulated
 from gearbench.diagnosis.judging.drift import drift_of
-from gearbench.diagnosis.judging.judged import Judged
+from gearbench.diagnosis.judging.judged import DUE, Judged
 from gearbench.diagnosis.judging.missing import Missing, missing_forces, nothing_missing
 from gearbench.diagnosis.judging.naming import drifts_of, effects_of
 from gearbench.diagnosis.judging.repeating import sentences_of_others
@@ -143,9 +144,11 @@ def with_rivals(groups: Sequence[tuple[str, ...]], named: Sequence[Weighed]) -> 
 
 
 def changing_of(judged: Judged, parts: Mapping[str, float]) -> float:
-    """The largest rms of what changes between repetitions over that of the nominal gap."""
-    sizes = judged.sizes
-    return max((parts[c] * one.fluctuation / one.nominal for c, one in sizes.items() if c in parts), default=0.0)
+    """The largest rms of what changes between repetitions over that of the nominal gap, of the channels in which it
+    makes what is left, noise included, as much larger as an effect that is due would: less is no matter to the gap."""
+    seen = sqrt(DUE**2 - 1.0)
+    sizes = {c: (parts[c] * one.fluctuation, one) for c, one in judged.sizes.items() if c in parts}
+    return max((rms / one.nominal for rms, one in sizes.values() if rms > seen * one.final), default=0.0)
 
 
 def _why(judged: Judged, kept: Sequence[Hypothesis]) -> tuple[str, ...]:
