@@ -33,7 +33,6 @@ STEPS = 25
 # bends the whole step. Each is tried once, as the next is shorter.
 REACHES = (1.0, 0.3, 0.1, 0.03, 0.01)
 SETTLED = 25.0  # nats that another step may promise: a fit that is close enough not to be gone on with
-ROUNDS = 4  # that one is gone on with where each gains more than that
 
 
 @dataclass(frozen=True)
@@ -105,18 +104,11 @@ def refreshed(simulator: Simulator, found: Optimum, chosen: Flags) -> Optimum:
 def gone_on(
     simulator: Simulator, found: Optimum, renewals: int, tell: Callable[[], None] = lambda: None
 ) -> Optimum:
-    """The optimum, fitted on for as long as another step promises much, which is told, and going on has kept it."""
-    for _ in range(ROUNDS):
-        if found.left <= SETTLED:
-            break
-        tell()
-        again = fit(simulator, found.p, found.sd, found.sensitivity, renewals=renewals)
-        if again is None:
-            break
-        gain, found = found.cost - again.cost, again
-        if gain <= SETTLED:
-            break
-    return found
+    """The optimum, fitted on where another step still promises much, which is told."""
+    if found.left <= SETTLED:
+        return found
+    tell()
+    return fit(simulator, found.p, found.sd, found.sensitivity, renewals=renewals) or found
 
 
 def cost_of(simulator: Simulator, p: Array, sd: Array) -> float:
