@@ -18,8 +18,6 @@ from numpy.typing import NDArray
 
 from gearbench.records.errors import RecordError
 
-Array = NDArray[np.float64]
-
 # Channels that force and transmission error are made of, else these themselves.
 PARTS = ("torque_driver", "torque_driven", "angle_driver", "angle_driven", "y_driver", "y_driven")
 WHOLE = ("force", "dte")
@@ -34,7 +32,7 @@ class Lag:
     corner: float = 0.0
     order: int = 0
 
-    def response(self, frequency: Array) -> NDArray[np.complex128]:
+    def response(self, frequency: NDArray[np.floating[Any]]) -> NDArray[np.complex128]:
         """By what lines at frequencies (n,) [Hz] were multiplied."""
         if self.order:
             return butterworth(frequency, self.corner, self.order)

@@ -36,18 +36,26 @@ def measured() -> xr.Dataset:
     return record.assign(dte=(record["dte"].dims, record["dte"].values + noise, record["dte"].attrs))
 
 
+def settings_of(window: tuple[int, int, int]) -> IdentificationSettings:
+    harmonics, order, half_width = window
+    return IdentificationSettings(
+        harmonics=harmonics, order=order, window=half_width, band=BAND, step=4, phases=50, modes=0
+    )
+
+
+@cache
+def planned_for(window: tuple[int, int, int]) -> Design:
+    return design(planned(), settings_of(window), snr_db=30.0)
+
+
 @pytest.mark.parametrize(
     "window",
     [(3, 1, 10), *(pytest.param(one, marks=pytest.mark.validation) for one in ((6, 2, 20), (8, 3, 36)))],
 )
 def test_error_is_told_before_the_record_is_made(window: tuple[int, int, int]) -> None:
     """Spectra whose sidebands keep the source's phase at negative lines (no conjugate) err twice as much."""
-    harmonics, order, half_width = window
-    settings = IdentificationSettings(
-        harmonics=harmonics, order=order, window=half_width, band=BAND, step=4, phases=50, modes=0
-    )
-    told = design(planned(), settings, snr_db=30.0)
-    frf = identify([measured()], settings)
+    told = planned_for(window)
+    frf = identify([measured()], settings_of(window))
     frequency = frf["frequency"].values[::3]
     exact = exact_itf(lumped_periodic_system(planned()), frequency, np.arange(50) / 50)
     error = float(np.linalg.norm(itf(frf).values[::3] - exact) / np.linalg.norm(exact))
@@ -70,7 +78,7 @@ def test_planned_spectra_are_those_of_the_record() -> None:
 
 
 def test_plan_is_that_of_the_case() -> None:
-    told = design(planned(), IdentificationSettings(harmonics=3, order=1, window=10, band=BAND, modes=0))
+    told = planned_for((3, 1, 10))
     assert (told.lines, told.spacing, told.realisations) == (1750, 2.0, 2)
     assert told.peak == pytest.approx(50.0)
     assert told.mesh_frequency == pytest.approx(400.0)
