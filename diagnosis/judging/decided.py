@@ -218,9 +218,10 @@ def _late(late: float) -> str:
 
 def _changes(place: Place, changing: float) -> str:
     """That records change between repetitions where this is not the cause of the gap."""
+    small = f"that is {percent(changing)} of the gap" if changing > 0.0 else "what is left hardly grows by it"
     return (
         f"the force missing {at_place(place)} changes from one repetition to the next, so that something drifts, but"
-        f" that is {percent(changing)} of the gap"
+        f" {small}"
     )
 
 

@@ -180,6 +180,8 @@ def test_what_changes_counts_by_its_part_of_the_gap() -> None:
     made = decided(900.0, unsteady=out, changing=0.3)
     assert (made.verdict, made.place) == ("unknown", "driven-support") and "repetition" in made.because[0]
     assert decided(900.0, unsteady=out, changing=0.02).verdict == "effects"
+    unseen = decided(None, unsteady=out, changing=0.0)
+    assert unseen.verdict == "none" and "what is left hardly grows by it" in unseen.because[-1]
     quiet = decided(None, unsteady=out, changing=0.02)
     # What drifts is told even where the gap does not come from it.
     assert quiet.verdict == "none" and "changes from one repetition to the next" in quiet.because[-1]
