@@ -21,7 +21,7 @@ from gearbench.records.errors import RecordError
 # Channels that force and transmission error are made of, else these themselves.
 PARTS = ("torque_driver", "torque_driven", "angle_driver", "angle_driven", "y_driver", "y_driven")
 WHOLE = ("force", "dte")
-ORDERS = range(1, 21)
+BUTTERWORTH, ORDERS = "Butterworth, order ", range(1, 21)
 
 
 @dataclass(frozen=True)
@@ -49,20 +49,26 @@ def common_lag(record: xr.Dataset) -> Lag | None:
     stated = [_stated(record, name) for name in names]
     if not stated or any(one is None for one in stated):
         return None
-    first, own = stated[0], record["mesh_phase"].attrs.get("delay", 0.0) if "mesh_phase" in record else 0.0
+    first, phase = stated[0], _stated(record, "mesh_phase") if "mesh_phase" in record else None
+    own = 0.0 if phase is None else phase.delay
     if first is not None and first.order and all(one == first for one in stated) and not own:
         return first
-    delay = min(one.delay for one in stated if one is not None) - float(own)
+    delay = min(one.delay for one in stated if one is not None) - own
     return Lag(delay) if delay > 0.0 else None
+
+
+def about_filter(corner: float, order: int) -> dict[str, Any]:
+    """Attributes by which a channel states a Butterworth filter that it passed, its corner in Hz."""
+    return {"filter_hz": corner, "filter": f"{BUTTERWORTH}{order}", "delay": butterworth_delay(corner, order)}
 
 
 def _stated(record: xr.Dataset, name: str) -> Lag | None:
     about = record[name].attrs
-    found = re.fullmatch(r"Butterworth, order (\d+)", str(about.get("filter", "")))
+    found = re.fullmatch(rf"{BUTTERWORTH}(\d+)", str(about.get("filter", "")))
     if found is not None and "filter_hz" in about:
         corner, order = _number(about, name, "filter_hz", "Hz"), int(found[1])
         if order not in ORDERS:
-            raise RecordError(f"{name}: filter = 'Butterworth, order {order}' must be of order 1 to {ORDERS[-1]}")
+            raise RecordError(f"{name}: filter = '{BUTTERWORTH}{order}' must be of order 1 to {ORDERS[-1]}")
         return Lag(butterworth_delay(corner, order), corner, order)
     return Lag(_number(about, name, "delay", "s", least=0.0)) if "delay" in about else None
 

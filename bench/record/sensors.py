@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.bench.errors import BenchError
-from gearbench.records.antialias import butterworth, butterworth_delay
+from gearbench.records.antialias import about_filter, butterworth, butterworth_delay
 from gearbench.rig import Rig, Sensors
 
 Array = NDArray[np.float64]
@@ -217,8 +217,7 @@ def sensor_attributes(rig: Rig, names: Mapping[str, Any]) -> dict[str, dict[str,
     corner = rig.sensors.filter
     if corner is None:
         return {}
-    about = {"filter_hz": corner, "filter": f"Butterworth, order {FILTER_ORDER}", "delay": filter_delay(corner)}
-    return {name: dict(about) for name in names if name in CHANNELS}
+    return {name: about_filter(corner, FILTER_ORDER) for name in names if name in CHANNELS}
 
 
 def needs_whole(rig: Rig) -> bool:

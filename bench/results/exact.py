@@ -5,6 +5,9 @@ The lumped model hands over its periodic matrices, identification solves them: h
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -39,8 +42,7 @@ def lumped_periodic_system(case: Case) -> PeriodicSystem:
 
         smooth = case.simulation.mesh_stiffness == "finite-element" or case.simulation.stiffness_edge > 0.0
         phases = FEWEST_PHASES if smooth else MOST_PHASES
-        matrices = linearised_matrices(case, meshing, phases, 0.0 if smooth else 0.5 / phases)
-        return _between(plan.mesh_period, matrices, smooth)
+        return _on_grid(plan.mesh_period, partial(linearised_matrices, case, meshing), phases, smooth)
     return periodic_system(lumped_model(case.rig, meshing, case.simulation), plan.mesh_period)
 
 
@@ -48,10 +50,14 @@ def periodic_system(model: Lumped, mesh_period: float) -> PeriodicSystem:
     """A lumped model that meshes with the given period [s] as a periodic system from F [N] to DTE [m]."""
     edge = float(getattr(model.stiffness, "edge", 0.0))
     phases = MOST_PHASES if edge == 0.0 else int(np.clip(POINTS_PER_EDGE / edge, FEWEST_PHASES, MOST_PHASES))
-    return _between(mesh_period, periodic_matrices(model, phases, 0.0 if edge else 0.5 / phases), edge > 0.0)
+    return _on_grid(mesh_period, partial(periodic_matrices, model), phases, edge > 0.0)
 
 
-def _between(mesh_period: float, matrices: tuple[Array, Array, Array], smooth: bool) -> PeriodicSystem:
-    """The periodic system of matrices on an even grid of phases, from 0 on where it is smooth. A piece of another is
+def _on_grid(
+    mesh_period: float, matrices: Callable[[int, float], tuple[Array, Array, Array]], phases: int, smooth: bool
+) -> PeriodicSystem:
+    """The periodic system of `matrices(phases, first phase)`, from phase 0 on where it is smooth. A piece of another is
     that of its middle: of its beginning it would lag by half a piece."""
-    return PeriodicSystem(mesh_period, *matrices, interpolation="trigonometric" if smooth else "piecewise")
+    if smooth:
+        return PeriodicSystem(mesh_period, *matrices(phases, 0.0), interpolation="trigonometric")
+    return PeriodicSystem(mesh_period, *matrices(phases, 0.5 / phases), interpolation="piecewise")

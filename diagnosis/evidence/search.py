@@ -151,8 +151,13 @@ def relative_size(unknowns: Unknowns, hypothesis: Hypothesis, fit: Fit) -> float
     """Rms of what a hypothesis makes wide, in standard deviations of the background, each unknown by how much of its
     prior variance the records have taken away: what they do not show has no size."""
     at = hypothesis.entries(unknowns)
-    told = np.clip(1.0 - (fit.std[at] / fit.sd[at]) ** 2, 1e-6, 1.0)
-    return float(np.sqrt(np.average((fit.p[at] / unknowns.prior()[at]) ** 2, weights=told)))
+    weights = told(fit.std[at], fit.sd[at])
+    return float(np.sqrt(np.average((fit.p[at] / unknowns.prior()[at]) ** 2, weights=weights)))
+
+
+def told(std: Array, sd: Array) -> Array:
+    """By how much of its prior variance (n,) the records have taken away of each unknown, from standard deviations."""
+    return np.asarray(np.clip(1.0 - (std / np.maximum(sd, 1e-300)) ** 2, 1e-6, 1.0))
 
 
 def _level(problem: Problem, base: Fit, tried: list[Tried]) -> tuple[Fit, list[Tried]]:

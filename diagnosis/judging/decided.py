@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gearbench.diagnosis.evidence.calibration import LIMITS, Limits
 from gearbench.diagnosis.evidence.decision import Decision, at_place, worst
-from gearbench.diagnosis.evidence.search import Search
+from gearbench.diagnosis.evidence.search import Search, told
 from gearbench.diagnosis.forces.equations import PLACES
 from gearbench.diagnosis.judging.drift import Drift
 from gearbench.diagnosis.judging.judged import GREATER, Judged
@@ -248,8 +248,7 @@ def relative_size(found: Simulated, one: Weighed) -> float:
     """Rms of an effect's unknowns in standard deviations of the background, each by how much the records tell of it."""
     unknowns, best = found.layout.unknowns, found.selection.best
     at = one.hypothesis.entries(unknowns)
-    told = np.clip(1.0 - (found.std[at] / np.maximum(best.sd[at], 1e-300)) ** 2, 1e-6, 1.0)
-    return size_of(unknowns, one.hypothesis, best.p, told)
+    return size_of(unknowns, one.hypothesis, best.p, told(found.std[at], best.sd[at]))
 
 
 def _by_force(forces: Search, named: tuple[Weighed, ...]) -> float:

@@ -76,7 +76,7 @@ def held_against_background(
             best, stay = without, rest
             base = base if rest else better(base, without)
         else:
-            stay[stay.index(one)] = now
+            stay = [now if other is one else other for other in stay]
     return base, best, tuple(stay)
 
 
