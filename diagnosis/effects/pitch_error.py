@@ -72,7 +72,7 @@ def add(rig: Rig, hypothesis: Hypothesis, fitted: Fitted) -> Added:
 
 PITCH_ERROR = Effect(
     name="pitch-error",
-    noun="pitch errors",
+    noun="uneven pitch of the teeth",
     meaning="The teeth are not evenly spaced: measure the pitch of the gear, or turn the gears to other pairings and"
     " see whether the pattern moves.",
     parameters={"rms": "rms of the pitch errors"},
