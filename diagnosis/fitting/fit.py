@@ -1,14 +1,15 @@
 """Output-error fit: all unknowns moved together to where the simulation comes closest, under one set of priors.
 
 Gauss-Newton on `quadratic`, whose steps are simulated: a step that does not lower the cost is halved, then tried
-without what the rig does not feel yet, then the Jacobian is renewed where the unknowns are by now; it is done when no
-step promises half a nat.
+without what the rig does not feel yet, then damped ever more; the Jacobian is renewed where the unknowns are by now
+when a step keeps little of what it promised. It is done when no step promises half a nat.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,10 +29,10 @@ POOR = 0.25  # part of what a step promised, below which the Jacobian is renewed
 LITTLE = 0.01  # the same, below which another renewal is of no use
 ANEW = 3.0  # nats that a renewal must have brought for another one
 HALVINGS = 3
-STEPS = 25
-# Standard deviations that a step may move any unknown by where no part of a longer one is of use: a kink in one of them
-# bends the whole step. Each is tried once, as the next is shorter.
-REACHES = (1.0, 0.3, 0.1, 0.03, 0.01)
+STEPS = 60
+# Standard deviations that a step is damped to where no part of a longer one is of use, as valleys bend: the first, what
+# it is multiplied by after one that does not help and after one that does, and the shortest.
+REACH, SHRINK, GROW, SHORTEST = 0.3, 0.4, 2.0, 0.003
 SETTLED = 25.0  # nats that another step may promise: a fit that is close enough not to be gone on with
 
 
@@ -133,6 +134,37 @@ def _stepped(
     return p, cost
 
 
+def _improved(
+    simulator: Simulator, p: Array, sd: Array, near: Quadratic, cost: float, reach: float
+) -> tuple[Array, float, float, float]:
+    """`p` (size,) after the longest step that lowers the cost, of no more than `reach` standard deviations; the cost
+    there, the nats that the last step tried promised, and the reach of the next one."""
+    standing, hoped = _standing(simulator.layout.unknowns, p), 0.0
+    best, least = p, cost
+    if reach == inf:
+        for limits in (simulator.layout.unknowns.bounds(), standing):
+            step, promised, _ = near.best(p, sd, limits)
+            hoped = cost - promised
+            if hoped > GAIN:
+                best, least = _stepped(simulator, p, sd, near.active, step, cost, HALVINGS)
+                if cost - least >= min(ANEW, POOR * hoped):
+                    return best, least, hoped, inf
+            if least < cost:
+                break
+        if hoped <= GAIN:
+            return best, least, hoped, inf
+        reach = REACH
+    while reach > SHORTEST:
+        step, promised, _ = near.best(p, sd, standing, reach=reach)
+        moved, value = _stepped(simulator, p, sd, near.active, step, cost, 0)
+        if value < least:
+            best, least, hoped = moved, value, cost - promised
+        if cost - value >= POOR * (cost - promised):
+            return best, least, hoped, reach * GROW if reach * GROW < 1.0 else inf
+        reach *= SHRINK
+    return best, least, hoped, inf
+
+
 def _standing(unknowns: Unknowns, p: Array) -> tuple[Array, Array]:
     """Bounds (size,) between which what a rig does not feel yet stands still: its derivative is that of a jump, and a
     step shorter than that promises what it does not keep."""
@@ -142,12 +174,6 @@ def _standing(unknowns: Unknowns, p: Array) -> tuple[Array, Array]:
         at = at[(p[at] >= 0.0) & (p[at] < least)]
         low[at] = high[at] = p[at]
     return low, high
-
-
-def _within(bounds: tuple[Array, Array], p: Array, sd: Array, reach: float) -> tuple[Array, Array]:
-    """The bounds (size,), and within them so many standard deviations about `p` (size,)."""
-    low, high = bounds
-    return np.maximum(low, p - reach * sd), np.minimum(high, p + reach * sd)
 
 
 def _unseen(unknowns: Unknowns, sensitivity: Sensitivity) -> Flags:
@@ -185,21 +211,13 @@ def fit(
     cost = cost_of(simulator, p, sd)
     if not np.isfinite(cost):
         return None
-    fresh = False
+    fresh, reach = False, inf
     for _ in range(STEPS):
         lines = simulator.lines(p)
         assert lines is not None
-        near = sensitivity.quadratic.moved(target.lines - lines)
-        before = cost
-        standing = _standing(simulator.layout.unknowns, p)
-        short = [(_within(standing, p, sd, reach), 0) for reach in REACHES]
-        for limits, halvings in ((bounds, HALVINGS), (standing, HALVINGS), *short):
-            step, promised, _ = near.best(p, sd, limits)
-            if cost - promised > GAIN:
-                p, cost = _stepped(simulator, p, sd, near.active, step, cost, halvings)
-            if cost < before:
-                break
-        gain, hoped = before - cost, before - promised
+        near, before = sensitivity.quadratic.moved(target.lines - lines), cost
+        p, cost, hoped, reach = _improved(simulator, p, sd, near, cost, reach)
+        gain = before - cost
         if gain < max(GAIN, POOR * hoped):
             # A rig that bends gives little of what is promised, but does so again from there.
             if renewals == 0 or (fresh and gain < max(ANEW, LITTLE * hoped)):

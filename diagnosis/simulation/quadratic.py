@@ -9,6 +9,7 @@ downhill to its minimum under a prior.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,40 +70,45 @@ class Quadratic:
         return np.asarray(np.tensordot(self.weights(step), self.squares, axes=1))
 
     def best(
-        self, p: Array, sd: Array, bounds: tuple[Array, Array], start: Array | None = None
+        self, p: Array, sd: Array, bounds: tuple[Array, Array], start: Array | None = None, reach: float = inf
     ) -> tuple[Array, float, Array]:
         """The step (q,) to the least cost under the prior `sd` (size,) from unknowns `p` (size,) within bounds (size,),
-        what it costs with the prior, and the information there. Unknowns of sd 0 stay, or go where their bounds are."""
+        what it costs with the prior, and the information there. Unknowns of sd 0 stay, or go where their bounds are.
+        A step is damped to about `reach` standard deviations (Levenberg 1944)."""
         here, width = p[self.active], sd[self.active]
         low, high = (bound[self.active] - here for bound in bounds)
         step = np.clip(np.zeros(len(here)) if start is None else start, low, high)
-        free = width > 0.0
+        free, tied = width > 0.0, reach**-2
         energies = self._energies(step)
         cost = self._cost(energies) + prior_cost(here + step, width)
+        held = tied * prior_cost(step, width)
         for _ in range(ROUNDS):
             weights = self._weights(energies)
             information = np.tensordot(weights, self.squares, axes=1)
-            trial = self._solved(information, weights @ self.slopes, here, width, free, (low, high))
+            trial = self._solved(information, weights @ self.slopes, here, width, free, (low, high), tied)
             there = self._energies(trial)
-            value = self._cost(there) + prior_cost(here + trial, width)
-            if value < cost:
-                step, energies, gained, cost = trial, there, cost - value, value
+            value, pull = self._cost(there) + prior_cost(here + trial, width), tied * prior_cost(trial, width)
+            if value + pull < cost + held:
+                gained = cost + held - value - pull
+                step, energies, cost, held = trial, there, value, pull
                 if gained > ENOUGH:
                     continue
             break
         return step, cost, information
 
     def _solved(
-        self, information: Array, slope: Array, here: Array, width: Array, free: Flags, bounds: tuple[Array, Array]
-    ) -> Array:
-        """Least squares under the prior; what would leave its bounds stays on them."""
+        self, information: Array, slope: Array, here: Array, width: Array, free: Flags, bounds: tuple[Array, Array],
+        tied: float,
+    ) -> Array:  # fmt: skip
+        """Least squares under the prior, `tied` to where it begins by so much of it; what would leave its bounds stays
+        on them."""
         low, high = bounds
         step = np.clip(np.zeros(len(here)), low, high)
         free = free.copy()
         for _ in range(len(here)):
             scale = width[free]
             inside = information[free]
-            matrix = inside[:, free] * scale[:, None] * scale[None, :] + np.eye(len(scale))
+            matrix = inside[:, free] * scale[:, None] * scale[None, :] + (1.0 + tied) * np.eye(len(scale))
             pull = (slope[free] - inside[:, ~free] @ step[~free]) * scale - here[free] / scale
             step[free] = scale * _solution(matrix, pull)
             outside = free & ((step < low) | (step > high))

@@ -117,6 +117,24 @@ def test_a_valley_that_bends_is_followed_to_its_end() -> None:
     assert best.p == pytest.approx(true, abs=5e-3)
 
 
+@pytest.mark.parametrize("begin", [-0.4, -0.3])
+def test_a_narrow_valley_that_winds_is_followed_by_damped_steps(begin: float) -> None:
+    """Where two unknowns make up for each other along a curve, each alone costs much: no part of a long step is of use,
+    and none whose unknowns are held to a box each."""
+
+    def winding(p: np.ndarray) -> np.ndarray:
+        return 0.1 * p[0] * MATRIX[0] + 2.0 * (p[1] - np.sin(2.5 * p[0])) * MATRIX[1]
+
+    true, start = (np.array([at, np.sin(2.5 * at), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]) for at in (0.9, begin))
+    wide = np.where(np.arange(8) < 2, 3.0, 0.0)
+    simulator = FakeSimulator(winding, target(winding(true) + noise(2e-2)))
+    first = sensitivity_of(simulator, start, wide)
+    assert first is not None
+    best = fit(simulator, start, wide, first, renewals=60)
+    assert best is not None and best.left < 0.5
+    assert best.p[:2] == pytest.approx(true[:2], abs=0.02)
+
+
 def test_derivatives_that_stayed_behind_are_taken_anew() -> None:
     """A fit led astray by one that is wrong by a half stops short; with it taken anew it arrives."""
     simulator = FakeSimulator(curved, target(curved(TRUE) + noise(1e-3)))

@@ -45,6 +45,25 @@ def test_the_best_step_is_that_of_a_general_minimiser() -> None:
     assert cost - wanted.fun < 0.1 and step[:7] == pytest.approx(wanted.x, abs=2e-3)
 
 
+def test_a_damped_step_is_that_of_a_general_minimiser_that_is_tied_to_where_it_begins() -> None:
+    where, quadratic = made()
+    p, sd, reach = 0.05 * np.ones(8), np.array([0.1, 0.1, 0.1, 0.5, 0.01, 0.01, 0.02, 0.0]), 0.03
+
+    def whole(step: np.ndarray) -> float:
+        step = np.append(step, 0.0)
+        return where.cost(RESIDUAL - step @ MATRIX) + 0.5 * float((((p + step)[:7] / sd[:7]) ** 2).sum())
+
+    def tied(step: np.ndarray) -> float:
+        return whole(step) + 0.5 * float(((step / sd[:7] / reach) ** 2).sum())
+
+    step, cost, _ = quadratic.best(p, sd, FREE, reach=reach)
+    wanted = minimize(tied, np.zeros(7), method="BFGS", options={"gtol": 1e-6})
+    assert cost == pytest.approx(whole(step[:7]), rel=1e-9)
+    assert tied(step[:7]) - wanted.fun < 0.1 and step[:7] == pytest.approx(wanted.x, abs=1e-3)
+    far, _, _ = quadratic.best(p, sd, FREE)
+    assert np.linalg.norm(step[:7] / sd[:7]) < 0.5 * np.linalg.norm(far[:7] / sd[:7])
+
+
 def test_bounds_hold_and_the_rest_is_the_best_beside_them() -> None:
     _, quadratic = made()
     p, sd = np.zeros(8), np.full(8, 0.5)
