@@ -1,146 +1,192 @@
 """A housing on which the displacement sensors stand: they see none of its motion, so that nothing but the transmission
 error shows where it resonates.
 
-What a housing of little compliance c adds to a line at a frequency w is to first order c E(w) g(w), with g its answer
-over its compliance, 1 / (1 - r^2 + 2 i zeta r) and r the ratio of w to its own frequency. So one simulation of a stiff
-one tells E, and resonances of any frequency and damping follow without a simulation: many are compared on the excited
-lines, and only the best are simulated.
+What a motion of the housing with the shares s (4,) of both supports, along and across, and little compliance adds to a
+line at a frequency w is to first order the sum of s_i s_j E_ij(w) g(w), with g its answer over its compliance,
+1 / (1 - r^2 + 2 i zeta r) and r the ratio of w to its own frequency. So ten simulations of stiff ones tell E, and any
+resonance follows without a simulation: many are compared on the excited lines, each with all other unknowns where they
+fit best beside it (what was fitted without a housing has made up for a part of it).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from itertools import product
-from math import exp, log, pi
+from math import log, pi, sqrt
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve
 
-from gearbench.diagnosis.forces.unknowns import Unknowns
+from gearbench.diagnosis.fitting.fit import Sensitivity, sensitivity_of
 from gearbench.diagnosis.intake.signals import frequencies
+from gearbench.diagnosis.simulation.quadratic import real_parts
 from gearbench.diagnosis.simulation.simulator import Simulator
 from gearbench.diagnosis.simulation.target import Target
 from gearbench.diagnosis.structure.structure import (
     ACROSS,
     ACROSS_BEGIN,
+    EQUAL,
     HOUSING,
     HOUSING_RATIO,
+    HOUSING_SD,
+    LEAST_STEP,
     MODE,
-    MOTIONS,
+    MODE_LARGEST,
+    MODE_SD,
+    NONE,
     OBLIQUE,
-    SIDES,
+    OBLIQUE_SD,
+    SEAT,
+    SHAPE,
     STIFFEST,
     pace_of,
     seated,
-    with_motion,
 )
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-# E (K,) of lines by kind of motion and shares across.
-Shares = Mapping[tuple[int, tuple[float, ...]], Complex]
 
-# Of the motion that tells E: logarithm of its frequency over the supports', and its compliance.
+# Of the motions that tell E: logarithm of their frequency over the supports', and their compliance.
 STIFF_AT, STIFF = 1.8, 0.01
-# Where resonances are looked for: logarithms of the frequency, damping ratios, and compliances over the supports'.
-SOUGHT_AT = tuple(float(at) for at in np.linspace(-2.2, 1.0, 97))
+# Where resonances are looked for: logarithms of the frequency, and damping ratios.
+SOUGHT_AT = tuple(float(at) for at in np.linspace(-MODE_LARGEST, 1.0, 121))
 RATIOS = (0.02, 0.035, 0.06)
-PARTS = (0.003, 0.006, 0.012, 0.025, 0.05, 0.1)
+# Compliance that a motion begins with at least: fits let stand what a rig does not feel.
+LEAST = 2 * LEAST_STEP[HOUSING]
+# Shares of driver and driven along, then across: ten whose products with themselves tell those of any.
+TOLD_BY = np.array([
+    (1, 0, 0, 0), (0, 1, 0, 0), (1, 1, 0, 0), (1, 0, 1, 0), (1, 0, -1, 0),
+    (1, 0, 0, 1), (1, 0, 0, -1), (0, 1, 1, 0), (0, 1, 0, 1), (1, 0, 1, 1),
+], dtype=float)  # fmt: skip
+# Shares that are compared: angles along and across, and root mean squares across over those along.
+ANGLES, OVER = 24, (0.0, 0.25, 0.5, 1.0)
+PAIRS = tuple((i, j) for i in range(4) for j in range(i, 4))
 
 
 class Resonance(NamedTuple):
-    """A motion of the housing: its kind, shares across (2,), logarithm of its frequency, damping ratio and
-    compliance."""
+    """Logarithm of the frequency of a motion of the housing over the supports', and its damping ratio."""
 
-    kind: int
-    across: tuple[float, ...]
     at: float
     ratio: float
-    part: float
 
 
-def hidden_housings(simulator: Simulator, p: Array) -> list[Array]:
-    """`p` (size,) with sensors on a housing whose resonances explain the excited lines best, one and two of them;
-    nothing where a rig has none to find, or no line is excited."""
-    unknowns, whole = simulator.layout.unknowns, simulator.target
-    if HOUSING not in unknowns.slices or not whole.excited.any():
-        return []
-    excited, plain = simulator.of_target(whole.of_lines(whole.excited[whole.of_line])), _without(unknowns, p)
-    target, here = excited.target, excited.lines(plain)
-    if here is None:
-        return []
-    over = _frequencies(target) / pace_of(simulator.layout.model)
-    shares = _shares(excited, plain, here, over)
-    if not shares:
-        return []
-    answers = {(at, ratio): _answer(over, at, ratio) for at, ratio in product(SOUGHT_AT, RATIOS)}
-    left = target.lines - here
-    alone, rest = _best(target, shares, answers, left)
-    pair, parts = [alone, alone], [left - rest, np.zeros_like(left)]
-    # Each beside the other, the new one first.
-    for number in (1, 0, 1):
-        beside = left - parts[1 - number]
-        pair[number], rest = _best(target, shares, answers, beside)
-        parts[number] = beside - rest
-    one, two = (pair if pair[0].kind <= pair[1].kind else reversed(pair))
-    return [
-        _with(unknowns, plain, alone, alone.kind),
-        _with(unknowns, _with(unknowns, plain, one, 0), two, 1),
-    ]
-
-
-def _frequencies(target: Target) -> Array:
-    """Angular frequencies (K,) [rad/s] of the lines of a target."""
-    return np.concatenate([2 * pi * frequencies(target.measurements[number])[bins] for number, _, bins in target.plan])
-
-
-def _without(unknowns: Unknowns, p: Array) -> Array:
+def without_housing(simulator: Simulator, p: Array) -> Array:
     """`p` (size,) without a housing, its sensors where they would stand on one, with supports that yield across."""
+    unknowns = simulator.layout.unknowns
     plain, soft = seated(unknowns, p), p[unknowns[ACROSS]]
     plain[unknowns[HOUSING]], plain[unknowns[OBLIQUE]] = 0.0, 0.0
     plain[unknowns[ACROSS]] = np.where(soft > STIFFEST, soft, ACROSS_BEGIN)
     return plain
 
 
-def _shares(excited: Simulator, plain: Array, here: Complex, over: Array) -> Shares:
-    """E (K,) of the lines of a simulator, which are `here` those of `plain` and lie at the frequencies `over` those of
-    the supports (K,)."""
-    unknowns, answer, out = excited.layout.unknowns, STIFF * _answer(over, STIFF_AT, HOUSING_RATIO), {}
-    for kind, across in product(range(len(MOTIONS)), product((1.0, -1.0), repeat=len(SIDES))):
-        trial = _with(unknowns, plain, Resonance(kind, across, STIFF_AT, HOUSING_RATIO, STIFF), kind)
-        moved = excited.lines(trial)
-        if moved is not None:
-            out[kind, across] = (moved - here) / answer
-    return out
+def with_hidden_motion(simulator: Simulator, p: Array, sd: Array, motion: int) -> Array | None:
+    """`p` (size,) with that motion of a housing its sensors stand on, whose resonance explains the excited lines best
+    under the prior `sd` (size,); None where a rig has none to find, or no line is excited."""
+    whole = simulator.target
+    if HOUSING not in simulator.layout.unknowns.slices or not whole.excited.any():
+        return None
+    excited = simulator.of_target(whole.of_lines(whole.excited[whole.of_line]))
+    try:
+        told = _told(excited, p, motion)
+        sensitivity = sensitivity_of(excited, p, sd)
+    except ValueError:
+        return None
+    if told is None or sensitivity is None:
+        return None
+    found, shares, compliance = _likeliest(excited, p, sd, told, sensitivity)
+    return _with(simulator, p, motion, found, shares, compliance)
 
 
-def _answer(over: Array, at: float, ratio: float) -> Complex:
+def _told(excited: Simulator, p: Array, motion: int) -> Complex | None:
+    """E (10, K) of the lines of a simulator, by PAIRS of shares of that motion; None where a rig cannot be."""
+    here, stiff = excited.lines(p), Resonance(STIFF_AT, HOUSING_RATIO)
+    if here is None:
+        return None
+    moved = []
+    for shares in TOLD_BY:
+        compliance = STIFF * float((shares[:2] ** 2).mean())
+        lines = excited.lines(_with(excited, p, motion, stiff, shares, compliance))
+        if lines is None:
+            return None
+        moved.append((lines - here) / (STIFF * _answer(_over(excited), stiff)))
+    return np.asarray(np.linalg.solve(_products(TOLD_BY), np.array(moved)))
+
+
+def _likeliest(
+    excited: Simulator, p: Array, sd: Array, told: Complex, sensitivity: Sensitivity
+) -> tuple[Resonance, Array, float]:
+    """The resonance, shares (4,) and compliance along that explain most, with all other unknowns where they are best
+    beside it."""
+    target, unknowns, quadratic, here = excited.target, excited.layout.unknowns, sensitivity.quadratic, excited.lines(p)
+    assert here is not None
+    step, _, _ = quadratic.best(p, sd, unknowns.bounds())
+    root = np.sqrt(quadratic.weights(step)[target.of_line])
+    active = quadratic.active
+    # A motion that is not there yet would compete.
+    aside = unknowns.of((SEAT,)) | (unknowns.of((HOUSING,)) & (p <= NONE))
+    kept = active[(sd[active] > 0.0) & ~aside[active]]
+    others = real_parts(sensitivity.jacobian[kept] * root) * sd[kept, None]
+    # About the centre of the others' priors.
+    left = real_parts((target.lines - here) * root) + p[kept] / sd[kept] @ others
+    inner = cho_factor(np.eye(len(kept)) + others @ others.T, lower=True)
+    shares = _shares()
+    products, across = _products(shares), 0.5 * (shares[:, 2:] ** 2).sum(axis=1) / OBLIQUE_SD**2
+    best = -np.inf, Resonance(0.0, HOUSING_RATIO), shares[0], 0.0
+    for found in map(Resonance._make, product(SOUGHT_AT, RATIOS)):
+        made = HOUSING_SD * real_parts(told * _answer(_over(excited), found) * root)
+        alone = made - cho_solve(inner, others @ made.T).T @ others
+        slopes = products @ (alone @ left)
+        curved = 1.0 + np.einsum("ni,ij,nj->n", products, alone @ made.T, products, optimize=True)
+        sizes = np.maximum(slopes / curved, LEAST / HOUSING_SD)
+        gains = sizes * (slopes - 0.5 * sizes * curved) - across
+        most = int(np.argmax(gains))
+        gain = float(gains[most]) - 0.5 * (found.at**2 + log(found.ratio / HOUSING_RATIO) ** 2) / MODE_SD**2
+        if gain > best[0]:
+            best = gain, found, shares[most], HOUSING_SD * float(sizes[most])
+    return best[1:]
+
+
+def _shares() -> Array:
+    """Shares (n, 4) that are compared, whose root mean square along is 1."""
+    along, across = (np.arange(ANGLES) * turn / ANGLES for turn in (pi, 2 * pi))
+    return np.array([
+        (sqrt(2) * np.cos(one), sqrt(2) * np.sin(one), over * sqrt(2) * np.cos(two), over * sqrt(2) * np.sin(two))
+        for one, over in product(along, OVER)
+        for two in (across if over > 0.0 else across[:1])
+    ])  # fmt: skip
+
+
+def _products(shares: Array) -> Array:
+    """Those (n, 10) of shares (n, 4) with themselves, by PAIRS."""
+    return np.stack([shares[:, i] * shares[:, j] for i, j in PAIRS], axis=1)
+
+
+def _over(excited: Simulator) -> Array:
+    """Frequencies (K,) of the lines of a simulator over those of the supports."""
+    target: Target = excited.target
+    lines = [frequencies(target.measurements[number])[bins] for number, _, bins in target.plan]
+    return 2 * pi * np.concatenate(lines) / pace_of(excited.layout.model)
+
+
+def _answer(over: Array, found: Resonance) -> Complex:
     """g (K,) at frequencies `over` those of the supports (K,)."""
-    r = over / exp(at)
-    return np.asarray(1.0 / (1.0 - r**2 + 2j * ratio * r))
+    r = over / np.exp(found.at)
+    return np.asarray(1.0 / (1.0 - r**2 + 2j * found.ratio * r))
 
 
-def _best(
-    target: Target, shares: Shares, answers: Mapping[tuple[float, float], Complex], left: Complex
-) -> tuple[Resonance, Complex]:
-    """The resonance that explains most of what is `left` (K,) of the lines of a target, and what it leaves."""
-    best: tuple[float, Resonance, Complex] | None = None
-    for ((kind, across), share), ((at, ratio), answer) in product(shares.items(), answers.items()):
-        made = share * answer
-        for part in PARTS:
-            rest = left - part * made
-            cost = target.cost(rest)
-            if best is None or cost < best[0]:
-                best = cost, Resonance(kind, across, at, ratio, part), rest
-    assert best is not None
-    return best[1], best[2]
-
-
-def _with(unknowns: Unknowns, p: Array, found: Resonance, motion: int) -> Array:
-    """`p` (size,) with a resonance as that motion of its housing."""
-    out = with_motion(unknowns, p, motion, found.at, found.part, found.kind)
-    out[unknowns[MODE].start + 2 * motion + 1] = log(found.ratio / HOUSING_RATIO)
-    first = unknowns[OBLIQUE].start + len(SIDES) * motion
-    out[first : first + len(SIDES)] = found.across
+def _with(simulator: Simulator, p: Array, motion: int, found: Resonance, shares: Array, compliance: float) -> Array:
+    """`p` (size,) with a resonance of those shares (4,) as that motion of its housing, `compliance` along."""
+    unknowns = simulator.layout.unknowns
+    turned = float(np.arctan2(shares[1], shares[0])) - EQUAL[motion]
+    low, high = (bound[unknowns[SHAPE].start + motion] for bound in unknowns.bounds())
+    across = shares[2:] / sqrt(float((shares[:2] ** 2).mean()))
+    # Shares of the other sign are the same motion.
+    turn = next((turned + k * pi for k in (0, 1, -1) if low <= turned + k * pi <= high), turned)
+    out = p.copy()
+    out[unknowns[HOUSING].start + motion] = compliance
+    mode, first = unknowns[MODE].start + 2 * motion, unknowns[OBLIQUE].start + 2 * motion
+    out[mode : mode + 2] = found.at, log(found.ratio / HOUSING_RATIO)
+    out[unknowns[SHAPE].start + motion] = turn
+    out[first : first + 2] = across if turn == turned else -across
     return out

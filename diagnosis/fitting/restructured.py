@@ -16,9 +16,9 @@ from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
 from gearbench.diagnosis.effects.torque_ripple import KEY as RIPPLE
 from gearbench.diagnosis.fitting.beginning import Around, levelled, linear_cost, seen_by
 from gearbench.diagnosis.fitting.fit import Optimum, cost_of, fit, fit_afresh, gone_on
-from gearbench.diagnosis.fitting.hidden_housing import hidden_housings
+from gearbench.diagnosis.fitting.hidden_housing import with_hidden_motion, without_housing
 from gearbench.diagnosis.simulation.simulator import Simulator
-from gearbench.diagnosis.structure.structure import SEAT, otherwise
+from gearbench.diagnosis.structure.structure import MOTIONS, SEAT, otherwise
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -90,18 +90,17 @@ def _from_around(simulator: Simulator, found: Optimum, around: Around | None, re
 
 
 def _on_a_housing(simulator: Simulator, found: Optimum, report: Report) -> Optimum | None:
-    """The fit begun with sensors on a housing that moves across, the one nearest to the excited lines; None where a rig
-    has none."""
-    alone = simulator.of_record(simulator.target.most_excited)
+    """The fit with sensors on a housing, one motion of it after the other as long as it comes closer by each; None
+    where a rig has none."""
     report("simulating: sensors on a housing")
-    trials = hidden_housings(alone, found.p)
-    if not trials:
-        return None
-    begin = min(trials, key=lambda p: linear_cost(alone, p, found.sd))
-    again = fit_afresh(simulator, begin, found.sd, renewals=RENEWALS)
-    if again is None or again.evidence <= found.evidence:
-        return again
-    return gone_on(simulator, again, RENEWALS)
+    p, best = without_housing(simulator, found.p), None
+    for motion in range(len(MOTIONS)):
+        begin = with_hidden_motion(simulator, p, found.sd, motion)
+        again = fit_afresh(simulator, begin, found.sd, renewals=RENEWALS) if begin is not None else None
+        if again is None or (best is not None and again.evidence <= best.evidence):
+            break
+        p, best = again.p, again
+    return gone_on(simulator, best, RENEWALS) if best is not None and best.evidence > found.evidence else best
 
 
 def _otherwise(simulator: Simulator, found: Optimum, report: Report) -> Optimum | None:

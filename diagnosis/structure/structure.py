@@ -34,7 +34,7 @@ DAMPED, DAMPED_SD, DAMPED_LARGEST = "across-damping", 0.5, 2.0
 # Housing: compliance over the supports' mean one (half a per cent to ten are usual), logarithms of its frequency over
 # that of a gear on its support, and of its damping ratio over a twentieth.
 HOUSING, HOUSING_SD, HOUSING_LARGEST = "housing", 0.04, 0.5
-MODE, MODE_SD, MODE_LARGEST, HOUSING_RATIO = "housing-mode", 0.7, 2.0, 0.05
+MODE, MODE_SD, MODE_LARGEST, HOUSING_RATIO = "housing-mode", 0.7, 3.0, 0.05
 # It has two motions: as a rule it moves along both supports, and it rocks, which is what the mesh pushes at; but both
 # may be of one kind. The angle whose cosine and sine are to each other as the shares of driver's and driven support: an
 # eighth of a turn where they are equal, and what departs, by a quarter of one into the other kind.
