@@ -100,6 +100,8 @@ def _on_a_housing(simulator: Simulator, found: Optimum, report: Report) -> Optim
         if again is None or (best is not None and again.evidence <= best.evidence):
             break
         p, best = again.p, again
+        if best.cost - best.left > found.cost:  # another motion would not catch up
+            break
     return gone_on(simulator, best, RENEWALS) if best is not None and best.evidence > found.evidence else best
 
 
