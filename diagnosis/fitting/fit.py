@@ -33,6 +33,7 @@ STEPS = 60
 # Standard deviations that a step is damped to where no part of a longer one is of use, as valleys bend: the first, what
 # it is multiplied by after one that does not help and after one that does, and the shortest.
 REACH, SHRINK, GROW, SHORTEST = 0.3, 0.4, 2.0, 0.003
+NEARLY = 10.0  # nats promised up to which any gain will do
 SETTLED = 25.0  # nats that another step may promise: a fit that is close enough not to be gone on with
 
 
@@ -147,7 +148,7 @@ def _improved(
             hoped = cost - promised
             if hoped > GAIN:
                 best, least = _stepped(simulator, p, sd, near.active, step, cost, HALVINGS)
-                if cost - least >= min(ANEW, POOR * hoped):
+                if cost - least >= min(ANEW, POOR * hoped) or (least < cost and hoped <= NEARLY):
                     return best, least, hoped, inf
             if least < cost:
                 break
