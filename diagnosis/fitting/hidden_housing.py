@@ -71,9 +71,12 @@ class Resonance(NamedTuple):
     ratio: float
 
 
-def without_housing(simulator: Simulator, p: Array) -> Array:
-    """`p` (size,) without a housing, its sensors where they would stand on one, with supports that yield across."""
+def without_housing(simulator: Simulator, p: Array) -> Array | None:
+    """`p` (size,) without a housing, its sensors where they would stand on one, with supports that yield across; None
+    where a rig has none to find, as one whose case gives it."""
     unknowns = simulator.layout.unknowns
+    if HOUSING not in unknowns.slices:
+        return None
     plain, soft = seated(unknowns, p), p[unknowns[ACROSS]]
     plain[unknowns[HOUSING]], plain[unknowns[OBLIQUE]] = 0.0, 0.0
     plain[unknowns[ACROSS]] = np.where(soft > STIFFEST, soft, ACROSS_BEGIN)
@@ -82,9 +85,9 @@ def without_housing(simulator: Simulator, p: Array) -> Array:
 
 def with_hidden_motion(simulator: Simulator, p: Array, sd: Array, motion: int) -> Array | None:
     """`p` (size,) with that motion of a housing its sensors stand on, whose resonance explains the excited lines best
-    under the prior `sd` (size,); None where a rig has none to find, or no line is excited."""
+    under the prior `sd` (size,); None where no line is excited, or no such rig can be."""
     whole = simulator.target
-    if HOUSING not in simulator.layout.unknowns.slices or not whole.excited.any():
+    if not whole.excited.any():
         return None
     excited = simulator.of_target(whole.of_lines(whole.excited[whole.of_line]))
     try:

@@ -92,8 +92,10 @@ def _from_around(simulator: Simulator, found: Optimum, around: Around | None, re
 def _on_a_housing(simulator: Simulator, found: Optimum, report: Report) -> Optimum | None:
     """The fit with sensors on a housing, one motion of it after the other as long as it comes closer by each; None
     where a rig has none."""
-    report("simulating: sensors on a housing")
     p, best = without_housing(simulator, found.p), None
+    if p is None:
+        return None
+    report("simulating: sensors on a housing")
     for motion in range(len(MOTIONS)):
         begin = with_hidden_motion(simulator, p, found.sd, motion)
         again = fit_afresh(simulator, begin, found.sd, renewals=RENEWALS) if begin is not None else None
