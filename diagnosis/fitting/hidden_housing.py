@@ -90,19 +90,21 @@ def with_hidden_motion(simulator: Simulator, p: Array, sd: Array, motion: int) -
     if not whole.excited.any():
         return None
     excited = simulator.of_target(whole.of_lines(whole.excited[whole.of_line]))
+    over = _over(excited)
     try:
-        told = _told(excited, p, motion)
+        told = _told(excited, p, motion, over)
         sensitivity = sensitivity_of(excited, p, sd)
     except ValueError:
         return None
     if told is None or sensitivity is None:
         return None
-    found, shares, compliance = _likeliest(excited, p, sd, told, sensitivity)
+    found, shares, compliance = _likeliest(excited, p, sd, told, sensitivity, over)
     return _with(simulator, p, motion, found, shares, compliance)
 
 
-def _told(excited: Simulator, p: Array, motion: int) -> Complex | None:
-    """E (10, K) of the lines of a simulator, by PAIRS of shares of that motion; None where a rig cannot be."""
+def _told(excited: Simulator, p: Array, motion: int, over: Array) -> Complex | None:
+    """E (10, K) of the lines of a simulator, at frequencies `over` those of the supports (K,), by PAIRS of shares of
+    that motion; None where a rig cannot be."""
     here, stiff = excited.lines(p), Resonance(STIFF_AT, HOUSING_RATIO)
     if here is None:
         return None
@@ -112,12 +114,12 @@ def _told(excited: Simulator, p: Array, motion: int) -> Complex | None:
         lines = excited.lines(_with(excited, p, motion, stiff, shares, compliance))
         if lines is None:
             return None
-        moved.append((lines - here) / (STIFF * _answer(_over(excited), stiff)))
-    return np.asarray(np.linalg.solve(_products(TOLD_BY), np.array(moved)))
+        moved.append(lines - here)
+    return np.asarray(np.linalg.solve(_products(TOLD_BY), np.array(moved) / (STIFF * _answer(over, stiff))))
 
 
 def _likeliest(
-    excited: Simulator, p: Array, sd: Array, told: Complex, sensitivity: Sensitivity
+    excited: Simulator, p: Array, sd: Array, told: Complex, sensitivity: Sensitivity, over: Array
 ) -> tuple[Resonance, Array, float]:
     """The resonance, shares (4,) and compliance along that explain most, with all other unknowns where they are best
     beside it."""
@@ -137,7 +139,7 @@ def _likeliest(
     products, across = _products(shares), 0.5 * (shares[:, 2:] ** 2).sum(axis=1) / OBLIQUE_SD**2
     best = -np.inf, Resonance(0.0, HOUSING_RATIO), shares[0], 0.0
     for found in map(Resonance._make, product(SOUGHT_AT, RATIOS)):
-        made = HOUSING_SD * real_parts(told * _answer(_over(excited), found) * root)
+        made = HOUSING_SD * real_parts(told * _answer(over, found) * root)
         alone = made - cho_solve(inner, others @ made.T).T @ others
         slopes = products @ (alone @ left)
         curved = 1.0 + np.einsum("ni,ij,nj->n", products, alone @ made.T, products, optimize=True)
