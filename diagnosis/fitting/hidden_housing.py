@@ -10,6 +10,7 @@ fit best beside it (what was fitted without a housing has made up for a part of 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import product
 from math import log, pi, sqrt
 from typing import NamedTuple
@@ -18,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
-from gearbench.diagnosis.fitting.fit import Sensitivity, sensitivity_of
+from gearbench.diagnosis.fitting.fit import Optimum, Sensitivity, fit_afresh, gone_on, refreshed, sensitivity_of
 from gearbench.diagnosis.intake.signals import frequencies
 from gearbench.diagnosis.simulation.quadratic import real_parts
 from gearbench.diagnosis.simulation.simulator import Simulator
@@ -34,6 +35,7 @@ from gearbench.diagnosis.structure.structure import (
     MODE,
     MODE_LARGEST,
     MODE_SD,
+    MOTIONS,
     NONE,
     OBLIQUE,
     OBLIQUE_SD,
@@ -52,6 +54,7 @@ STIFF_AT, STIFF = 1.8, 0.01
 # Where resonances are looked for: logarithms of the frequency, and damping ratios.
 SOUGHT_AT = tuple(float(at) for at in np.linspace(-MODE_LARGEST, 1.0, 121))
 RATIOS = (0.02, 0.035, 0.06)
+RENEWALS = 3
 # Compliance that a motion begins with at least: fits let stand what a rig does not feel.
 LEAST = 2 * LEAST_STEP[HOUSING]
 # Shares of driver and driven along, then across: ten whose products with themselves tell those of any.
@@ -69,6 +72,30 @@ class Resonance(NamedTuple):
 
     at: float
     ratio: float
+
+
+def on_a_housing(simulator: Simulator, found: Optimum, tell: Callable[[], None] = lambda: None) -> Optimum | None:
+    """The fit with sensors on a housing, one motion of it after the other as long as it comes closer by each, which is
+    told; None where a rig has none."""
+    unknowns = simulator.layout.unknowns
+    p, best = without_housing(simulator, found.p), None
+    if p is None:
+        return None
+    tell()
+    free = ~unknowns.of((HOUSING,))
+    for motion in range(len(MOTIONS)):
+        # One whose resonance is not looked for yet would grow at another's meanwhile.
+        free[unknowns[HOUSING].start + motion] = True
+        begin = with_hidden_motion(simulator, p, found.sd, motion)
+        again = fit_afresh(simulator, begin, found.sd, renewals=RENEWALS, chosen=free) if begin is not None else None
+        if again is None or (best is not None and again.evidence <= best.evidence):
+            break
+        p, best = again.p, again
+        if best.cost - best.left > found.cost:  # another motion would not catch up
+            break
+    if best is None or best.evidence <= found.evidence:
+        return best
+    return gone_on(simulator, refreshed(simulator, best, unknowns.of((HOUSING,)) & (best.p <= NONE)), RENEWALS)
 
 
 def without_housing(simulator: Simulator, p: Array) -> Array | None:

@@ -16,9 +16,9 @@ from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
 from gearbench.diagnosis.effects.torque_ripple import KEY as RIPPLE
 from gearbench.diagnosis.fitting.beginning import Around, levelled, linear_cost, seen_by
 from gearbench.diagnosis.fitting.fit import Optimum, cost_of, fit, fit_afresh, gone_on
-from gearbench.diagnosis.fitting.hidden_housing import with_hidden_motion, without_housing
+from gearbench.diagnosis.fitting.hidden_housing import on_a_housing
 from gearbench.diagnosis.simulation.simulator import Simulator
-from gearbench.diagnosis.structure.structure import MOTIONS, SEAT, otherwise
+from gearbench.diagnosis.structure.structure import SEAT, otherwise
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -42,7 +42,7 @@ def restructured(simulator: Simulator, found: Optimum, around: Around | None, re
     if not is_close(simulator, found):
         found = better(found, _from_around(simulator, found, around, report))
     if not is_close(simulator, found):
-        found = better(found, _on_a_housing(simulator, found, report))
+        found = better(found, on_a_housing(simulator, found, partial(report, "simulating: sensors on a housing")))
     if not is_close(simulator, found):
         found = better(found, _otherwise(simulator, found, report))
     return found
@@ -87,24 +87,6 @@ def _from_around(simulator: Simulator, found: Optimum, around: Around | None, re
     if best is None or linear_cost(simulator, best.p, found.sd) > linear_cost(simulator, found.p, found.sd):
         return None
     return fit_afresh(simulator, best.p, found.sd, renewals=RENEWALS)
-
-
-def _on_a_housing(simulator: Simulator, found: Optimum, report: Report) -> Optimum | None:
-    """The fit with sensors on a housing, one motion of it after the other as long as it comes closer by each; None
-    where a rig has none."""
-    p, best = without_housing(simulator, found.p), None
-    if p is None:
-        return None
-    report("simulating: sensors on a housing")
-    for motion in range(len(MOTIONS)):
-        begin = with_hidden_motion(simulator, p, found.sd, motion)
-        again = fit_afresh(simulator, begin, found.sd, renewals=RENEWALS) if begin is not None else None
-        if again is None or (best is not None and again.evidence <= best.evidence):
-            break
-        p, best = again.p, again
-        if best.cost - best.left > found.cost:  # another motion would not catch up
-            break
-    return gone_on(simulator, best, RENEWALS) if best is not None and best.evidence > found.evidence else best
 
 
 def _otherwise(simulator: Simulator, found: Optimum, report: Report) -> Optimum | None:

@@ -15,14 +15,22 @@ from gearbench.diagnosis.structure.layout import layout_of
 from gearbench.rig import Load, read_case
 
 
-def demonstration(load: Load | None = None) -> Simulator:
-    """Replays of one record of `gap_demo`, or of it with this load, whose tooth 3 may be cracked."""
+def demonstration(load: Load | None = None, faster: int = 1) -> Simulator:
+    """Replays of one record of `gap_demo`, or of it with this load or at so many times its speed, whose tooth 3 may be
+    cracked."""
     nominal = read_case(case_files()["gap_demo"])
-    case = nominal.under(nominal.conditions[0])
+    first = nominal.conditions[0]
+    quick = {
+        "mesh_frequency": faster * first.experiment.mesh_frequency,
+        "samples_per_period": first.experiment.samples_per_period // faster,
+    }
+    first = first.model_copy(update={"experiment": first.experiment.model_copy(update=quick)})
+    nominal = nominal.model_copy(update={"conditions": (first,)})
+    case = nominal.under(first)
     if load is not None:
         case = case.model_copy(update={"rig": case.rig.model_copy(update={"load": load})})
     record = simulate(case)
-    measured = measurement(record, "base", nominal)
+    measured = measurement(record, first.name, nominal)
     problem = problem_of([measured], nominal)
     layout = layout_of(nominal, problem.model, problem.conditions, (3,))
     return Simulator(layout, target_of([measured], problem.conditions), replays(problem.model.law))
