@@ -21,8 +21,9 @@ from gearbench.diagnosis.fitting.fit import Optimum
 from gearbench.diagnosis.forces.condition import prepare
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.intake.signals import measured_channels
+from gearbench.diagnosis.selection.followable import nudges_of
 from gearbench.diagnosis.selection.selection import further, only, taken_out
-from gearbench.diagnosis.selection.simulated import Simulated, nudges_of
+from gearbench.diagnosis.selection.simulated import Simulated
 from gearbench.diagnosis.selection.weighing import Weighed, is_own
 from gearbench.diagnosis.simulation.passed_noise import noise_left
 from gearbench.diagnosis.simulation.simulator import Simulator

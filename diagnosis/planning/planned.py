@@ -15,7 +15,7 @@ from gearbench.diagnosis.evidence.problem import Problem, problem_of
 from gearbench.diagnosis.forces.condition import Condition, prepare
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.replay.replays import Replay, replays_of
-from gearbench.diagnosis.selection.simulated import followable
+from gearbench.diagnosis.selection.followable import followable
 from gearbench.diagnosis.simulation.simulator import Simulator
 from gearbench.diagnosis.simulation.target import target_of
 from gearbench.diagnosis.structure.layout import Layout, layout_of

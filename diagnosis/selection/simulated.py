@@ -19,13 +19,12 @@ from gearbench.diagnosis.fitting.around import around
 from gearbench.diagnosis.fitting.background import background
 from gearbench.diagnosis.fitting.fit import Optimum, fit_afresh
 from gearbench.diagnosis.fitting.likely_teeth import with_likely_teeth, with_small_cracks
-from gearbench.diagnosis.forces.condition import Condition
-from gearbench.diagnosis.forces.nominal import NominalModel
 from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.replay.replays import Replay
 from gearbench.diagnosis.selection.by_forces import Start, begun_by_forces
 from gearbench.diagnosis.selection.by_losses import with_losses
+from gearbench.diagnosis.selection.followable import followable, nudges_of
 from gearbench.diagnosis.selection.selection import Selection, select
 from gearbench.diagnosis.selection.weighing import WORTH, Weighed, entering
 from gearbench.diagnosis.simulation.passed_noise import noise_left
@@ -38,10 +37,6 @@ from gearbench.rig import Case
 Array = NDArray[np.float64]
 Report = Callable[[str], None]
 
-# Part of the time without contact from which a record is too rough to follow downhill: small changes make jumps.
-LOSING = 0.01
-# The same where no record is smoother: impacts that are few and repeat bend a fit without breaking it.
-LOSING_MORE = 0.1
 SPACING = 0.15  # of the backlash, between the values that are tried
 CRACKED = 2  # teeth that may be cracked: those that the force residuals rank first
 
@@ -198,60 +193,6 @@ def _opened(simulator: Simulator, selection: Selection, start: Start, apart: boo
         return replace(selection, weighed=weighed)
     entered = tuple(sorted((*selection.entered, entered_now), key=lambda one: -one.log_bayes_factor))
     return replace(selection, best=optimum, entered=entered, weighed=weighed)
-
-
-def followable(
-    rigs: Sequence[Case], measurements: Sequence[Measurement], problem: Problem, simulate: Replay
-) -> tuple[list[int], Mapping[str, float], frozenset[str]]:
-    """Numbers of the records that a fit can follow, what nudges the driver in each that parts its flanks, by its name
-    [N s/m], and the names of those that part for long: those whose flanks stay together on the first rig, else all,
-    nudged."""
-    lost = lost_contact(rigs[0], measurements, simulate)
-    smooth = [number for number, part in enumerate(lost) if part < LOSING]
-    if smooth:
-        return smooth, {}, frozenset()
-    nudges = nudges_of(problem.model, problem.conditions)
-    if not lost or len(nudges) < len(measurements):
-        return smooth_records(rigs, measurements, simulate), {}, frozenset()
-    restless = {one.name for one, part in zip(measurements, lost, strict=True) if part >= LOSING_MORE}
-    return list(range(len(measurements))), nudges, frozenset(restless)
-
-
-def nudges_of(model: NominalModel, conditions: Sequence[Condition]) -> dict[str, float]:
-    """Damper [N s/m] between the driver and its motion as each condition's record has it, by its name: as stiff as the
-    mesh where the driver vibrates on it."""
-    mass = (model.inertia[0] + model.rotor) / model.base_radius[0] ** 2
-    known = [one for one in conditions if "angle_driver" in one.spectra]
-    return {one.name: float(np.sqrt(one.stiffness_level * mass)) for one in known}
-
-
-def smooth_records(rigs: Sequence[Case], measurements: Sequence[Measurement], simulate: Replay) -> list[int]:
-    """Numbers of the records whose flanks stay together on the first of the rigs, and where there is none, of those
-    that part for little of their time: elsewhere small changes make jumps, so that no fit can follow them. Where there
-    is none of these either the next rig is asked: a resonance of the first need not be the records'."""
-    for rig in rigs:
-        lost = lost_contact(rig, measurements, simulate)
-        for limit in (LOSING, LOSING_MORE):
-            smooth = [number for number, part in enumerate(lost) if part < limit]
-            if smooth:
-                return smooth
-    return []
-
-
-def lost_contact(rig: Case, measurements: Sequence[Measurement], simulate: Replay) -> list[float]:
-    """Part of the time that the flanks of a rig are apart in each record; empty where it cannot be simulated in one of
-    them, or one does not tell the mesh phase."""
-    if not all(one.phase_known for one in measurements):
-        return []
-    lost = []
-    for one in measurements:
-        try:
-            steady = simulate(rig, one.record)
-        except ValueError:
-            return []
-        samples = max(int(np.prod(steady["time"].shape)), 1)
-        lost.append(float(steady.attrs.get("contact_lost_samples", 0)) / samples)
-    return lost
 
 
 def carried_over(layout: Layout, unknowns: Unknowns, p: Array) -> Array:

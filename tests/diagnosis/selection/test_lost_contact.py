@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from gearbench.diagnosis.selection.simulated import LOSING, LOSING_MORE, followable, lost_contact, smooth_records
+from gearbench.diagnosis.selection.followable import LOSING, LOSING_MORE, followable, lost_contact, smooth_records
 
 
 def answer(case: Any, record: int | None) -> xr.Dataset:
