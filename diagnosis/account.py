@@ -139,6 +139,14 @@ def sentence_of_effect(noun: str, closing: Closing, share: float) -> str:
     )
 
 
+def sentence_of_only(noun: str, record: str) -> str:
+    """That no record but the judged one shows an effect."""
+    return (
+        f"The record {record} alone shows {noun}, and tells its size: what is closed by it there is fitted, not"
+        " predicted; measure another record whose flanks meet behind"
+    )
+
+
 def sentence_of_rivals(causes: Sequence[Hypothesis]) -> str:
     """That the records speak as well for other causes as for the one that is named."""
     named, *others = (_which(one) for one in causes)

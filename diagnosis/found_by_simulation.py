@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.diagnosis.account import places_of, sentence_of_effect, sentence_of_rivals
+from gearbench.diagnosis.account import places_of, sentence_of_effect, sentence_of_only, sentence_of_rivals
+from gearbench.diagnosis.effects.backlash import BACKLASH
 from gearbench.diagnosis.effects.effect import Hypothesis
 from gearbench.diagnosis.effects.temperature_drift import TEMPERATURE_DRIFT
 from gearbench.diagnosis.evidence.fit import Fit
@@ -27,6 +28,7 @@ from gearbench.diagnosis.judging.drift import drift_of
 from gearbench.diagnosis.judging.judged import DUE, Judged
 from gearbench.diagnosis.judging.missing import Missing, missing_forces, nothing_missing
 from gearbench.diagnosis.judging.naming import drifts_of, effects_of
+from gearbench.diagnosis.judging.only_there import with_backlash_there
 from gearbench.diagnosis.judging.repeating import sentences_of_others
 from gearbench.diagnosis.judging.sifted import judged_of_size, left_out, seconded, sized
 from gearbench.diagnosis.odds import Calibration
@@ -67,7 +69,7 @@ def by_simulation(
 ) -> Finding:
     """The finding that simulation justifies."""
     entered = found.selection.entered
-    judged = judged_of_size(of.problem, sized(seconded(found, of.result)), held_out, of.measurements, report)
+    judged = judged_of_size(of.problem, _judgeable(of, found, held_out), held_out, of.measurements, report)
     band = of.problem.conditions[0].band
     changing = changing_of(judged, changing_parts(of.steady, band))
     doubts: tuple[str, ...] = ()
@@ -117,9 +119,18 @@ def by_simulation(
     )
 
 
+def _judgeable(of: Searched, found: Simulated, held_out: Measurement | None) -> Simulated:
+    """What was found, sifted by the size of its effects and what the force residuals name, with what only the held-out
+    record can show."""
+    found = sized(seconded(found, of.result))
+    if held_out is None or not held_out.phase_known or BACKLASH.name in of.without:
+        return found
+    return with_backlash_there(of.problem, found, held_out)
+
+
 def _missing(of: Searched, found: Simulated) -> Missing:
     """The forces that the rig found lacks, with what the force residuals' fit leaves, a line."""
-    best_p, smooth = found.end_of(found.selection.best), found.simulator.target.measurements
+    best_p, smooth = found.end_of(found.selection.best), found.simulator.held_by
     try:
         missing = missing_forces(
             of.problem,
@@ -158,6 +169,8 @@ def _why(judged: Judged, kept: Sequence[Hypothesis]) -> tuple[str, ...]:
         assert one.effect is not None
         closing = judged.closings[one.name]
         said.append(sentence_of_effect(one.effect.noun, closing, judged.share(closing.without)))
+    said += [sentence_of_only(one.hypothesis.effect.noun, one.only_in)
+             for one in judged.found.selection.entered if one.only_in and one.hypothesis.effect]
     said += [sentence_of_rivals(one.causes) for one in judged.found.selection.entered if one.rivals]
     for weighed in judged.dropped:
         assert weighed.hypothesis.effect is not None

@@ -14,6 +14,7 @@ from math import inf
 import numpy as np
 from numpy.typing import NDArray
 
+from gearbench.diagnosis.effects.backlash import KEY as BACKLASH
 from gearbench.diagnosis.effects.profile_error import FLANKS
 from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.simulation.quadratic import Quadratic, prior_cost, quadratic_of
@@ -179,10 +180,11 @@ def _standing(unknowns: Unknowns, p: Array) -> tuple[Array, Array]:
 
 def _unseen(unknowns: Unknowns, sensitivity: Sensitivity) -> Flags:
     """Which unknowns (size,) these records do not show. Flanks that stand back behind all contact are not felt, but
-    would be if they came forward."""
+    would be if they came forward; nor is a backlash that something else has opened."""
     out = np.isin(np.arange(unknowns.size), sensitivity.quadratic.active, invert=True)
-    if FLANKS in unknowns.slices:
-        out[unknowns[FLANKS]] = False
+    for key in (FLANKS, BACKLASH):
+        if key in unknowns.slices:
+            out[unknowns[key]] = False
     return out
 
 

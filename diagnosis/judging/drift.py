@@ -98,11 +98,12 @@ def _parts(found: Simulated) -> list[_Part]:
     """The channels of all records in which lines change between repetitions."""
     target, rows, out, start = found.simulator.target, _rows(found.layout.unknowns), [], 0
     jacobian = _jacobian(found, list(rows.values()))
+    smooth = found.simulator.smooth
     for number, channel, bins in target.plan:
         stop = start + len(bins)
         repetitions = measured_channels(target.measurements[number])[channel]
         count = len(repetitions)
-        if count > 1:
+        if count > 1 and number in smooth:
             lines = np.fft.rfft(repetitions, axis=-1)[:, bins] / repetitions.shape[-1]
             apart, white = scatter_of(lines)
             changing = apart > COLOURED * white

@@ -28,6 +28,7 @@ from gearbench.diagnosis.structure.viscous import LOADED
 from gearbench.rig import Case
 
 Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 Report = Callable[[str], None]
 
 # Unknowns that stay as they are: the elements lack the first; the others change teeth, which would be meshed anew at
@@ -56,7 +57,10 @@ def by_elements(judged: Judged, effects: bool, report: Report) -> ByElements:
     found, selection = judged.found, judged.found.selection
     named = [one.hypothesis.name for one in selection.entered] if effects else []
     carried: dict[str, Carried] = {}
-    elements = Simulator(found.layout, found.simulator.target, _simulate(found.layout.model.resonance, carried))
+    target = found.simulator.target
+    # Elements cannot be nudged: the records that they can follow are those that hold the rig.
+    held_by, simulate = found.simulator.smooth, _simulate(found.layout.model.resonance, carried)
+    elements, lines = Simulator(found.layout, target.of_records(held_by), simulate), target.in_records(held_by)
     open_teeth = any(one.hypothesis.wide[0].key == BACKLASH for one in selection.entered)
 
     def answered(p: Array) -> tuple[Case, Mapping[str, Array]]:
@@ -65,7 +69,7 @@ def by_elements(judged: Judged, effects: bool, report: Report) -> ByElements:
 
     def again(optimum: Optimum, words: str) -> Optimum:
         report(f"by finite elements: {words}")
-        return refitted(elements, optimum, open_teeth)
+        return refitted(elements, optimum, open_teeth, lines)
 
     report("by finite elements: the nominal rig")
     vectors = {"nominal": np.zeros(found.layout.size)}
@@ -102,8 +106,9 @@ def _simulate(resonance: float, carried: dict[str, Carried]) -> Replay:
     return simulate
 
 
-def refitted(elements: Simulator, optimum: Optimum, open_teeth: bool) -> Optimum:
-    """The optimum by finite elements near that of the lumped model; where none of its steps comes closer, itself."""
+def refitted(elements: Simulator, optimum: Optimum, open_teeth: bool, lines: Flags | slice = slice(None)) -> Optimum:
+    """The optimum by finite elements near that of the lumped model, of whose lines (K,) they are fitted to some; where
+    none of its steps comes closer, itself."""
     unknowns, target = elements.layout.unknowns, elements.target
     p, sd = optimum.p.copy(), optimum.sd.copy()
     for key in HELD:
@@ -112,11 +117,11 @@ def refitted(elements: Simulator, optimum: Optimum, open_teeth: bool) -> Optimum
             # What flanks that stay together never show is left at the nominal teeth.
             if key == LOADED or (key == BACKLASH and not open_teeth):
                 p[unknowns[key]] = 0.0
-    lines = elements.lines(p)
-    if lines is None:
+    here = elements.lines(p)
+    if here is None:
         raise ValueError("finite elements cannot answer the records of the search with what the lumped model found")
-    jacobian = optimum.sensitivity.jacobian
+    jacobian = optimum.sensitivity.jacobian[:, lines]
     active = np.flatnonzero(np.abs(jacobian).max(axis=1) > 0.0)
-    near = Sensitivity(jacobian, quadratic_of(target, target.lines - lines, jacobian, active))
+    near = Sensitivity(jacobian, quadratic_of(target, target.lines - here, jacobian, active))
     better = fit(elements, p, sd, near)
     return better if better is not None else replace(optimum, p=p, sd=sd)

@@ -21,7 +21,7 @@ from gearbench.diagnosis.fitting.fit import Optimum
 from gearbench.diagnosis.forces.condition import prepare
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.intake.signals import measured_channels
-from gearbench.diagnosis.selection.followable import nudges_of
+from gearbench.diagnosis.selection.followable import LOSING, lost_contact, nudges_of
 from gearbench.diagnosis.selection.selection import further, only, taken_out
 from gearbench.diagnosis.selection.simulated import Simulated
 from gearbench.diagnosis.selection.weighing import Weighed, is_own
@@ -145,7 +145,7 @@ class Judged:
         """By channel of the records of the search, all together: parts of its fluctuation that are left beyond noise,
         and that are noise."""
         simulator, best = self.found.simulator, self.found.selection.best
-        own = simulator.free.lines(self.found.end_of(best)) if simulator.nudges else None
+        own = None if simulator.anchored else simulator.free.lines(self.found.end_of(best))
         lines = best.lines if own is None else own
         target = simulator.target
         parts = (target.energies(target.lines - lines) - target.noise, target.noise, target.energies(target.lines))
@@ -190,21 +190,21 @@ def judged_on(
 ) -> Judged | None:
     """The selection with only those effects that close a part of the gap of `measured`, and those whose place others
     had that do not; None where the rig found cannot answer that record. Those of the records `searched` whose flanks
-    part, which the fit leaves out, judge what `measured` does not feel, or feels too little of to speak for or against
-    it."""
+    part, which the fit leaves out or is nudged along, judge what `measured` does not feel, or feels too little of to
+    speak for or against it."""
     band = problem.conditions[0].band
     noise = noise_left(found.layout.nominal, measured, found.simulator.simulate)
     condition = prepare(measured, problem.model, band)
     target = target_of([measured], [condition], [noise])
-    if found.simulator.nudges:
+    if is_nudged(found, measured):
         nudges = {**found.simulator.nudges, **nudges_of(problem.model, [condition])}
         found = replace(found, simulator=replace(found.simulator, nudges=nudges))
-    smooth = found.simulator.target.measurements
-    rough = [one for one in searched if not any(one is own for own in smooth)]
+    fitted = found.simulator.target.measurements
+    rough = [one for one in searched if not any(one is own for own in found.simulator.held_by)]
     parted = [target_of([one], [prepare(one, problem.model, band)]) for one in rough]
     dropped: list[Weighed] = []
     # A record that had part in the search cannot make up for what it lacked.
-    apart = not any(measured is searched for searched in smooth)
+    apart = not any(measured is searched for searched in fitted)
     while True:
         try:
             judged = _closings(found, target, measured, parted, noise, apart=apart)
@@ -235,9 +235,18 @@ def _stays(judged: Judged, one: Weighed) -> bool:
     return closing.due and not (closing.lacking and judged.left > GREATER)
 
 
+def is_nudged(found: Simulated, measured: Measurement) -> bool:
+    """Whether the driver is nudged in a record that judges: where all records of the search are, or some, and its
+    flanks part as theirs."""
+    if found.simulator.anchored and found.simulator.nudges:
+        lost = lost_contact(found.layout.nominal, [measured], found.simulator.simulate)
+        return bool(lost and lost[0] >= LOSING)
+    return bool(found.simulator.nudges)
+
+
 def itself(problem: Problem, found: Simulated) -> Judged:
     """The selection on the first record that it was found from, where no other can be answered."""
-    measured = found.simulator.target.measurements[0]
+    measured = found.simulator.held_by[0]
     judged = judged_on(problem, found, measured)
     assert judged is not None  # its optimum has been simulated there
     return judged
@@ -262,7 +271,7 @@ def _closings(
         optimum = taken_out(simulator, selection, one)
         closing = closing_of(target, simulator.channels(optimum.p, measured), nudged)
         silent = not feels(target, closing.without, nudged)
-        if simulator.nudges:
+        if not simulator.anchored or (simulator.nudges and measured.name in simulator.nudges):
             # Alone, an effect must do better than the rig that was found without any, too.
             others = [optimum, selection.bare] if len(selection.entered) == 1 else [optimum]
             without = [free.channels(found.end_of(other), measured) for other in others]

@@ -13,13 +13,13 @@ from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.judging.judged import DUE, FELT, GAIN, growth_of
 from gearbench.diagnosis.planning.information import floors_of
 from gearbench.diagnosis.planning.planned import Planned
-from gearbench.diagnosis.selection.simulated import SPACING
 from gearbench.diagnosis.selection.weighing import LIMIT
 
 Array = NDArray[np.float64]
 
 LEAST, MOST = 0.02, 3.0  # wide standard deviations, between which it is looked for
 HALVINGS = 7
+SPACING = 0.15  # of a backlash, to which a verdict knows it
 
 
 def smallest_backlash(plan: Planned, left: float) -> tuple[float, float] | None:

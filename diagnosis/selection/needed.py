@@ -34,11 +34,15 @@ RENEWALS = 4
 
 
 def needed(simulator: Simulator, best: Optimum, entered: Sequence[Weighed], apart: bool) -> tuple[Weighed, ...]:
-    """Each of the effects that entered that the others do not make needless, with what it is worth by the quadratic."""
+    """Each of the effects that entered that the others do not make needless, with what it is worth by the quadratic.
+    One that is not felt where it is, as flanks that part over a wider gap are not, keeps its worth."""
     unknowns, kept = simulator.layout.unknowns, list[Weighed | None]()
     for one in entered:
         sd = best.sd.copy()
         at = one.hypothesis.entries(unknowns)
+        if not np.isin(at, best.sensitivity.quadratic.active).any():
+            kept.append(one)
+            continue
         sd[at] = prior_of(simulator, unknowns.prior())[at]
         p = np.where((sd > 0.0) | (best.sd == 0.0), best.p, 0.0)
         quadratic = best.sensitivity.quadratic

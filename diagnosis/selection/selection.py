@@ -107,6 +107,40 @@ def further(
     return replace(selection, base=base, bare=_without(simulator, base, kept), best=best, entered=kept)
 
 
+def carried_on(
+    simulator: Simulator,
+    selection: Selection,
+    hypotheses: Sequence[Hypothesis],
+    report: Report = lambda step: None,
+    *,
+    apart: bool = False,
+) -> Selection | None:
+    """The selection on the records of `simulator`, which that far was one on fewer, with what these call for besides;
+    None where they lead nowhere from there."""
+    before = selection.best
+    best = base = fit_afresh(simulator, before.p, before.sd, renewals=RENEWALS_FRESH)
+    if selection.entered:
+        base = fit_afresh(simulator, selection.base.p, selection.base.sd, renewals=RENEWALS_FRESH)
+    if best is None or base is None:
+        return None
+    taken = [one.hypothesis for one in selection.entered]
+    rest = [one for one in hypotheses if not any(is_like(one, other) for other in taken)]
+    starts = _found(selection.weighed)
+    best, entered, weighed = _forward(simulator, best, selection.entered, rest, starts, report, apart=apart)
+    if len(entered) == 1:
+        alone = best.evidence - base.evidence - float(np.log(entered[0].hypothesis.choices))
+        entered = [replace(entered[0], log_bayes_factor=alone)]
+    kept = needed(simulator, best, entered, apart)
+    if kept:
+        best = gone_on(simulator, best, RENEWALS_LAST, partial(report, "simulating: all together"))
+        base, best, kept = held_against_background(simulator, base, best, kept, report, apart=apart)
+    else:
+        best = base
+    if selection.entered:
+        weighed = list(selection.weighed)
+    return Selection(base, _without(simulator, base, kept), best, kept, tuple(weighed))
+
+
 def _forward(
     simulator: Simulator,
     best: Optimum,

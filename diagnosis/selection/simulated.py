@@ -25,8 +25,9 @@ from gearbench.diagnosis.replay.replays import Replay
 from gearbench.diagnosis.selection.by_forces import Start, begun_by_forces
 from gearbench.diagnosis.selection.by_losses import with_losses
 from gearbench.diagnosis.selection.followable import followable, nudges_of
+from gearbench.diagnosis.selection.parting import Parting, with_parting
 from gearbench.diagnosis.selection.selection import Selection, select
-from gearbench.diagnosis.selection.weighing import WORTH, Weighed, entering
+from gearbench.diagnosis.selection.weighing import Weighed
 from gearbench.diagnosis.simulation.passed_noise import noise_left
 from gearbench.diagnosis.simulation.simulator import Simulator
 from gearbench.diagnosis.simulation.target import target_of
@@ -37,7 +38,6 @@ from gearbench.rig import Case
 Array = NDArray[np.float64]
 Report = Callable[[str], None]
 
-SPACING = 0.15  # of the backlash, between the values that are tried
 CRACKED = 2  # teeth that may be cracked: those that the force residuals rank first
 
 
@@ -48,7 +48,6 @@ class Simulated:
     layout: Layout
     simulator: Simulator
     selection: Selection
-    std: Array  # (size,) of the unknowns at the optimum
     # Names of records whose motion need not repeat where nothing changes.
     restless: frozenset[str] = frozenset()
     # Effects that entered and were left out again, not to be tried once more.
@@ -57,7 +56,16 @@ class Simulated:
 
     def with_selection(self, selection: Selection) -> Simulated:
         """The same with another selection."""
-        return replace(self, selection=selection, std=selection.best.std)
+        return replace(self, selection=selection)
+
+    @property
+    def std(self) -> Array:
+        """Standard deviations (size,) of the unknowns at the optimum."""
+        out = self.selection.best.std
+        for one in self.selection.entered:
+            if one.std is not None:
+                out[one.hypothesis.entries(self.layout.unknowns)] = one.std
+        return out
 
     @property
     def recalibrated(self) -> Case:
@@ -76,9 +84,9 @@ class Simulated:
         return self.layout.case(self.end_of(self.selection.best)) if self.selection.entered else None
 
     def end_of(self, optimum: Optimum) -> Array:
-        """Unknowns (size,) of an optimum, fitted on without what nudges: gaps are those of simulations that go their
-        own way."""
-        if not self.simulator.nudges:
+        """Unknowns (size,) of an optimum, where all records are nudged fitted on without that: gaps are those of
+        simulations that go their own way."""
+        if self.simulator.anchored:
             return optimum.p
         key = optimum.p.tobytes()
         if key not in self._ends:
@@ -135,23 +143,18 @@ def simulated(
             base, starts = begun_by_forces(simulator, base, _weighed(listed, simulator.layout), starts, seen, report)
             if base is here:
                 break
-    layout = simulator.layout
-    weighed = _weighed(listed, layout)
+    weighed = _weighed(listed, simulator.layout)
     selection = select(simulator, base, weighed, starts, report, seen, apart=apart)
-    std = selection.best.std
     rough = [number for number, one in enumerate(measurements) if number not in smooth or one.name in nudges]
-    start = starts.get("backlash")
-    if rough and start is not None and start.log_bayes_factor > WORTH:
-        report("simulating: backlash")
-        target = target_of(
-            [measurements[number] for number in rough], [problem.conditions[number] for number in rough]
+    if rough:
+        conditions = [problem.conditions[number] for number in rough]
+        parting = Parting(
+            tuple(measurements[number] for number in rough), tuple(conditions), nudges_of(problem.model, conditions)
         )
-        nudging = nudges_of(problem.model, [problem.conditions[number] for number in rough])
-        opened = _opened(Simulator(layout, target, simulate, nudging), selection, start, apart)
-        if opened is not None:
-            selection = opened
-            std[layout.unknowns[BACKLASH]] = SPACING * selection.best.p[layout.unknowns[BACKLASH]]
-    return Simulated(layout, simulator, selection, std, restless)
+        simulator, selection = with_parting(simulator, selection, parting, weighed, starts, report, apart=apart)
+        if not nudges:
+            restless = frozenset(simulator.nudges)
+    return Simulated(simulator.layout, simulator, selection, restless)
 
 
 def _weighed(listed: Sequence[Hypothesis], layout: Layout) -> list[Hypothesis]:
@@ -165,41 +168,12 @@ def _cracked_by_forces(problem: Problem, found: Search, cracks: Sequence[Hypothe
     return [at for at in (cracks[number].wide[0].at for number in ranked) if at is not None]
 
 
-def _opened(simulator: Simulator, selection: Selection, start: Start, apart: bool) -> Selection | None:
-    """The selection with backlash, if the records whose flanks part call for it: followed downhill they would lead
-    astray, so that backlash alone is tried there, around where the force residuals have it."""
-    unknowns = simulator.layout.unknowns
-    at, wide = unknowns[BACKLASH].start, unknowns.group(BACKLASH).wide[0]
-    costs: dict[float, float] = {}
-    for factor in (0.0, *(1.0 + SPACING * step for step in range(-2, 3))):
-        p = selection.best.p.copy()
-        p[at] = factor * start.p[at]
-        lines = simulator.lines(p)
-        if lines is not None:
-            costs[factor] = simulator.target.cost(simulator.target.lines - lines) + 0.5 * (p[at] / wide) ** 2
-    if 0.0 not in costs or len(costs) < 2:
-        return None
-    best = min(costs, key=lambda factor: costs[factor])
-    value = best * start.p[at]
-    occam = float(np.log(wide / max(SPACING * abs(value), 1e-300)))
-    worth = costs[0.0] - costs[best] - max(occam, 0.0)
-    p = selection.best.p.copy()
-    p[at] = value
-    optimum = replace(selection.best, p=p)
-    found = Weighed(start.hypothesis, worth, optimum)
-    weighed = tuple(sorted((*selection.weighed, found), key=lambda one: -one.log_bayes_factor))
-    entered_now = entering(unknowns, found, apart)
-    if entered_now is None:
-        return replace(selection, weighed=weighed)
-    entered = tuple(sorted((*selection.entered, entered_now), key=lambda one: -one.log_bayes_factor))
-    return replace(selection, best=optimum, entered=entered, weighed=weighed)
-
-
 def carried_over(layout: Layout, unknowns: Unknowns, p: Array) -> Array:
-    """Unknowns of the force residuals (size,) as those of a layout; no tooth is cracked."""
+    """Unknowns of the force residuals (size,) as those of a layout; no tooth is cracked, and backlash, which few
+    records feel, is the nominal one."""
     out = np.zeros(layout.size)
     for one in layout.unknowns.groups:
-        if one.key in unknowns.slices and one.key != CRACK:
+        if one.key in unknowns.slices and one.key not in (CRACK, BACKLASH):
             out[layout.unknowns[one.key]] = p[unknowns[one.key]]
     return out
 
@@ -218,6 +192,8 @@ def _starts(
         if one.fit is None or one.hypothesis.name not in names:
             continue
         p = carried_over(layout, unknowns, one.fit.p)
+        if one.hypothesis.wide[0].key == BACKLASH:
+            p[layout.unknowns[BACKLASH]] = one.fit.p[unknowns[BACKLASH]]
         at = one.hypothesis.wide[0].at
         if one.hypothesis.wide[0].key == CRACK and at is not None:
             p[layout.unknowns[CRACK].start + at] = max(float(one.fit.p[unknowns[CRACK].start + at]), 0.0)

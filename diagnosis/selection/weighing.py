@@ -42,13 +42,16 @@ RENEWALS = 1  # of the Jacobian, for each promising hypothesis
 @dataclass(frozen=True)
 class Weighed:
     """A hypothesis, its log Bayes factor over what was there before it, its optimum (None: by the quadratic), and of
-    one that entered the `rivals` that explain the records as well and the nats that it is `lacking` up to its limit."""
+    one that entered the `rivals` that explain the records as well and the nats that it is `lacking` up to its limit;
+    of one whose size was tried value by value its `std`, and the record that shows it if it is `only_in` that."""
 
     hypothesis: Hypothesis
     log_bayes_factor: float
     optimum: Optimum | None
     rivals: tuple[Hypothesis, ...] = ()
     lacking: float = 0.0
+    std: float | None = None
+    only_in: str = ""
 
     @property
     def causes(self) -> tuple[Hypothesis, ...]:

@@ -50,6 +50,22 @@ class Simulator:
         """The same without what nudges."""
         return Simulator(self.layout, self.target, self.simulate) if self.nudges else self
 
+    @property
+    def smooth(self) -> tuple[int, ...]:
+        """Numbers of the records that nothing nudges; all where there is none."""
+        kept = tuple(number for number, one in enumerate(self.target.measurements) if one.name not in self.nudges)
+        return kept or tuple(range(len(self.target.measurements)))
+
+    @property
+    def held_by(self) -> tuple[Measurement, ...]:
+        """Those records."""
+        return tuple(self.target.measurements[number] for number in self.smooth)
+
+    @property
+    def anchored(self) -> bool:
+        """Whether records that nothing nudges hold the rig, which those that are nudged only refine."""
+        return any(one.name not in self.nudges for one in self.target.measurements)
+
     def lines(self, p: Array) -> Complex | None:
         """Simulated lines (K,) of unknowns (size,); None where no rig has them or it does not settle."""
         key = p.tobytes()

@@ -83,10 +83,17 @@ class Target:
 
     def of_record(self, number: int) -> Target:
         """What is measured in one record alone."""
-        mine = [np.full(len(bins), record == number) for record, _, bins in self.plan]
-        alone = self.of_lines(np.concatenate(mine))
-        plan = tuple((0, channel, bins) for _, channel, bins in alone.plan)
-        return replace(alone, measurements=(self.measurements[number],), plan=plan)
+        return self.of_records((number,))
+
+    def of_records(self, numbers: Sequence[int]) -> Target:
+        """What is measured in some records alone."""
+        alone, place = self.of_lines(self.in_records(numbers)), {number: at for at, number in enumerate(numbers)}
+        plan = tuple((place[number], channel, bins) for number, channel, bins in alone.plan)
+        return replace(alone, measurements=tuple(self.measurements[number] for number in numbers), plan=plan)
+
+    def in_records(self, numbers: Sequence[int]) -> Flags:
+        """Which lines (K,) are in some records."""
+        return np.concatenate([np.full(len(bins), number in numbers) for number, _, bins in self.plan])
 
     def of_lines(self, inside: Flags) -> Target:
         """Those of the lines (K,) that are `inside`."""
@@ -192,6 +199,23 @@ def target_of(
         np.array(noises),
         np.array(counts, dtype=float),
         np.bincount(of_line, minlength=len(blocks)).astype(float),
+    )
+
+
+def joined(first: Target, second: Target) -> Target:
+    """The lines of both, those of the second behind."""
+    before = len(first.measurements)
+    plan = tuple((number + before, channel, bins) for number, channel, bins in second.plan)
+    return Target(
+        (*first.measurements, *second.measurements),
+        (*first.plan, *plan),
+        np.concatenate([first.lines, second.lines]),
+        np.concatenate([first.of_line, second.of_line + len(first.blocks)]),
+        (*first.blocks, *second.blocks),
+        np.concatenate([first.floors, second.floors]),
+        np.concatenate([first.noise, second.noise]),
+        np.concatenate([first.counts, second.counts]),
+        np.concatenate([first.sizes, second.sizes]),
     )
 
 

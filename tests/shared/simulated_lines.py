@@ -12,28 +12,32 @@ from gearbench.diagnosis.replay.replays import replays
 from gearbench.diagnosis.simulation.simulator import Simulator
 from gearbench.diagnosis.simulation.target import target_of
 from gearbench.diagnosis.structure.layout import layout_of
-from gearbench.rig import Load, read_case
+from gearbench.rig import Case, Load, read_case
 
 
 def demonstration(load: Load | None = None, faster: int = 1) -> Simulator:
     """Replays of one record of `gap_demo`, or of it with this load or at so many times its speed, whose tooth 3 may be
     cracked."""
-    nominal = read_case(case_files()["gap_demo"])
-    first = nominal.conditions[0]
-    quick = {
-        "mesh_frequency": faster * first.experiment.mesh_frequency,
-        "samples_per_period": first.experiment.samples_per_period // faster,
-    }
-    first = first.model_copy(update={"experiment": first.experiment.model_copy(update=quick)})
-    nominal = nominal.model_copy(update={"conditions": (first,)})
-    case = nominal.under(first)
+    nominal = quicker(faster, 1)
+    case = nominal.under(nominal.conditions[0])
     if load is not None:
         case = case.model_copy(update={"rig": case.rig.model_copy(update={"load": load})})
-    record = simulate(case)
-    measured = measurement(record, first.name, nominal)
+    measured = measurement(simulate(case), nominal.conditions[0].name, nominal)
     problem = problem_of([measured], nominal)
     layout = layout_of(nominal, problem.model, problem.conditions, (3,))
     return Simulator(layout, target_of([measured], problem.conditions), replays(problem.model.law))
+
+
+def quicker(faster: int, conditions: int) -> Case:
+    """`gap_demo` with its first conditions, at so many times its speed."""
+    nominal, out = read_case(case_files()["gap_demo"]), []
+    for one in nominal.conditions[:conditions]:
+        quick = {
+            "mesh_frequency": faster * one.experiment.mesh_frequency,
+            "samples_per_period": one.experiment.samples_per_period // faster,
+        }
+        out.append(one.model_copy(update={"experiment": one.experiment.model_copy(update=quick)}))
+    return nominal.model_copy(update={"conditions": tuple(out)})
 
 
 def jacobian_at(simulator: Simulator, p: np.ndarray) -> np.ndarray:

@@ -46,7 +46,7 @@ def found(changes: np.ndarray, monkeypatch: pytest.MonkeyPatch, columns: np.ndar
     target = SimpleNamespace(plan=((0, "dte", BINS), (0, "y_driver", BINS)), measurements=(None,))
     optimum = SimpleNamespace(sensitivity=SimpleNamespace(jacobian=derivatives() if columns is None else columns))
     simulated: Any = SimpleNamespace(
-        simulator=SimpleNamespace(nudges={}, target=target),
+        simulator=SimpleNamespace(nudges={}, target=target, smooth=(0,)),
         selection=SimpleNamespace(best=optimum),
         layout=SimpleNamespace(unknowns=UNKNOWNS),
     )

@@ -52,6 +52,14 @@ class Answering(FakeSimulator):
     def __post_init__(self) -> None:
         self.free = self.free or self
 
+    @property
+    def anchored(self) -> bool:
+        return not self.nudges
+
+    @property
+    def held_by(self) -> tuple[Any, ...]:
+        return self.target.measurements
+
     def channels(self, p: np.ndarray, measured: Any) -> dict[str, np.ndarray]:
         return {"lines": p @ OTHER, "dte": np.zeros(8)}
 
@@ -94,7 +102,7 @@ def judged(
     monkeypatch.setattr(module, "prepare", lambda measured, model, band: None)
     problem: Any = SimpleNamespace(model=None, conditions=[SimpleNamespace(band=1.0)])
     layout: Any = simulator.layout
-    found = judged_on(problem, Simulated(layout, simulator, selection, selection.best.std), None)  # type: ignore[arg-type]
+    found = judged_on(problem, Simulated(layout, simulator, selection), None)  # type: ignore[arg-type]
     assert found is not None
     return found
 
@@ -283,7 +291,7 @@ def test_what_the_judged_record_does_not_feel_is_told_by_one_whose_flanks_part(
     monkeypatch.setattr(module, "prepare", lambda measured, model, band: None)
     problem: Any = SimpleNamespace(model=None, conditions=[SimpleNamespace(band=1.0)])
     layout: Any = simulator.layout
-    whole: Any = Simulated(layout, simulator, selection, selection.best.std)  # type: ignore[arg-type]
+    whole: Any = Simulated(layout, simulator, selection)  # type: ignore[arg-type]
     held, rough = HELD, LIGHT
     assert names(judged_on(problem, whole, held).found.selection.entered) == []  # type: ignore[arg-type, union-attr]
     found = judged_on(problem, whole, held, (rough,))  # type: ignore[arg-type]

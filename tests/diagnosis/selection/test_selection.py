@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from gearbench.diagnosis.selection import selection as module
 from gearbench.diagnosis.selection import weighing
 from gearbench.diagnosis.selection.by_forces import Start
 from gearbench.diagnosis.selection.rivals import compared, is_like, rivals_of, usual_of
-from gearbench.diagnosis.selection.selection import Selection, known_within
+from gearbench.diagnosis.selection.selection import Selection, carried_on, known_within
 from gearbench.diagnosis.selection.weighing import LIMIT, Weighed
 
 MATRIX = sensitivities(3)
@@ -267,3 +268,24 @@ def test_a_number_known_to_a_third_or_worse_may_be_nothing() -> None:
     low, high = known_within(np.array([0.1, 0.4]))
     assert np.exp(low[0]) == pytest.approx(0.7) and np.exp(low[1]) < 0.01
     np.testing.assert_allclose(high, [0.3, 1.2])
+
+
+def test_what_further_records_call_for_enters_beside_what_is_there() -> None:
+    p = np.array([0.08, -0.1, 0.02, 0.4, 0.3, -0.2, 0.0, 0.0])
+    few = MATRIX.copy()
+    few[3] = 0.0  # what the first records do not feel
+    rng = np.random.default_rng(11)
+    noise = 0.02 * (rng.standard_normal(LINES) + 1j * rng.standard_normal(LINES))
+    first = FakeSimulator(lambda q: q @ few, target(p @ few + noise))
+    begun = chosen(first, LISTED, [np.zeros(8)], {})
+    assert begun is not None and names(begun) == ["torque-ripple"]
+    whole: Any = FakeSimulator(lambda q: q @ MATRIX, target(p @ MATRIX + noise))
+    found = carried_on(whole, begun, LISTED)
+    assert found is not None and sorted(names(found)) == ["friction", "torque-ripple"]
+    assert found.best.p[3:6] == pytest.approx(p[3:6], abs=0.05)
+    assert found.base.misfit > found.best.misfit + LIMIT and found.bare.p[3] == 0.0
+    # One that they do not bear out leaves again.
+    sound = np.where(np.arange(8) == 4, 0.0, np.where(np.arange(8) == 5, 0.0, p))
+    other: Any = FakeSimulator(lambda q: q @ MATRIX, target(sound @ MATRIX + noise))
+    found = carried_on(other, begun, LISTED)
+    assert found is not None and names(found) == ["friction"]

@@ -1,0 +1,163 @@
+"""Records whose flanks part, beside those that a fit could follow.
+
+Followed downhill on their own they lead astray: a small change makes jumps. Where the smooth records have led close to
+them, with the driver nudged along its measured motion, they are taken in, and all is fitted and weighed again on all
+records: how a mesh carries little load, and its backlash, shows there alone. Where they stay far, backlash alone is
+tried, and believed where the force residuals have as much.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import inf
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.diagnosis.effects.backlash import KEY as BACKLASH
+from gearbench.diagnosis.effects.effect import Hypothesis
+from gearbench.diagnosis.fitting.fit import Optimum
+from gearbench.diagnosis.forces.condition import Condition
+from gearbench.diagnosis.forces.unknowns import Unknowns
+from gearbench.diagnosis.intake.measurements import Measurement
+from gearbench.diagnosis.selection.by_forces import Start
+from gearbench.diagnosis.selection.opened import opened
+from gearbench.diagnosis.selection.selection import Selection, carried_on
+from gearbench.diagnosis.selection.weighing import WORTH, Weighed, entering
+from gearbench.diagnosis.simulation.simulator import Simulator
+from gearbench.diagnosis.simulation.target import Target, joined, target_of
+
+Array = NDArray[np.float64]
+Report = Callable[[str], None]
+
+# Part of any channel's fluctuation up to which a nudged simulation may be off a record for it to be taken in, as the
+# smooth records have led to it and after a fit.
+NEAR, FOLLOWED = 0.15, 0.05
+# Part of the force residuals' backlash by which that of a simulation may differ where nothing else is followed.
+AGREES = 0.35
+
+
+@dataclass(frozen=True)
+class Parting:
+    """Measurements whose flanks part, with their conditions, and what nudges the driver in each [N s/m] by its name."""
+
+    measurements: tuple[Measurement, ...]
+    conditions: tuple[Condition, ...]
+    nudges: Mapping[str, float]
+
+    @property
+    def target(self) -> Target:
+        """Their lines."""
+        return target_of(self.measurements, self.conditions)
+
+
+def with_parting(
+    simulator: Simulator,
+    selection: Selection,
+    parting: Parting,
+    hypotheses: Sequence[Hypothesis],
+    starts: Mapping[str, Start],
+    report: Report = lambda step: None,
+    *,
+    apart: bool = False,
+) -> tuple[Simulator, Selection]:
+    """The simulator and the selection with the records whose flanks part taken in, where they can be followed, or with
+    what they say of the backlash."""
+    alone = Simulator(simulator.layout, parting.target, simulator.simulate, parting.nudges)
+    if not simulator.nudges and len(parting.nudges) == len(parting.measurements):
+        found = _taken_in(simulator, alone, selection, hypotheses, report, apart)
+        if found is not None:
+            return found
+    start = starts.get("backlash")
+    if start is None or start.log_bayes_factor <= WORTH:
+        return simulator, selection
+    report("simulating: backlash")
+    opened_there = with_backlash(alone, selection, start.hypothesis, apart)
+    forces, value = (float(p[simulator.layout.unknowns[BACKLASH]][0]) for p in (start.p, opened_there.best.p))
+    return simulator, opened_there if abs(value - forces) <= AGREES * abs(forces) else selection
+
+
+def _taken_in(
+    simulator: Simulator,
+    alone: Simulator,
+    selection: Selection,
+    hypotheses: Sequence[Hypothesis],
+    report: Report,
+    apart: bool,
+) -> tuple[Simulator, Selection] | None:
+    """The simulator of all records, and the selection on them; None where those `alone` are not followed."""
+    backlash = next((one for one in hypotheses if one.wide[0].key == BACKLASH), None)
+    begun = with_backlash(alone, selection, backlash, apart, share=True) if backlash is not None else selection
+    if off(alone, begun.best.p) > NEAR:
+        return None
+    report("simulating: records whose flanks part")
+    whole = Simulator(simulator.layout, joined(simulator.target, alone.target), simulator.simulate, alone.nudges)
+    found = carried_on(whole, begun, hypotheses, report, apart=apart)
+    if found is None or off(alone, found.best.p) > FOLLOWED:
+        return None
+    return whole, resized(whole, found)
+
+
+def off(alone: Simulator, p: Array) -> float:
+    """The largest part of any channel's fluctuation in a record that the rig `p` (size,) leaves beyond noise; infinite
+    where there is no such rig."""
+    target, lines = alone.target, alone.lines(p)
+    if lines is None:
+        return inf
+    left = (target.energies(target.lines - lines) - target.noise) * target.sizes
+    whole = target.energies(target.lines) * target.sizes
+    channels = {(block.record, block.channel) for block in target.blocks}
+    inside = [np.array([(block.record, block.channel) == one for block in target.blocks]) for one in channels]
+    return max(float(np.sqrt(max(left[mine].sum(), 0.0) / whole[mine].sum())) for mine in inside)
+
+
+def with_backlash(
+    simulator: Simulator,
+    selection: Selection,
+    backlash: Hypothesis,
+    apart: bool,
+    *,
+    only_in: str = "",
+    share: bool = False,
+) -> Selection:
+    """The selection with backlash, if these records call for it; `only_in`: name of the one that alone can; `share`:
+    or else with a good rig's share of it."""
+    if _backlash_of(selection) is not None:
+        return selection
+    unknowns, found = simulator.layout.unknowns, opened(simulator, selection.best.p)
+    if found is None:
+        return selection
+    best = _at(unknowns, selection.best, found.value, backlash.widened(unknowns, selection.best.sd))
+    weighed = Weighed(backlash, found.worth, best, std=found.std, only_in=only_in)
+    listed = tuple(sorted((*selection.weighed, weighed), key=lambda one: -one.log_bayes_factor))
+    entered = entering(unknowns, weighed, apart)
+    if share:
+        base = _at(unknowns, selection.base, found.good, selection.base.sd)
+        here = _at(unknowns, selection.best, found.good, selection.best.sd) if selection.entered else base
+        selection = replace(selection, base=base, bare=base, best=here)
+    if entered is None:
+        return replace(selection, weighed=listed)
+    return replace(selection, best=best, entered=(*selection.entered, entered), weighed=listed)
+
+
+def resized(simulator: Simulator, selection: Selection) -> Selection:
+    """The selection with the size that its backlash has beside all that was fitted after it, if it has any."""
+    one = _backlash_of(selection)
+    found = opened(simulator, selection.best.p) if one is not None else None
+    if one is None or found is None:
+        return selection
+    best = _at(simulator.layout.unknowns, selection.best, found.value, selection.best.sd)
+    now = replace(one, std=found.std)
+    return replace(selection, best=best, entered=tuple(now if other is one else other for other in selection.entered))
+
+
+def _backlash_of(selection: Selection) -> Weighed | None:
+    return next((one for one in selection.entered if one.hypothesis.wide[0].key == BACKLASH), None)
+
+
+def _at(unknowns: Unknowns, best: Optimum, value: float, sd: Array) -> Optimum:
+    """The optimum with that backlash [m] under the prior `sd` (size,), all else as it is."""
+    p = best.p.copy()
+    p[unknowns[BACKLASH]] = value
+    return replace(best, p=p, sd=sd)

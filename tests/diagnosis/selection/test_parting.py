@@ -1,0 +1,101 @@
+"""Records whose flanks part, beside smooth ones: of the demonstration, whose light record rattles."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from shared.simulated_lines import quicker
+
+from gearbench.bench import simulate
+from gearbench.diagnosis.effects.backlash import KEY as BACKLASH
+from gearbench.diagnosis.effects.library import hypotheses
+from gearbench.diagnosis.evidence.problem import Problem, problem_of
+from gearbench.diagnosis.fitting.fit import fit_afresh
+from gearbench.diagnosis.intake.measurements import Measurement, measurement
+from gearbench.diagnosis.judging.judged import judged_on
+from gearbench.diagnosis.judging.only_there import with_backlash_there
+from gearbench.diagnosis.replay.replays import replays
+from gearbench.diagnosis.selection import parting as module
+from gearbench.diagnosis.selection.followable import nudges_of
+from gearbench.diagnosis.selection.parting import FOLLOWED, NEAR, Parting, off, with_parting
+from gearbench.diagnosis.selection.selection import Selection
+from gearbench.diagnosis.selection.simulated import Simulated
+from gearbench.diagnosis.simulation.simulator import Simulator
+from gearbench.diagnosis.simulation.target import target_of
+from gearbench.diagnosis.structure.layout import layout_of
+
+
+class Searched(NamedTuple):
+    """A smooth record and the rough one beside it, of a rig with the unknowns `true`, and what the smooth one says."""
+
+    problem: Problem
+    simulator: Simulator
+    selection: Selection
+    rough: Measurement
+    parting: Parting
+    true: np.ndarray
+
+
+def searched(more: float, faster: int) -> Searched:
+    """With so much backlash [m] beyond the nominal one, and a mesh that is off."""
+    nominal = quicker(faster, 2)
+    records = [measurement(simulate(nominal.under(one)), one.name, nominal) for one in nominal.conditions]
+    model = problem_of(records, nominal).model
+    layout = layout_of(nominal, model, problem_of(records, nominal).conditions, ())
+    keys, true = layout.unknowns, np.zeros(layout.size)
+    true[keys[BACKLASH]], true[keys["scale"]], true[keys["mesh-ratio"]] = more, 0.06, 0.2
+    rig = layout.case(true).rig
+    records = [
+        measurement(simulate(nominal.under(one).model_copy(update={"rig": rig})), one.name, nominal)
+        for one in nominal.conditions
+    ]
+    problem = problem_of(records, nominal)
+    smooth = Simulator(layout, target_of(records[:1], problem.conditions[:1]), replays(model.law))
+    found = fit_afresh(smooth, np.zeros(layout.size), keys.prior(), renewals=1)
+    assert found is not None
+    parting = Parting((records[1],), (problem.conditions[1],), nudges_of(model, problem.conditions[1:]))
+    return Searched(problem, smooth, Selection(found, found, found, (), ()), records[1], parting, true)
+
+
+def test_a_record_whose_flanks_part_is_taken_in_with_a_good_rigs_share_of_backlash() -> None:
+    of = searched(-25e-6, 6)
+    keys, smooth = of.simulator.layout.unknowns, of.selection.best.p
+    alone = Simulator(of.simulator.layout, of.parting.target, of.simulator.simulate, of.parting.nudges)
+    assert off(alone, smooth) > NEAR and smooth[keys[BACKLASH]] == 0.0
+    listed = hypotheses(of.problem.model, ())
+    whole, found = with_parting(of.simulator, of.selection, of.parting, listed, {})
+    assert [one.name for one in whole.target.measurements] == ["base", "light"]
+    assert whole.nudges == of.parting.nudges and whole.anchored and whole.held_by == of.simulator.target.measurements
+    # Less than four of a good rig's standard deviations are no effect; the mean of repetitions is the noise.
+    assert not found.entered and found.best.p[keys[BACKLASH]] == pytest.approx(-25e-6, abs=0.5e-6)
+    assert off(alone, found.best.p) < min(FOLLOWED, 2.0 * off(alone, of.true))
+    assert found.best.p[keys["scale"]] == pytest.approx(0.06, abs=0.02)
+    assert found.best.p[keys["mesh-ratio"]] == pytest.approx(0.2, abs=0.03)
+
+
+def test_one_that_stays_far_is_not_taken_in(monkeypatch: pytest.MonkeyPatch) -> None:
+    of = searched(0.0, 6)
+    monkeypatch.setattr(module, "NEAR", 1e-6)
+    simulator, found = with_parting(of.simulator, of.selection, of.parting, hypotheses(of.problem.model, ()), {})
+    assert simulator is of.simulator and found is of.selection
+
+
+def test_backlash_that_the_judged_record_alone_shows_is_found_there() -> None:
+    of = searched(-40e-6, 6)
+    keys = of.simulator.layout.unknowns
+    before = Simulated(of.simulator.layout, of.simulator, of.selection)
+    found = with_backlash_there(of.problem, before, of.rough)
+    (one,) = found.selection.entered
+    assert one.hypothesis.name == "backlash" and one.only_in == "light"
+    at = keys[BACKLASH].start
+    assert found.selection.best.p[at] == pytest.approx(-40e-6, abs=1e-6) and 0.0 < found.std[at] < 3e-6
+    assert found.selection.bare.p[at] == 0.0
+    # The records of the search are explained as before.
+    assert np.array_equal(of.simulator.lines(found.selection.best.p), of.simulator.lines(of.selection.best.p))
+    judged = judged_on(of.problem, found, of.rough)
+    assert judged is not None and judged.closings["backlash"].due and judged.closings["backlash"].growth > 3.0
+    sound = searched(0.0, 6)
+    before = Simulated(sound.simulator.layout, sound.simulator, sound.selection)
+    assert with_backlash_there(sound.problem, before, sound.rough) is before
