@@ -68,6 +68,12 @@ def test_a_record_whose_flanks_part_is_taken_in_with_a_good_rigs_share_of_backla
     whole, found = with_parting(of.simulator, of.selection, of.parting, listed, {})
     assert [one.name for one in whole.target.measurements] == ["base", "light"]
     assert whole.nudges == of.parting.nudges and whole.anchored and whole.held_by == of.simulator.target.measurements
+    parts = [(one.target, one.target.energies(one.target.lines)) for one in (of.simulator, alone)]
+    together = whole.target.energies(whole.target.lines)
+    assert together == pytest.approx(np.concatenate([energies for _, energies in parts]))
+    for number, (target, energies) in enumerate(parts):
+        one = whole.target.of_record(number)
+        assert one.energies(one.lines) == pytest.approx(energies) and one.blocks == target.blocks
     # Less than four of a good rig's standard deviations are no effect; the mean of repetitions is the noise.
     assert not found.entered and found.best.p[keys[BACKLASH]] == pytest.approx(-25e-6, abs=0.5e-6)
     assert off(alone, found.best.p) < min(FOLLOWED, 2.0 * off(alone, of.true))
