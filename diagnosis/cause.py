@@ -46,8 +46,8 @@ def find_cause(
     best = named(result)
     fit = best.fit if best and best.fit else result.base
     simulate = replays(problem.model.sound)
-    apart = held_out is not None and held_out.phase_known
-    found = simulated(problem, result, measurements, nominal, simulate, without, report, apart=apart)
+    judged = held_out if held_out is not None and held_out.phase_known else None
+    found = simulated(problem, result, measurements, nominal, simulate, without, report, judged=judged)
     report("steadiness")
     band, steady = problem.conditions[0].band, repeating(measurements, found)
     unsteady = unsteadiness(problem.model, steady, problem.unknowns, fit.p, band)

@@ -21,7 +21,7 @@ from gearbench.diagnosis.fitting.fit import Optimum
 from gearbench.diagnosis.forces.condition import prepare
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.intake.signals import measured_channels
-from gearbench.diagnosis.selection.followable import LOSING, lost_contact, nudges_of
+from gearbench.diagnosis.selection.followable import nudges_of, parts
 from gearbench.diagnosis.selection.selection import further, only, taken_out
 from gearbench.diagnosis.selection.simulated import Simulated
 from gearbench.diagnosis.selection.weighing import Weighed, is_own
@@ -239,8 +239,7 @@ def is_nudged(found: Simulated, measured: Measurement) -> bool:
     """Whether the driver is nudged in a record that judges: where all records of the search are, or some, and its
     flanks part as theirs."""
     if found.simulator.anchored and found.simulator.nudges:
-        lost = lost_contact(found.layout.nominal, [measured], found.simulator.simulate)
-        return bool(lost and lost[0] >= LOSING)
+        return parts(found.layout.nominal, measured, found.simulator.simulate)
     return bool(found.simulator.nudges)
 
 

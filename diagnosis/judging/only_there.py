@@ -11,7 +11,8 @@ from gearbench.diagnosis.effects.backlash import BACKLASH
 from gearbench.diagnosis.evidence.problem import Problem
 from gearbench.diagnosis.forces.condition import prepare
 from gearbench.diagnosis.intake.measurements import Measurement
-from gearbench.diagnosis.selection.followable import LOSING, lost_contact, nudges_of
+from gearbench.diagnosis.selection.followable import nudges_of, parts
+from gearbench.diagnosis.selection.opened import opened
 from gearbench.diagnosis.selection.parting import FOLLOWED, off, with_backlash
 from gearbench.diagnosis.selection.simulated import Simulated
 from gearbench.diagnosis.simulation.simulator import Simulator
@@ -23,16 +24,16 @@ CLOSED = 0.5
 
 def with_backlash_there(problem: Problem, found: Simulated, measured: Measurement) -> Simulated:
     """What simulation found, with the backlash that the judged record alone shows, if it is far off without."""
-    lost = lost_contact(found.layout.nominal, [measured], found.simulator.simulate)
     condition = prepare(measured, problem.model, problem.conditions[0].band)
     nudges = nudges_of(problem.model, [condition])
-    if not lost or lost[0] < LOSING or not nudges:
+    if not nudges or not parts(found.layout.nominal, measured, found.simulator.simulate):
         return found
     searched, simulate = found.simulator, found.simulator.simulate
     alone = Simulator(found.layout, target_of([measured], [condition]), simulate, nudges)
     both = Simulator(found.layout, joined(searched.target, alone.target), simulate, {**searched.nudges, **nudges})
     (backlash,) = BACKLASH.hypotheses(problem.model)
-    selection = with_backlash(both, found.selection, backlash, apart=False, only_in=measured.name)
+    more = opened(both, found.selection.best.p)
+    selection = with_backlash(both, found.selection, backlash, more, apart=False, only_in=measured.name)
     if len(selection.entered) == len(found.selection.entered):
         return found
     left, before = off(alone, selection.best.p), off(alone, found.selection.best.p)

@@ -58,6 +58,12 @@ def smooth_records(rigs: Sequence[Case], measurements: Sequence[Measurement], si
     return []
 
 
+def parts(rig: Case, measured: Measurement, simulate: Replay) -> bool:
+    """Whether the flanks of a rig part in a record so long that no fit can follow it; not where it cannot be told."""
+    lost = lost_contact(rig, [measured], simulate)
+    return bool(lost and lost[0] >= LOSING)
+
+
 def lost_contact(rig: Case, measurements: Sequence[Measurement], simulate: Replay) -> list[float]:
     """Part of the time that the flanks of a rig are apart in each record; empty where it cannot be simulated in one of
     them, or one does not tell the mesh phase."""

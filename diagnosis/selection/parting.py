@@ -22,7 +22,7 @@ from gearbench.diagnosis.forces.condition import Condition
 from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.selection.by_forces import Start
-from gearbench.diagnosis.selection.opened import opened
+from gearbench.diagnosis.selection.opened import Opened, opened
 from gearbench.diagnosis.selection.selection import Selection, carried_on
 from gearbench.diagnosis.selection.weighing import WORTH, Weighed, entering
 from gearbench.diagnosis.simulation.simulator import Simulator
@@ -60,43 +60,54 @@ def with_parting(
     starts: Mapping[str, Start],
     report: Report = lambda step: None,
     *,
+    wanted: bool,
     apart: bool = False,
 ) -> tuple[Simulator, Selection]:
-    """The simulator and the selection with the records whose flanks part taken in, where they can be followed, or with
-    what they say of the backlash."""
-    alone = Simulator(simulator.layout, parting.target, simulator.simulate, parting.nudges)
-    if not simulator.nudges and len(parting.nudges) == len(parting.measurements):
-        found = _taken_in(simulator, alone, selection, hypotheses, report, apart)
-        if found is not None:
-            return found
-    start = starts.get("backlash")
-    if start is None or start.log_bayes_factor <= WORTH:
+    """The simulator and the selection with the records whose flanks part taken in, where that is `wanted` and they can
+    be followed, or with what they say of the backlash."""
+    backlash = next((one for one in hypotheses if one.wide[0].key == BACKLASH), None)
+    if backlash is None:
         return simulator, selection
     report("simulating: backlash")
-    opened_there = with_backlash(alone, selection, start.hypothesis, apart)
-    forces, value = (float(p[simulator.layout.unknowns[BACKLASH]][0]) for p in (start.p, opened_there.best.p))
-    return simulator, opened_there if abs(value - forces) <= AGREES * abs(forces) else selection
+    alone = Simulator(simulator.layout, parting.target, simulator.simulate, parting.nudges)
+    beside = not simulator.nudges and len(parting.nudges) == len(parting.measurements)
+    found = opened(alone, selection.best.p)
+    if found is None and not (beside and wanted):
+        return simulator, selection
+    if beside and wanted:
+        taken = _taken_in(simulator, alone, selection, backlash, found, hypotheses, report, apart)
+        if taken is not None:
+            return taken
+    with_it = with_backlash(simulator, selection, backlash, found, apart)
+    if beside and off(alone, with_it.best.p) < FOLLOWED:
+        return simulator, with_it
+    start = starts.get(backlash.name)
+    if found is None or start is None or start.log_bayes_factor <= WORTH:
+        return simulator, selection
+    forces = float(start.p[simulator.layout.unknowns[BACKLASH]][0])
+    return simulator, with_it if abs(found.value - forces) <= AGREES * abs(forces) else selection
 
 
 def _taken_in(
     simulator: Simulator,
     alone: Simulator,
     selection: Selection,
+    backlash: Hypothesis,
+    found: Opened | None,
     hypotheses: Sequence[Hypothesis],
     report: Report,
     apart: bool,
 ) -> tuple[Simulator, Selection] | None:
     """The simulator of all records, and the selection on them; None where those `alone` are not followed."""
-    backlash = next((one for one in hypotheses if one.wide[0].key == BACKLASH), None)
-    begun = with_backlash(alone, selection, backlash, apart, share=True) if backlash is not None else selection
+    begun = with_backlash(simulator, _with_share(simulator.layout.unknowns, selection, found), backlash, found, apart)
     if off(alone, begun.best.p) > NEAR:
         return None
     report("simulating: records whose flanks part")
     whole = Simulator(simulator.layout, joined(simulator.target, alone.target), simulator.simulate, alone.nudges)
-    found = carried_on(whole, begun, hypotheses, report, apart=apart)
-    if found is None or off(alone, found.best.p) > FOLLOWED:
+    further = carried_on(whole, begun, hypotheses, report, apart=apart)
+    if further is None or off(alone, further.best.p) > FOLLOWED:
         return None
-    return whole, resized(whole, found)
+    return whole, resized(whole, further)
 
 
 def off(alone: Simulator, p: Array) -> float:
@@ -116,29 +127,32 @@ def with_backlash(
     simulator: Simulator,
     selection: Selection,
     backlash: Hypothesis,
+    found: Opened | None,
     apart: bool,
     *,
     only_in: str = "",
-    share: bool = False,
 ) -> Selection:
-    """The selection with backlash, if these records call for it; `only_in`: name of the one that alone can; `share`:
-    or else with a good rig's share of it."""
-    if _backlash_of(selection) is not None:
+    """The selection with the backlash that was found, if records call for it; `only_in`: name of the one that alone
+    does."""
+    if found is None or _backlash_of(selection) is not None:
         return selection
-    unknowns, found = simulator.layout.unknowns, opened(simulator, selection.best.p)
-    if found is None:
-        return selection
+    unknowns = simulator.layout.unknowns
     best = _at(unknowns, selection.best, found.value, backlash.widened(unknowns, selection.best.sd))
     weighed = Weighed(backlash, found.worth, best, std=found.std, only_in=only_in)
     listed = tuple(sorted((*selection.weighed, weighed), key=lambda one: -one.log_bayes_factor))
     entered = entering(unknowns, weighed, apart)
-    if share:
-        base = _at(unknowns, selection.base, found.good, selection.base.sd)
-        here = _at(unknowns, selection.best, found.good, selection.best.sd) if selection.entered else base
-        selection = replace(selection, base=base, bare=base, best=here)
     if entered is None:
         return replace(selection, weighed=listed)
     return replace(selection, best=best, entered=(*selection.entered, entered), weighed=listed)
+
+
+def _with_share(unknowns: Unknowns, selection: Selection, found: Opened | None) -> Selection:
+    """The selection with a good rig's share of the backlash that was found."""
+    if found is None:
+        return selection
+    base = _at(unknowns, selection.base, found.good, selection.base.sd)
+    best = _at(unknowns, selection.best, found.good, selection.best.sd) if selection.entered else base
+    return replace(selection, base=base, bare=base, best=best)
 
 
 def resized(simulator: Simulator, selection: Selection) -> Selection:

@@ -24,7 +24,7 @@ from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.replay.replays import Replay
 from gearbench.diagnosis.selection.by_forces import Start, begun_by_forces
 from gearbench.diagnosis.selection.by_losses import with_losses
-from gearbench.diagnosis.selection.followable import followable, nudges_of
+from gearbench.diagnosis.selection.followable import followable, nudges_of, parts
 from gearbench.diagnosis.selection.parting import Parting, with_parting
 from gearbench.diagnosis.selection.selection import Selection, select
 from gearbench.diagnosis.selection.weighing import Weighed
@@ -107,12 +107,12 @@ def simulated(
     without: Sequence[str] = (),
     report: Report = lambda step: None,
     *,
-    apart: bool = False,
+    judged: Measurement | None = None,
 ) -> Simulated | None:
     """Which effects the records call for, by simulation; None where the nominal rig cannot be simulated at all, records
     do not tell the mesh phase, or flanks part in all of them, on the nominal rig and on that of the force residuals.
-    `apart`: another record judges what enters."""
-    layout = layout_of(nominal, problem.model, problem.conditions, ())
+    `judged`: the record that judges what enters, None where none does."""
+    apart, layout = judged is not None, layout_of(nominal, problem.model, problem.conditions, ())
     by_forces = carried_over(layout, problem.unknowns, found.base.p)
     smooth, nudges, restless = followable((nominal, layout.case(by_forces)), measurements, problem, simulate)
     if not smooth:
@@ -151,9 +151,12 @@ def simulated(
         parting = Parting(
             tuple(measurements[number] for number in rough), tuple(conditions), nudges_of(problem.model, conditions)
         )
-        simulator, selection = with_parting(simulator, selection, parting, weighed, starts, report, apart=apart)
-        if not nudges:
-            restless = frozenset(simulator.nudges)
+        # Only a record whose flanks part needs what others tell of that.
+        wanted = judged is not None and parts(nominal, judged, simulate)
+        simulator, selection = with_parting(
+            simulator, selection, parting, weighed, starts, report, wanted=wanted, apart=apart
+        )
+        restless = restless if nudges else frozenset(simulator.nudges)
     return Simulated(simulator.layout, simulator, selection, restless)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -38,6 +39,7 @@ class Searched(NamedTuple):
     true: np.ndarray
 
 
+@cache
 def searched(more: float, faster: int) -> Searched:
     """With so much backlash [m] beyond the nominal one, and a mesh that is off."""
     nominal = quicker(faster, 2)
@@ -65,7 +67,7 @@ def test_a_record_whose_flanks_part_is_taken_in_with_a_good_rigs_share_of_backla
     alone = Simulator(of.simulator.layout, of.parting.target, of.simulator.simulate, of.parting.nudges)
     assert off(alone, smooth) > NEAR and smooth[keys[BACKLASH]] == 0.0
     listed = hypotheses(of.problem.model, ())
-    whole, found = with_parting(of.simulator, of.selection, of.parting, listed, {})
+    whole, found = with_parting(of.simulator, of.selection, of.parting, listed, {}, wanted=True)
     assert [one.name for one in whole.target.measurements] == ["base", "light"]
     assert whole.nudges == of.parting.nudges and whole.anchored and whole.held_by == of.simulator.target.measurements
     parts = [(one.target, one.target.energies(one.target.lines)) for one in (of.simulator, alone)]
@@ -81,22 +83,34 @@ def test_a_record_whose_flanks_part_is_taken_in_with_a_good_rigs_share_of_backla
     assert found.best.p[keys["mesh-ratio"]] == pytest.approx(0.2, abs=0.03)
 
 
-def test_one_that_stays_far_is_not_taken_in(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_one_that_stays_far_or_that_nothing_needs_is_not_taken_in(monkeypatch: pytest.MonkeyPatch) -> None:
     of = searched(0.0, 6)
-    monkeypatch.setattr(module, "NEAR", 1e-6)
-    simulator, found = with_parting(of.simulator, of.selection, of.parting, hypotheses(of.problem.model, ()), {})
-    assert simulator is of.simulator and found is of.selection
+    listed = hypotheses(of.problem.model, ())
+    for wanted in (False, True):
+        monkeypatch.setattr(module, "NEAR", 1e-6 if wanted else NEAR)
+        simulator, found = with_parting(of.simulator, of.selection, of.parting, listed, {}, wanted=wanted)
+        assert simulator is of.simulator and found.best is of.selection.best and not found.entered
+
+
+def test_backlash_that_a_rough_record_shows_is_named_where_it_is_followed_with_it() -> None:
+    of = searched(-45e-6, 6)
+    simulator, found = with_parting(
+        of.simulator, of.selection, of.parting, hypotheses(of.problem.model, ()), {}, wanted=False
+    )
+    (one,) = found.entered
+    assert simulator is of.simulator and one.hypothesis.name == "backlash" and found.base is of.selection.base
+    assert found.best.p[simulator.layout.unknowns[BACKLASH]] == pytest.approx(-45e-6, abs=1e-6)
 
 
 def test_backlash_that_the_judged_record_alone_shows_is_found_there() -> None:
-    of = searched(-40e-6, 6)
+    of = searched(-45e-6, 6)
     keys = of.simulator.layout.unknowns
     before = Simulated(of.simulator.layout, of.simulator, of.selection)
     found = with_backlash_there(of.problem, before, of.rough)
     (one,) = found.selection.entered
     assert one.hypothesis.name == "backlash" and one.only_in == "light"
     at = keys[BACKLASH].start
-    assert found.selection.best.p[at] == pytest.approx(-40e-6, abs=1e-6) and 0.0 < found.std[at] < 3e-6
+    assert found.selection.best.p[at] == pytest.approx(-45e-6, abs=1e-6) and 0.0 < found.std[at] < 3e-6
     assert found.selection.bare.p[at] == 0.0
     # The records of the search are explained as before.
     assert np.array_equal(of.simulator.lines(found.selection.best.p), of.simulator.lines(of.selection.best.p))
