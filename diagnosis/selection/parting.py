@@ -32,8 +32,8 @@ Array = NDArray[np.float64]
 Report = Callable[[str], None]
 
 # Part of any channel's fluctuation up to which a nudged simulation may be off a record for it to be taken in, as the
-# smooth records have led to it and after a fit.
-NEAR, FOLLOWED = 0.15, 0.05
+# smooth records have led to it and after a fit; one that is not nudged needs no more where it is no further off.
+NEAR, FOLLOWED, EXPLAINED = 0.15, 0.05, 0.05
 # Part of the force residuals' backlash by which that of a simulation may differ where nothing else is followed.
 AGREES = 0.35
 
@@ -98,10 +98,13 @@ def _taken_in(
     report: Report,
     apart: bool,
 ) -> tuple[Simulator, Selection] | None:
-    """The simulator of all records, and the selection on them; None where those `alone` are not followed."""
+    """The simulator of all records, and the selection on them, or with no more than their backlash where that explains
+    them; None where those `alone` are not followed."""
     begun = with_backlash(simulator, _with_share(simulator.layout.unknowns, selection, found), backlash, found, apart)
     if off(alone, begun.best.p) > NEAR:
         return None
+    if off(alone.free, begun.best.p) < EXPLAINED:
+        return simulator, begun
     report("simulating: records whose flanks part")
     whole = Simulator(simulator.layout, joined(simulator.target, alone.target), simulator.simulate, alone.nudges)
     further = carried_on(whole, begun, hypotheses, report, apart=apart)

@@ -20,7 +20,7 @@ from gearbench.diagnosis.judging.only_there import with_backlash_there
 from gearbench.diagnosis.replay.replays import replays
 from gearbench.diagnosis.selection import parting as module
 from gearbench.diagnosis.selection.followable import nudges_of
-from gearbench.diagnosis.selection.parting import FOLLOWED, NEAR, Parting, off, with_parting
+from gearbench.diagnosis.selection.parting import EXPLAINED, FOLLOWED, NEAR, Parting, off, with_parting
 from gearbench.diagnosis.selection.selection import Selection
 from gearbench.diagnosis.selection.simulated import Simulated
 from gearbench.diagnosis.simulation.simulator import Simulator
@@ -61,12 +61,19 @@ def searched(more: float, faster: int) -> Searched:
     return Searched(problem, smooth, Selection(found, found, found, (), ()), records[1], parting, true)
 
 
-def test_a_record_whose_flanks_part_is_taken_in_with_a_good_rigs_share_of_backlash() -> None:
+def test_a_record_whose_flanks_part_is_taken_in_with_a_good_rigs_share_of_backlash(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     of = searched(-25e-6, 6)
     keys, smooth = of.simulator.layout.unknowns, of.selection.best.p
     alone = Simulator(of.simulator.layout, of.parting.target, of.simulator.simulate, of.parting.nudges)
     assert off(alone, smooth) > NEAR and smooth[keys[BACKLASH]] == 0.0
     listed = hypotheses(of.problem.model, ())
+    # With as much backlash the smooth record's rig explains it, too.
+    simulator, found = with_parting(of.simulator, of.selection, of.parting, listed, {}, wanted=True)
+    assert simulator is of.simulator and off(alone.free, found.best.p) < EXPLAINED and not found.entered
+    assert found.base is found.best and found.best.p[keys[BACKLASH]] == pytest.approx(-25e-6, abs=0.5e-6)
+    monkeypatch.setattr(module, "EXPLAINED", 0.0)
     whole, found = with_parting(of.simulator, of.selection, of.parting, listed, {}, wanted=True)
     assert [one.name for one in whole.target.measurements] == ["base", "light"]
     assert whole.nudges == of.parting.nudges and whole.anchored and whole.held_by == of.simulator.target.measurements
