@@ -33,7 +33,7 @@ def with_backlash_there(problem: Problem, found: Simulated, measured: Measuremen
     both = Simulator(found.layout, joined(searched.target, alone.target), simulate, {**searched.nudges, **nudges})
     (backlash,) = BACKLASH.hypotheses(problem.model)
     more = opened(both, found.selection.best.p)
-    selection = with_backlash(both, found.selection, backlash, more, apart=False, only_in=measured.name)
+    selection = with_backlash(both, found.selection, backlash, more, apart=True, only_in=measured.name)
     if len(selection.entered) == len(found.selection.entered):
         return found
     left, before = off(alone, selection.best.p), off(alone, found.selection.best.p)

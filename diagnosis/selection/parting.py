@@ -146,6 +146,8 @@ def with_backlash(
     entered = entering(unknowns, weighed, apart)
     if entered is None:
         return replace(selection, weighed=listed)
+    if only_in:  # what would make up for little evidence has given it
+        entered = replace(entered, lacking=0.0)
     return replace(selection, best=best, entered=(*selection.entered, entered), weighed=listed)
 
 
