@@ -19,8 +19,9 @@ from gearbench.diagnosis.simulation.simulator import Simulator
 Array = NDArray[np.float64]
 
 # What is simulated at first, over the width of the hypothesis' prior and of a good rig's.
-TRIED = np.linspace(-3.0, 3.0, 25)
+TRIED = np.array([-3.0, -2.0, *np.linspace(-1.5, 1.5, 13), 2.0, 3.0])
 NEAR_NOTHING = np.linspace(-2.0, 2.0, 5)
+FINE = 2001  # values that are integrated over, between those simulated
 # How often the values next to the likeliest come closer by half, and the nats that they differ by where it ends.
 CLOSER, ALIKE = 7, 0.5
 
@@ -60,8 +61,9 @@ def opened(simulator: Simulator, p: Array) -> Opened | None:
         if max(costs[value] for value in around) - costs[values[best]] < ALIKE:
             break
         tried((around[1:] + around[:-1]) / 2)
-    values = np.array(sorted(costs))
-    nats = np.array([costs[value] for value in values])
+    tried_at = np.array(sorted(costs))
+    values = np.union1d(tried_at, np.linspace(tried_at[0], tried_at[-1], FINE))
+    nats = np.interp(values, tried_at, [costs[value] for value in tried_at])
     worth = _evidence(values, nats, wide) - _evidence(values, nats, narrow)
     value, std = _known(values, nats, wide)
     return Opened(value, std, worth, _known(values, nats, narrow)[0])
