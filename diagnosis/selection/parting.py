@@ -66,25 +66,22 @@ def with_parting(
     """The simulator and the selection with the records whose flanks part taken in, where that is `wanted` and they can
     be followed, or with what they say of the backlash."""
     backlash = next((one for one in hypotheses if one.wide[0].key == BACKLASH), None)
-    if backlash is None:
+    beside = not simulator.nudges and len(parting.nudges) == len(parting.measurements)
+    start = starts.get("backlash")
+    forced = start is not None and start.log_bayes_factor > WORTH
+    if backlash is None or not (beside or forced):
         return simulator, selection
     report("simulating: backlash")
     alone = Simulator(simulator.layout, parting.target, simulator.simulate, parting.nudges)
-    beside = not simulator.nudges and len(parting.nudges) == len(parting.measurements)
     found = opened(alone, selection.best.p)
-    if found is None and not (beside and wanted):
-        return simulator, selection
     if beside and wanted:
         taken = _taken_in(simulator, alone, selection, backlash, found, hypotheses, report, apart)
         if taken is not None:
             return taken
     with_it = with_backlash(simulator, selection, backlash, found, apart)
-    if beside and off(alone, with_it.best.p) < FOLLOWED:
+    if found is None or with_it.best is selection.best or (beside and off(alone, with_it.best.p) < FOLLOWED):
         return simulator, with_it
-    start = starts.get(backlash.name)
-    if found is None or start is None or start.log_bayes_factor <= WORTH:
-        return simulator, selection
-    forces = float(start.p[simulator.layout.unknowns[BACKLASH]][0])
+    forces = float(start.p[simulator.layout.unknowns[BACKLASH]][0]) if start is not None and forced else 0.0
     return simulator, with_it if abs(found.value - forces) <= AGREES * abs(forces) else selection
 
 

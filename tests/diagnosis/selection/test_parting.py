@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from typing import NamedTuple
 
@@ -19,6 +20,7 @@ from gearbench.diagnosis.judging.judged import judged_on
 from gearbench.diagnosis.judging.only_there import with_backlash_there
 from gearbench.diagnosis.replay.replays import replays
 from gearbench.diagnosis.selection import parting as module
+from gearbench.diagnosis.selection.by_forces import Start
 from gearbench.diagnosis.selection.followable import nudges_of
 from gearbench.diagnosis.selection.parting import EXPLAINED, FOLLOWED, NEAR, Parting, off, with_parting
 from gearbench.diagnosis.selection.selection import Selection
@@ -107,6 +109,23 @@ def test_backlash_that_a_rough_record_shows_is_named_where_it_is_followed_with_i
     (one,) = found.entered
     assert simulator is of.simulator and one.hypothesis.name == "backlash" and found.base is of.selection.base
     assert found.best.p[simulator.layout.unknowns[BACKLASH]] == pytest.approx(-45e-6, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("forces", "evidence", "named"), [(-40e-6, 9.0, True), (-20e-6, 9.0, False), (-45e-6, 0.0, False)]
+)
+def test_where_nothing_follows_a_rough_record_the_force_residuals_must_have_as_much(
+    forces: float, evidence: float, named: bool
+) -> None:
+    of = searched(-45e-6, 6)
+    listed = hypotheses(of.problem.model, ())
+    (backlash,) = (one for one in listed if one.name == "backlash")
+    p = np.zeros(of.simulator.layout.size)
+    p[of.simulator.layout.unknowns[BACKLASH]] = forces
+    blind = replace(of.parting, nudges={})  # no angle of the driver
+    starts = {"backlash": Start(backlash, p, evidence)}
+    _, found = with_parting(of.simulator, of.selection, blind, listed, starts, wanted=True)
+    assert [one.hypothesis.name for one in found.entered] == ["backlash"] * named
 
 
 def test_backlash_that_the_judged_record_alone_shows_is_found_there() -> None:
