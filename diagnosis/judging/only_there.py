@@ -30,10 +30,13 @@ def with_backlash_there(problem: Problem, found: Simulated, measured: Measuremen
         return found
     searched, simulate = found.simulator, found.simulator.simulate
     alone = Simulator(found.layout, target_of([measured], [condition]), simulate, nudges)
-    both = Simulator(found.layout, joined(searched.target, alone.target), simulate, {**searched.nudges, **nudges})
+    # Smooth records say nothing of it.
+    rough = [number for number, one in enumerate(searched.target.measurements) if one.name in searched.nudges]
+    target = joined(searched.target.of_records(rough), alone.target) if rough else alone.target
+    told = Simulator(found.layout, target, simulate, {**searched.nudges, **nudges})
     (backlash,) = BACKLASH.hypotheses(problem.model)
-    more = opened(both, found.selection.best.p)
-    selection = with_backlash(both, found.selection, backlash, more, apart=True, only_in=measured.name)
+    more = opened(told, found.selection.best.p)
+    selection = with_backlash(told, found.selection, backlash, more, apart=True, only_in=measured.name)
     if len(selection.entered) == len(found.selection.entered):
         return found
     left, before = off(alone, selection.best.p), off(alone, found.selection.best.p)
