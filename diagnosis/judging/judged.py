@@ -148,9 +148,7 @@ class Judged:
         own = None if simulator.anchored else simulator.free.lines(self.found.end_of(best))
         lines = best.lines if own is None else own
         target = simulator.target
-        parts = (target.energies(target.lines - lines) - target.noise, target.noise, target.energies(target.lines))
-        left, noise, whole = (target.of_channels(part * target.sizes) for part in parts)
-        shares = zip(np.sqrt(np.maximum(left, 0.0) / whole), np.sqrt(noise / whole), strict=True)
+        shares = zip(*target.shares(target.lines - lines), strict=True)
         return {block.channel: (float(a), float(b)) for block, (a, b) in zip(target.blocks, shares, strict=True)}
 
     def share(self, without: Mapping[str, Array]) -> float:

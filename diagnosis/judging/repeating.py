@@ -18,7 +18,7 @@ def repeating(measurements: Sequence[Measurement], found: Simulated | None) -> t
     """The records whose flanks stay together, or part little, which simulation follows; all where it follows none."""
     if found is None:
         return tuple(measurements)
-    return tuple(one for one in found.simulator.target.measurements if one.name not in found.restless)
+    return tuple(one for one in found.simulator.held_by if one.name not in found.restless)
 
 
 def sentences_of_others(

@@ -9,7 +9,7 @@ tried, and believed where the force residuals have as much.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import inf
 
 import numpy as np
@@ -18,15 +18,13 @@ from numpy.typing import NDArray
 from gearbench.diagnosis.effects.backlash import KEY as BACKLASH
 from gearbench.diagnosis.effects.effect import Hypothesis
 from gearbench.diagnosis.fitting.fit import Optimum
-from gearbench.diagnosis.forces.condition import Condition
 from gearbench.diagnosis.forces.unknowns import Unknowns
-from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.selection.by_forces import Start
 from gearbench.diagnosis.selection.opened import Opened, opened
 from gearbench.diagnosis.selection.selection import Selection, carried_on
 from gearbench.diagnosis.selection.weighing import WORTH, Weighed, entering
 from gearbench.diagnosis.simulation.simulator import Simulator
-from gearbench.diagnosis.simulation.target import Target, joined, target_of
+from gearbench.diagnosis.simulation.target import joined
 
 Array = NDArray[np.float64]
 Report = Callable[[str], None]
@@ -38,24 +36,10 @@ NEAR, FOLLOWED, EXPLAINED = 0.15, 0.05, 0.05
 AGREES = 0.35
 
 
-@dataclass(frozen=True)
-class Parting:
-    """Measurements whose flanks part, with their conditions, and what nudges the driver in each [N s/m] by its name."""
-
-    measurements: tuple[Measurement, ...]
-    conditions: tuple[Condition, ...]
-    nudges: Mapping[str, float]
-
-    @property
-    def target(self) -> Target:
-        """Their lines."""
-        return target_of(self.measurements, self.conditions)
-
-
 def with_parting(
     simulator: Simulator,
+    alone: Simulator,
     selection: Selection,
-    parting: Parting,
     hypotheses: Sequence[Hypothesis],
     starts: Mapping[str, Start],
     report: Report = lambda step: None,
@@ -63,16 +47,15 @@ def with_parting(
     wanted: bool,
     apart: bool = False,
 ) -> tuple[Simulator, Selection]:
-    """The simulator and the selection with the records whose flanks part taken in, where that is `wanted` and they can
-    be followed, or with what they say of the backlash."""
+    """The simulator and the selection with the records of `alone`, whose flanks part, taken in, where that is `wanted`
+    and they can be followed, or with what they say of the backlash."""
     backlash = next((one for one in hypotheses if one.wide[0].key == BACKLASH), None)
-    beside = not simulator.nudges and len(parting.nudges) == len(parting.measurements)
+    beside = not simulator.nudges and all(one.name in alone.nudges for one in alone.target.measurements)
     start = starts.get("backlash")
     forced = start is not None and start.log_bayes_factor > WORTH
     if backlash is None or not (beside or forced):
         return simulator, selection
     report("simulating: backlash")
-    alone = Simulator(simulator.layout, parting.target, simulator.simulate, parting.nudges)
     found = opened(alone, selection.best.p)
     if beside and wanted:
         taken = _taken_in(simulator, alone, selection, backlash, found, hypotheses, report, apart)
@@ -116,11 +99,11 @@ def off(alone: Simulator, p: Array) -> float:
     target, lines = alone.target, alone.lines(p)
     if lines is None:
         return inf
-    left = (target.energies(target.lines - lines) - target.noise) * target.sizes
-    whole = target.energies(target.lines) * target.sizes
-    channels = {(block.record, block.channel) for block in target.blocks}
-    inside = [np.array([(block.record, block.channel) == one for block in target.blocks]) for one in channels]
-    return max(float(np.sqrt(max(left[mine].sum(), 0.0) / whole[mine].sum())) for mine in inside)
+    rest, most = target.lines - lines, 0.0
+    for number in range(len(target.measurements)):
+        left, _ = target.of_record(number).shares(rest[target.in_records((number,))])
+        most = max(most, float(left.max()))
+    return most
 
 
 def with_backlash(

@@ -101,9 +101,7 @@ def further(
     best, entered, _ = _forward(simulator, best, selection.entered, rest, starts, report, apart=apart)
     if len(entered) == len(selection.entered):
         return None
-    kept = needed(simulator, best, entered, apart)
-    best = gone_on(simulator, best, RENEWALS_LAST, partial(report, "simulating: all together"))
-    base, best, kept = held_against_background(simulator, selection.base, best, kept, report, apart=apart)
+    base, best, kept = _together(simulator, selection.base, best, entered, report, apart=apart)
     return replace(selection, base=base, bare=_without(simulator, base, kept), best=best, entered=kept)
 
 
@@ -123,22 +121,31 @@ def carried_on(
         base = fit_afresh(simulator, selection.base.p, selection.base.sd, renewals=RENEWALS_FRESH)
     if best is None or base is None:
         return None
-    taken = [one.hypothesis for one in selection.entered]
-    rest = [one for one in hypotheses if not any(is_like(one, other) for other in taken)]
     starts = _found(selection.weighed)
-    best, entered, weighed = _forward(simulator, best, selection.entered, rest, starts, report, apart=apart)
+    best, entered, weighed = _forward(simulator, best, selection.entered, hypotheses, starts, report, apart=apart)
     if len(entered) == 1:
         alone = best.evidence - base.evidence - float(np.log(entered[0].hypothesis.choices))
         entered = [replace(entered[0], log_bayes_factor=alone)]
-    kept = needed(simulator, best, entered, apart)
-    if kept:
-        best = gone_on(simulator, best, RENEWALS_LAST, partial(report, "simulating: all together"))
-        base, best, kept = held_against_background(simulator, base, best, kept, report, apart=apart)
-    else:
-        best = base
+    base, best, kept = _together(simulator, base, best, entered, report, apart=apart)
+    best = best if kept else base
     if selection.entered:
         weighed = list(selection.weighed)
     return Selection(base, _without(simulator, base, kept), best, kept, tuple(weighed))
+
+
+def _together(
+    simulator: Simulator,
+    base: Optimum,
+    best: Optimum,
+    entered: Sequence[Weighed],
+    report: Report,
+    *,
+    apart: bool,
+) -> tuple[Optimum, Optimum, tuple[Weighed, ...]]:
+    """The background's optimum, that with effects, fitted to the end, and those of what entered that stay."""
+    kept = needed(simulator, best, entered, apart)
+    best = gone_on(simulator, best, RENEWALS_LAST, partial(report, "simulating: all together"))
+    return held_against_background(simulator, base, best, kept, report, apart=apart)
 
 
 def _forward(

@@ -25,7 +25,7 @@ from gearbench.diagnosis.replay.replays import Replay
 from gearbench.diagnosis.selection.by_forces import Start, begun_by_forces
 from gearbench.diagnosis.selection.by_losses import with_losses
 from gearbench.diagnosis.selection.followable import followable, nudges_of, parts
-from gearbench.diagnosis.selection.parting import Parting, with_parting
+from gearbench.diagnosis.selection.parting import with_parting
 from gearbench.diagnosis.selection.selection import Selection, select
 from gearbench.diagnosis.selection.weighing import Weighed
 from gearbench.diagnosis.simulation.passed_noise import noise_left
@@ -38,6 +38,9 @@ from gearbench.rig import Case
 Array = NDArray[np.float64]
 Report = Callable[[str], None]
 
+# What only its own hypothesis carries over from the force residuals: no tooth is cracked else, and backlash, which few
+# records feel, is the nominal one.
+ITS_OWN = (CRACK, BACKLASH)
 CRACKED = 2  # teeth that may be cracked: those that the force residuals rank first
 
 
@@ -148,15 +151,13 @@ def simulated(
     rough = [number for number, one in enumerate(measurements) if number not in smooth or one.name in nudges]
     if rough:
         conditions = [problem.conditions[number] for number in rough]
-        parting = Parting(
-            tuple(measurements[number] for number in rough), tuple(conditions), nudges_of(problem.model, conditions)
-        )
+        target = target_of([measurements[number] for number in rough], conditions)
+        alone = Simulator(simulator.layout, target, simulate, nudges_of(problem.model, conditions))
         # Only a record whose flanks part needs what others tell of that.
         wanted = judged is not None and parts(nominal, judged, simulate)
         simulator, selection = with_parting(
-            simulator, selection, parting, weighed, starts, report, wanted=wanted, apart=apart
+            simulator, alone, selection, weighed, starts, report, wanted=wanted, apart=apart
         )
-        restless = restless if nudges else frozenset(simulator.nudges)
     return Simulated(simulator.layout, simulator, selection, restless)
 
 
@@ -172,11 +173,10 @@ def _cracked_by_forces(problem: Problem, found: Search, cracks: Sequence[Hypothe
 
 
 def carried_over(layout: Layout, unknowns: Unknowns, p: Array) -> Array:
-    """Unknowns of the force residuals (size,) as those of a layout; no tooth is cracked, and backlash, which few
-    records feel, is the nominal one."""
+    """Unknowns of the force residuals (size,) as those of a layout, but for those that a hypothesis carries alone."""
     out = np.zeros(layout.size)
     for one in layout.unknowns.groups:
-        if one.key in unknowns.slices and one.key not in (CRACK, BACKLASH):
+        if one.key in unknowns.slices and one.key not in ITS_OWN:
             out[layout.unknowns[one.key]] = p[unknowns[one.key]]
     return out
 
@@ -195,10 +195,9 @@ def _starts(
         if one.fit is None or one.hypothesis.name not in names:
             continue
         p = carried_over(layout, unknowns, one.fit.p)
-        if one.hypothesis.wide[0].key == BACKLASH:
-            p[layout.unknowns[BACKLASH]] = one.fit.p[unknowns[BACKLASH]]
-        at = one.hypothesis.wide[0].at
-        if one.hypothesis.wide[0].key == CRACK and at is not None:
-            p[layout.unknowns[CRACK].start + at] = max(float(one.fit.p[unknowns[CRACK].start + at]), 0.0)
+        if one.hypothesis.wide[0].key in ITS_OWN:
+            here, there = (one.hypothesis.entries(of) for of in (layout.unknowns, unknowns))
+            own = one.fit.p[there]
+            p[here] = np.maximum(own, 0.0) if one.hypothesis.wide[0].key == CRACK else own
         out[one.hypothesis.name] = Start(names[one.hypothesis.name], p, one.log_bayes_factor)
     return out

@@ -122,6 +122,13 @@ class Target:
         channels = np.array([block.channel for block in self.blocks])
         return np.array([values[channels == one].sum() for one in channels])
 
+    def shares(self, residual: Complex) -> tuple[Array, Array]:
+        """Of a residual (K,) by blocks (blocks,), for each one's channel: parts of its fluctuation that are left beyond
+        noise, and that are noise."""
+        parts = (self.energies(residual) - self.noise, self.noise, self.energies(self.lines))
+        left, noise, whole = (self.of_channels(part * self.sizes) for part in parts)
+        return np.sqrt(np.maximum(left, 0.0) / whole), np.sqrt(noise / whole)
+
     def nats(self, energies: Array) -> Array:
         """What mean squares (blocks,) cost a line [nats] (blocks,)."""
         return np.asarray(np.log1p(energies / self.floors))

@@ -20,8 +20,8 @@ def test_a_record_whose_flanks_part_says_nothing_of_what_changes() -> None:
     wave = 3e-6 * np.cos(2 * np.pi * 40 * np.arange(SAMPLES) / SAMPLES)
     seen = steady.periods["y_driver"] + wave * np.array([[1.0], [-1.0]])
     parting = replace(steady, name="light", periods=dict(steady.periods) | {"y_driver": seen})
-    target, restless = SimpleNamespace(measurements=(steady,)), frozenset[str]()
-    found = cast(Any, SimpleNamespace(simulator=SimpleNamespace(target=target), restless=restless))
+    restless = frozenset[str]()
+    found = cast(Any, SimpleNamespace(simulator=SimpleNamespace(held_by=(steady,)), restless=restless))
     records = (steady, parting)
 
     assert repeating(records, found) == (steady,)

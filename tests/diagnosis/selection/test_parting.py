@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cache
 from typing import NamedTuple
 
@@ -22,7 +21,7 @@ from gearbench.diagnosis.replay.replays import replays
 from gearbench.diagnosis.selection import parting as module
 from gearbench.diagnosis.selection.by_forces import Start
 from gearbench.diagnosis.selection.followable import nudges_of
-from gearbench.diagnosis.selection.parting import EXPLAINED, FOLLOWED, NEAR, Parting, off, with_parting
+from gearbench.diagnosis.selection.parting import EXPLAINED, FOLLOWED, NEAR, off, with_parting
 from gearbench.diagnosis.selection.selection import Selection
 from gearbench.diagnosis.selection.simulated import Simulated
 from gearbench.diagnosis.simulation.simulator import Simulator
@@ -37,7 +36,7 @@ class Searched(NamedTuple):
     simulator: Simulator
     selection: Selection
     rough: Measurement
-    parting: Parting
+    alone: Simulator
     true: np.ndarray
 
 
@@ -46,8 +45,8 @@ def searched(more: float, faster: int) -> Searched:
     """With so much backlash [m] beyond the nominal one, and a mesh that is off."""
     nominal = quicker(faster, 2)
     records = [measurement(simulate(nominal.under(one)), one.name, nominal) for one in nominal.conditions]
-    model = problem_of(records, nominal).model
-    layout = layout_of(nominal, model, problem_of(records, nominal).conditions, ())
+    planned = problem_of(records, nominal)
+    model, layout = planned.model, layout_of(nominal, planned.model, planned.conditions, ())
     keys, true = layout.unknowns, np.zeros(layout.size)
     true[keys[BACKLASH]], true[keys["scale"]], true[keys["mesh-ratio"]] = more, 0.06, 0.2
     rig = layout.case(true).rig
@@ -59,26 +58,26 @@ def searched(more: float, faster: int) -> Searched:
     smooth = Simulator(layout, target_of(records[:1], problem.conditions[:1]), replays(model.law))
     found = fit_afresh(smooth, np.zeros(layout.size), keys.prior(), renewals=1)
     assert found is not None
-    parting = Parting((records[1],), (problem.conditions[1],), nudges_of(model, problem.conditions[1:]))
-    return Searched(problem, smooth, Selection(found, found, found, (), ()), records[1], parting, true)
+    rough = target_of(records[1:], problem.conditions[1:])
+    alone = Simulator(layout, rough, smooth.simulate, nudges_of(model, problem.conditions[1:]))
+    return Searched(problem, smooth, Selection(found, found, found, (), ()), records[1], alone, true)
 
 
 def test_a_record_whose_flanks_part_is_taken_in_with_a_good_rigs_share_of_backlash(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     of = searched(-25e-6, 6)
-    keys, smooth = of.simulator.layout.unknowns, of.selection.best.p
-    alone = Simulator(of.simulator.layout, of.parting.target, of.simulator.simulate, of.parting.nudges)
+    keys, smooth, alone = of.simulator.layout.unknowns, of.selection.best.p, of.alone
     assert off(alone, smooth) > NEAR and smooth[keys[BACKLASH]] == 0.0
     listed = hypotheses(of.problem.model, ())
     # With as much backlash the smooth record's rig explains it, too.
-    simulator, found = with_parting(of.simulator, of.selection, of.parting, listed, {}, wanted=True)
+    simulator, found = with_parting(of.simulator, of.alone, of.selection, listed, {}, wanted=True)
     assert simulator is of.simulator and off(alone.free, found.best.p) < EXPLAINED and not found.entered
     assert found.base is found.best and found.best.p[keys[BACKLASH]] == pytest.approx(-25e-6, abs=0.5e-6)
     monkeypatch.setattr(module, "EXPLAINED", 0.0)
-    whole, found = with_parting(of.simulator, of.selection, of.parting, listed, {}, wanted=True)
+    whole, found = with_parting(of.simulator, of.alone, of.selection, listed, {}, wanted=True)
     assert [one.name for one in whole.target.measurements] == ["base", "light"]
-    assert whole.nudges == of.parting.nudges and whole.anchored and whole.held_by == of.simulator.target.measurements
+    assert whole.nudges == alone.nudges and whole.anchored and whole.held_by == of.simulator.target.measurements
     parts = [(one.target, one.target.energies(one.target.lines)) for one in (of.simulator, alone)]
     together = whole.target.energies(whole.target.lines)
     assert together == pytest.approx(np.concatenate([energies for _, energies in parts]))
@@ -97,14 +96,14 @@ def test_one_that_stays_far_or_that_nothing_needs_is_not_taken_in(monkeypatch: p
     listed = hypotheses(of.problem.model, ())
     for wanted in (False, True):
         monkeypatch.setattr(module, "NEAR", 1e-6 if wanted else NEAR)
-        simulator, found = with_parting(of.simulator, of.selection, of.parting, listed, {}, wanted=wanted)
+        simulator, found = with_parting(of.simulator, of.alone, of.selection, listed, {}, wanted=wanted)
         assert simulator is of.simulator and found.best is of.selection.best and not found.entered
 
 
 def test_backlash_that_a_rough_record_shows_is_named_where_it_is_followed_with_it() -> None:
     of = searched(-45e-6, 6)
     simulator, found = with_parting(
-        of.simulator, of.selection, of.parting, hypotheses(of.problem.model, ()), {}, wanted=False
+        of.simulator, of.alone, of.selection, hypotheses(of.problem.model, ()), {}, wanted=False
     )
     (one,) = found.entered
     assert simulator is of.simulator and one.hypothesis.name == "backlash" and found.base is of.selection.base
@@ -122,9 +121,9 @@ def test_where_nothing_follows_a_rough_record_the_force_residuals_must_have_as_m
     (backlash,) = (one for one in listed if one.name == "backlash")
     p = np.zeros(of.simulator.layout.size)
     p[of.simulator.layout.unknowns[BACKLASH]] = forces
-    blind = replace(of.parting, nudges={})  # no angle of the driver
+    blind = Simulator(of.simulator.layout, of.alone.target, of.simulator.simulate)  # no angle of the driver
     starts = {"backlash": Start(backlash, p, evidence)}
-    _, found = with_parting(of.simulator, of.selection, blind, listed, starts, wanted=True)
+    _, found = with_parting(of.simulator, blind, of.selection, listed, starts, wanted=True)
     assert [one.hypothesis.name for one in found.entered] == ["backlash"] * named
 
 
