@@ -70,15 +70,14 @@ def select(
         base = refreshed(simulator, base, unknowns.of(WEIGHED))
     base = gone_on(simulator, base, RENEWALS_FRESH)
     best, entered, weighed = _forward(simulator, base, [], hypotheses, starts, report, apart=apart)
-    kept = needed(simulator, best, entered, apart)
+    best, kept = _with_needed(simulator, base, best, entered, apart)
     if kept:
         best = gone_on(simulator, best, RENEWALS_LAST, partial(report, "simulating: all together"))
         best = restructured(simulator, best, around, report)
         report("simulating: all together, from the nominal rig")
         best = begun_at_nominal(simulator, best, _entries(unknowns, kept))
         base, best, kept = held_against_background(simulator, base, best, kept, report, apart=apart)
-    bare = _without(simulator, base, kept)
-    return Selection(base, bare, best, kept, tuple(weighed))
+    return Selection(base, _without(simulator, base, kept), best if kept else base, kept, tuple(weighed))
 
 
 def further(
@@ -127,7 +126,6 @@ def carried_on(
         alone = best.evidence - base.evidence - float(np.log(entered[0].hypothesis.choices))
         entered = [replace(entered[0], log_bayes_factor=alone)]
     base, best, kept = _together(simulator, base, best, entered, report, apart=apart)
-    best = best if kept else base
     if selection.entered:
         weighed = list(selection.weighed)
     return Selection(base, _without(simulator, base, kept), best, kept, tuple(weighed))
@@ -142,10 +140,23 @@ def _together(
     *,
     apart: bool,
 ) -> tuple[Optimum, Optimum, tuple[Weighed, ...]]:
-    """The background's optimum, that with effects, fitted to the end, and those of what entered that stay."""
+    """The background's optimum, that with the effects that stay of what entered, fitted to the end, and these."""
+    best, kept = _with_needed(simulator, base, best, entered, apart)
+    if kept:
+        best = gone_on(simulator, best, RENEWALS_LAST, partial(report, "simulating: all together"))
+        base, best, kept = held_against_background(simulator, base, best, kept, report, apart=apart)
+    return base, best if kept else base, kept
+
+
+def _with_needed(
+    simulator: Simulator, base: Optimum, best: Optimum, entered: Sequence[Weighed], apart: bool
+) -> tuple[Optimum, tuple[Weighed, ...]]:
+    """The optimum with what is needed of the effects that entered, the others no larger than in the background `base`,
+    and these effects."""
     kept = needed(simulator, best, entered, apart)
-    best = gone_on(simulator, best, RENEWALS_LAST, partial(report, "simulating: all together"))
-    return held_against_background(simulator, base, best, kept, report, apart=apart)
+    if not kept:
+        return base, kept
+    return (beside(simulator, base, best, kept) if len(kept) < len(entered) else None) or best, kept
 
 
 def _forward(

@@ -259,6 +259,22 @@ def test_structure_that_the_rig_shows_around_its_mesh_is_begun_from() -> None:
     assert found.base.p[[0, 1, 2, 3]] == pytest.approx(true[:4], abs=0.01)
 
 
+@pytest.mark.parametrize("left", [(), ("torque-ripple",)])
+def test_nothing_of_what_proves_needless_is_left(monkeypatch: pytest.MonkeyPatch, left: tuple[str, ...]) -> None:
+    """Of two that entered those not `left` go back to a good rig's share, of which their size is many."""
+
+    def only(_simulator: Any, _best: Any, entered: Any, _apart: bool) -> tuple[Weighed, ...]:
+        return tuple(one for one in entered if one.hypothesis.name in left)
+
+    monkeypatch.setattr(module, "needed", only)
+    found = selected({3: 0.4, 4: 0.3, 5: -0.2})
+    assert names(found) == list(left)
+    assert (found.best is found.base) == (not left)
+    assert found.best.sd[3] == found.base.sd[3] and abs(found.best.p[3]) < 0.1
+    if left:
+        assert found.best.p[4:6] == pytest.approx([0.3, -0.2], abs=0.1)
+
+
 def test_no_rig_at_the_start_is_no_selection() -> None:
     simulator = FakeSimulator(lambda q: q @ MATRIX, target(MATRIX[0]), largest=0.1)
     assert chosen(simulator, LISTED, [np.ones(8)], {}) is None
