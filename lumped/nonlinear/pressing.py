@@ -92,7 +92,8 @@ def travel_under(law: MeshLaw, at: Instants, force: Array) -> Array:
         with np.errstate(divide="ignore", invalid="ignore"):
             step = travel + (force - found) / stiff
         halved = 0.5 * (low + high)
-        after = np.where((step > low) & (step < high), step, halved)
+        # One that rounding leaves at a bound is there; half way to the other would begin anew.
+        after = np.where((step >= low) & (step <= high), step, halved)
         if np.all(np.abs(after - travel) <= CLOSE * (high - low + law.approach[-1])):
             return np.asarray(after)
         travel = after

@@ -23,6 +23,7 @@ Integers = NDArray[np.int64]
 
 
 ANEW = 64  # entries between which a wave is turned on: 1e-14 of it
+NEXT = 0.02  # angle [rad] up to which the series of sine and cosine are exact to rounding
 
 
 class Table(NamedTuple):
@@ -174,10 +175,9 @@ def tables(model: NonLinear, motion: Motion) -> Table:
     )
     varied = motion.varied
     if varied is None:
-        each = motion.cycles / motion.entries
-        phase = motion.first_phase + np.arange(-1.0, motion.entries + 2) * each
+        phase = motion.first_phase + np.arange(-1.0, motion.entries + 2) * (motion.cycles / motion.entries)
     else:
-        phase, each = varied.phase, 0.0
+        phase = varied.phase
     # One entry before and one behind, for the rate of the excess.
     position, excess, rate, gain, ripple, back, first = np.empty((7, motion.entries + 3))
     runs_out = any(gear.runout for gear in (rig.driver, rig.driven))
@@ -185,7 +185,7 @@ def tables(model: NonLinear, motion: Motion) -> Table:
     table = Table(position, excess, rate, gain, ripple, back, first, _own(model, phase), levers=levers)
     teeth = rig.driver.teeth, rig.driven.teeth
     fixed = correction, _runout(model), ends_of(model), _waves(model)
-    _fill(table, phase, each, floor(phase[0]), law.phases, teeth, *fixed)
+    _fill(table, phase, floor(phase[0]), law.phases, teeth, *fixed)
     rate[1:-1] = (excess[2:] - excess[:-2]) / motion.step
     pace, pull = (np.empty(0), np.empty(0)) if varied is None else varied[1:]
     return table.part(1, -1)._replace(pace=pace, pull=pull)
@@ -247,14 +247,18 @@ def _towards_end(cycle: float, ends: Ends) -> float:
 
 
 @compiled(inline="always")
-def _rippled(waves: Waves, phase: float) -> float:
-    """Force [N] of the torque's ripple at a phase [cycles]."""
-    total = 0.0
-    if len(waves.order) == 0:
-        return total
-    angle = 2 * pi * waves.order[0] * phase
-    cosine, sine = cos(angle), sin(angle)
-    real, imaginary = cosine, sine
+def _turned_on(cosine: float, sine: float, angle: float) -> tuple[float, float]:
+    """Cosine and sine of an angle that is larger by at most NEXT."""
+    square = angle * angle
+    onward = 1.0 - square * (1 / 2 - square * (1 / 24 - square / 720))
+    aslant = angle * (1.0 - square * (1 / 6 - square * (1 / 120 - square / 5040)))
+    return cosine * onward - sine * aslant, sine * onward + cosine * aslant
+
+
+@compiled(inline="always")
+def _rippled(waves: Waves, phase: float, cosine: float, sine: float) -> float:
+    """Force [N] of the torque's ripple at a phase [cycles] where the first wave has that cosine and sine."""
+    total, real, imaginary = 0.0, cosine, sine
     for i in range(len(waves.order)):
         if i > 0 and waves.in_turn:
             real, imaginary = real * cosine - imaginary * sine, real * sine + imaginary * cosine
@@ -267,24 +271,37 @@ def _rippled(waves: Waves, phase: float) -> float:
 
 @compiled
 def _fill(
-    out: Table, phases: Array, each: float, begin: int, rows: int, teeth: tuple[int, int],
+    out: Table, phases: Array, begin: int, rows: int, teeth: tuple[int, int],
     correction: Correction, runout: Runout, ends: Ends, waves: Waves,
 ) -> None:  # fmt: skip
-    """Fill the table but for `excess_rate`, own, pace and pull; entry n belongs to the n-th of `phases` [cycles], which
-    lie `each` apart (0: any way) and whose whole part begins with `begin`; rows: of the force table. A lever about a
-    gear's axis is the base radius and how far its centre stands aside of the normal through that axis."""
-    series = len(correction.error.cosine) > 0 or len(correction.stiffness.cosine) > 0
-    first, second = 1.0, 0.0
-    onward, aslant = cos(2 * pi * each), sin(2 * pi * each)
+    """Fill the table but for `excess_rate`, own, pace and pull; entry n belongs to the n-th of `phases` [cycles], whose
+    whole part begins with `begin`; rows: of the force table. A lever about a gear's axis is the base radius and how far
+    its centre stands aside of the normal through that axis."""
+    runs_out = runout.cosine**2 + runout.sine**2 > 0.0
+    # Mesh, driver, driven gear and the ripple's first wave: whether they turn, how often in a mesh cycle, and how far.
+    turns = np.array([
+        len(correction.error.cosine) > 0 or len(correction.stiffness.cosine) > 0, runs_out[0], runs_out[1],
+        len(waves.order) > 0,
+    ])  # fmt: skip
+    speeds = 2 * pi * np.array([1.0, 1.0 / teeth[0], 1.0 / teeth[1], waves.order[0] if turns[3] else 0.0])
+    real, imaginary = np.ones(4), np.zeros(4)
     for n in range(len(out.position)):
         phase = phases[n]
         whole = floor(phase)
         cycle = phase - whole
+        for k in range(4):
+            if not turns[k]:
+                continue
+            step = speeds[k] * (phase - phases[n - 1]) if n % ANEW else 1.0
+            if abs(step) > NEXT:
+                angle = speeds[k] * (phase if k > 0 else cycle)
+                real[k], imaginary[k] = cos(angle), sin(angle)
+            else:
+                real[k], imaginary[k] = _turned_on(real[k], imaginary[k], step)
         turned, turned_back, leant = 0.0, 0.0, 0.0
         for i in range(2):
-            if runout.cosine[i] != 0.0 or runout.sine[i] != 0.0:
-                angle = 2 * pi * phase / (teeth[0] if i == 0 else teeth[1])
-                along, across = cos(angle), sin(angle)
+            if runs_out[i]:
+                along, across = real[i + 1], imaginary[i + 1]
                 turned += runout.cosine[i] * along + runout.sine[i] * across
                 turned_back += runout.cosine_back[i] * along + runout.sine_back[i] * across
                 aside = (2 * i - 1) * (runout.cosine[i] * across - runout.sine[i] * along)
@@ -294,11 +311,7 @@ def _fill(
                 out.levers[n, i] = 0.0
         if len(out.levers) > 0:
             out.levers[n, 2] = leant / runout.line
-        if series and (each == 0.0 or n % ANEW == 0):
-            first, second = cos(2 * pi * cycle), sin(2 * pi * cycle)
-        elif series:
-            first, second = first * onward - second * aslant, second * onward + first * aslant
-        every = correction.mean_error + _wave(correction.error, first, second) + turned
+        every = correction.mean_error + _wave(correction.error, real[0], imaginary[0]) + turned
         place = cycle
         if turned != 0.0 or leant != 0.0:
             near = _towards_end(cycle, ends)
@@ -309,6 +322,6 @@ def _fill(
         out.position[n] = min(place * rows, rows * (1.0 - 1e-16))
         out.first_pair[n] = whole - begin + 1
         out.excess[n] = every
-        out.gain[n] = correction.scale * (1.0 + _wave(correction.stiffness, first, second))
-        out.ripple[n] = _rippled(waves, phase)
+        out.gain[n] = correction.scale * (1.0 + _wave(correction.stiffness, real[0], imaginary[0]))
+        out.ripple[n] = _rippled(waves, phase, real[3], imaginary[3])
         out.back[n] = turned_back
