@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.kernels.compiled import ROUNDING, compiled
+from gearbench.kernels.compiled import INLINED, ROUNDING, compiled
 from gearbench.lumped.nonlinear.constants import Constants, Rubbing
 from gearbench.lumped.nonlinear.coordinates import Coordinates, Further
 from gearbench.lumped.nonlinear.forces import Apart, Entry, Rubbed, friction, mesh, spring, turned_on
@@ -62,7 +62,7 @@ class Felt(NamedTuple):
     rubbed: Rubbed
 
 
-@compiled(fastmath=ROUNDING)
+@compiled(fastmath=ROUNDING, **INLINED)
 def _travel(q: Coordinates, e: Any, at: Entry, p: Constants) -> float:
     """What the coordinates q and e, or their rates, close the mesh by."""
     turned = (1.0 + at.lever1) * q.u1 - (1.0 + at.lever2) * q.u2
@@ -72,7 +72,7 @@ def _travel(q: Coordinates, e: Any, at: Entry, p: Constants) -> float:
     return travel + (p.slide - at.tilt * p.factor) * (e.x1 - e.x2)
 
 
-@compiled(fastmath=ROUNDING)
+@compiled(fastmath=ROUNDING, **INLINED)
 def _felt(f: float, shaft: float, drive: float, nudge: float, rubbed: Rubbed, at: Entry, p: Constants) -> Felt:
     """The forces of a mesh pressed by f; what run-out turns is known of the working flanks."""
     part = 1.0 if f > 0.0 else 0.0
@@ -89,7 +89,7 @@ def _felt(f: float, shaft: float, drive: float, nudge: float, rubbed: Rubbed, at
     )
 
 
-@compiled(fastmath=ROUNDING)
+@compiled(fastmath=ROUNDING, **INLINED)
 def _plain(q: Coordinates, v: Coordinates, felt: Felt, force: float, p: Constants, free: float) -> Answer:
     """The answer of a rig without more structure."""
     push, pull, pull2 = felt.driver, felt.rubbed.driver, felt.rubbed.driven
@@ -105,7 +105,7 @@ def _plain(q: Coordinates, v: Coordinates, felt: Felt, force: float, p: Constant
     return Answer(acceleration, (), felt.mesh, load, felt.drive)
 
 
-@compiled(fastmath=ROUNDING)
+@compiled(fastmath=ROUNDING, **INLINED)
 def _structured(
     q: Coordinates, v: Coordinates, e: Further, r: Further, felt: Felt, force: float, mean: float, p: Constants,
     s: Structure,
@@ -148,7 +148,7 @@ def _structured(
     return Answer(acceleration, further, felt.mesh, load, felt.shaft + p.rigid * taken)
 
 
-@compiled(fastmath=ROUNDING)
+@compiled(fastmath=ROUNDING, **INLINED)
 def _answered(
     q: Coordinates, v: Coordinates, e: Any, r: Any, felt: Felt, force: float, mean: float, p: Constants, s: Any,
     free: float,
@@ -159,7 +159,7 @@ def _answered(
     return _structured(q, v, e, r, felt, force, mean, p, s)
 
 
-@compiled(fastmath=ROUNDING)
+@compiled(fastmath=ROUNDING, **INLINED)
 def _rubbed(f: float, v: Coordinates, r: Any, at: Entry, p: Constants, rubbing: Rubbing | None) -> Rubbed:
     """Friction [N] under the normal force f."""
     if rubbing is not None and f > 0.0:  # without friction rubbing is None, known to the compiler
@@ -168,13 +168,13 @@ def _rubbed(f: float, v: Coordinates, r: Any, at: Entry, p: Constants, rubbing: 
     return Rubbed(0.0, 0.0, 0.0, 0.0)
 
 
-@compiled(fastmath=ROUNDING)
+@compiled(fastmath=ROUNDING, **INLINED)
 def _rigid_load(s: Any) -> float:
     """1 where the load acts on the driven gear itself."""
     return 1.0 if len(s) == 0 else s.rigid_load
 
 
-@compiled(fastmath=ROUNDING)
+@compiled(fastmath=ROUNDING, **INLINED)
 def _behind(further: Any, pull: float, pushed: float, s: Any) -> Any:
     """Accelerations of further coordinates, the load's end lagging behind the rotation but for a force on it [N]."""
     if len(further) == 0:
@@ -184,7 +184,7 @@ def _behind(further: Any, pull: float, pushed: float, s: Any) -> Any:
     return Further(load, further.housing, further.rocking, further.x1, further.x2)
 
 
-@compiled(fastmath=ROUNDING)
+@compiled(fastmath=ROUNDING, **INLINED)
 def _accelerated(found: Answer, pull: float, of: Equations) -> Answer:
     """The answer in departures from a rotation that gains speed by pull [m/s^2] along the line of action: what turns
     lags behind it, what is held at its speed takes a force, and a load that balances both gears pushes."""
@@ -200,7 +200,7 @@ def _accelerated(found: Answer, pull: float, of: Equations) -> Answer:
     return Answer(acceleration, _behind(found.further, pull, pushed, of.structure), found.mesh_force, load, drive)
 
 
-@compiled(fastmath=ROUNDING)
+@compiled(fastmath=ROUNDING, **INLINED)
 def answer(q: Coordinates, v: Coordinates, e: Any, r: Any, at: Entry, force: float, of: Equations) -> Answer:
     """Accelerations and forces at the coordinates q and e and their rates v and r, under T1/rb1 = force [N]."""
     p, s = of.constants, of.structure

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.kernels.compiled import ROUNDING, compiled
+from gearbench.kernels.compiled import INLINED, ROUNDING, compiled
 from gearbench.lumped.nonlinear.constants import Constants, Rubbing
 from gearbench.lumped.nonlinear.coordinates import Coordinates
 from gearbench.lumped.nonlinear.law import MeshLaw
@@ -61,7 +61,7 @@ def apart_of(table: Table, law: MeshLaw) -> Apart | tuple[()]:
     return Apart(table.own, law.pair_secants, law.closed[1] if table.own[:, 1:].any() else ())
 
 
-@compiled(fastmath=ROUNDING)
+@compiled(fastmath=ROUNDING, **INLINED)
 def entry(table: Table, i: int) -> Entry:
     """Entry i of the table."""
     changes, runs_out = len(table.pull) > 0, len(table.levers) > 0
@@ -82,7 +82,7 @@ def entry(table: Table, i: int) -> Entry:
     )
 
 
-@compiled(fastmath=ROUNDING)
+@compiled(fastmath=ROUNDING, **INLINED)
 def _held(cycles: float, first: int, apart: Any) -> int:
     """By how many pairs `first` moves on with so many cycles, of those that there are."""
     if len(apart) == 0:
@@ -91,7 +91,7 @@ def _held(cycles: float, first: int, apart: Any) -> int:
     return int(min(max(first + cycles, 0.0), float(last))) - first
 
 
-@compiled(fastmath=ROUNDING)
+@compiled(fastmath=ROUNDING, **INLINED)
 def turned_on(at: Entry, rows: float, count: int, apart: Any) -> Entry:
     """The entry with the mesh turned on by so many rows of a table of `count`."""
     position, first = at.position + rows, at.first_pair
@@ -105,7 +105,7 @@ def turned_on(at: Entry, rows: float, count: int, apart: Any) -> Entry:
     )  # fmt: skip
 
 
-@compiled(fastmath=ROUNDING)
+@compiled(fastmath=ROUNDING, **INLINED)
 def _viscosity(elastic: float, tangent: float, p: Constants) -> float:
     """Damping coefficient of the mesh [N s/m] at an elastic force [N] and its tangent [N/m]."""
     plain = p.damping_factor * sqrt(tangent)
@@ -114,7 +114,7 @@ def _viscosity(elastic: float, tangent: float, p: Constants) -> float:
     return plain * (elastic * p.damping_pliancy) ** p.damping_exponent
 
 
-@compiled(fastmath=ROUNDING)
+@compiled(fastmath=ROUNDING, **INLINED)
 def _beyond(depth: float, low: float, high: float, last: int, root: float) -> tuple[float, float]:
     """Force and tangent behind the last node of a table whose last two secants are these; `root`: nodes per root of
     a deflection [m]."""
@@ -123,7 +123,7 @@ def _beyond(depth: float, low: float, high: float, last: int, root: float) -> tu
     return end * high + tangent * (depth - end), tangent
 
 
-@compiled(fastmath=ROUNDING)
+@compiled(fastmath=ROUNDING, **INLINED)
 def _pressed(depth: float, rate: float, position: float, gain: float, secant: Array, p: Constants) -> float:
     """Force [N] of flanks pressed by depth > 0 [m] and closing at rate [m/s]; never negative."""
     last = secant.shape[1] - 1
@@ -143,7 +143,7 @@ def _pressed(depth: float, rate: float, position: float, gain: float, secant: Ar
     return max(elastic + _viscosity(elastic, gain * tangent, p) * rate, 0.0)
 
 
-@compiled(fastmath=ROUNDING)
+@compiled(fastmath=ROUNDING, **INLINED)
 def _left(bending: Any, own: Array, pair: int, row: int, o: int, weight: float) -> float:
     """Part of its stiffness that cracks leave a pair."""
     if len(bending) == 0:
@@ -153,7 +153,7 @@ def _left(bending: Any, own: Array, pair: int, row: int, o: int, weight: float) 
     return 1.0 / (1.0 + one * own[pair, 1] + two * own[pair, 2])
 
 
-@compiled(fastmath=ROUNDING)
+@compiled(fastmath=ROUNDING, **INLINED)
 def _pressed_apart(travel: float, rate: float, at: Entry, apart: Apart, p: Constants) -> float:
     """Force [N] of pairs that each have an excess of their own over the deflection `travel` [m], closing at rate [m/s];
     never negative."""
@@ -184,7 +184,7 @@ def _pressed_apart(travel: float, rate: float, at: Entry, apart: Apart, p: Const
     return max(elastic + _viscosity(elastic, at.gain * tangent, p) * rate, 0.0)
 
 
-@compiled(fastmath=ROUNDING)
+@compiled(fastmath=ROUNDING, **INLINED)
 def mesh(travel: float, rate: float, at: Entry, secant: Array, apart: Any, p: Constants) -> float:
     """Mesh force [N] at dte `travel` [m] and its rate [m/s]; negative on the back flanks."""
     depth = travel + at.excess
@@ -204,7 +204,7 @@ def mesh(travel: float, rate: float, at: Entry, secant: Array, apart: Any, p: Co
     return 0.0
 
 
-@compiled(fastmath=ROUNDING)
+@compiled(fastmath=ROUNDING, **INLINED)
 def spring(y: float, stiffness: float, exponent: float, reference: float) -> float:
     """Force [N] of a support."""
     if exponent == 0.0:
@@ -212,7 +212,7 @@ def spring(y: float, stiffness: float, exponent: float, reference: float) -> flo
     return stiffness * reference * copysign((abs(y) / reference) ** (1.0 + exponent), y)
 
 
-@compiled(fastmath=ROUNDING)
+@compiled(fastmath=ROUNDING, **INLINED)
 def _aside(sliding: float, r: Any, factor: float) -> float:
     """Sliding velocity with that of the centres across their supports."""
     if len(r) == 0:
@@ -220,7 +220,7 @@ def _aside(sliding: float, r: Any, factor: float) -> float:
     return sliding - factor * (r.x1 - r.x2)
 
 
-@compiled(fastmath=ROUNDING)
+@compiled(fastmath=ROUNDING, **INLINED)
 def _slid(sliding: float) -> float:
     """tanh to rounding of one: the library's, exact near zero too, takes several times as long."""
     if abs(sliding) > 19.0:  # one to rounding
@@ -228,7 +228,7 @@ def _slid(sliding: float) -> float:
     return 1.0 - 2.0 / (exp(2.0 * sliding) + 1.0)
 
 
-@compiled(fastmath=ROUNDING)
+@compiled(fastmath=ROUNDING, **INLINED)
 def friction(v: Coordinates, further: Any, at: Entry, r: Rubbing, factor: float) -> Rubbed:
     """What friction does per normal force, at the rates v and `further`; factor: g."""
     position = at.position

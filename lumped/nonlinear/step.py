@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.kernels.compiled import ROUNDING, compiled
+from gearbench.kernels.compiled import INLINED, ROUNDING, compiled
 from gearbench.lumped.errors import LumpedError
 from gearbench.lumped.nonlinear.coordinates import Coordinates, Further, parted
 from gearbench.lumped.nonlinear.equations import Answer, Equations, answer
@@ -102,19 +102,19 @@ def columns(samples: Array) -> Outputs:
     return Outputs(*found, *(np.empty(0) for _ in range(len(Outputs._fields) - len(found))))
 
 
-@compiled(fastmath=ROUNDING)
+@compiled(fastmath=ROUNDING, **INLINED)
 def _moved(q: Coordinates, h: float, v: Coordinates) -> Coordinates:
     """q + h v."""
     return Coordinates(q.u1 + h * v.u1, q.y1 + h * v.y1, q.y2 + h * v.y2, q.u2 + h * v.u2, q.w + h * v.w)
 
 
-@compiled(fastmath=ROUNDING)
+@compiled(fastmath=ROUNDING, **INLINED)
 def _mean(h: float, one: float, two: float, three: float, four: float) -> float:
     """Change in a sixth h of a step by the rates at its four stages."""
     return h * (one + 2.0 * (two + three) + four)
 
 
-@compiled(fastmath=ROUNDING)
+@compiled(fastmath=ROUNDING, **INLINED)
 def _stepped(
     q: Coordinates, h: float, one: Coordinates, two: Coordinates, three: Coordinates, four: Coordinates
 ) -> Coordinates:
@@ -128,7 +128,7 @@ def _stepped(
     )
 
 
-@compiled(fastmath=ROUNDING)
+@compiled(fastmath=ROUNDING, **INLINED)
 def _moved_further(e: Any, h: float, r: Any) -> Any:
     """e + h r."""
     if len(e) == 0:
@@ -142,7 +142,7 @@ def _moved_further(e: Any, h: float, r: Any) -> Any:
     )
 
 
-@compiled(fastmath=ROUNDING)
+@compiled(fastmath=ROUNDING, **INLINED)
 def _stepped_further(e: Any, h: float, one: Any, two: Any, three: Any, four: Any) -> Any:
     """e after a step of which h is the sixth part."""
     if len(e) == 0:
@@ -156,7 +156,7 @@ def _stepped_further(e: Any, h: float, one: Any, two: Any, three: Any, four: Any
     )
 
 
-@compiled
+@compiled(**INLINED)
 def _tell_further(out: Outputs, sample: int, e: Any, one: Answer) -> None:
     """Write what only a rig with structure has."""
     if len(e) != 0:
