@@ -15,7 +15,7 @@ from gearbench.geometry import pair
 from gearbench.lumped.nonlinear.model import nonlinear_model
 from gearbench.lumped.nonlinear.pressing import alike
 from gearbench.lumped.nonlinear.step import columns, integrate
-from gearbench.lumped.nonlinear.tables import Motion, instants, tables
+from gearbench.lumped.nonlinear.tables import Motion, Varied, instants, tables
 from gearbench.rig import (
     Coupling,
     Crack,
@@ -82,6 +82,30 @@ def test_corrections_scale_and_shape_the_stiffness() -> None:
     phase = np.arange(64) / 32
     expected = 0.8 * (1 + 0.1 * np.cos(2 * pi * phase) - 0.05 * np.sin(4 * pi * phase))
     np.testing.assert_allclose(gain, expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("wander", [0.0, 0.3])
+def test_waves_that_are_turned_on_from_step_to_step_stay_what_they_are(wander: float) -> None:
+    """Mesh series, run-out and ripple on a grid as fine as a simulation's, at constant speed and in a rotation that
+    departs from it, against their own cosines."""
+    mesh = MeshCorrection(stiffness_cos=(0.1, 0.0), stiffness_sin=(0.0, -0.05))
+    ripple = Ripple(orders=(6, 12, 20), amplitude=(3.0, 2.0, 1.0), phase=(0.4, 1.1, -0.3))
+    rig = make_rig(mesh=mesh, driver={"runout": 20e-6, "runout_phase": 0.7}, drive=Drive(ripple=ripple))
+    entries, cycles = 6000, 10.0
+    phase = 41.37 + np.arange(-1.0, entries + 2) * cycles / entries
+    phase += wander * np.sin(2 * pi * phase / 7)
+    varied = Varied(phase, np.ones(entries + 1), np.zeros(entries + 1)) if wander else None
+    table = tables(make_model(rig), Motion(cycles, entries, 1e-5, 41.37, varied))
+    at = phase[1:-1]
+    series = 1 + 0.1 * np.cos(2 * pi * at) - 0.05 * np.sin(4 * pi * at)
+    np.testing.assert_allclose(table.gain, series, rtol=1e-12)
+    aside = -10e-6 * np.sin(2 * pi * at / 20 - 0.7) / RADII[0]
+    np.testing.assert_allclose(table.levers[:, 0], aside, atol=1e-12 * np.abs(aside).max())
+    waves = sum(
+        a * np.cos(2 * pi * order * at / 20 + start)
+        for order, a, start in zip(ripple.orders, ripple.amplitude, ripple.phase, strict=True)
+    )
+    np.testing.assert_allclose(table.ripple * RADII[0], waves, atol=1e-11)
 
 
 @pytest.mark.parametrize("boundary", ["speed", "torque"])
