@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.kernels.compiled import ROUNDING, compiled
+from gearbench.kernels.compiled import INLINED, ROUNDING, compiled
 from gearbench.lumped.nonlinear.coordinates import IN_MESH, Acting
 
 Array = NDArray[np.float64]
@@ -83,7 +83,7 @@ def departures(
     return places[..., :columns], pushes[:, :columns]
 
 
-@compiled(fastmath=ROUNDING)
+@compiled(fastmath=ROUNDING, **INLINED)
 def _rates(
     q: Single, v: Single, springs: Single, dampers: Single, inverse: Single, mesh: Single, pushed: Single,
     k: np.float32, c: np.float32, force: Single, bearings: Single, held: Single, stiffer: Single, turned: Single,
@@ -118,7 +118,7 @@ def _rates(
                         out[i, p] += held[b, i] * stiffer[b] * bearings[b, j] * q[j, p]
 
 
-@compiled(fastmath=ROUNDING)
+@compiled(fastmath=ROUNDING, **INLINED)
 def _gather(push: Single, weight: np.float32, number: int, pushes: Single) -> None:
     """Add a stage's part of the force in the mesh to that of its step."""
     if number >= 0 and weight > 0.0:
