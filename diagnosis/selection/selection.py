@@ -70,14 +70,14 @@ def select(
         base = refreshed(simulator, base, unknowns.of(WEIGHED))
     base = gone_on(simulator, base, RENEWALS_FRESH)
     best, entered, weighed = _forward(simulator, base, [], hypotheses, starts, report, apart=apart)
-    best, kept = _with_needed(simulator, base, best, entered, apart)
-    if kept:
-        best = gone_on(simulator, best, RENEWALS_LAST, partial(report, "simulating: all together"))
+
+    def begun_elsewhere(best: Optimum, kept: Sequence[Weighed]) -> Optimum:
         best = restructured(simulator, best, around, report)
         report("simulating: all together, from the nominal rig")
-        best = begun_at_nominal(simulator, best, _entries(unknowns, kept))
-        base, best, kept = held_against_background(simulator, base, best, kept, report, apart=apart)
-    return Selection(base, _without(simulator, base, kept), best if kept else base, kept, tuple(weighed))
+        return begun_at_nominal(simulator, best, _entries(unknowns, kept))
+
+    base, best, kept = _together(simulator, base, best, entered, report, begun_elsewhere, apart=apart)
+    return Selection(base, _without(simulator, base, kept), best, kept, tuple(weighed))
 
 
 def further(
@@ -137,26 +137,24 @@ def _together(
     best: Optimum,
     entered: Sequence[Weighed],
     report: Report,
+    then: Callable[[Optimum, Sequence[Weighed]], Optimum] = lambda best, kept: best,
     *,
     apart: bool,
 ) -> tuple[Optimum, Optimum, tuple[Weighed, ...]]:
-    """The background's optimum, that with the effects that stay of what entered, fitted to the end, and these."""
-    best, kept = _with_needed(simulator, base, best, entered, apart)
+    """The background's optimum, that with the effects that stay of what entered, fitted to the end and what is done
+    `then`, and these."""
+    kept = needed(simulator, best, entered, apart)
+    if len(kept) < len(entered):
+        best = _with_only(simulator, base, best, kept)
     if kept:
-        best = gone_on(simulator, best, RENEWALS_LAST, partial(report, "simulating: all together"))
+        best = then(gone_on(simulator, best, RENEWALS_LAST, partial(report, "simulating: all together")), kept)
         base, best, kept = held_against_background(simulator, base, best, kept, report, apart=apart)
     return base, best if kept else base, kept
 
 
-def _with_needed(
-    simulator: Simulator, base: Optimum, best: Optimum, entered: Sequence[Weighed], apart: bool
-) -> tuple[Optimum, tuple[Weighed, ...]]:
-    """The optimum with what is needed of the effects that entered, the others no larger than in the background `base`,
-    and these effects."""
-    kept = needed(simulator, best, entered, apart)
-    if not kept:
-        return base, kept
-    return (beside(simulator, base, best, kept) if len(kept) < len(entered) else None) or best, kept
+def _with_only(simulator: Simulator, base: Optimum, best: Optimum, kept: Sequence[Weighed]) -> Optimum:
+    """The optimum with these of the effects that entered, the others no larger than in the background `base`."""
+    return (beside(simulator, base, best, kept) or best) if kept else base
 
 
 def _forward(
@@ -219,11 +217,8 @@ def with_entered(simulator: Simulator, selection: Selection, one: Weighed) -> Se
 
 def only(simulator: Simulator, selection: Selection, kept: Sequence[Weighed]) -> Selection:
     """The selection with only these of the effects that entered: the others go back to a background's size."""
-    base = selection.base
-    if not kept:
-        return replace(selection, bare=base, best=base, entered=())
-    best = beside(simulator, base, selection.best, kept) or selection.best
-    bare = _without(simulator, base, kept)
+    best = _with_only(simulator, selection.base, selection.best, kept)
+    bare = _without(simulator, selection.base, kept)
     return replace(selection, bare=bare, best=best, entered=tuple(kept))
 
 

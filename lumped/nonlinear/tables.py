@@ -247,7 +247,7 @@ def _towards_end(cycle: float, ends: Ends) -> float:
 
 
 @compiled(inline="always")
-def _turned_on(cosine: float, sine: float, angle: float) -> tuple[float, float]:
+def _rotated(cosine: float, sine: float, angle: float) -> tuple[float, float]:
     """Cosine and sine of an angle that is larger by at most NEXT."""
     square = angle * angle
     onward = 1.0 - square * (1 / 2 - square * (1 / 24 - square / 720))
@@ -297,7 +297,7 @@ def _fill(
                 angle = speeds[k] * (phase if k > 0 else cycle)
                 real[k], imaginary[k] = cos(angle), sin(angle)
             else:
-                real[k], imaginary[k] = _turned_on(real[k], imaginary[k], step)
+                real[k], imaginary[k] = _rotated(real[k], imaginary[k], step)
         turned, turned_back, leant = 0.0, 0.0, 0.0
         for i in range(2):
             if runs_out[i]:
