@@ -183,7 +183,9 @@ def class_data(spectra: Spectra, excited: int, sidebands: int = SIDEBANDS) -> Cl
     weight = np.where((2 * classes) % d == 0, np.sqrt(0.5), 1.0)
     # Of a single realisation nothing is left of the operating response's class, which need not be solved.
     there = np.abs(dte).max(axis=(1, 2)) > 0
-    lines, valid, modelled, force, dte, weight = (x[there] for x in (lines, valid, modelled, force, dte, weight))
+    shown = modelled[there].any(axis=0)
+    lines, valid, modelled, force, dte = (x[there][:, shown] for x in (lines, valid, modelled, force, dte))
+    weight = weight[there]
     force_unit, dte_unit = (
         float(np.sqrt(np.sum(np.abs(x[valid]) ** 2) / max(np.count_nonzero(x[valid]), 1))) or 1.0 for x in (force, dte)
     )

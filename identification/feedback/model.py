@@ -132,9 +132,13 @@ class Operator:
             np.where(valid, diagonal, 1.0), model.k[:kept], model.c[:kept], omega, valid
         )
 
-    def solve(self, index: int, right: Complexes) -> Complexes:
-        """A^-1 `right` (S, m) of one class."""
-        return self._matrices.solve(index, right)
+    def times(self, values: Complexes) -> Complexes:
+        """A `values` (C, S, m)."""
+        return self._matrices.times(values)
+
+    def solve(self, index: int, right: Complexes, even: bool = False) -> Complexes:
+        """A^-1 `right` (S, m) of one class; `even`: of spectra of real signals, over negative lines as well."""
+        return self._matrices.solve(index, right, even)
 
 
 def coupled(values: Complexes, omega: Floats, harmonics: int) -> tuple[Complexes, Complexes]:

@@ -15,7 +15,7 @@ from gearbench.identification.feedback.data import ClassData
 from gearbench.identification.feedback.evidence import Marginal, averaged, evident, lengthened, marginal
 from gearbench.identification.feedback.functions import Fractions
 from gearbench.identification.feedback.model import Model
-from gearbench.identification.feedback.refine import Refined, refined
+from gearbench.identification.feedback.refine import Refined, output_error, refined
 from gearbench.identification.feedback.shapes import Mesh, of_harmonics, of_zones, only_zones
 from gearbench.identification.feedback.zones import Zones
 
@@ -69,6 +69,8 @@ def in_zones(fit: Refined, data: ClassData, settled: float) -> InZones | None:
     mesh = mesh.of_length(zones, enough)
     wide = lengthened(model, enough)
     start = wide.moved(np.concatenate([wide.vector()[: wide.free], mesh.harmonics]))
+    if not np.isfinite(output_error(start, data)):
+        return None
     found = refined(start, data, settled, mesh)
     # What the fit leaves beyond what was promised of it speaks against the zones.
     gain -= error.count * float(np.log(found.noise / (2 * promised)))

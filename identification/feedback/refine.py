@@ -30,6 +30,8 @@ SETTLED = 1e-3
 # but hides, and end far from the least cost.
 DAMPING, GROWTH, TRIALS = 1e-4, 10.0, 7
 TINY = 1e-11
+# What may be left of the equations, of their largest right-hand side.
+UNSOLVED = 1e-6
 # Weight of the row that keeps the common factor of all parameters where it is.
 GAUGE = 1e3
 
@@ -61,7 +63,18 @@ def response(model: Model, data: ClassData) -> Complexes:
 def _deflection(operator: Operator, data: ClassData) -> Complexes:
     """Y^ = A^-1 N U (C, S, E)."""
     source = operator.n[:, :, None] * data.force
-    return np.stack([operator.solve(index, source[index]) for index in range(source.shape[0])])
+    return np.stack([operator.solve(index, source[index], even=True) for index in range(source.shape[0])])
+
+
+def _responding(model: Model, data: ClassData) -> tuple[Operator, Complexes, float]:
+    """The operator of a model, its deflection, and its output error: infinite where the deflection does not fulfil its
+    equations. Rounding prevents that where the stiffness is negative over a part of the mesh cycle: deflections stay
+    there without any force, and the matrix is singular."""
+    operator = Operator(model, data.omega, data.modelled)
+    deflection, source = _deflection(operator, data), operator.n[:, :, None] * data.force
+    left = np.abs(operator.times(deflection) - source).max()
+    solved = bool(left < UNSOLVED * np.abs(source).max())
+    return operator, deflection, _cost(data, _shown(model, data, deflection)) if solved else np.inf
 
 
 def _shown(model: Model, data: ClassData, deflection: Complexes) -> Complexes:
@@ -79,6 +92,8 @@ def refined(model: Model, data: ClassData, settled: float = SETTLED, mesh: Mesh 
     """
     mesh = mesh or Mesh.of_harmonics(model.vector()[model.free :])
     now, damping = State.of(model, mesh, data), 0.0
+    if not np.isfinite(now.cost):  # any solvable neighbour is better
+        now = replace(now, cost=_cost(data, _shown(model, data, now.deflection)))
     for _ in range(ROUNDS):
         noise = now.cost / _freedom(data, now)
         system = normal_system(now, data, noise)
@@ -98,7 +113,7 @@ def refined(model: Model, data: ClassData, settled: float = SETTLED, mesh: Mesh 
 
 def output_error(model: Model, data: ClassData) -> float:
     """Weighted sum of the squared residuals of the response; infinite for a model that has none."""
-    return _cost(data, response(model, data))
+    return _responding(model, data)[2]
 
 
 def linearised(model: Model, data: ClassData, shapes: Shapes | None = None) -> tuple[Floats, Floats]:
@@ -133,7 +148,8 @@ def told_beside(fit: Refined, data: ClassData, change: Complexes) -> tuple[float
 
 @dataclass(frozen=True)
 class State:
-    """A model, what its mesh is made of, and its response: that of the deflection (C, S, E), and what records show."""
+    """A model, what its mesh is made of, its response (C, S, E), that of the deflection, and its output error: infinite
+    where there is no response."""
 
     model: Model
     mesh: Mesh
@@ -143,9 +159,8 @@ class State:
 
     @staticmethod
     def of(model: Model, mesh: Mesh, data: ClassData) -> State:
-        operator = Operator(model, data.omega, data.modelled)
-        deflection = _deflection(operator, data)
-        return State(model, mesh, operator, deflection, _cost(data, _shown(model, data, deflection)))
+        operator, deflection, cost = _responding(model, data)
+        return State(model, mesh, operator, deflection, cost)
 
     def objective(self, noise: float) -> float:
         """What a step must lower: the error and, in its units, how unlikely amplitudes are under a prior that is held.
@@ -214,7 +229,7 @@ def derivatives(
             columns = -model.columns(values, omega, y, u)
             if shapes is not None:
                 columns = np.concatenate([columns[:, :free], shapes.columns(columns[:, free:])], axis=1)
-            columns = operator.solve(index, columns * modelled[:, None])
+            columns = operator.solve(index, columns * modelled[:, None], even=True)
             columns = data.sampled(model.shown_columns(values, omega, columns, y, u)) * weight[:, None]
             shown = data.sampled(model.shown(omega, y, u) * modelled)
             yield index, columns, (measured - shown) * weight
