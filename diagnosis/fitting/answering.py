@@ -40,7 +40,7 @@ APART = 1e-5  # of its standard deviation, by which an unknown is moved for a de
 
 @dataclass(frozen=True)
 class Lines:
-    """Lines of a record: omega (K,), channels (K, C) with variances of noise (C,) and levels (K, C), torque (K,)."""
+    """Lines of records: omega (K,), channels (K, C) with variances of noise (K, C) and levels (K, C), torque (K,)."""
 
     names: tuple[str, ...]
     omega: Array
@@ -225,19 +225,40 @@ def _changes(
     shown = np.stack([system.shown.get(name, np.zeros(len(system.free))) for name in lines.names], axis=1)
     stiffness = np.swapaxes(_stiffness(system, lines), 1, 2)
     adjoint = np.linalg.solve(stiffness, np.broadcast_to(shown + 0j, (len(omega), *shown.shape)))
+    adjoint, moved_first = np.moveaxis(adjoint, 1, 0), np.ascontiguousarray(np.moveaxis(moved, 1, 0))
     for number, slope in enumerate(slopes):
-        if slope.springs.any() or slope.dampers.any() or slope.mass.any():
-            pulled = slope.springs @ moved + 1j * omega[..., None] * (slope.dampers @ moved)
-            pulled -= omega[..., None] ** 2 * (slope.mass @ moved)
-            out[number] -= np.swapaxes(adjoint, 1, 2) @ pulled
+        # A slope is a few springs, a damper or a mass: few coordinates are pulled.
+        parts = (slope.springs, slope.dampers, slope.mass)
+        pulling = np.flatnonzero(np.any([part != 0.0 for part in parts], axis=(0, 2)))
+        for row in pulling:
+            pulled = np.tensordot(slope.springs[row], moved_first, 1)
+            pulled += 1j * omega * np.tensordot(slope.dampers[row], moved_first, 1)
+            pulled -= omega**2 * np.tensordot(slope.mass[row], moved_first, 1)
+            out[number] -= adjoint[row][:, :, None] * pulled[:, None, :]
         for column, name in enumerate(lines.names):
-            if name == REACTION:
-                out[number, :, column, 0] = layout.model.base_radius[1] * slope.gain
-                continue
-            out[number, :, column] += slope.shown[name] @ moved
-            out[number, :, column] *= _late(system, lines, name)
-            out[number, :, column] -= 1j * omega * slope.late[name] * answer[:, column]
+            if name != REACTION and slope.shown[name].any():
+                out[number, :, column] += np.tensordot(slope.shown[name], moved_first, 1)
+    for column, name in enumerate(lines.names):
+        if name == REACTION:
+            gains = np.array([slope.gain for slope in slopes])
+            out[:, :, column, 0] = layout.model.base_radius[1] * gains[:, None]
+            continue
+        late = np.array([slope.late[name] for slope in slopes])
+        out[:, :, column] *= _late(system, lines, name)
+        out[late != 0.0, :, column] -= 1j * late[late != 0.0, None, None] * omega * answer[:, column]
     return out
+
+
+def joined(lines: Sequence[Lines]) -> list[Lines]:
+    """Lines of all records that have the same channels as one."""
+    alike: dict[tuple[str, ...], list[Lines]] = {}
+    for one in lines:
+        alike.setdefault(one.names, []).append(one)
+    parts = ("omega", "channels", "torque", "noise", "level")
+    return [
+        Lines(names, *(np.concatenate([getattr(one, part) for one in group]) for part in parts))
+        for names, group in alike.items()
+    ]
 
 
 def lines_of(model: NominalModel, condition: Condition, wanted: tuple[str, ...], most: int) -> Lines | None:
@@ -261,4 +282,4 @@ def lines_of(model: NominalModel, condition: Condition, wanted: tuple[str, ...],
     still = level.mean(axis=0) + noise == 0.0
     if still.any():  # a channel that shows nothing tells nothing
         return None
-    return Lines(names, omega, channels, spectra["torque_driver"], noise, level)
+    return Lines(names, omega, channels, spectra["torque_driver"], np.tile(noise, (len(omega), 1)), level)

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from gearbench.bench.plan.workers import side_by_side
 from gearbench.diagnosis.effects.coupling import KEY as COMPLIANCE
 from gearbench.diagnosis.effects.coupling import LOSS
 from gearbench.diagnosis.effects.effect import SIDES
@@ -23,6 +22,7 @@ from gearbench.diagnosis.fitting.answering import (
     MOVED,
     REACTION,
     Lines,
+    joined,
     left_over,
     left_over_moved,
     lines_of,
@@ -77,7 +77,8 @@ def around(layout: Layout, conditions: Sequence[Condition], held: Array) -> Arra
     reaction = (REACTION,) if load.boundary == "speed" and not load.twists else ()
     wanted, most = (*MOVED, *reaction), max(LINES // len(conditions), FEWEST)
     found = (lines_of(layout.model, one, wanted, most) for one in conditions)
-    lines = [one for one in found if one is not None]
+    # Matrices are small: threads would wait for each other.
+    lines = joined([one for one in found if one is not None])
     if not lines:
         return None
     unknowns = layout.unknowns
@@ -90,7 +91,7 @@ def around(layout: Layout, conditions: Sequence[Condition], held: Array) -> Arra
         begun = [best]
         if HOUSING in unknowns.slices and not held[unknowns[SEAT]].any():
             begun.append(seated(unknowns, best))
-        rigs = side_by_side(lambda one: _found(layout, lines, cost, one), begun)
+        rigs = [_found(layout, lines, cost, one) for one in begun]
     except ValueError:  # no rig there
         return None
     return min(rigs, key=lambda p: _misfit(layout, lines, p) + prior_cost(p, _prior(unknowns, p)))
@@ -124,7 +125,7 @@ def _found(layout: Layout, lines: Sequence[Lines], cost: float, best: Array) -> 
     # The mesh pushes both gears apart: a housing that moves along answers faintly, and is imitated from afar.
     trials = [with_motion(unknowns, best, 0, at, HOUSING_FROM[-1], 0) for at in FAINT_AT]
     keys = (*KEYS, *HOUSED)
-    tried = side_by_side(lambda trial: _fitted(layout, lines, trial, keys, LEVELS[1:], FAINT_EVALUATIONS), trials)
+    tried = [_fitted(layout, lines, trial, keys, LEVELS[1:], FAINT_EVALUATIONS) for trial in trials]
     value, p = min(tried, key=lambda one: one[0])
     return _fitted(layout, lines, p, keys, LEVELS[1:])[1] if value < cost else best
 

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
+from gearbench.bench.plan.workers import side_by_side
 from gearbench.diagnosis.effects.backlash import KEY as BACKLASH
 from gearbench.diagnosis.simulation.simulator import Simulator
 
@@ -43,13 +44,16 @@ def opened(simulator: Simulator, p: Array) -> Opened | None:
     wide = float(unknowns.group(BACKLASH).wide[0])
     costs: dict[float, float] = {}
 
+    def cost_of(value: float) -> float | None:
+        there = p.copy()
+        there[at] = value
+        lines = simulator.lines(there)
+        return None if lines is None else simulator.target.cost(simulator.target.lines - lines)
+
     def tried(values: Array) -> None:
-        for value in values:
-            there = p.copy()
-            there[at] = value
-            lines = simulator.lines(there) if value not in costs else None
-            if lines is not None:
-                costs[value] = simulator.target.cost(simulator.target.lines - lines)
+        new = [value for value in dict.fromkeys(values) if value not in costs]
+        found = zip(new, side_by_side(cost_of, new), strict=True)
+        costs.update((value, cost) for value, cost in found if cost is not None)
 
     tried(np.concatenate([wide * TRIED, narrow * NEAR_NOTHING]))
     if 0.0 not in costs or max(costs.values()) - min(costs.values()) < ALIKE:
