@@ -92,8 +92,9 @@ def given_by(case: Case, record: xr.Dataset, realisation: int = 0) -> Given:
 
 
 def steady_motion(
-    case: Case, record: xr.Dataset, law: MeshLaw | None = None, realisation: int = 0, nudge: float = 0.0
-) -> Steady:
+    case: Case, record: xr.Dataset, law: MeshLaw | None = None, realisation: int = 0, nudge: float = 0.0,
+    coarser: float = 1.0,
+) -> Steady:  # fmt: skip
     """The steady motion of the case's rig under the record's torque, as its sensors would not show it; arguments and
     refusals as those of `replay`."""
     if nudge and "angle_driver" not in record:
@@ -105,7 +106,8 @@ def steady_motion(
     if nudge:
         guide = guide_of(case.rig, record, realisation, given.plan.cycles_per_sample, given.phase, given.turning)
     setup = make_setup(
-        case, given.plan, law, given.phase, given.turning, nominal=given.nominal, guide=guide, nudge=nudge
+        case, given.plan, law, given.phase, given.turning, nominal=given.nominal, guide=guide, nudge=nudge,
+        coarser=coarser,
     )
     drive = Drive(torque, resampled(torque, 2 * setup.substeps * torque.size) / setup.meshing.driver.base_radius)
     load_forces = np.empty(setup.substeps * setup.block_samples)
@@ -115,8 +117,9 @@ def steady_motion(
 
 
 def replay(
-    case: Case, record: xr.Dataset, law: MeshLaw | None = None, realisation: int = 0, nudge: float = 0.0
-) -> xr.Dataset:
+    case: Case, record: xr.Dataset, law: MeshLaw | None = None, realisation: int = 0, nudge: float = 0.0,
+    coarser: float = 1.0,
+) -> xr.Dataset:  # fmt: skip
     """One steady period of the case's rig under the record's torque, rotation of the driven gear, sampling and starting
     mesh phase.
 
@@ -126,11 +129,11 @@ def replay(
     applied, but for noise and quantisation. Where teeth differ and the excitation period does not hold all pairings,
     the result is as long as they take; where the mesh stiffness drifts, as long as the record. A `nudge` [N s/m] is a
     damper between the driver and its recorded motion, less its mean rate, that keeps flanks which part on the record's
-    way (Abarbanel et al., SIAM J. Appl. Dyn. Syst. 8, 2009).
+    way (Abarbanel et al., SIAM J. Appl. Dyn. Syst. 8, 2009). Steps may be `coarser` than those of a simulation.
     Attribute `settling_residual` is the change of the DTE over the last two periods; a motion that does not settle is
     returned with a warning. Raises BenchError for a record that says too little.
     """
-    return seen_of(case, steady_motion(case, record, law, realisation, nudge))
+    return seen_of(case, steady_motion(case, record, law, realisation, nudge, coarser))
 
 
 def seen_of(case: Case, steady: Steady) -> xr.Dataset:

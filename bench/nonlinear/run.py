@@ -291,11 +291,11 @@ def largest_load(experiment: Experiment) -> float:
 
 def make_setup(
     case: Case, plan: Schedule, law: MeshLaw | None = None, first_phase: float = 0.0, followed: Followed | None = None,
-    nominal: bool = True, guide: Followed | None = None, nudge: float = 0.0,
+    nominal: bool = True, guide: Followed | None = None, nudge: float = 0.0, coarser: float = 1.0,
 ) -> Setup:  # fmt: skip
     """Model, step and tables of an experiment that begins at `first_phase` [cycles] of the `nominal` rotation, else of
     the driven gear's own, with the mesh law given or solved, and the rotation of a record in place of a constant
-    speed's.
+    speed's; steps may be `coarser` by that factor.
 
     Raises LumpedError, BenchError, GeometryError or ContactError.
     """
@@ -304,12 +304,12 @@ def make_setup(
     law = law or mesh_law(rig, simulation, largest_load(experiment))
     model = replace(nonlinear_model(rig, meshing, law), nudge=nudge)
     force = experiment.torque_mean / meshing.driver.base_radius
-    fastest = model.fastest_rate(force, np.pi * plan.sampling_rate)
+    fastest = model.fastest_rate(force, np.pi * plan.sampling_rate, coarser)
     tabled = simulation.mesh_stiffness == "potential-energy"
     setup = Setup(
         model=model,
         meshing=meshing,
-        substeps=runge_kutta_substeps(fastest, experiment, simulation, plan),
+        substeps=runge_kutta_substeps(fastest, experiment, simulation, plan, coarser),
         mean_torque=experiment.torque_mean,
         sampling_rate=plan.sampling_rate,
         samples_per_period=plan.samples_per_period,

@@ -337,11 +337,12 @@ class NonLinear:
         matrix[size:, size:] = -inverse[:, None] * dampers
         return matrix
 
-    def fastest_rate(self, force: float, visible: float = inf) -> float:
+    def fastest_rate(self, force: float, visible: float = inf, coarser: float = 1.0) -> float:
         """Rate [rad/s] that steps must resolve: the largest magnitude of an eigenvalue over the mesh cycle, at the
         largest tabulated deflection; or more, where friction turns round faster than a step of such a mode bears.
 
-        Modes faster than `visible` [rad/s], which no sample shows, count with the part UNSEEN.
+        Modes faster than `visible` [rad/s], which no sample shows, count with the part UNSEEN. Steps may be `coarser`
+        for modes by that factor; friction bears no coarser ones.
         """
         gain = self.rig.mesh.stiffness_scale
         gain *= 1 + sum(np.hypot(self.rig.mesh.stiffness_cos, self.rig.mesh.stiffness_sin)) if self._shaped else 1.0
@@ -349,7 +350,7 @@ class NonLinear:
         _, tangent = self.law.evaluate(self.law.approach[-1], np.arange(self.law.phases) / self.law.phases)
         modes = np.abs(np.linalg.eigvals(self.linearised(gain * float(tangent.max()), force)))
         modes = np.where(modes > visible, UNSEEN * modes, modes)
-        return max(float(modes.max()), RESOLVED * self.friction_rate())
+        return max(float(modes.max()) / coarser, RESOLVED * self.friction_rate())
 
     @property
     def _shaped(self) -> bool:

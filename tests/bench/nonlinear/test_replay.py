@@ -156,3 +156,16 @@ def test_records_that_say_too_little_are_refused(case: Case, record: xr.Dataset)
     keep = {str(n): record[n].values[:, :1530] for n in record.data_vars}
     with pytest.raises(BenchError, match=r"holds 59\.7\d* mesh periods, which must be a whole number"):
         replay(case, make_record(keep, {**record.attrs, "periods": 1, "samples_per_period": 1530}))
+
+
+@pytest.mark.parametrize(("friction", "part"), [(1e-4, 4 / 7), (0.05, 1.0)])
+def test_steps_may_be_coarser_where_friction_bears_them(friction: float, part: float) -> None:
+    """Fewer for the modes of a rig, with errors of the fourth order; as many where friction turns round in a step."""
+    slow = {"mesh_frequency": 20.0, "settling_tolerance": 1e-8, "settling_periods_max": 50}
+    case = small_case(None, None, slow, friction=Friction(coefficient=friction, transition_speed=1e-3))
+    record = simulate(small_case(None, None, slow, {"substeps": 128}, friction=case.rig.friction))
+    found = [replay(case, record, coarser=coarser) for coarser in (1.0, 1.75)]
+    steps = [one.attrs["substeps"] for one in found]
+    errors = [differs(one, record) for one in found]
+    assert steps[1] == pytest.approx(part * steps[0])
+    assert errors[1] / errors[0] == pytest.approx(part**-4, rel=0.3)
