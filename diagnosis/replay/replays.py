@@ -16,8 +16,8 @@ from gearbench.geometry import pair
 from gearbench.lumped.nonlinear.law import MeshLaw
 from gearbench.rig import Case
 
-# Steps are so much longer than those of a simulation: the fastest mode's frequency is then right to 2e-3, and lines to
-# 5e-4 where the finer steps leave 1e-4; any model of a record is wrong by more.
+# Steps of a search are so much longer than those of a simulation: the fastest mode's frequency is then right to 2e-3,
+# and lines to 5e-4 where the finer steps leave 1e-4; any model of a record is wrong by more.
 COARSER = 2**0.5
 LAWS = 8  # of different backlash or flanks whose secants are kept: most replays have the nominal ones
 
@@ -51,15 +51,15 @@ def _with_backlash(law: MeshLaw, backlash: float) -> MeshLaw:
     return replace(law, backlash=backlash)
 
 
-def replays(sound: MeshLaw) -> Replay:
+def replays(sound: MeshLaw, coarser: float = 1.0) -> Replay:
     """Replays on the non-linear lumped model with this law of sound teeth: rigs may differ in everything but the teeth
-    that it was made for."""
+    that it was made for. Steps are `coarser` than those of a simulation."""
 
     def simulate(case: Case, record: xr.Dataset, /, nudge: float = 0.0) -> xr.Dataset:
         # Its time loop is compiled on import, which not every user of this module wants.
         from gearbench.bench.nonlinear.replay import replay
 
-        return replay(case, record, law_of(sound, case), nudge=nudge, coarser=COARSER)
+        return replay(case, record, law_of(sound, case), nudge=nudge, coarser=coarser)
 
     return simulate
 
