@@ -77,7 +77,6 @@ def around(layout: Layout, conditions: Sequence[Condition], held: Array) -> Arra
     reaction = (REACTION,) if load.boundary == "speed" and not load.twists else ()
     wanted, most = (*MOVED, *reaction), max(LINES // len(conditions), FEWEST)
     found = (lines_of(layout.model, one, wanted, most) for one in conditions)
-    # Matrices are small: threads would wait for each other.
     lines = joined([one for one in found if one is not None])
     if not lines:
         return None
@@ -91,6 +90,7 @@ def around(layout: Layout, conditions: Sequence[Condition], held: Array) -> Arra
         begun = [best]
         if HOUSING in unknowns.slices and not held[unknowns[SEAT]].any():
             begun.append(seated(unknowns, best))
+        # Matrices are small: threads would wait for each other.
         rigs = [_found(layout, lines, cost, one) for one in begun]
     except ValueError:  # no rig there
         return None

@@ -74,10 +74,9 @@ class MeshMatrices:
 
     def times(self, values: Complexes) -> Complexes:
         """A `values` (C, S, m)."""
-        coupled = values * self._valid[:, :, None]
-        reach = values.shape[1]
+        coupled, size = values * self._valid[:, :, None], values.shape[1]
         found = sum(
-            fftconvolve(x, table[None, 1:-1, None], axes=1)[:, reach - 1 : 2 * reach - 1]
+            fftconvolve(x, table[None, 1:-1, None], axes=1)[:, size - 1 : 2 * size - 1]
             for table, x in zip(self._tables, (coupled, self._speed[:, :, None] * coupled), strict=True)
         )
         return np.asarray(self._diagonal[:, :, None] * values + found * self._valid[:, :, None])
