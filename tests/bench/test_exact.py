@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from gearbench.bench import simulate
 from gearbench.bench.nonlinear.static import linearised_matrices
 from gearbench.bench.refusals.effects import is_nonlinear
 from gearbench.bench.results import exact
@@ -51,3 +52,25 @@ def test_sharp_switches_are_where_far_finer_pieces_have_them(
     assert (system.phases, system.interpolation) == (2048, "piecewise")
     one, other = (exact_itf(s, FREQUENCY, PHASE) for s in (PeriodicSystem(system.period, *matrices), system))
     assert np.linalg.norm(other - one) < 1e-3 * np.linalg.norm(one)
+
+
+@pytest.mark.parametrize("direction", ["tangential", "line-of-action"])
+def test_small_vibrations_of_the_nonlinear_rig_are_those_of_the_exact_response(direction: str) -> None:
+    """What two records differ by whose torques differ by little. Gears whose centres move across the line between them
+    turn the mesh, at rest and as they vibrate."""
+    case = rig(
+        f"rig.support.direction={direction}", "rig.support.stiffness_n_per_m=2e8", "experiment.mesh_frequency_hz=16",
+        "experiment.multisine.amplitude_nm=0.5", "experiment.multisine.band_hz=[600, 1400]", "experiment.periods=1",
+        "experiment.realisations=2", "experiment.settling_tolerance=1e-9", "rig.sensors.noise_torque_nm=1e-12",
+        "simulation.substeps=16",
+    )  # fmt: skip
+    record = simulate(case)
+    samples, cycle = record.sizes["time"], 1024
+    force, dte = (np.diff(record[name].values, axis=0)[0] for name in ("force", "dte"))
+    spectrum = np.fft.rfft(force)
+    lines = np.flatnonzero(np.abs(spectrum) > 1e-6 * np.abs(spectrum).max())
+    time, phase = np.arange(samples), np.arange(cycle) / cycle + record["mesh_phase"].values[0, 0]
+    response = exact_itf(lumped_periodic_system(case), lines * 16384.0 / samples, phase % 1.0)
+    waves = np.exp(2j * np.pi * np.outer(lines, time) / samples) * spectrum[lines, None] * 2 / samples
+    expected = (response[:, time % cycle] * waves).sum(axis=0).real
+    assert np.linalg.norm(dte - expected) < 2e-3 * np.linalg.norm(expected)
