@@ -20,7 +20,7 @@ from gearbench.diagnosis.judging.decided import unexplained
 from gearbench.diagnosis.judging.repeating import repeating
 from gearbench.diagnosis.odds import Calibration
 from gearbench.diagnosis.population import POPULATION
-from gearbench.diagnosis.replay.replays import COARSER, replays
+from gearbench.diagnosis.replay.replays import COARSER, Replays
 from gearbench.diagnosis.selection.simulated import simulated
 from gearbench.rig import Case
 
@@ -45,7 +45,7 @@ def find_cause(
     result = search(problem, without, report)
     best = named(result)
     fit = best.fit if best and best.fit else result.base
-    simulate = replays(problem.model.sound, COARSER)
+    simulate = Replays(problem.model.sound, COARSER)
     judged = held_out if held_out is not None and held_out.phase_known else None
     found = simulated(problem, result, measurements, nominal, simulate, without, report, judged=judged)
     report("steadiness")

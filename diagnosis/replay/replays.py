@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Protocol
 
@@ -51,21 +51,23 @@ def _with_backlash(law: MeshLaw, backlash: float) -> MeshLaw:
     return replace(law, backlash=backlash)
 
 
-def replays(sound: MeshLaw, coarser: float = 1.0) -> Replay:
-    """Replays on the non-linear lumped model with this law of sound teeth: rigs may differ in everything but the teeth
-    that it was made for. Steps are `coarser` than those of a simulation."""
+@dataclass(frozen=True, eq=False)
+class Replays:
+    """Replays on the non-linear lumped model with the law of `sound` teeth: rigs may differ in everything but the teeth
+    that it was made for. Steps are `coarser` than those of a simulation by that factor."""
 
-    def simulate(case: Case, record: xr.Dataset, /, nudge: float = 0.0) -> xr.Dataset:
+    sound: MeshLaw
+    coarser: float = 1.0
+
+    def __call__(self, case: Case, record: xr.Dataset, /, nudge: float = 0.0) -> xr.Dataset:
         # Its time loop is compiled on import, which not every user of this module wants.
         from gearbench.bench.nonlinear.replay import replay
 
-        return replay(case, record, law_of(sound, case), nudge=nudge, coarser=coarser)
-
-    return simulate
+        return replay(case, record, law_of(self.sound, case), nudge=nudge, coarser=self.coarser)
 
 
 def replays_of(nominal: Case, measurements: Sequence[Measurement]) -> Replay:
     """The replays of these measurements on the nominal rig's law."""
     from gearbench.bench.nonlinear.law_table import teeth_law
 
-    return replays(teeth_law(nominal.rig, nominal.simulation, table_load(nominal.rig, measurements)))
+    return Replays(teeth_law(nominal.rig, nominal.simulation, table_load(nominal.rig, measurements)))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from gearbench.bench.plan.workers import side_by_side
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.intake.signals import simulated_channels
-from gearbench.diagnosis.replay.replays import COARSER, Replay, law_of
+from gearbench.diagnosis.replay.replays import Replay, Replays, law_of
 from gearbench.diagnosis.simulation.jacobian import MOVED, SHORT_STEP, STEP, Other, forces_of, others_of, sensor_columns
 from gearbench.diagnosis.simulation.target import Target
 from gearbench.diagnosis.structure.layout import Layout
@@ -159,11 +159,13 @@ class Simulator:
         from gearbench.bench.nonlinear.along import along
         from gearbench.bench.nonlinear.replay import seen_of, steady_motion
 
+        coarser = self.simulate.coarser if isinstance(self.simulate, Replays) else 1.0
+
         def one(item: tuple[int, Measurement]) -> tuple[Integers, Spectra, dict[int, dict[str, Complex]]]:
             number, measured = item
             case = self.layout.case(p, measured.name)
             law, nudge = law_of(self.layout.model.sound, case), self.nudges.get(measured.name, 0.0)
-            steady = steady_motion(case, measured.record, law, nudge=nudge, coarser=COARSER)
+            steady = steady_motion(case, measured.record, law, nudge=nudge, coarser=coarser)
             tangent = along(steady)
             forces = forces_of(self.layout, p, tangent, measured.name, chosen, others)
             answers = tangent.answers(forces.acting)

@@ -8,7 +8,7 @@ from gearbench.bench import simulate
 from gearbench.cases import case_files
 from gearbench.diagnosis.evidence.problem import problem_of
 from gearbench.diagnosis.intake.measurements import measurement
-from gearbench.diagnosis.replay.replays import replays
+from gearbench.diagnosis.replay.replays import Replays
 from gearbench.diagnosis.simulation.simulator import Simulator
 from gearbench.diagnosis.simulation.target import target_of
 from gearbench.diagnosis.structure.layout import layout_of
@@ -25,7 +25,7 @@ def demonstration(load: Load | None = None, faster: int = 1) -> Simulator:
     measured = measurement(simulate(case), nominal.conditions[0].name, nominal)
     problem = problem_of([measured], nominal)
     layout = layout_of(nominal, problem.model, problem.conditions, (3,))
-    return Simulator(layout, target_of([measured], problem.conditions), replays(problem.model.law))
+    return Simulator(layout, target_of([measured], problem.conditions), Replays(problem.model.law))
 
 
 def quicker(faster: int, conditions: int) -> Case:

@@ -17,7 +17,7 @@ from gearbench.diagnosis.fitting.fit import fit_afresh
 from gearbench.diagnosis.intake.measurements import Measurement, measurement
 from gearbench.diagnosis.judging.judged import judged_on
 from gearbench.diagnosis.judging.only_there import with_backlash_there
-from gearbench.diagnosis.replay.replays import replays
+from gearbench.diagnosis.replay.replays import Replays
 from gearbench.diagnosis.selection import parting as module
 from gearbench.diagnosis.selection.by_forces import Start
 from gearbench.diagnosis.selection.followable import nudges_of
@@ -55,7 +55,7 @@ def searched(more: float, faster: int) -> Searched:
         for one in nominal.conditions
     ]
     problem = problem_of(records, nominal)
-    smooth = Simulator(layout, target_of(records[:1], problem.conditions[:1]), replays(model.law))
+    smooth = Simulator(layout, target_of(records[:1], problem.conditions[:1]), Replays(model.law))
     found = fit_afresh(smooth, np.zeros(layout.size), keys.prior(), renewals=1)
     assert found is not None
     rough = target_of(records[1:], problem.conditions[1:])

@@ -12,7 +12,7 @@ from gearbench.cases import case_files
 from gearbench.diagnosis.evidence.problem import problem_of
 from gearbench.diagnosis.intake.measurements import Measurement, measurement
 from gearbench.diagnosis.intake.signals import excited, measured_channels, noise_of_mean, simulated_channels
-from gearbench.diagnosis.replay.replays import Replay, replays
+from gearbench.diagnosis.replay.replays import Replay, Replays
 from gearbench.diagnosis.simulation.passed_noise import noise_left
 from gearbench.diagnosis.simulation.target import BY_TEETH, INDEPENDENT, target_of
 from gearbench.rig import Case, read_case
@@ -62,7 +62,7 @@ def rig() -> Rig:
 @pytest.fixture(scope="module")
 def noisy(rig: Rig) -> tuple[Measurement, Replay]:
     measured = rig.measured(ANGLE)
-    return measured, replays(problem_of([measured], rig.case).model.sound)
+    return measured, Replays(problem_of([measured], rig.case).model.sound)
 
 
 def lines(measured: Measurement, parts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
