@@ -7,7 +7,7 @@ from math import degrees, pi
 import numpy as np
 
 from gearbench.records.checks.finding import ANGLE_UNITS, Finding, unit_hint
-from gearbench.records.checks.look import GEARS, Look
+from gearbench.records.checks.look import GEARS, Look, mean_rate
 
 # Speeds against teeth, base radii against teeth.
 RATIO = 1e-3
@@ -77,8 +77,11 @@ def angles_keep_mesh_period(look: Look) -> list[Finding]:
     teeth, period = look.number("teeth_driver"), look.mesh_period
     if look.channel("angle_driver") is None or teeth is None or period is None or not look.speed("driver") > 0:
         return []
-    got, declared = look.speed("driver") * teeth / (2 * pi), 1.0 / period
-    source = "mesh_period" if look.number("mesh_period") is not None else "mesh_phase"
+    got, declared, source = look.speed("driver") * teeth / (2 * pi), 1.0 / period, "mesh_period"
+    phase = look.channel("mesh_phase")
+    if look.number("mesh_period") is None and phase is not None:
+        # Of a speed that wanders the ends say another mean than a line does.
+        declared, source = mean_rate(phase, look.rate, int(look.record.attrs["periods"])), "mesh_phase"
     if abs(got / declared - 1) <= max(FREQUENCY, _slack(look)):
         return []
     return [

@@ -167,7 +167,11 @@ def mean_speed(record: xr.Dataset, gear: str) -> float:
     """Mean speed [rad/s] of a gear in the first realisation: by how much its angle advances from period to period; with
     a single period by a linear fit, which swings of the gear falsify."""
     values, rate = record[f"angle_{gear}"].values[0], float(record.attrs["sampling_rate"])
-    periods = int(record.attrs["periods"])
+    return mean_rate(values, rate, int(record.attrs["periods"]))
+
+
+def mean_rate(values: NDArray[np.float64], rate: float, periods: int) -> float:
+    """By how much values (N,), sampled at a rate [Hz], advance in a second, likewise."""
     if periods > 1:
         values, rate = values.reshape(periods, -1).mean(axis=1), rate * periods / values.size
     steps = np.arange(values.size) - 0.5 * (values.size - 1)

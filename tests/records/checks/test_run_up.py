@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from gearbench.records.checks.angles import angles_keep_mesh_period
 from gearbench.records.checks.contradictions import clocks_agree
 from gearbench.records.checks.look import Look
 from gearbench.records.checks.mesh_force import accounts_of
@@ -47,3 +48,18 @@ def test_only_a_constant_speed_has_accounts(rise: float) -> None:
     assert (accounts_of(found) is None) == (rise > 0.0)
     if rise:
         assert not clocks_agree(found) and not periods_repeat(found)
+
+
+@pytest.mark.parametrize(("teeth", "refused"), [(TEETH, 0), (TEETH + 1, 1)])
+def test_a_speed_that_wanders_by_part_of_a_cycle_has_the_mesh_frequency_of_its_phase(
+    teeth: int, refused: int
+) -> None:
+    """Its ends say another mean than a straight line, by 5 % here."""
+    time = np.arange(SAMPLES) / RATE
+    mesh = 50.0 * (time - 0.2 / (2 * np.pi * 0.65) * (np.cos(2 * np.pi * 0.65 * time + 0.4) - np.cos(0.4)))
+    record = look(0.0).record.copy(deep=True)
+    record["mesh_phase"].values[0] = mesh
+    for gear in ("driver", "driven"):
+        record[f"angle_{gear}"].values[0] = 2 * np.pi / TEETH * mesh
+    record.attrs.update(teeth_driver=teeth, periods=1, samples_per_period=SAMPLES)
+    assert len(angles_keep_mesh_period(Look(record))) == refused
