@@ -12,7 +12,7 @@ from gearbench.bench.nonlinear.fine import Motion
 from gearbench.bench.nonlinear.replay import Steady
 from gearbench.bench.nonlinear.run import Setup
 from gearbench.lumped.nonlinear.model import NonLinear
-from gearbench.lumped.nonlinear.pressing import of_pairs, pressed
+from gearbench.lumped.nonlinear.pressing import Instants, of_pairs, pressed, turning
 from gearbench.lumped.nonlinear.rubbing import rubbed_along
 from gearbench.lumped.nonlinear.sensitive import sensitivities
 from gearbench.lumped.nonlinear.tables import Table, instants
@@ -57,18 +57,15 @@ def pushing(steady: Steady, motion: Motion, substeps: int) -> Pushing:
     # Back flanks close at the rate of the deflection alone.
     closing = motion.rate + np.where(force < 0.0, 0.0, table.excess_rate[:count])
 
-    def force_at(phase: Array) -> Array:
-        elastic, tangent = pressed(model.law, at._replace(phase=np.clip(phase, 0.0, 1.0 - 1e-12)), travel)
+    def force_at(there: Instants) -> Array:
+        elastic, tangent = pressed(model.law, there, travel)
         return np.asarray(elastic + _damping(model, elastic, tangent) * closing)
 
-    # Between two rows of the law the motion sees a straight line.
-    row = np.floor(turned * model.law.phases)
-    turning = (force_at((row + 1) / model.law.phases) - force_at(row / model.law.phases)) * model.law.phases
-    slope = np.maximum(slope, 0.0)
+    onward, slope = turning(model.law, at, force_at), np.maximum(slope, 0.0)
     damping = _damping(model, force, slope)
     # Flanks that part faster than they spring back push no more.
     idle = (force + damping * closing) * force <= 0.0
-    force, slope, damping, turning = (np.where(idle, 0.0, one) for one in (force, slope, damping, turning))
+    force, slope, damping, onward = (np.where(idle, 0.0, one) for one in (force, slope, damping, onward))
     # Damping that grows with the force is the stiffer for being pressed while the flanks close.
     stiffer = 1.0 + model.rig.damping.mesh_exponent * damping * closing / np.where(idle, 1.0, force)
     mesh = model.rig.mesh
@@ -81,7 +78,7 @@ def pushing(steady: Steady, motion: Motion, substeps: int) -> Pushing:
     rubbed = _rubbed(setup, table, motion, turned * model.law.phases)
     return Pushing(
         force, pair_force, pair_tangent, form, closing, answer.level, answer.sharing, stiffer, stiffness, damping,
-        turning, rubbed,
+        onward, rubbed,
     )  # fmt: skip
 
 

@@ -15,7 +15,7 @@ from gearbench.fem.limits import LOAD_RANGE
 from gearbench.geometry import Pair, pair
 from gearbench.lumped.nonlinear.coordinates import HOUSING, LOAD, U1, U2, Y1, Y2, W
 from gearbench.lumped.nonlinear.model import NonLinear, nonlinear_model
-from gearbench.lumped.nonlinear.pressing import Instants, alike, pressed, travel_under
+from gearbench.lumped.nonlinear.pressing import alike, pressed, travel_under, turning
 from gearbench.lumped.nonlinear.rest import inverse_masses, mesh_direction
 from gearbench.lumped.nonlinear.tables import Motion, instants, tables
 from gearbench.rig import Case
@@ -78,34 +78,19 @@ def linearised_matrices(
     table = tables(model, Motion(cycles=1.0, entries=phases, step=1.0, first_phase=first))
     at = instants(model, table, -1)
     travel = travel_under(model.law, at, np.array(force))
-    tangent, turning = pressed(model.law, at, travel).tangent, _turning(model, at, travel)
+    tangent = pressed(model.law, at, travel).tangent
+    onward = turning(model.law, at, lambda there: pressed(model.law, there, travel).force)
     seen = _relative(model)
     back = np.linalg.pinv(seen)
     size, n = model.size, len(seen)
     a = np.zeros((phases, 2 * n, 2 * n))
     a[:, :n, n:] = np.eye(n)
-    inverse, mesh = (of(model.constants(), model.structure) for of in (inverse_masses, mesh_direction))
-    # Centres that lean turn the mesh, which changes its force at the same deflection.
-    turned = np.outer(inverse * mesh, model.turned_on(np.eye(size)))
-    for row, stiffness, slope in zip(a, tangent, turning, strict=True):
-        full = model.linearised(float(stiffness), force)
-        full[size:, :size] -= slope * turned
+    for row, stiffness, slope in zip(a, tangent, onward, strict=True):
+        full = model.linearised(float(stiffness), force, float(slope))
         row[n:, :n] = seen @ full[size:, :size] @ back
         row[n:, n:] = seen @ full[size:, size:] @ back
-    dte = mesh @ back
+    dte = mesh_direction(model.constants(), model.structure) @ back
     return a, np.concatenate([np.zeros(n), seen @ _push(model)]), np.concatenate([dte, np.zeros(n)])
-
-
-def _turning(model: NonLinear, at: Instants, travel: Array) -> Array:
-    """What the mesh's force (n,) [N/cycle] at the DTE `travel` (n,) [m] changes by as it turns: between two rows of the
-    law along a straight line."""
-    rows = model.law.phases
-    row = np.floor((at.phase - np.floor(at.phase)) * rows)
-    low, high = (
-        pressed(model.law, at._replace(phase=np.clip(one / rows, 0.0, 1.0 - 1e-12)), travel).force
-        for one in (row, row + 1)
-    )
-    return np.asarray((high - low) * rows)
 
 
 def _push(model: NonLinear) -> Array:

@@ -11,6 +11,8 @@ middle, the core, is coupled to both.
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from scipy.signal import fftconvolve
@@ -32,6 +34,7 @@ class MeshMatrices:
 
     def __init__(self, diagonal: Complexes, k: Complexes, c: Complexes, omega: Floats, valid: np.ndarray) -> None:
         size, reach = diagonal.shape[1], max(k.size, 1)
+        self._reach = reach
         self._diagonal, self._speed, self._valid = diagonal, 1j * omega, valid
         self._tables = tuple(_two_sided(x, size) for x in (k, c))
         self.mirrored = _mirrored(diagonal, omega, valid)
@@ -43,7 +46,7 @@ class MeshMatrices:
         self.inverse: list[Complexes] = []
         self.upper: list[Complexes] = []
         self.down: list[Complexes] = []
-        for own, following in zip(self._blocks, [*self._blocks[1:], self._core], strict=False):
+        for own, following in pairwise([*self._blocks, self._core]):
             self.inverse.append(np.asarray(np.linalg.inv(self._left_of(own)), dtype=complex))
             self.upper.append(self._block(own, following))
             self.down.append(self._block(following, own) @ self.inverse[-1])
@@ -74,9 +77,10 @@ class MeshMatrices:
 
     def times(self, values: Complexes) -> Complexes:
         """A `values` (C, S, m)."""
-        coupled, size = values * self._valid[:, :, None], values.shape[1]
+        coupled, middle = values * self._valid[:, :, None], values.shape[1]
+        band = slice(middle - self._reach, middle + self._reach + 1)
         found = sum(
-            fftconvolve(x, table[None, 1:-1, None], axes=1)[:, size - 1 : 2 * size - 1]
+            fftconvolve(x, table[None, band, None], mode="same", axes=1)
             for table, x in zip(self._tables, (coupled, self._speed[:, :, None] * coupled), strict=True)
         )
         return np.asarray(self._diagonal[:, :, None] * values + found * self._valid[:, :, None])

@@ -321,14 +321,16 @@ class NonLinear:
         one, two = (float(spring.tangent(y)) for spring, y in zip(self.support_springs, deflections, strict=True))
         return Around(*springs_and_dampers(c, s, (one, two)), inverse_masses(c, s), mesh_direction(c, s))
 
-    def linearised(self, stiffness: float, force: float) -> Array:
-        """State matrix (2 size, 2 size) at a mesh stiffness [N/m], supports at rest under `force`.
+    def linearised(self, stiffness: float, force: float, turning: float = 0.0) -> Array:
+        """State matrix (2 size, 2 size) at a mesh stiffness [N/m], supports at rest under `force`, of a mesh whose
+        force changes by `turning` [N/cycle] where the centres' motion turns it.
 
         Without friction: away from the pitch point small vibrations do not turn the steady direction of sliding.
         """
         (y1, _), (y2, _) = self.centres(force)
         springs, dampers, inverse, mesh = self.around((y1, y2))
         springs += stiffness * np.outer(mesh, mesh)
+        springs += turning * np.outer(mesh, self.turned_on(np.eye(self.size)))
         dampers += self.viscosity(stiffness, force) * np.outer(mesh, mesh)
         size = self.size
         matrix = np.zeros((2 * size, 2 * size))

@@ -3,6 +3,7 @@ integrator's mesh does at an instant, without vibration."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -69,6 +70,16 @@ def pressed(law: MeshLaw, at: Instants, travel: Array) -> Pressed:
     working, stiff = pairs.force.sum(axis=-1), pairs.tangent.sum(axis=-1)
     back = (force < 0.0) & (working == 0.0)
     return Pressed(np.where(back, at.gain * force, working), np.where(back, at.gain * tangent, stiff))
+
+
+def turning(law: MeshLaw, at: Instants, force: Callable[[Instants], Array]) -> Array:
+    """What a force (n,) [N/cycle] of the mesh changes by as it turns: between two rows of the law along a straight
+    line."""
+    row = np.floor(at.phase * law.phases)
+    low, high = (
+        force(at._replace(phase=np.clip(one / law.phases, 0.0, 1.0 - 1e-12))) for one in (row, row + 1)
+    )
+    return np.asarray((high - low) * law.phases)
 
 
 def travel_under(law: MeshLaw, at: Instants, force: Array) -> Array:
