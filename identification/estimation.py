@@ -17,11 +17,12 @@ from gearbench.identification.feedback.varying_frf import signals_of, varying_fr
 from gearbench.identification.local import by_local_method, by_local_method_at_varying_speed
 from gearbench.identification.lpm.local_solve import LpmError
 from gearbench.identification.lpm.selection import LADDER
-from gearbench.identification.spectra.course import LOST, VARIES, course_spectra, speed_varies
+from gearbench.identification.spectra.course import LOST, course_spectra, speed_varies
 from gearbench.identification.spectra.joint import Spectra, SpectraError, require_mesh_periods
 from gearbench.identification.spectra.records import record_spectra
 from gearbench.identification.task import IdentificationSettings, Progress, Task, attributes_of, output_lines
 from gearbench.records.checks import angles_keep_mesh_period, check_record
+from gearbench.records.even_speed import VARIES
 from gearbench.records.record import require_finite
 
 # Expected error of mesh-feedback beyond which the local polynomial method is tried as well.

@@ -8,6 +8,9 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+# Departure of the mesh phase from constant speed [cycles] from which on a record counts as of varying speed.
+VARIES = 0.05
+
 
 def mesh_phase(record: xr.Dataset) -> Array | None:
     """Mesh phase (E, N) [cycles]: the channel `mesh_phase`, else teeth times the driver's turns, else None."""

@@ -18,11 +18,11 @@ from gearbench.identification.spectra.excited import excited_lines
 from gearbench.identification.spectra.joint import Floats, Spectra, SpectraError
 from gearbench.identification.spectra.transmission_error import dte, force
 from gearbench.records.antialias import common_lag
-from gearbench.records.even_speed import departure, mesh_phase
+from gearbench.records.even_speed import VARIES, departure, mesh_phase
 
-# Departure of the mesh phase from constant speed [cycles] from which on a record counts as of varying speed, and beyond
-# which averages over excitation periods lose the branches.
-VARIES, LOST = 0.05, 0.25
+# Departure of the mesh phase from constant speed [cycles] beyond which averages over excitation periods lose the
+# branches.
+LOST = 0.25
 # Mesh periods for each interval of the splines of the phase, and most intervals.
 SMOOTHED, INTERVALS = 4, 64
 # Fewest mesh periods in a record, and a line counts as excited if its force exceeds this part of the strongest one's.

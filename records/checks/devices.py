@@ -86,12 +86,11 @@ def _force(look: Look, gear: str) -> Complexes:
     torque, swing = look.channel(f"torque_{gear}"), look.swing(gear)
     radius, inertia = look.number(f"base_radius_{gear}") or 1.0, look.number(f"inertia_{gear}")
     assert torque is not None  # there is an account of this gear
-    total = np.fft.rfft(torque)
-    omega = 2 * np.pi * np.arange(total.size) * look.rate / look.samples
+    total = look.transform(torque)
     if swing is not None and inertia is not None:
-        total += (1.0 if gear == "driver" else -1.0) * inertia * omega**2 * np.fft.rfft(swing)
+        total -= (1.0 if gear == "driver" else -1.0) * inertia * look.transform(swing, derivative=2)
     total[int(look.lines[-1]) + 1 :] = 0.0
-    total[0] = 0.0
+    total[: look.lowest] = 0.0
     return np.asarray(total / radius)
 
 
@@ -112,9 +111,9 @@ def error_of_lag(look: Look, names: frozenset[str], delay: float) -> float:
         return 0.0
     lines = look.lines[look.excited(force)]
     d = 0
-    if look.mesh_period is not None:  # there the operating response hides what the excitation makes
+    if look.mesh_period is not None and not look.tapered:
         cycles = lines * look.rate / look.samples * look.mesh_period
-        between = np.abs(cycles - np.round(cycles)) > 1e-6
+        between = np.abs(cycles - np.round(cycles)) > 1e-6  # elsewhere the operating response hides the excitation's
         lines = lines[between] if between.any() else lines
         d = round(look.samples / look.rate / look.mesh_period)
     if not lines.size:
@@ -122,8 +121,8 @@ def error_of_lag(look: Look, names: frozenset[str], delay: float) -> float:
     driving = _changes(look, names, delay, force, "torque_")
     response = _changes(look, names, delay, error, "")
     direct = _wrong(response, driving, lines, lines)
-    inside = [lines[(lines - n * d > 0) & (lines - n * d <= look.lines[-1])] for n in SIDE] if d else []
-    asides = [_wrong(response, driving, some, some - n * d) for n, some in zip(SIDE, inside, strict=True) if some.size]
+    sides = [(n, lines[(lines > n * d) & (lines - n * d <= look.lines[-1])]) for n in SIDE] if d else []
+    asides = [_wrong(response, driving, some, some - n * d) for n, some in sides if some.size]
     share = _turned_aside(driving[0], response[0], int(look.lines[-1]), d)
     aside = float(np.sqrt(share * np.mean(np.square(asides)))) if asides else 0.0
     return max(direct, aside)
@@ -132,12 +131,12 @@ def error_of_lag(look: Look, names: frozenset[str], delay: float) -> float:
 def _changes(look: Look, names: frozenset[str], delay: float, now: Array, kind: str) -> tuple[Complexes, Complexes]:
     """Spectra of force (`kind` "torque_") or dte as it is, and as it is without the lag."""
     omega = 2 * np.pi * np.arange(look.samples // 2 + 1) * look.rate / look.samples
-    found = np.fft.rfft(now)
+    found = look.transform(now)
     right = found.copy()
     for name in names:
         part = _part(look, name) if name.startswith("torque_") == bool(kind) else None
         if part is not None:
-            right += (np.exp(1j * omega * delay) - 1) * np.fft.rfft(part)
+            right += (np.exp(1j * omega * delay) - 1) * look.transform(part)
     return found, right
 
 

@@ -12,7 +12,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from gearbench.records.attributes import numeric_attribute
-from gearbench.records.even_speed import departure
+from gearbench.records.checks.taper import SPREAD, transform
+from gearbench.records.even_speed import VARIES, departure, mesh_phase
 from gearbench.records.transmission_error import (
     AngleOnlyWarning,
     TransmissionError,
@@ -26,8 +27,8 @@ Complexes = NDArray[np.complex128]
 GEARS = ("driver", "driven")
 # Lines of a spectrum that the checks use at most, evenly spread: more would not tell more.
 MOST_LINES = 800
-# Departure of the mesh phase from even rotation [cycles] from which the speed varies, and nothing need repeat.
-VARIES = 0.5
+# Departure of the mesh phase from even rotation [cycles] from which on nothing need repeat.
+WANDERS = 0.5
 # A line is excited when its force exceeds this part of the strongest line's, the mean apart.
 EXCITED = 0.1
 
@@ -67,11 +68,21 @@ class Look:
         return declared
 
     @cached_property
+    def departure(self) -> float:
+        """Departure of the mesh phase [cycles] from that of a constant speed, 0 where the record does not say."""
+        phase = mesh_phase(self.record.isel(realisation=[0]))
+        return 0.0 if phase is None else departure(phase[0])
+
+    @property
     def steady(self) -> bool:
-        """Whether the speed is constant as far as the record says, so that its spectra are those of something that
-        repeats: at both ends of a run-up the gears are elsewhere, which derivatives by lines take for a jump."""
-        phase = self.channel("mesh_phase")
-        return phase is None or departure(phase) < VARIES
+        """Whether the speed is constant, so that what repeats with the mesh shows on lines of its own."""
+        return self.departure < WANDERS
+
+    @property
+    def tapered(self) -> bool:
+        """Whether spectra are tapered: at both ends of a run-up the gears are elsewhere, which derivatives by lines
+        would take for a jump."""
+        return self.departure > VARIES
 
     @cached_property
     def zero_known(self) -> bool:
@@ -91,8 +102,12 @@ class Look:
         return mean_speed(self.record, gear)
 
     def swing(self, gear: str) -> Array | None:
-        """Departure (samples,) [rad] of a gear's angle from steady rotation at the declared mesh period."""
+        """Departure (samples,) [rad] of a gear's angle from steady rotation at the declared mesh period; of a speed
+        that varies, from the straight line that fits best."""
         values, teeth = self.channel(f"angle_{gear}"), self.number(f"teeth_{gear}")
+        if values is not None and self.tapered:
+            steps = np.arange(values.size) - 0.5 * (values.size - 1)
+            return np.asarray(values - values.mean() - float(steps @ values) / float(steps @ steps) * steps)
         if values is None or teeth is None or self.mesh_period is None:
             return None
         ramp = 2 * pi / (teeth * self.mesh_period * self.rate) * np.arange(values.size)
@@ -104,17 +119,22 @@ class Look:
         driving = self.channel("torque_driver")
         driving = self.channel("force") if driving is None else driving
         assert driving is not None  # or the record would not be one
-        size = np.abs(np.fft.rfft(driving - driving.mean()))
+        size = self._size(driving)
         top = int(np.flatnonzero(size >= EXCITED * size.max())[-1])
         if size.max() <= 1e-9 * np.abs(driving).sum():
             top = self.samples // 4
         step = max(1, top // MOST_LINES)
         # An odd step meets even and odd lines, and with most combs lines of theirs.
-        found = np.arange(1, max(top, 2) + 1, step + 1 - step % 2)
+        found = np.arange(self.lowest, max(top, self.lowest + 1) + 1, step + 1 - step % 2)
         met = size[found] >= EXCITED * size.max()
         excited = np.flatnonzero(size >= EXCITED * size.max())
-        excited = excited[(excited > 0) & (excited <= top)]
+        excited = excited[(excited >= self.lowest) & (excited <= top)]
         return found if met.any() else np.union1d(found, excited[:: max(1, excited.size // MOST_LINES)])
+
+    @property
+    def lowest(self) -> int:
+        """The first line that holds nothing of the mean, or, of a speed that varies, of its course."""
+        return SPREAD if self.tapered else 1
 
     @cached_property
     def omega(self) -> Array:
@@ -155,12 +175,22 @@ class Look:
     def excited(self, force: Array) -> NDArray[np.bool_]:
         """Which of `lines` a force (samples,) excites; none where it is constant. What counts is the strongest of all
         lines: those that are looked at may lie between the excited ones."""
-        size = np.abs(np.fft.rfft(force - force.mean()))
+        size = self._size(force)
         return np.asarray((size[self.lines] >= EXCITED * size.max()) & (size[self.lines] > 0))
 
-    def spectrum(self, values: Array) -> Complexes:
-        """DFT of values (samples,) on `lines`, divided by the number of samples."""
-        return np.asarray(np.fft.rfft(values)[self.lines] / values.size)
+    def _size(self, force: Array) -> Array:
+        """Sizes of a force's lines, those below the lowest one 0."""
+        size = np.abs(self.transform(force - force.mean()))
+        size[: self.lowest] = 0.0
+        return np.asarray(size)
+
+    def spectrum(self, values: Array, derivative: int = 0) -> Complexes:
+        """DFT of values (samples,), or of a derivative in time, on `lines`, divided by the number of samples."""
+        return np.asarray(self.transform(values, derivative)[self.lines] / values.size)
+
+    def transform(self, values: Array, derivative: int = 0) -> Complexes:
+        """The same on all lines, not divided, tapered where the speed varies."""
+        return transform(values, self.rate, derivative, self.tapered)
 
 
 def mean_speed(record: xr.Dataset, gear: str) -> float:

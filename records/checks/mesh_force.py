@@ -30,8 +30,8 @@ NOTHING = 1e-300  # N; accounts of no force agree
 
 @dataclass(frozen=True, eq=False)
 class Accounts:
-    """`gears`: gear -> channel -> its part (lines,) of the force [N]; `centres`: gear -> y (lines,) [m]; `omega`
-    (lines,) [rad/s]."""
+    """`gears`: gear -> channel -> its part (lines,) of the force [N]; `centres`: gear -> y, its rate and acceleration
+    (lines, 3) [m, m/s, m/s^2]; `omega` (lines,) [rad/s]."""
 
     gears: dict[str, dict[str, Complexes]]
     centres: dict[str, Complexes]
@@ -98,14 +98,11 @@ class Accounts:
         return {centre: _orthonormal(self._columns(centre)).conj() for centre in self.centres}
 
     def _columns(self, centre: str) -> Complexes:
-        y = SIGNS[centre] * self.centres[centre]
-        return np.stack([y, 1j * self.omega * y, -(self.omega**2) * y], axis=1)
+        return SIGNS[centre] * self.centres[centre]
 
 
 def accounts_of(look: Look) -> Accounts | None:
-    """The accounts that a record allows; None where there are not two of them, or the speed varies."""
-    if not look.steady:
-        return None
+    """The accounts that a record allows; None where there are not two of them."""
     held = look.record.attrs.get("driven_boundary") == "speed"
     gears: dict[str, dict[str, Complexes]] = {}
     for gear, sign in zip(GEARS, (1.0, -1.0), strict=True):
@@ -115,7 +112,7 @@ def accounts_of(look: Look) -> Accounts | None:
             continue
         parts = {f"torque_{gear}": look.spectrum(torque) / radius}
         if swing is not None and inertia is not None:
-            parts[f"angle_{gear}"] = sign * inertia / radius * look.omega**2 * look.spectrum(swing)
+            parts[f"angle_{gear}"] = -sign * inertia / radius * look.spectrum(swing, derivative=2)
         elif not (held and gear == "driven"):  # a gear that turns steadily needs no inertia
             continue
         if any(np.any(part) for part in parts.values()):
@@ -125,7 +122,7 @@ def accounts_of(look: Look) -> Accounts | None:
     for gear in GEARS:
         y = look.channel(f"y_{gear}")
         if y is not None and np.ptp(y) > STILL * max(turned):
-            centres[gear] = look.spectrum(y)
+            centres[gear] = np.stack([look.spectrum(y, derivative) for derivative in range(3)], axis=1)
     accounts = Accounts(gears, centres, look.omega)
     return accounts if accounts.relations() else None
 

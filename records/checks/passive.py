@@ -71,7 +71,7 @@ def _cosine(look: Look, force: NDArray[np.float64], error: NDArray[np.float64], 
     driving = look.spectrum(force)
     lines = np.flatnonzero(look.excited(force))
     lines = lines[: max(int(np.ceil(part * lines.size)), 1)]
-    driving, rate = driving[lines], (1j * look.omega * look.spectrum(error))[lines]
+    driving, rate = driving[lines], look.spectrum(error, derivative=1)[lines]
     size = float(np.linalg.norm(driving) * np.linalg.norm(rate))
     return float(np.vdot(driving, rate).real) / size if size > 0 else 0.0
 

@@ -49,6 +49,6 @@ def test_a_displacement_in_the_wrong_unit_is_no_held_centre() -> None:
 def test_accounts_of_no_force_agree_without_a_warning(recwarn: pytest.WarningsRecorder) -> None:
     nothing = np.zeros(5, dtype=complex)
     gears = {gear: {f"torque_{gear}": nothing} for gear in ("driver", "driven")}
-    accounts = Accounts(gears, {"driver": np.ones(5, dtype=complex)}, np.arange(1.0, 6.0))
+    accounts = Accounts(gears, {"driver": np.ones((5, 3), dtype=complex)}, np.arange(1.0, 6.0))
     assert [float(accounts.misfit(one)[0]) for one in accounts.relations()] == [0.0, 0.0, 0.0]
     assert not recwarn.list
