@@ -2,8 +2,8 @@
 
 With a clock that runs fast by r the response to the same lines turns by exp(-j w r t). The mean response of the first
 half of the record against that of the second tells r from the phases of all lines: a slope over frequency that no rig
-has, as both halves hold the same rig at the same mesh phases. Sidebands of the mesh and noise scatter these phases;
-how much they scatter says what can be told.
+has, as both halves hold the same rig at the same mesh phases. Sidebands of the mesh and noise scatter these phases:
+neighbouring lines, that a drift turns alike, tell how much, and what scatters at random counts for nothing.
 """
 
 from __future__ import annotations
@@ -16,13 +16,15 @@ from gearbench.records.checks.look import EXCITED, Look
 
 Array = NDArray[np.float64]
 
-# Segments of each half, windowed and averaged, and groups of lines whose scatter tells the deviation; fewest lines.
-SEGMENTS, GROUPS, FEWEST = 4, 24, 240
+# Segments of each half, windowed and averaged; blocks of neighbouring lines, fewest lines, and fewest blocks whose lines
+# agree beyond chance: by COHERENT times the resultant that random phases have.
+SEGMENTS, BLOCKS, FEWEST, FEWEST_BLOCKS, COHERENT = 4, 24, 240, 6, 3.0
 # A drift is believed beyond so many of its standard deviations, and said if it costs this part of the response.
 SURE, COSTS = 6.0, 0.02
 # Largest drift looked for [s over half of the record], as turns of the highest line.
 TURNS = 3.0
 STEPS = 401
+FINEST = 1e-9  # of incoherence, so that phases without noise have a weight
 WHOLE = 1e-6
 
 
@@ -38,9 +40,10 @@ def clocks_keep_pace(look: Look) -> list[Finding]:
     if halves is None:
         return []
     omega, turned, response, seconds = halves
-    shift, deviation = _shift(omega, turned)
-    if not abs(shift) > SURE * deviation:
+    found = delay_between(omega, turned)
+    if found is None:
         return []
+    shift, deviation = found
     rate, duration = shift / seconds, look.samples / look.rate
     cost = _cost(omega * rate * duration, response)
     if cost < COSTS:
@@ -88,20 +91,38 @@ def _halves(
     return np.asarray(omega), turned, np.sqrt(np.abs(turned)), half / look.rate
 
 
-def _shift(omega: Array, turned: NDArray[np.complex128]) -> tuple[float, float]:
-    """The delay [s] that turns all phases back best, and its standard deviation from how groups of lines differ."""
+def delay_between(omega: Array, turned: NDArray[np.complex128]) -> tuple[float, float] | None:
+    """The delay [s] that turns the phases of `turned` (lines,) back best, and its standard deviation [s]; None where it
+    is none beyond chance, of all the delays that are tried.
+
+    Of n unit phasors with a resultant R the coherence is g = (R^2 - n) / (n^2 - n), and the variance of its phase
+    (1 - g) / (2 n g) (Bendat and Piersol, "Random Data", 4th ed. 2010, Eq. 9.91, for n averages).
+    """
     unit = turned / np.maximum(np.abs(turned), np.finfo(float).tiny)
+    blocks = np.array_split(np.arange(omega.size), BLOCKS)
+    resultant, middle, count = (np.array([part(own) for own in blocks]) for part in (
+        lambda own: unit[own].sum(), lambda own: omega[own].mean(), len))  # fmt: skip
+    kept = np.abs(resultant) > COHERENT * np.sqrt(count)
+    if np.count_nonzero(kept) < FEWEST_BLOCKS:
+        return None
+    resultant, middle, count = resultant[kept], middle[kept], count[kept]
+    coherence = np.minimum((np.abs(resultant) ** 2 - count) / (count**2 - count), 1 - FINEST)
+    weight = 2 * count * coherence / (1 - coherence)
+    phasor = resultant / np.abs(resultant)
+
     reach = TURNS * 2 * np.pi / float(omega[-1])
     delays = np.linspace(-reach, reach, STEPS)
-    score = (np.exp(1j * np.outer(delays, omega)) @ unit).real
+    score = (np.exp(1j * np.outer(delays, middle)) @ (weight * phasor)).real
     best = float(delays[int(np.argmax(score))])
-    groups = [np.arange(number, omega.size, GROUPS) for number in range(GROUPS)]
-    found = []
-    for own in groups:
-        phase = np.angle(unit[own] * np.exp(1j * omega[own] * best))
-        found.append(float(omega[own] @ phase) / float(omega[own] @ omega[own]))
-    steps = np.array(found)
-    return best - float(steps.mean()), float(steps.std(ddof=1)) / np.sqrt(GROUPS)
+    phase = np.angle(phasor * np.exp(1j * middle * best))
+    stiffness = float(weight @ middle**2)
+    best -= float((weight * middle) @ phase) / stiffness
+    left = np.angle(phasor * np.exp(1j * middle * best))
+    scale = max(1.0, float(weight @ left**2) / (phase.size - 1))
+    gained = float(weight @ (np.cos(left) - phasor.real))
+    deviation = float(np.sqrt(scale / stiffness))
+    sure = abs(best) > SURE * deviation and gained > 0.5 * SURE**2 * scale
+    return (best, deviation) if sure else None
 
 
 def _cost(turns: Array, response: Array) -> float:

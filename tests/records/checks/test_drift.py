@@ -50,6 +50,15 @@ def test_common_clocks_are_not_accused(record: xr.Dataset) -> None:
     assert clocks_keep_pace(Look(odd)) == []
 
 
+@pytest.mark.parametrize("noise", [0.3, 1.0, 3.0, 10.0])
+def test_noise_is_no_drift(record: xr.Dataset, noise: float) -> None:
+    """White noise of so many times the dte's rms, sixteen draws: none is taken for a drift, whatever delay fits best."""
+    values, random = record.dte.values, np.random.default_rng(8)
+    for _ in range(16):
+        white = noise * values.std() * random.standard_normal(values.shape)
+        assert clocks_keep_pace(Look(record.assign(dte=(record.dte.dims, values + white, record.dte.attrs)))) == []
+
+
 @pytest.mark.parametrize(("factor", "said"), [(1.0, None), (1e-3, "stiffest mesh"), (1e3, "softer")])
 def test_dte_of_a_record_without_angles_in_another_unit(record: xr.Dataset, factor: float, said: str | None) -> None:
     """A spring of 8e7 N/m becomes one of 8e10, which no mesh has, or of 8e4, which is doubtful."""
