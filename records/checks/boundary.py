@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from gearbench.records.checks.finding import Finding
 from gearbench.records.checks.look import GEARS, Complexes, Look
-from gearbench.records.checks.mesh_force import Accounts, accounts_of
+from gearbench.records.checks.mesh_force import NOTHING, Accounts, accounts_of
 
 Array = NDArray[np.float64]
 
@@ -29,6 +29,8 @@ GAINS = {
     180 / np.pi: "angles in another unit",
 }
 MET = 0.02
+# Accelerations that tell a factor are, with it, so many times what the forces disagree by after it.
+TOLD = 3.0
 
 
 def boundary_as_declared(look: Look) -> list[Finding]:
@@ -70,19 +72,24 @@ def boundary_as_declared(look: Look) -> list[Finding]:
 
 
 def accelerations_as_torques(look: Look) -> list[Finding]:
-    """Torques and accelerations of both gears balance as they are, not with all torques times one number: that number
-    is a unit of torque, inertias, or the square of a rate. Of a driver alone a number above 1 may as well be a
-    rotor beside it that is not in its inertia.
+    """Torques and accelerations balance as they are, not with all torques times one number: that number is a unit of
+    torque, inertias, or the square of a rate. Of a driver alone a number above 1 may as well be a rotor beside it that
+    is not in its inertia. Told by both gears, or, where these stand for one another, by each on a centre's support.
 
     The response is that many times too small if the torques have it. Where the number is known it is refused.
     """
     balance = _balance(look)
-    if balance is None:
-        return []
-    found, before, after = balance
+    found = [] if balance is None or balance[1] < OFF else _of_another_unit(*balance)
+    balance = None if found else _on_supports(look)
+    return found if balance is None else _of_another_unit(*balance)
+
+
+def _of_another_unit(found: Array, before: float, after: float) -> list[Finding]:
+    """The finding where accelerations are so many times, `found`, the torques'; `before`, `after`: what the forces
+    disagree by without and with that."""
     gain = float(found.mean())
     alike = min(found) > 0 and float(np.abs(found / gain - 1).max()) < OFF and (len(found) > 1 or gain < 1)
-    if not alike or abs(gain - 1) <= OFF or before < OFF or after > EXACT or after > EXPLAINED * before:
+    if not alike or abs(gain - 1) <= OFF or after > EXACT or after > EXPLAINED * before:
         return []
     known = next((words for factor, words in GAINS.items() if abs(gain / factor - 1) < MET), None)
     hint = f": {known}?" if known else ": are the inertias or the unit of the torques right, and sampling_rate?"
@@ -161,7 +168,31 @@ def _balance(look: Look) -> tuple[Array, float, float] | None:
     before, after = (
         float(Accounts(gears, {}, accounts.omega).misfit(GEARS)[0]) for gears in (accounts.gears, fitted)
     )
-    return np.asarray(found), before, after
+    parts = np.abs(found) * scale / max(float(np.linalg.norm(accounts.force("driver"))), NOTHING)
+    told = float(parts.max()) > TOLD * after
+    return (np.asarray(found), before, after) if told else None
+
+
+def _on_supports(look: Look) -> tuple[Array, float, float] | None:
+    """As `_balance`, with a factor of each gear: a in T / rb - a J theta'' / rb = -+ (k + c d/dt + m d^2/dt^2) y, the
+    support's k, c, m unknown."""
+    accounts = accounts_of(look)
+    if accounts is None:
+        return None
+    factors, misfits = [], []
+    for gear, parts in accounts.gears.items():
+        if len(parts) < 2 or not accounts.centres:
+            continue
+        fits = [(accounts.balance(gear, centre), f"y_{centre}") for centre in accounts.centres]
+        (factor, part, after), centre = min(fits, key=lambda fit: fit[0][2])
+        if not part > TOLD * after:
+            return None
+        factors.append(factor)
+        misfits.append((float(accounts.misfit((gear, centre))[0]), after))
+    if not factors:
+        return None
+    before, after = min(misfits, key=lambda pair: pair[0] / max(pair[1], NOTHING))
+    return np.array(factors), before, after
 
 
 def _forces(look: Look, factors: tuple[float, float] = (1.0, 1.0)) -> dict[str, Complexes] | None:

@@ -16,8 +16,8 @@ from gearbench.records.checks.look import EXCITED, Look
 
 Array = NDArray[np.float64]
 
-# Segments of each half, windowed and averaged; blocks of neighbouring lines, fewest lines, and fewest blocks whose lines
-# agree beyond chance: by COHERENT times the resultant that random phases have.
+# Segments of each half, windowed and averaged; blocks of neighbouring lines, fewest lines, and fewest blocks whose
+# lines agree beyond chance: by COHERENT times the resultant that random phases have.
 SEGMENTS, BLOCKS, FEWEST, FEWEST_BLOCKS, COHERENT = 4, 24, 240, 6, 3.0
 # A drift is believed beyond so many of its standard deviations, and said if it costs this part of the response.
 SURE, COSTS = 6.0, 0.02
@@ -52,8 +52,8 @@ def clocks_keep_pace(look: Look) -> list[Finding]:
     return [
         Finding(
             f"the dte {goes} the force by {1e6 * abs(shift):.2g} us in {seconds:.3g} s (standard deviation"
-            f" {1e6 * deviation:.1g} us), as on clocks that differ by {1e6 * abs(rate):.2g} ppm: resample one channel"
-            f" to the other's clock; it costs about {min(cost, 1.0):.0%} of the response",
+            f" {1e6 * deviation:.1g} us), as on clocks that differ by {1e6 * abs(rate):.2g} ppm, or where one has lost"
+            f" samples: resample one channel to the other's clock; it costs about {min(cost, 1.0):.0%} of the response",
             refused=False,
             error=min(cost, 1.0),
         )

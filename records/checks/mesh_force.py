@@ -72,14 +72,16 @@ class Accounts:
     def support(self, gear: str, centre: str) -> tuple[Array, Array, float]:
         """k, c, m (3,) of a centre's support [N/m, N s/m, kg] by least squares, the part of the force's rms that each
         explains (3,), and what they leave of it."""
-        columns = self._columns(centre)
-        force = self.force(gear)
-        stacked = np.vstack([columns.real, columns.imag])
-        scale = np.linalg.norm(stacked, axis=0)
-        target = np.concatenate([force.real, force.imag])
-        found = np.linalg.lstsq(stacked / scale, target, rcond=None)[0]
-        left = float(np.linalg.norm(target - stacked / scale @ found) / np.linalg.norm(target))
-        return found / scale, np.abs(found) / np.linalg.norm(target), left
+        found, scale, left, whole = _fit(self.force(gear), self._columns(centre))
+        return found, np.abs(found) * scale / whole, left
+
+    def balance(self, gear: str, centre: str) -> tuple[float, float, float]:
+        """The factor of a gear's acceleration with which it and the torque drive a centre's support best; relative to
+        the force that they make with it the acceleration's part, and what is left."""
+        torque, acceleration = self.gears[gear][f"torque_{gear}"], self.gears[gear][f"angle_{gear}"]
+        found, scale, left, whole = _fit(torque, np.column_stack([-acceleration, self._columns(centre)]))
+        force = max(float(np.linalg.norm(torque + found[0] * acceleration)), NOTHING)
+        return float(found[0]), float(abs(found[0]) * scale[0]) / force, left * whole / force
 
     def force(self, gear: str) -> Complexes:
         """Force (lines,) [N] on the mesh as a gear has it."""
@@ -125,6 +127,16 @@ def accounts_of(look: Look) -> Accounts | None:
             centres[gear] = np.stack([look.spectrum(y, derivative) for derivative in range(3)], axis=1)
     accounts = Accounts(gears, centres, look.omega)
     return accounts if accounts.relations() else None
+
+
+def _fit(target: Complexes, columns: Complexes) -> tuple[Array, Array, float, float]:
+    """Real factors (C,) of columns (lines, C) by least squares, the columns' norms, what they leave of the target
+    (lines,) and the target's norm."""
+    stacked, wanted = np.vstack([columns.real, columns.imag]), np.concatenate([target.real, target.imag])
+    scale = np.maximum(np.linalg.norm(stacked, axis=0), np.finfo(float).tiny)
+    found = np.linalg.lstsq(stacked / scale, wanted, rcond=None)[0]
+    whole = max(float(np.linalg.norm(wanted)), NOTHING)
+    return found / scale, scale, float(np.linalg.norm(wanted - stacked / scale @ found)) / whole, whole
 
 
 def _turned(look: Look, gear: str) -> float:

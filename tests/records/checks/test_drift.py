@@ -52,7 +52,7 @@ def test_common_clocks_are_not_accused(record: xr.Dataset) -> None:
 
 @pytest.mark.parametrize("noise", [0.3, 1.0, 3.0, 10.0])
 def test_noise_is_no_drift(record: xr.Dataset, noise: float) -> None:
-    """White noise of so many times the dte's rms, sixteen draws: none is taken for a drift, whatever delay fits best."""
+    """White noise of so many times the dte's rms, sixteen draws: none is a drift, whatever delay fits best."""
     values, random = record.dte.values, np.random.default_rng(8)
     for _ in range(16):
         white = noise * values.std() * random.standard_normal(values.shape)

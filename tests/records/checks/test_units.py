@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 import xarray as xr
-from shared.spoilt import Change, attribute, bare, simulated, times, under_steady_load
+from shared.spoilt import Change, attribute, bare, simulated, times, under_steady_load, with_values
 
 from gearbench.records import RecordError
 from gearbench.records.checks import check_record
+from gearbench.records.checks.boundary import accelerations_as_torques
+from gearbench.records.checks.look import GEARS, Look
 
 
 @pytest.fixture(scope="module")
@@ -38,6 +41,29 @@ def test_torques_in_another_unit_throughout_are_refused(rigs: dict[str, xr.Datas
     said = check_record(in_units(1.5, "torque_driver", "torque_driven")(steady))
     (found,) = [one for one in said if "the torques are 1.5 times" in one.sentence]
     assert found.error == pytest.approx(1 / 3, rel=0.01)
+
+
+def test_torques_in_another_unit_are_refused_where_the_load_repeats_the_drive(rigs: dict[str, xr.Dataset]) -> None:
+    """Gears whose accelerations balance by themselves tell no unit; each against a centre's support does."""
+    record = bare(rigs["16/48"])
+    assert check_record(record) == ()
+    for factor, words in ((0.737562, "lbf ft"), (8.850746, "lbf in")):
+        with pytest.raises(RecordError, match=f"torques are {factor:.4g}.* torques in {words}"):
+            check_record(in_units(factor, "torque_driver", "torque_driven")(record))
+
+
+@pytest.mark.parametrize("noise", [1e-7, 3e-6, 1e-5])
+def test_noise_of_angles_tells_no_unit(rigs: dict[str, xr.Dataset], noise: float) -> None:
+    """Torques that balance by themselves, with a small part of accelerations that are noise."""
+    record, random = bare(rigs["free"]).drop_vars(["y_driver", "y_driven"]), np.random.default_rng(3)
+    for _ in range(16):
+        noisy = record
+        for gear in GEARS:
+            values = record[f"angle_{gear}"].values
+            noisy = with_values(noisy, f"angle_{gear}", values + noise * random.standard_normal(values.shape))
+            values = record[f"torque_{gear}"].values
+            noisy = with_values(noisy, f"torque_{gear}", values + 1e-3 * random.standard_normal(values.shape))
+        assert accelerations_as_torques(Look(noisy)) == []
 
 
 def test_a_sampling_rate_off_by_two_is_refused(rigs: dict[str, xr.Dataset]) -> None:
