@@ -17,13 +17,13 @@ from gearbench.identification.feedback.varying_frf import signals_of, varying_fr
 from gearbench.identification.local import by_local_method, by_local_method_at_varying_speed
 from gearbench.identification.lpm.local_solve import LpmError
 from gearbench.identification.lpm.selection import LADDER
-from gearbench.identification.spectra.course import LOST, course_spectra, speed_varies
+from gearbench.identification.spectra.course import course_spectra, speed_varies
 from gearbench.identification.spectra.joint import Spectra, SpectraError, require_mesh_periods
 from gearbench.identification.spectra.records import record_spectra
 from gearbench.identification.task import IdentificationSettings, Progress, Task, attributes_of, output_lines
 from gearbench.records.checks import angles_keep_mesh_period, check_record
-from gearbench.records.even_speed import VARIES
-from gearbench.records.record import require_finite
+from gearbench.records.even_speed import LOST, VARIES
+from gearbench.records.record import validate_record
 
 # Expected error of mesh-feedback beyond which the local polynomial method is tried as well.
 SECOND_OPINION = 0.05
@@ -72,8 +72,7 @@ def _identified(records: Sequence[xr.Dataset], settings: IdentificationSettings,
     """As `identify`, whatever is to be expected of the result."""
     report(0.0, "spectra")
     for record in records:
-        for name in record.data_vars:
-            require_finite(record[name])
+        validate_record(record)
     if settings.method == "mesh-feedback" and speed_varies(records):
         if settings.mesh_frequency is not None:
             raise LpmError(

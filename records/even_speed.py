@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-# Departure of the mesh phase from constant speed [cycles] from which on a record counts as of varying speed.
-VARIES = 0.05
+# Departure of the mesh phase from constant speed [cycles] from which on a record counts as of varying speed, and beyond
+# which averages over excitation periods lose the branches.
+VARIES, LOST = 0.05, 0.25
 
 
 def mesh_phase(record: xr.Dataset) -> Array | None:

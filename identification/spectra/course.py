@@ -20,9 +20,6 @@ from gearbench.identification.spectra.transmission_error import dte, force
 from gearbench.records.antialias import common_lag
 from gearbench.records.even_speed import VARIES, departure, mesh_phase
 
-# Departure of the mesh phase from constant speed [cycles] beyond which averages over excitation periods lose the
-# branches.
-LOST = 0.25
 # Mesh periods for each interval of the splines of the phase, and most intervals.
 SMOOTHED, INTERVALS = 4, 64
 # Fewest mesh periods in a record, and a line counts as excited if its force exceeds this part of the strongest one's.

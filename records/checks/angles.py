@@ -8,11 +8,14 @@ import numpy as np
 
 from gearbench.records.checks.finding import ANGLE_UNITS, Finding, unit_hint
 from gearbench.records.checks.look import GEARS, Look, mean_rate
+from gearbench.records.even_speed import departure
 
 # Speeds against teeth, base radii against teeth.
 RATIO = 1e-3
 # Declared against measured mesh frequency, and cycles by which both may part over a period, beside what gears swing.
 FREQUENCY, CYCLES = 2e-3, 5e-3
+# By how many cycles the angles may depart from mesh_phase anywhere in a record whose speed varies.
+APART = 0.3
 # Working pressure angles of involute gears [deg], base radii [m].
 WORKING_ANGLE_DEG = (5.0, 45.0)
 BASE_RADIUS = (1e-4, 20.0)
@@ -90,6 +93,29 @@ def angles_keep_mesh_period(look: Look) -> list[Finding]:
             f" {declared:.5g} Hz (limit {FREQUENCY:.1%}){unit_hint(got / declared, ANGLE_UNITS, 'the angles', 'are')}"
         )
     ]
+
+
+def angles_follow_mesh_phase(look: Look) -> list[Finding]:
+    """Of a speed that varies, by the angles or by mesh_phase, both tell one course, their zeros apart."""
+    phase = look.channel("mesh_phase")
+    for gear in GEARS:
+        values, teeth = look.channel(f"angle_{gear}"), look.number(f"teeth_{gear}")
+        if phase is None or values is None or teeth is None:
+            continue
+        turned = values * teeth / (2 * pi)
+        if max(look.departure, departure(turned)) < APART:
+            continue
+        apart = np.abs(turned - phase - (turned - phase).mean())
+        worst = int(np.argmax(apart))
+        if apart[worst] > APART:
+            return [
+                Finding(
+                    f"angle_{gear} times teeth_{gear} = {teeth:g} departs from mesh_phase by {apart[worst]:.3g} cycles"
+                    f" at sample {worst} (limit {APART:g}, their means apart): is mesh_phase that of a constant speed?"
+                    " Where it and mesh_period are left out it is taken from angle_driver"
+                )
+            ]
+    return []
 
 
 def radii_fit_teeth(look: Look) -> list[Finding]:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 import xarray as xr
 
 from gearbench.records.checks.angles import (
+    angles_follow_mesh_phase,
     angles_keep_mesh_period,
     angles_roll,
     angles_unwrapped,
@@ -59,6 +60,7 @@ CHECKS: tuple[Check, ...] = (
     angles_do_not_slip,
     angles_roll,
     angles_keep_mesh_period,
+    angles_follow_mesh_phase,
     gears_pass_the_same_teeth,
     force_repeats_as_declared,
     mesh_lines_stand_out,

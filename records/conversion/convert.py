@@ -103,18 +103,17 @@ def convert_sources(
         put_on_clock(work, signal, period, partial(_report_part, report, number, len(signals), signal.name))
     period = mesh_period_of(work, period)
     integrate_all(work, period)
-    add_mesh_phase(work, period)
+    period = add_mesh_phase(work, period)
     say_locations(work)
     about = record_attributes(attributes) | {
         "sampling_rate": common.rate,
         "samples_per_period": common.samples,
         "periods": common.periods,
+        "mesh_period": period,
         "mesh_phase_origin": attributes.get("mesh_phase_origin", "arbitrary"),
         "warnings": "\n".join(dict.fromkeys(notes)) or None,
         "provenance": _origin(paths, source, channel_map, attributes),
     }
-    if period is not None:
-        about["mesh_period"] = period
     return make_record(work.channels, about, channel_attributes=work.details, start=common.start)
 
 

@@ -14,6 +14,7 @@ from gearbench.records.conversion.common import Common
 from gearbench.records.conversion.integrate import integrated, lost_share
 from gearbench.records.conversion.signals import Signal
 from gearbench.records.errors import RecordError
+from gearbench.records.even_speed import LOST, VARIES, departure
 from gearbench.records.formats.source import Array
 
 # Largest relative distance of a measured mean speed from the declared one.
@@ -76,13 +77,22 @@ def put_on_clock(work: Assembly, signal: Signal, mesh_period: float | None, prog
 
 
 def mesh_period_of(work: Assembly, declared: float | None) -> float | None:
-    """The mesh period [s]: declared and held against what turns, or taken from it. Raises RecordError."""
-    found = None
+    """The mesh period [s]: declared and held against what turns, or taken from it; of a speed that varies the mean one.
+    Raises RecordError."""
+    found, varies = None, False
     for signal in work.signals:
         teeth = work.teeth(signal)
         if teeth is None or signal.integrals == 2:
             continue
         values = work.channels[signal.name]
+        angle = np.cumsum(values, axis=1) / work.common.rate if signal.integrals else values
+        departs = max(departure(row) for row in angle * teeth / (2 * pi))
+        if signal.integrals and departs > LOST:
+            raise RecordError(
+                f"{signal.name} is integrated from speed, which varies by {departs:.3g} cycles of the mesh from a"
+                f" constant one (limit {LOST:g}): an error of its gain would run away; measure the angle"
+            )
+        varies = varies or departs > LOST
         speed = float(values.mean()) if signal.integrals else _speed(values, work.common.rate)
         if not speed > 0:
             raise RecordError(
@@ -90,12 +100,14 @@ def mesh_period_of(work: Assembly, declared: float | None) -> float | None:
                 f" rises in its own direction of rotation; give [channel.{signal.name}] sign = -1"
             )
         own = 2 * pi / (speed * teeth)
-        if declared is not None and abs(own / declared - 1) > SPEED:
+        if declared is not None and not varies and abs(own / declared - 1) > SPEED:
             raise RecordError(
                 f"{signal.name} turns at a mesh frequency of {1 / own:.5g} Hz, but {1 / declared:.5g} Hz is declared"
                 f" (limit {SPEED:.0%}): wrong unit, pulses per revolution, teeth or sampling rate"
             )
         found = found or own
+    if found is not None and varies:
+        return found
     if declared is not None or found is None:
         return declared
     duration = work.common.duration
@@ -158,22 +170,40 @@ def _integrate_vibration(work: Assembly, signal: Signal) -> None:
     )
 
 
-def add_mesh_phase(work: Assembly, mesh_period: float | None) -> None:
-    """Mesh phase [cycles] of each run at steady speed, from the angles: identification aligns runs by it."""
+def add_mesh_phase(work: Assembly, mesh_period: float | None) -> float | None:
+    """Mesh phase [cycles] of each run from the angles, by which identification aligns runs: at steady speed that of the
+    mesh period. Returns the mesh period, None where the speed varies too much for one."""
     turning = [(signal, teeth) for signal in work.signals if (teeth := work.teeth(signal)) is not None]
-    if "mesh_phase" in work.channels or mesh_period is None or not turning:
-        return
-    steps = np.arange(work.common.total) / (work.common.rate * mesh_period)
-    phases = [(work.channels[signal.name] * teeth / (2 * pi) - steps).mean(axis=1) for signal, teeth in turning]
-    start = np.mean(phases, axis=0)
-    work.channels["mesh_phase"] = start[:, np.newaxis] + steps
+    cycles = [work.channels[signal.name] * teeth / (2 * pi) for signal, teeth in turning]
+    given = work.channels.get("mesh_phase")
+    departs = max((departure(row) for rows in (cycles if given is None else [given]) for row in rows), default=0.0)
+    period = None if departs > LOST else mesh_period
+    if departs > VARIES:
+        work.notes.append(
+            f"the speed varies, by {departs:.3g} cycles of the mesh from a constant one:"
+            f" {'mesh_phase follows the angles' if given is None else 'mesh_phase tells it'}"
+            f"{', and the record has no mesh period' if period is None else ''}"
+        )
+    if given is not None or not turning or (mesh_period is None and departs <= VARIES):
+        return period
+    phase = np.mean(cycles, axis=0)
+    if departs <= VARIES and mesh_period is not None:
+        steps = np.arange(work.common.total) / (work.common.rate * mesh_period)
+        phase = (phase - steps).mean(axis=1, keepdims=True) + steps
+    work.channels["mesh_phase"] = phase
+    _say_where_phases_start(work, turning)
+    return period
+
+
+def _say_where_phases_start(work: Assembly, turning: list[tuple[Signal, float]]) -> None:
+    """Say what a zero that is not the geometry's means."""
     relative = [signal.name for signal, _ in turning if not signal.absolute]
     if relative and work.attributes.get("mesh_phase_origin") == "geometry":
         work.notes.append(
             f"{', '.join(relative)}: counted without an absolute zero, so that mesh phase 0 is not the geometry's, as"
             " mesh_phase_origin says"
         )
-    if relative and start.size > 1:
+    if relative and len(work.channels["mesh_phase"]) > 1:
         work.notes.append(
             f"{', '.join(relative)}: without an absolute zero the runs' mesh phases against one another are not known,"
             " and identify, which aligns runs by them, may be wrong"

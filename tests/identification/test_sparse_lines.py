@@ -57,5 +57,5 @@ def test_noise_of_the_torque_fills_no_lines(record: xr.Dataset) -> None:
     force = record["force"]
     noise = 0.01 * float(force.std()) * np.random.default_rng(1).standard_normal(force.shape)
     settings = IdentificationSettings(band=(700.0, 2500.0), phases=32, modes=0, branches="polynomials")
-    frf = identify([record.assign(force=(force.dims, force.values + noise))], settings)
+    frf = identify([record.assign(force=(force.dims, force.values + noise, force.attrs))], settings)
     assert "the force leaves most lines of its band out" in frf.attrs["warnings"]

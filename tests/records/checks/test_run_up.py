@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from gearbench.records.checks.angles import angles_keep_mesh_period
+from gearbench.records.checks.angles import angles_follow_mesh_phase, angles_keep_mesh_period
 from gearbench.records.checks.boundary import inertias_as_declared
 from gearbench.records.checks.contradictions import clocks_agree, gears_not_swapped
 from gearbench.records.checks.look import GEARS, Look
@@ -67,7 +67,7 @@ def test_accounts_of_a_run_up_balance_as_those_of_a_constant_speed() -> None:
 
 @pytest.mark.parametrize("rise", [0.0, 1.0])
 def test_what_contradicts_itself_in_a_run_up_is_found(rise: float) -> None:
-    """Driver and driven exchanged, an angle two samples late, inertias of another gear."""
+    """Driver and driven exchanged, an angle two samples late, a straight mesh phase, another gear's inertia."""
     swapped = look(rise).record.copy(deep=True)
     for name in ("angle", "torque"):
         for gear, other in (GEARS, GEARS[::-1]):
@@ -80,6 +80,14 @@ def test_what_contradicts_itself_in_a_run_up_is_found(rise: float) -> None:
     (finding,) = clocks_agree(Look(late))
     assert finding.sentence.startswith("angle_driver lags behind the other channels by")
     assert float(finding.sentence.split("(")[1].split(" samples")[0]) == pytest.approx(2.0, abs=0.05)
+
+    if rise:
+        straight = look(rise).record.copy(deep=True)
+        phase = straight.mesh_phase.values[0]
+        phase[:] = np.linspace(phase[0], phase[-1], phase.size)
+        (finding,) = angles_follow_mesh_phase(Look(straight))
+        assert finding.refused and "departs from mesh_phase by" in finding.sentence
+    assert angles_follow_mesh_phase(look(rise)) == []
 
     heavy = look(rise).record.assign_attrs(inertia_driver=2 * INERTIA["driver"])
     (finding,) = inertias_as_declared(Look(heavy))

@@ -189,6 +189,28 @@ def test_speeds_become_angles_that_keep_step(tmp_path: Path) -> None:
     assert "its zero is arbitrary" in record.attrs["warnings"]
 
 
+@pytest.mark.parametrize(("wander", "repeats"), [(0.03, True), (0.15, True), (3.0, False)])
+def test_mesh_phase_follows_a_speed_that_varies(tmp_path: Path, wander: float, repeats: bool) -> None:
+    """The speed swings by `wander` cycles of the mesh once in the record; a mesh period that means nothing is left
+    out."""
+    phase = MESH * TIME + wander * np.sin(2 * pi * TIME / (TIME.size / RATE))
+    angles = {
+        f"angle_{gear}": 2 * pi / teeth * phase + 1e-6 * vibration(TIME, 2)
+        for gear, teeth in zip(("driver", "driven"), TEETH, strict=True)
+    }
+    record = convert(tmp_path, whole(**angles))
+    found = record.mesh_phase.values[0]
+    straight = phase - wander * np.sin(2 * pi * TIME / (TIME.size / RATE))
+    assert ("mesh_period" in record.attrs) == repeats
+    assert ("the speed varies" in str(record.attrs.get("warnings", ""))) == (wander > 0.05)
+    apart = found - (phase if wander > 0.05 else straight)
+    assert np.abs(apart - apart.mean()).max() < 1e-4
+    if not repeats:
+        speed = np.gradient(angles["angle_driver"], 1 / RATE) * 30 / pi
+        with pytest.raises(RecordError, match=r"angle_driver is integrated.*varies by 2\.\d* cycles .*limit 0\.25"):
+            convert(tmp_path, whole(**angles | {"angle_driver": speed}), angle_driver={"unit": "rpm"})
+
+
 def test_accelerations_are_integrated_and_the_loss_is_said(tmp_path: Path) -> None:
     omega = 2 * pi * np.fft.rfftfreq(8000, 1 / RATE)
     slow = 1e-6 * np.sin(2 * pi * 2.0 * TIME)  # below the band: lost
