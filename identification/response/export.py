@@ -20,6 +20,7 @@ _FREQUENCY_RESPONSE, _COMPLEX_DOUBLE, _EVEN, _UNEVEN = 4, 6, 1, 0
 _DISPLACEMENT, _FORCE, _FREQUENCY = 8, 13, 18
 _EVENLY = 1e-9  # departure from equal steps, and of a printed number, relative
 _NO_UNIT = "1"
+_LINE = 80  # characters of a line in the header of dataset 58
 
 
 def export_frf(frf: xr.Dataset, path: str | Path) -> None:
@@ -28,7 +29,8 @@ def export_frf(frf: xr.Dataset, path: str | Path) -> None:
     Universal file: dataset 164 (SI), then one complex function 58 [m/N] for each phase of the ITF ("ITF at mesh
     phase 0.25", response node 1 + number of the phase) and for each branch of the HTF ("HTF of harmonic -2",
     response node 1001 + number of the branch, above 1000 phases the next thousand); frequencies have that format's
-    six digits. MAT-file (version 5): struct `frf` with the complex matrices itf (frequency x phase) and htf (harmonic x
+    six digits; lines 3 to 5 of its header hold the expected error and the first warnings, such as that dte holds the
+    angles only. MAT-file (version 5): struct `frf` with the complex matrices itf (frequency x phase) and htf (harmonic x
     frequency), every other variable and coordinate under its name, `units` and `attributes`. Raises FrfError for
     another suffix or dataset.
 
@@ -93,8 +95,9 @@ def _function(frf: xr.Dataset, values: np.ndarray, title: str, node: int) -> dic
     import pyuff
 
     about = f"gearbench, {frf.attrs['kind']}, mesh frequency {float(frf.attrs.get('mesh_frequency', np.nan)):.6g} Hz"
+    quality, *warned = _said(frf)
     made: dict[str, Any] = pyuff.prepare_58(
-        binary=0, id1=title, id2=about, id3="NONE", id4="NONE", id5="NONE", func_type=_FREQUENCY_RESPONSE, ver_num=0,
+        binary=0, id1=title, id2=about, id3=quality, id4=warned[0], id5=warned[1], func_type=_FREQUENCY_RESPONSE, ver_num=0,
         load_case_id=0, rsp_ent_name="DTE", rsp_node=node, rsp_dir=0, ref_ent_name="FORCE", ref_node=1, ref_dir=0,
         ord_data_type=_COMPLEX_DOUBLE, num_pts=frequency.size, abscissa_spacing=_EVEN if even else _UNEVEN,
         abscissa_min=start, abscissa_inc=step if even else 0.0, z_axis_value=0.0,
@@ -106,3 +109,13 @@ def _function(frf: xr.Dataset, values: np.ndarray, title: str, node: int) -> dic
         z_axis_temp_unit_exp=0, z_axis_axis_units_lab="NONE", data=values, x=frequency, return_full_dict=True,
     )  # fmt: skip
     return made
+
+
+def _said(frf: xr.Dataset) -> list[str]:
+    """Three lines of a header: what the response may err by, and the first two of its warnings."""
+    error = frf.attrs.get("expected_error")
+    quality = "NONE" if error is None else f"expected error {float(error):.2%} of the ITF, by {frf.attrs['method']}"
+    warned = [line for line in str(frf.attrs.get("warnings", "")).splitlines() if line]
+    lines = [quality, *warned[:2], "NONE", "NONE"][:3]
+    ascii_only = [line.encode("ascii", "replace").decode() for line in lines]
+    return [line if len(line) <= _LINE else f"{line[: _LINE - 3]}..." for line in ascii_only]

@@ -29,7 +29,10 @@ def response(step: float = 0.25) -> xr.Dataset:
     return make_frf(
         "identified", frequency=frequency, itf=values(50, PHASES), htf=values(5, 50), modes=modes,
         itf_variance=np.full((50, PHASES), 1e-20), coherence=np.full(50, 0.9),
-        attributes={"mesh_frequency": 8.0, "method": "lpm", "warnings": "none to speak of"},
+        attributes={
+            "mesh_frequency": 8.0, "method": "lpm", "expected_error": 0.025,
+            "warnings": f"dte holds the angles only\n{'x' * 100}\nanother",
+        },
     )  # fmt: skip
 
 
@@ -53,6 +56,9 @@ def test_a_universal_file_holds_each_phase_and_branch_with_units(tmp_path: Path,
         assert one["abscissa_axis_units_lab"] == "Hz"
     titles = [one["id1"] for one in sets[1:]]
     assert titles[1] == "ITF at mesh phase 0.25" and titles[PHASES] == "HTF of harmonic -2"
+    assert [sets[1][f"id{line}"] for line in (3, 4, 5)] == [
+        "expected error 2.50% of the ITF, by lpm", "dte holds the angles only", f"{'x' * 77}..."
+    ]  # fmt: skip
 
 
 def test_a_mat_file_holds_named_fields_and_their_units(tmp_path: Path) -> None:
