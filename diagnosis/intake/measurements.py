@@ -30,7 +30,14 @@ from gearbench.diagnosis.intake.plausible import (
 )
 from gearbench.diagnosis.intake.quality import NOISE_IN_WORDS, drift_of, noise_of
 from gearbench.records import read_record
-from gearbench.records.checks import CHECKS, check_record, clipped_channels, periods_repeat, same_samples
+from gearbench.records.checks import (
+    CHECKS,
+    angles_follow_mesh_phase,
+    check_record,
+    clipped_channels,
+    periods_repeat,
+    same_samples,
+)
 from gearbench.rig import Case
 
 Array = NDArray[np.float64]
@@ -44,8 +51,8 @@ PHASE_FIT = 0.05
 UNSTEADY, TOO_UNSTEADY = 0.03, 0.25
 # Channels that are derived from others or are no signal of a sensor.
 DERIVED = ("mesh_phase", "dte", "force")
-# Repetitions are compared here, by hunting periods and channel by channel.
-DOOR = tuple(check for check in CHECKS if check is not periods_repeat)
+# Repetitions are compared here, by hunting periods and channel by channel, and the speed has to be steady.
+DOOR = tuple(check for check in CHECKS if check not in (periods_repeat, angles_follow_mesh_phase))
 
 
 @dataclass(frozen=True, eq=False)

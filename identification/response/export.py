@@ -30,8 +30,8 @@ def export_frf(frf: xr.Dataset, path: str | Path) -> None:
     phase 0.25", response node 1 + number of the phase) and for each branch of the HTF ("HTF of harmonic -2",
     response node 1001 + number of the branch, above 1000 phases the next thousand); frequencies have that format's
     six digits; lines 3 to 5 of its header hold the expected error and the first warnings, such as that dte holds the
-    angles only. MAT-file (version 5): struct `frf` with the complex matrices itf (frequency x phase) and htf (harmonic x
-    frequency), every other variable and coordinate under its name, `units` and `attributes`. Raises FrfError for
+    angles only. MAT-file (version 5): struct `frf` with the complex matrices itf (frequency x phase) and htf (harmonic
+    x frequency), every other variable and coordinate under its name, `units` and `attributes`. Raises FrfError for
     another suffix or dataset.
 
     >>> import gearbench as gb
@@ -97,8 +97,9 @@ def _function(frf: xr.Dataset, values: np.ndarray, title: str, node: int) -> dic
     about = f"gearbench, {frf.attrs['kind']}, mesh frequency {float(frf.attrs.get('mesh_frequency', np.nan)):.6g} Hz"
     quality, *warned = _said(frf)
     made: dict[str, Any] = pyuff.prepare_58(
-        binary=0, id1=title, id2=about, id3=quality, id4=warned[0], id5=warned[1], func_type=_FREQUENCY_RESPONSE, ver_num=0,
-        load_case_id=0, rsp_ent_name="DTE", rsp_node=node, rsp_dir=0, ref_ent_name="FORCE", ref_node=1, ref_dir=0,
+        binary=0, id1=title, id2=about, id3=quality, id4=warned[0], id5=warned[1],
+        func_type=_FREQUENCY_RESPONSE, ver_num=0, load_case_id=0,
+        rsp_ent_name="DTE", rsp_node=node, rsp_dir=0, ref_ent_name="FORCE", ref_node=1, ref_dir=0,
         ord_data_type=_COMPLEX_DOUBLE, num_pts=frequency.size, abscissa_spacing=_EVEN if even else _UNEVEN,
         abscissa_min=start, abscissa_inc=step if even else 0.0, z_axis_value=0.0,
         abscissa_spec_data_type=_FREQUENCY, abscissa_len_unit_exp=0, abscissa_force_unit_exp=0,

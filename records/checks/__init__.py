@@ -1,6 +1,6 @@
 """What a record alone can tell about itself: refused in a sentence, or warned of where it can be right."""
 
-from gearbench.records.checks.angles import angles_keep_mesh_period
+from gearbench.records.checks.angles import angles_follow_mesh_phase, angles_keep_mesh_period
 from gearbench.records.checks.clipping import clipped_channels
 from gearbench.records.checks.copies import same_samples
 from gearbench.records.checks.door import CHECKS, check_record
@@ -13,6 +13,7 @@ __all__ = [
     "CHECKS",
     "TORQUE_UNITS",
     "Finding",
+    "angles_follow_mesh_phase",
     "angles_keep_mesh_period",
     "check_record",
     "clipped_channels",

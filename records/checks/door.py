@@ -44,6 +44,7 @@ from gearbench.records.checks.look import Look
 from gearbench.records.checks.mesh_lines import mesh_lines_stand_out
 from gearbench.records.checks.passive import force_feeds_the_rig
 from gearbench.records.checks.periods import force_repeats_as_declared, periods_repeat
+from gearbench.records.checks.run_out import shafts_turn_true
 from gearbench.records.checks.sampled import sampled_fast_enough
 from gearbench.records.checks.slips import angles_do_not_slip, gears_pass_the_same_teeth
 from gearbench.records.checks.torques import load_balances, torque_as_declared
@@ -82,6 +83,7 @@ CHECKS: tuple[Check, ...] = (
     inertias_as_declared,
     not_clipped,
     channels_do_not_stick,
+    shafts_turn_true,
     sampled_fast_enough,
     clocks_agree,
     force_and_dte_in_step,
