@@ -37,6 +37,7 @@ from gearbench.records.checks import (
     clipped_channels,
     periods_repeat,
     same_samples,
+    shafts_turn_true,
 )
 from gearbench.rig import Case
 
@@ -51,8 +52,9 @@ PHASE_FIT = 0.05
 UNSTEADY, TOO_UNSTEADY = 0.03, 0.25
 # Channels that are derived from others or are no signal of a sensor.
 DERIVED = ("mesh_phase", "dte", "force")
-# Repetitions are compared here, by hunting periods and channel by channel, and the speed has to be steady.
-DOOR = tuple(check for check in CHECKS if check not in (periods_repeat, angles_follow_mesh_phase))
+# Repetitions are compared here, by hunting periods and channel by channel, the speed has to be steady, and what turns
+# with a shaft is an effect.
+DOOR = tuple(check for check in CHECKS if check not in (periods_repeat, angles_follow_mesh_phase, shafts_turn_true))
 
 
 @dataclass(frozen=True, eq=False)

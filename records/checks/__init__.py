@@ -7,6 +7,7 @@ from gearbench.records.checks.door import CHECKS, check_record
 from gearbench.records.checks.finding import ANGLE_UNITS, TORQUE_UNITS, Finding, unit_hint
 from gearbench.records.checks.look import mean_speed
 from gearbench.records.checks.periods import periods_repeat
+from gearbench.records.checks.run_out import shafts_turn_true
 
 __all__ = [
     "ANGLE_UNITS",
@@ -20,5 +21,6 @@ __all__ = [
     "mean_speed",
     "periods_repeat",
     "same_samples",
+    "shafts_turn_true",
     "unit_hint",
 ]

@@ -7,12 +7,10 @@ from numpy.typing import NDArray
 
 from gearbench.records.checks.finding import Finding
 from gearbench.records.checks.look import GEARS, Complexes, Look
-from gearbench.records.checks.mesh_force import NOTHING, Accounts, accounts_of
+from gearbench.records.checks.mesh_force import AGREE, EXPLAINED, NOTHING, Accounts, accounts_of
 
 Array = NDArray[np.float64]
 
-# Both accounts of the force agree below AGREE; what explains a disagreement leaves EXPLAINED of it at most.
-AGREE, EXPLAINED = 0.25, 1 / 3
 # Part of the force that accelerates a driven gear that is held.
 HELD = 1e-3
 # A balance that fits so well tells inertias, to OFF of themselves, where they do not stand for one another (smallest

@@ -21,7 +21,6 @@ from gearbench.records.checks.boundary import (
 )
 from gearbench.records.checks.clipping import not_clipped
 from gearbench.records.checks.contradictions import (
-    clocks_agree,
     displacements_fit,
     gears_not_swapped,
     load_torque_alive,
@@ -40,13 +39,15 @@ from gearbench.records.checks.drift import clocks_keep_pace
 from gearbench.records.checks.dropouts import channels_do_not_stick
 from gearbench.records.checks.finding import Finding
 from gearbench.records.checks.lag import force_and_dte_in_step
+from gearbench.records.checks.late import clocks_agree
 from gearbench.records.checks.look import Look
+from gearbench.records.checks.lost import channels_keep_step
 from gearbench.records.checks.mesh_lines import mesh_lines_stand_out
 from gearbench.records.checks.passive import force_feeds_the_rig
 from gearbench.records.checks.periods import force_repeats_as_declared, periods_repeat
 from gearbench.records.checks.run_out import shafts_turn_true
 from gearbench.records.checks.sampled import sampled_fast_enough
-from gearbench.records.checks.slips import angles_do_not_slip, gears_pass_the_same_teeth
+from gearbench.records.checks.slips import angles_do_not_slip, gears_pass_the_same_teeth, no_gap_in_all_channels
 from gearbench.records.checks.torques import load_balances, torque_as_declared
 from gearbench.records.errors import RecordError
 
@@ -58,6 +59,7 @@ CHECKS: tuple[Check, ...] = (
     radii_fit_teeth,
     radii_fit_inertias,
     angles_unwrapped,
+    no_gap_in_all_channels,
     angles_do_not_slip,
     angles_roll,
     angles_keep_mesh_period,
@@ -86,6 +88,7 @@ CHECKS: tuple[Check, ...] = (
     shafts_turn_true,
     sampled_fast_enough,
     clocks_agree,
+    channels_keep_step,
     force_and_dte_in_step,
     clocks_keep_pace,
     periods_repeat,

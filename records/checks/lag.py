@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.records.checks.contradictions import LONGEST, STEPS
 from gearbench.records.checks.finding import Finding
+from gearbench.records.checks.late import LONGEST, STEPS
 from gearbench.records.checks.look import EXCITED, Look
 from gearbench.records.checks.mesh_force import accounts_of
 

@@ -39,6 +39,7 @@ class Look:
     that the first one tells it."""
 
     record: xr.Dataset
+    cut: bool = False  # a stretch out of a longer record, which need not repeat
 
     def number(self, name: str) -> float | None:
         """A numeric attribute, None where the record lacks it. Raises RecordError for text."""
@@ -82,7 +83,13 @@ class Look:
     def tapered(self) -> bool:
         """Whether spectra are tapered: at both ends of a run-up the gears are elsewhere, which derivatives by lines
         would take for a jump."""
-        return self.departure > VARIES
+        return self.cut or self.departure > VARIES
+
+    def stretches(self, count: int) -> list[Look]:
+        """The first realisation cut into so many stretches of equal length."""
+        size = self.samples // count
+        first = self.record.isel(realisation=[0])
+        return [Look(first.isel(time=slice(size * part, size * (part + 1))), cut=True) for part in range(count)]
 
     @cached_property
     def zero_known(self) -> bool:

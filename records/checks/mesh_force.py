@@ -22,6 +22,9 @@ Array = NDArray[np.float64]
 
 # Signs by which the mesh force acts on y (docs/physics.md, "Axes, signs, zeros").
 SIGNS = {"driver": -1.0, "driven": 1.0}
+# Accounts of the force agree when their misfit is below AGREE, and a suspicion is taken for true when under it they
+# agree and misfit by EXPLAINED times less than without.
+AGREE, EXPLAINED = 0.25, 1 / 3
 # Motion of a centre, over that of the flanks, below which it is held: what moves there is a rigid support.
 # A y that is recorded 1e6 times too small is above it.
 STILL = 1e-7
@@ -69,6 +72,11 @@ class Accounts:
         total = _size(first, turn)
         return np.asarray(np.sqrt(np.maximum(total**2 - (inside**2).sum(axis=1), 0.0)) / np.maximum(total, NOTHING))
 
+    @property
+    def worst(self) -> float:
+        """The largest misfit of all relations."""
+        return max(float(self.misfit(relation)[0]) for relation in self.relations())
+
     def support(self, gear: str, centre: str) -> tuple[Array, Array, float]:
         """k, c, m (3,) of a centre's support [N/m, N s/m, kg] by least squares, the part of the force's rms that each
         explains (3,), and what they leave of it."""
@@ -101,6 +109,11 @@ class Accounts:
 
     def _columns(self, centre: str) -> Complexes:
         return SIGNS[centre] * self.centres[centre]
+
+
+def explains(before: float, after: float) -> bool:
+    """Whether a suspicion that turns one misfit into another is to be believed."""
+    return after < AGREE and after < EXPLAINED * before
 
 
 def accounts_of(look: Look) -> Accounts | None:

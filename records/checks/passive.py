@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.records.checks.contradictions import accounts_agree, clocks_agree
+from gearbench.records.checks.contradictions import accounts_agree
 from gearbench.records.checks.finding import Finding
+from gearbench.records.checks.late import clocks_agree
 from gearbench.records.checks.look import GEARS, Look
 
 # Cosine between force and rate of the transmission error over the excited lines. At the gears themselves a passive rig

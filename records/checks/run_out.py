@@ -14,8 +14,9 @@ Array = NDArray[np.float64]
 
 # Orders of a shaft that are looked at, and fewest of its turns.
 ORDERS, TURNS = (1, 2), 1.5
-# Part of the dte's power that is said, and by how much an order exceeds what lies midway between orders.
-SHARE, STANDS_OUT = 0.002, 10.0
+# Part of the dte's power that is said: where the record holds whole turns, and else, when it leaks into all lines; how
+# near to whole, and by how much an order exceeds what lies midway between orders.
+SHARE, LEAKS, WHOLE, STANDS_OUT = 0.05, 0.002, 0.01, 10.0
 # Orders of both shafts are told apart where they part by so many cycles along the record.
 APART = 0.5
 # Samples that are looked at, evenly spread.
@@ -42,14 +43,16 @@ def shafts_turn_true(look: Look) -> list[Finding]:
     sizes, left = _amplitudes(swing, slow, [order * turned[gear] for gear, order in places])
     between, _ = _amplitudes(left, slow, [(order + 0.5) * turned[gear] for gear, order in places])
     largest = int(np.argmax(sizes))
-    share = 0.5 * float(sizes[largest]) ** 2 / max(float(np.mean(swing**2)), np.finfo(float).tiny)
-    if share < SHARE or sizes[largest] ** 2 < STANDS_OUT * between.max() ** 2:
-        return []
     gear, order = places[largest]
+    share = 0.5 * float(sizes[largest]) ** 2 / max(float(np.mean(swing**2)), np.finfo(float).tiny)
+    turns = float(np.ptp(turned[gear])) / (2 * pi) * swing.size / (swing.size - 1)
+    limit = SHARE if abs(order * turns - round(order * turns)) < WHOLE else LEAKS
+    if share < limit or sizes[largest] ** 2 < STANDS_OUT * between.max() ** 2:
+        return []
     return [
         Finding(
             f"the dte holds {1e6 * sizes[largest]:.2g} um at order {order} of the {gear}'s shaft, {share:.2g} of its"
-            f" power (limit {SHARE:g}): run-out of the gear or of its encoder, which is no response to the excitation"
+            f" power (limit {limit:g}): run-out of the gear or of its encoder, which is no response to the excitation"
             " (runout_orders of a channel map takes an encoder's off)",
             refused=False,
         )

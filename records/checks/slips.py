@@ -17,6 +17,9 @@ from gearbench.records.checks.look import GEARS, Look
 # A step between two samples of so many times the 99th percentile of all of them (1.6 times is the most in 283 records
 # of sound rigs), which stays: of the samples around it at least this part of it is left.
 STEP, STAYS, AROUND = 4.0, 0.5, 32
+# Steps of an angle over the 99th percentile of all: samples are missing in all channels (gears that twist by as much as
+# they turn reach 2).
+MISSING = 3.5
 # Way that the dte goes along the record, in its rms fluctuation, and the part at both ends that tells it. What repeats
 # goes by no more than three times its rms (1.7 in those 283 records).
 GONE, END = 5.0, 8
@@ -44,6 +47,26 @@ def angles_do_not_slip(look: Look) -> list[Finding]:
             f"angle_{GEARS[number]} leaps by {abs(size) / radius:.3g} rad, {1e6 * abs(size):.3g} um on the base circle,"
             f" between samples {place} and {place + 1} and stays there (limit {1e6 * limit:.2g} um, {STEP:g} times what"
             " 99 % of the samples move by): did the encoder miss or double a pulse?"
+        )
+    ]
+
+
+def no_gap_in_all_channels(look: Look) -> list[Finding]:
+    """Neither gear turns by many times its step from one sample to the next."""
+    angles = [values for gear in GEARS if (values := look.channel(f"angle_{gear}")) is not None]
+    if not angles or look.samples < FEWEST:
+        return []
+    moves = [np.diff(values) for values in angles]
+    usual = [float(np.percentile(np.abs(move), 99)) for move in moves]
+    place = int(np.argmax(moves[0]))
+    leaps = [float(move[place]) / size if size > 0 else 0.0 for move, size in zip(moves, usual, strict=True)]
+    if min(leaps) < MISSING:
+        return []
+    lost = float(moves[0][place] / np.median(moves[0])) - 1
+    return [
+        Finding(
+            f"the gears turn {leaps[0]:.3g} times as far as in 99 % of the steps between samples {place} and"
+            f" {place + 1} (limit {MISSING:g}): about {lost:.0f} samples are missing in the angles, or in all channels"
         )
     ]
 

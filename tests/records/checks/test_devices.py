@@ -5,7 +5,7 @@ import pytest
 import xarray as xr
 
 import gearbench as gb
-from gearbench.records.checks.contradictions import clocks_agree
+from gearbench.records.checks.late import clocks_agree
 from gearbench.records.checks.look import Look
 
 PAIR = [

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from gearbench.records.checks.angles import angles_follow_mesh_phase, angles_keep_mesh_period
 from gearbench.records.checks.boundary import inertias_as_declared
-from gearbench.records.checks.contradictions import clocks_agree, gears_not_swapped
+from gearbench.records.checks.contradictions import gears_not_swapped
+from gearbench.records.checks.late import clocks_agree
 from gearbench.records.checks.look import GEARS, Look
 from gearbench.records.checks.mesh_force import accounts_of
 from gearbench.records.checks.periods import periods_repeat

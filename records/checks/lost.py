@@ -1,0 +1,106 @@
+"""Samples that a channel, or a device with several, lost or doubled: its delay leaps within the record."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.records.checks.devices import groups_of
+from gearbench.records.checks.finding import Finding
+from gearbench.records.checks.late import SUSPICIOUS, delays_of, lag_of
+from gearbench.records.checks.look import Look
+from gearbench.records.checks.mesh_force import AGREE, Accounts, accounts_of
+
+Array = NDArray[np.float64]
+
+# Stretches in which delays are told (in long ones longer delays), and fewest samples of one.
+STRETCHES, FEWEST = (8, 4), 1024
+# Samples by which a delay leaps at least, in deviations of the stretches on either side, of LEAST samples at least; and
+# part of the disagreement's power that a leap may leave.
+LEAP, SURE, LEAST, LEFT = 0.5, 6.0, 0.05, 0.8
+
+
+@dataclass(frozen=True)
+class Leap:
+    """Channels, in words `what`, that come earlier by `samples` after one of `count` stretches; `left`: mean square of
+    the misfits without."""
+
+    what: str
+    several: bool
+    count: int
+    stretch: int
+    samples: float
+    left: float
+
+
+def channels_keep_step(look: Look) -> list[Finding]:
+    """Delays are the same all along the record: where the accounts of the mesh force disagree on the whole, and by no
+    common lag, the delay that makes them agree best is told in each stretch. If it is one in all stretches up to some
+    and another in all after it, samples are missing or double there. What a rig does looks alike in all stretches.
+    """
+    whole = accounts_of(look)
+    if whole is None or whole.worst < SUSPICIOUS or lag_of(look, whole) is not None:
+        return []
+    for count in STRETCHES:
+        leap = _largest(look, count) if look.samples >= count * FEWEST else None
+        if leap is not None:
+            return [_finding(look, leap)]
+    return []
+
+
+def _largest(look: Look, count: int) -> Leap | None:
+    """The leap that leaves least of the misfits, of any channel or device."""
+    pieces = look.stretches(count)
+    accounts = [found for piece in pieces if (found := accounts_of(piece)) is not None]
+    if len(accounts) < count or len({tuple(one.relations()) for one in accounts}) > 1:
+        return None
+    every = sorted(set().union(*(accounts[0].channels(relation) for relation in accounts[0].relations())))
+    groups = [(name, frozenset([name])) for name in every]
+    groups += [(f"the {words} ({', '.join(sorted(names))})", names) for words, names in groups_of(accounts[0])]
+    leaps = [_leap(pieces, accounts, what, names) for what, names in groups]
+    return min((leap for leap in leaps if leap is not None), key=lambda leap: leap.left, default=None)
+
+
+def _leap(pieces: list[Look], accounts: list[Accounts], what: str, names: frozenset[str]) -> Leap | None:
+    """The leap of some channels; None where there is none that is sure."""
+    told = [_delay(piece, one, names) for piece, one in zip(pieces, accounts, strict=True)]
+    delay, least, now = (np.array(column) for column in zip(*told, strict=True))
+    delay, count = delay * pieces[0].rate, len(pieces)
+    rest = [np.delete(np.arange(count), stretch) for stretch in range(1, count - 1)]
+    power = [float(np.mean(least[kept] ** 2)) for kept in rest]
+    stretch = 1 + int(np.argmin(power))
+    kept, left = rest[stretch - 1], power[stretch - 1]
+    before, after = (delay[kept[kept < stretch]], delay[kept[kept > stretch]])
+    size = float(np.median(after) - np.median(before))
+    scatter = np.concatenate([before - np.median(before), after - np.median(after)])
+    sure = abs(size) > max(LEAP, SURE * max(float(np.sqrt(np.mean(scatter**2))), LEAST))
+    if not sure or left > LEFT * float(np.mean(now[kept] ** 2)) or left > AGREE**2:
+        return None
+    return Leap(what, len(names) > 1, count, stretch, size, left)
+
+
+def _delay(piece: Look, accounts: Accounts, names: frozenset[str]) -> tuple[float, float, float]:
+    """The delay [s] of some channels with which all accounts agree best in a stretch, and the worst misfit with and
+    without it."""
+    both = [(relation, accounts.channels(relation)) for relation in accounts.relations()]
+    apart = [relation for relation, channels in both if names & channels and not channels <= names]
+    fixed = max((float(accounts.misfit(one)[0]) for one in accounts.relations() if one not in apart), default=0.0)
+    coarse = delays_of(piece, accounts)
+    best, found = 0.0, np.zeros(1)
+    for delays in (coarse, (coarse[1] - coarse[0]) * np.linspace(-1.0, 1.0, 41)):
+        turn = np.exp(1j * np.outer(best + delays, accounts.omega))
+        found = np.max([accounts.misfit(one, names, turn) for one in apart], axis=0) if apart else np.zeros(1)
+        best += float(delays[int(np.argmin(found))]) if apart else 0.0
+    return best, max(float(found.min()), fixed), accounts.worst
+
+
+def _finding(look: Look, leap: Leap) -> Finding:
+    size = look.samples // leap.count
+    return Finding(
+        f"{leap.what} {'leap' if leap.several else 'leaps'} by {abs(leap.samples):.3g} samples against the other"
+        f" channels, between samples {leap.stretch * size - size // 2} and {(leap.stretch + 1) * size + size // 2},"
+        f" as the balance of forces at the gears shows in {leap.count} stretches (limit {LEAP:g}):"
+        f" {'have they' if leap.several else 'has it'} {'lost' if leap.samples < 0 else 'doubled'} samples?"
+    )
