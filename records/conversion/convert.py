@@ -93,7 +93,7 @@ def convert_sources(
     runs = {signal.name: signal.values.shape[0] for signal in signals}
     if len(set(runs.values())) > 1:
         raise RecordError(f"channels differ in their number of runs: {runs}")
-    signals, details = taken_off(signals, channel_map.channels, notes)
+    signals, details = taken_off(signals, channel_map.channels, notes, attributes)
     signals = clocks_by_teeth(signals, channel_map.channels, attributes, notes)
     common = common_clock(signals, reference_rate(signals, channel_map.channels) | attributes, notes)
     work = Assembly(tuple(signals), common, channel_map, attributes, notes, details=details)

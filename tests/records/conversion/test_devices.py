@@ -33,11 +33,16 @@ E1, E2 = 1.2e-3 * np.exp(-0.7j), 2e-4 * np.exp(-2.1j)  # e cos(theta - phi): e e
 
 
 def angle(gear: int, t: np.ndarray) -> np.ndarray:
-    """True angle: steady rotation and a vibration that repeats after a second."""
-    rng = np.random.default_rng(gear)
+    """True angle: steady rotation, a vibration that repeats after a second, which both gears in mesh share, and a
+    tenth of it that they do not."""
+    swing = vibration(7, t) + 0.1 * vibration(gear, t)
+    return SPEEDS[gear] * t + 0.3 + 2e-5 * TEETH[0] / TEETH[gear] * swing
+
+
+def vibration(seed: int, t: np.ndarray) -> np.ndarray:
+    rng = np.random.default_rng(seed)
     lines, phases = rng.choice(np.arange(2, 400), 30, replace=False), rng.uniform(0, 2 * pi, 30)
-    vibration = np.sin(2 * pi * np.outer(t, lines) + phases).sum(axis=1)
-    return SPEEDS[gear] * t + 0.3 + 2e-5 * vibration
+    return np.sin(2 * pi * np.outer(t, lines) + phases).sum(axis=1)
 
 
 def read(true: np.ndarray) -> np.ndarray:
@@ -82,8 +87,39 @@ def test_runout_is_found_and_taken_off(tmp_path: Path) -> None:
 
 def test_an_angle_without_runout_stays_as_it_is(tmp_path: Path) -> None:
     record = convert(tmp_path, columns(), angle_driven={"runout_orders": 2.0})
-    np.testing.assert_array_equal(record["angle_driven"].values[0], angle(1, TIME))
-    assert record["angle_driven"].attrs["runout_removed"] == 0.0
+    # A tenth of a line of the vibration, that both orders may hold by chance.
+    assert np.abs(record["angle_driven"].values[0] - angle(1, TIME)).max() < 2e-6
+    assert record["angle_driven"].attrs["runout_removed"] < 2e-6
+
+
+@pytest.mark.parametrize("course", ["run-up", "wander"])
+def test_runout_is_found_whatever_the_speed_does(tmp_path: Path, course: str) -> None:
+    """Both encoders run out, of one gear or the other or both it is asked; nothing is made up of the speed."""
+    more = 0.2 * TIME**2 if course == "run-up" else 0.05 * np.sin(2 * pi * 1.7 * TIME)  # turns of the driver
+    true = [angle(gear, TIME) + 2 * pi * more * TEETH[0] / TEETH[gear] for gear in (0, 1)]
+    for runs_out in ((False, False), (True, False), (True, True)):
+        given = {
+            f"angle_{name}": read(one) if runs else one
+            for name, one, runs in zip(("driver", "driven"), true, runs_out, strict=True)
+        }
+        orders = {name: {"runout_orders": 2.0} for name in given}
+        record = convert(tmp_path, columns() | given, **orders)
+        for name, one, runs in zip(given, true, runs_out, strict=True):
+            removed = record[name].attrs["runout_removed"]
+            assert removed == pytest.approx(abs(E1) if runs else 0.0, rel=0.01, abs=2e-6)
+            assert np.ptp(record[name].values[0] - one) < 0.02 * 2 * abs(E1)
+    # Of both that run out only one is asked for; the other's does not go with it.
+    record = convert(tmp_path, columns() | given, angle_driver={"runout_orders": 2.0})
+    assert record["angle_driver"].attrs["runout_removed"] == pytest.approx(abs(E1), rel=0.01)
+    np.testing.assert_array_equal(record["angle_driven"].values[0], given["angle_driven"])
+
+
+def test_runout_of_a_single_angle_needs_a_steady_speed(tmp_path: Path) -> None:
+    data = columns()
+    del data["angle_driver"]
+    data["angle_driven"] = data["angle_driven"] + 0.2 * 2 * pi * TIME**2
+    with pytest.raises(RecordError, match=r"angle_driven.runout_orders: the speed varies, by \S* cycles .*limit 0\.05"):
+        convert(tmp_path, data, angle_driven={"runout_orders": 3.0})
 
 
 def test_uneven_pulses_are_evened(tmp_path: Path) -> None:
