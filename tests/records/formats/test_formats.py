@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import wave
+from collections.abc import Mapping
 from pathlib import Path
 
 import h5py
@@ -102,6 +103,48 @@ def test_tdms(tmp_path: Path) -> None:
     assert (one.name, one.unit, one.runs, one.start) == ("M1", "Nm", 2, 0.25)
     assert one.rate == pytest.approx(1000.0, rel=1e-12)
     assert read_source(path).facts["teeth_driver"] == 20.0
+
+
+def write_starts(path: Path, starts: Mapping[str, np.datetime64 | None], offset: float = 0.0) -> None:
+    """A TDMS file of channels `group/name` that begin at these times; None: the file does not say."""
+    with nptdms.TdmsWriter(path) as writer:
+        made = []
+        for place, start in starts.items():
+            properties = {"wf_increment": 1e-3, "wf_start_offset": offset, "unit_string": "Nm"}
+            group, _, name = place.partition("/")
+            begins = {} if start is None else {"wf_start_time": start}
+            made.append(nptdms.ChannelObject(group, name, SIGNAL, properties=properties | begins))
+        writer.write_segment(made)
+
+
+NOON = np.datetime64("2026-11-28T12:00:00.000000")
+
+
+def test_tdms_channels_start_when_their_devices_did(tmp_path: Path) -> None:
+    path, later = tmp_path / "m.tdms", NOON + np.timedelta64(250_125, "us")
+    unset = np.datetime64("1904-01-01T00:00:00.000000")  # a time that LabVIEW was not told
+    write_starts(path, {"a/M1": later, "a/M2": NOON, "b/y1": None, "b/y2": unset}, offset=0.5)
+    starts = {one.name: one.start for one in read_source(path).columns}
+    assert starts == pytest.approx({"M1": 0.750125, "M2": 0.5, "y1": 0.5, "y2": 0.5}, abs=1e-9)
+
+
+def test_tdms_runs_begin_one_after_another(tmp_path: Path) -> None:
+    path, minute, late = tmp_path / "m.tdms", np.timedelta64(60, "s"), np.timedelta64(3, "ms")
+    starts = {"1/M1": NOON, "1/y1": NOON + late, "2/M1": NOON + minute, "2/y1": NOON + minute + late}
+    write_starts(path, starts)
+    assert [(one.runs, one.start) for one in read_source(path).columns] == [(2, 0.0), (2, pytest.approx(0.003))]
+    write_starts(path, starts | {"2/y1": NOON + minute})
+    with pytest.raises(RecordError, match=r"y1 starts 0 s into one run and 0\.003 s into another \(limit 1e-06 s"):
+        read_source(path)
+
+
+def test_tdms_times_of_samples_are_seconds(tmp_path: Path) -> None:
+    times = NOON + np.arange(0, 2_000_000, 400_000).astype("timedelta64[us]")
+    with nptdms.TdmsWriter(tmp_path / "m.tdms") as writer:
+        writer.write_segment([nptdms.ChannelObject("g", "t", times)])
+    (one,) = read_source(tmp_path / "m.tdms").columns
+    assert one.unit == "s"
+    np.testing.assert_allclose(one.values, [[0.0, 0.4, 0.8, 1.2, 1.6]], atol=1e-9)
 
 
 def test_netcdf_and_hdf5(tmp_path: Path) -> None:
