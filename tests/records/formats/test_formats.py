@@ -105,6 +105,42 @@ def test_tdms(tmp_path: Path) -> None:
     assert read_source(path).facts["teeth_driver"] == 20.0
 
 
+@pytest.mark.parametrize("binary", [0, 1])
+def test_uff_that_is_cut_anywhere_is_refused(tmp_path: Path, binary: int) -> None:
+    """But where a dataset ends: nothing tells that another one followed."""
+    path = tmp_path / "m.uff"
+    write_uff(path, *(dataset_58(name, SIGNAL[:9], "N m", binary=binary) for name in ("M1", "M2", "M3")))
+    content = path.read_bytes()
+    third = content.rfind(b"    -1\n    58")
+    ends = [content.find(b"    -1\n", 60), content.rfind(b"    -1\n", 0, third), len(content) - 7]
+    for cut in range(third + 5, len(content) - 1):
+        path.write_bytes(content[:cut])
+        with pytest.raises(RecordError, match=r"m\.uff is truncated: dataset 3( \(M.?\))? is not ended by -1"):
+            read_source(path)
+    for number, end in enumerate(ends, start=1):
+        path.write_bytes(content[:end])
+        with pytest.raises(RecordError, match=rf"truncated: dataset {number} \(M{number}\) is not ended by -1"):
+            read_source(path)
+        path.write_bytes(content[: end + 6])  # without the last end of line
+        assert len(read_source(path).names) == number
+
+
+def test_uff_with_uneven_abscissas_is_whole(tmp_path: Path) -> None:
+    """Its writer counts half the bytes of a binary set."""
+    write_uff(tmp_path / "m.uff", *(dataset_58(name, SIGNAL, "N m", abscissa_spacing=0) for name in ("M1", "M2")))
+    source = read_source(tmp_path / "m.uff")
+    assert source.names == ("M1", "M2")
+    np.testing.assert_array_equal(column(source, "M2"), [SIGNAL])
+
+
+def test_uff_with_fewer_values_than_it_says_names_the_dataset(tmp_path: Path) -> None:
+    write_uff(tmp_path / "m.uff", *(dataset_58(name, SIGNAL, "N m", binary=0) for name in ("M1", "M2")))
+    lines = (tmp_path / "m.uff").read_text().splitlines(keepends=True)
+    (tmp_path / "m.uff").write_text("".join(lines[:-3] + lines[-1:]))
+    with pytest.raises(RecordError, match=r"m\.uff: dataset 2 \(M2\) is truncated: it has 19\d of 200 values"):
+        read_source(tmp_path / "m.uff")
+
+
 def write_starts(path: Path, starts: Mapping[str, np.datetime64 | None], offset: float = 0.0) -> None:
     """A TDMS file of channels `group/name` that begin at these times; None: the file does not say."""
     with nptdms.TdmsWriter(path) as writer:
