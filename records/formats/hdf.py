@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gearbench.records.errors import RecordError
 from gearbench.records.formats.source import Column, Source, first_line, make_column
@@ -15,6 +16,9 @@ if TYPE_CHECKING:
 
 _UNIT_NAMES = ("units", "unit", "Unit", "Units", "UNIT")
 _RATE_NAMES = ("sampling_rate", "sample_rate", "fs")
+_MISSING_NAMES = ("_FillValue", "missing_value")
+# How the CF conventions pack numbers: what stands for an attribute that is not there, and what it must be besides.
+_PACKING = {"scale_factor": (1.0, ", not 0"), "add_offset": (0.0, "")}
 
 
 def read_hdf(path: Path) -> Source:
@@ -60,17 +64,53 @@ def _take(
         facts[name] = "".join(map(chr, np.ravel(item[()]).astype(int)))
     elif kind in ("cell", "struct", "table", "string") or item.dtype.kind not in "fiub":
         skipped[name] = f"is of type {kind or item.dtype}, not an array of real numbers"
-    elif item.size == 1:
-        facts[name] = float(np.ravel(item[()])[0])
     elif item.size == 0:
         skipped[name] = "is empty"
     else:
-        rate = next((float(item.attrs[key]) for key in _RATE_NAMES if _is_number(item.attrs.get(key))), None)
-        unit = next((_text(item.attrs[key]) for key in _UNIT_NAMES if key in item.attrs), None)
-        try:
-            columns.append(make_column(name, item[()], unit=unit or None, rate=rate))
-        except RecordError as reason:
-            skipped[name] = str(reason)
+        _take_numbers(name, item, columns, facts, skipped)
+
+
+def _take_numbers(
+    name: str, item: h5py.Dataset, columns: list[Column], facts: dict[str, float | str], skipped: dict[str, str]
+) -> None:
+    try:
+        values = _unpacked(item)
+        if values.size > 1:
+            rate = next((float(item.attrs[key]) for key in _RATE_NAMES if _is_number(item.attrs.get(key))), None)
+            unit = next((_text(item.attrs[key]) for key in _UNIT_NAMES if key in item.attrs), None)
+            columns.append(make_column(name, values, unit=unit or None, rate=rate))
+        elif np.isnan(values).all():
+            skipped[name] = "is missing"
+        else:
+            facts[name] = float(np.ravel(values)[0])
+    except RecordError as reason:
+        skipped[name] = str(reason)
+
+
+def _unpacked(item: h5py.Dataset) -> NDArray:
+    """Values as the CF conventions pack them: scale_factor x stored + add_offset, NaN where the stored one stands for
+    a missing value. Raises RecordError for a scale or an offset that is no finite number."""
+    stored = item[()]
+    absent = np.zeros(np.shape(stored), dtype=bool)
+    for key in _MISSING_NAMES:
+        marks = np.ravel(item.attrs.get(key, ()))
+        if marks.dtype.kind in "fiub":
+            # A float is as exact as those stored; an integer must not wrap around.
+            with np.errstate(over="ignore"):
+                absent |= np.isin(stored, marks.astype(stored.dtype) if stored.dtype.kind == "f" else marks)
+    scale, offset = (_packing(item, key) for key in _PACKING)
+    if not absent.any() and (scale, offset) == (1.0, 0.0):
+        return np.asarray(stored)
+    return np.where(absent, np.nan, scale * np.asarray(stored, dtype=np.float64) + offset)
+
+
+def _packing(item: h5py.Dataset, key: str) -> float:
+    absent, limit = _PACKING[key]
+    value = item.attrs.get(key, absent)
+    number = float(np.ravel(value)[0]) if _is_number(value) else np.nan
+    if not np.isfinite(number) or (key == "scale_factor" and number == 0.0):
+        raise RecordError(f"has {key} = {_text(value)}, which must be one finite number{limit}")
+    return number
 
 
 def _attributes(file: h5py.File) -> dict[str, float | str]:

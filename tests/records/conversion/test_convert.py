@@ -370,3 +370,21 @@ def test_provenance_names_the_file_and_the_map(tmp_path: Path) -> None:
     digest = hashlib.sha256((tmp_path / "m.h5").read_bytes()).hexdigest()
     assert settings["converted"] == [{"name": "m.h5", "sha256": digest}]
     assert "[channel.y_driver]" in settings["channel_map"]
+
+
+def test_what_a_file_marks_as_missing_is_refused_with_its_place(tmp_path: Path) -> None:
+    """In NetCDF and HDF5 a number of the file's own choice stands for a missing value."""
+    data = whole()
+    units = {"torque_driver": "N m", "angle_driver": "rad", "angle_driven": "rad"}
+    channels = {name: ChannelSpec((name,), unit) for name, unit in units.items()}
+    for marked, words in (
+        ("torque_driver", r"torque_driver .* has 2 value\(s\) that are missing or not finite, first at sample 70"),
+        ("t", r"time column t has 2 value\(s\) that are not finite, first at sample 70"),
+    ):
+        held = data[marked].copy()
+        held[70:72] = -9999.0
+        write_columns(tmp_path / "m.h5", data | {marked: held})
+        with h5py.File(tmp_path / "m.h5", "a") as file:
+            file[marked].attrs["_FillValue"] = -9999.0
+        with pytest.raises(RecordError, match=words):
+            gb.convert(tmp_path / "m.h5", ChannelMap(channels, {**ABOUT, "time": "t"}))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import wave
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import h5py
 import nptdms
@@ -195,6 +196,49 @@ def test_netcdf_and_hdf5(tmp_path: Path) -> None:
         file.create_dataset("names", data=["x", "y"])
     plain = read_source(tmp_path / "m.h5")
     assert plain.names == ("a.b",) and plain.columns[0].unit == "g" and "names" in plain.skipped
+
+
+def write_packed(path: Path, stored: np.ndarray, **attributes: Any) -> None:
+    with h5py.File(path, "w") as file:
+        file.create_dataset("M1", data=stored).attrs.update(attributes)
+        file.create_dataset("M2", data=SIGNAL)
+
+
+def test_packed_netcdf_is_unpacked(tmp_path: Path) -> None:
+    """As xarray writes it, and as it reads it back."""
+    made = xr.Dataset({"M1": ("n", np.where(TIME < 0.15, SIGNAL, np.nan))})
+    packing = {"dtype": "int16", "scale_factor": 2e-3, "add_offset": 10.0, "_FillValue": -32768}
+    made.to_netcdf(tmp_path / "m.nc", engine="h5netcdf", encoding={"M1": packing})
+    with xr.open_dataset(tmp_path / "m.nc", engine="h5netcdf") as back:
+        found = column(read_source(tmp_path / "m.nc"), "M1")[0]
+        np.testing.assert_allclose(found, back["M1"].values, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(found[:150], SIGNAL[:150], rtol=0, atol=1.01e-3)
+    assert np.isnan(found[150:]).all()
+
+
+def test_values_that_stand_for_missing_ones_are_not_a_number(tmp_path: Path) -> None:
+    path, stored = tmp_path / "m.h5", np.array([0.5, 1e20, -9999.0, 3.0], dtype=np.float32)
+    write_packed(path, stored, _FillValue=1e20, missing_value=[-9999.0, -1.0])
+    np.testing.assert_array_equal(column(read_source(path), "M1"), [[0.5, np.nan, np.nan, 3.0]])
+    write_packed(path, np.array([241, 1, 2], dtype=np.uint8), _FillValue=-15)  # 241 modulo 256
+    np.testing.assert_array_equal(column(read_source(path), "M1"), [[241.0, 1.0, 2.0]])
+    write_packed(path, np.array([-9999.0]), _FillValue=-9999.0)
+    assert read_source(path).skipped == {"M1": "is missing"}
+
+
+@pytest.mark.parametrize(
+    ("attributes", "words"),
+    [
+        ({"scale_factor": 0.0}, "has scale_factor = 0.0, which must be one finite number, not 0"),
+        ({"scale_factor": "2"}, "has scale_factor = 2, which must be one finite number, not 0"),
+        ({"add_offset": np.nan}, "has add_offset = nan, which must be one finite number"),
+        ({"add_offset": [1.0, 2.0]}, "has add_offset = [1. 2.], which must be one finite number"),
+    ],
+)
+def test_a_packing_that_is_none_makes_no_column(tmp_path: Path, attributes: dict[str, Any], words: str) -> None:
+    write_packed(tmp_path / "m.h5", SIGNAL, **attributes)
+    source = read_source(tmp_path / "m.h5")
+    assert source.names == ("M2",) and source.skipped == {"M1": words}
 
 
 @pytest.mark.parametrize(("width", "tolerance"), [(1, 1 / 128), (2, 2**-15), (3, 2**-23)])
