@@ -128,12 +128,12 @@ def _unit(column: Column, channel: str, doubts: list[str], remarks: dict[str, st
     wanted = unit_of_channel(channel)
     if column.unit is None:
         return wanted
-    if not is_unit(column.unit):
+    of_channel = QUANTITIES[wanted]
+    if not is_unit(column.unit, of_channel):
         doubts.append(f"{column.name} has the unit {column.unit!r}, which is not known: it is not taken as {channel}")
         remarks[column.name] = "unknown unit"
         return None
-    quantity = unit_of(column.unit, column.name).quantity
-    of_channel = QUANTITIES[wanted]
+    quantity = unit_of(column.unit, column.name, of_channel).quantity
     if quantity == of_channel or quantity in INTEGRALS.get(of_channel, {}):
         return column.unit
     doubts.append(f"{column.name} is named like {channel} but has the unit {column.unit!r}: it is not taken")

@@ -109,8 +109,8 @@ def _unit(name: str, spec: ChannelSpec, column: Column, where: str) -> Unit:
     word = spec.unit or column.unit
     if word is None:
         raise RecordError(f'{where} has no unit: give [channel.{name}] unit = "{unit_of_channel(name)}" or another one')
-    unit = unit_of(word, where)
     wanted = QUANTITIES[unit_of_channel(name)]
+    unit = unit_of(word, where, wanted)
     fits = {wanted, *INTEGRALS.get(wanted, {})} | (set(PULSES) if wanted == "angle" else set())
     if unit.quantity not in fits:
         raise RecordError(
@@ -128,7 +128,7 @@ def _clock(
     chosen = spec.time or (None if own else attributes.get("time"))
     if chosen is not None:
         times = find_column(source, str(chosen), "time")
-        unit = unit_of(times.unit or "s", f"column {times.name}")
+        unit = unit_of(times.unit or "s", f"column {times.name}", "time")
         if unit.quantity != "time":
             raise RecordError(f"column {times.name} has the unit {times.unit!r}, but times are given in s")
         if times.samples != column.samples:

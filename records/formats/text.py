@@ -129,7 +129,7 @@ def _head(path: Path, lines: list[str], layout: _Layout) -> tuple[list[str], lis
 def _are_units(cells: list[str]) -> bool:
     """Whether a row below the names holds units: in brackets, or words that are units."""
     filled = [cell for cell in cells if cell not in ("", "-")]
-    return bool(filled) and all(cell[:1] in "[(" or is_unit(cell) for cell in filled)
+    return bool(filled) and all(cell[:1] in "[(" or is_unit(cell, "force") for cell in filled)
 
 
 def _numbers(path: Path, rows: list[str], layout: _Layout, names: list[str]) -> NDArray[np.float64]:

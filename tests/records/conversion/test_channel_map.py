@@ -11,7 +11,7 @@ import pytest
 from gearbench.records import ChannelMap, ChannelSpec, RecordError, Source, guess_map, map_text, read_map
 from gearbench.records.conversion.channel_map import parse_map
 from gearbench.records.formats.source import make_column
-from gearbench.records.formats.unit_words import unit_of
+from gearbench.records.formats.unit_words import si_word, unit_of
 
 CHANNEL = {"channel": {"dte": {"column": "te"}}}
 
@@ -84,12 +84,53 @@ def test_a_map_that_is_no_toml(tmp_path: Path) -> None:
         ("μm", "length", 1e-6), ("um", "length", 1e-6), ("mm/s²", "acceleration", 1e-3), ("m/s2", "acceleration", 1.0),
         ("m/s^2", "acceleration", 1.0), ("m s^-2", "acceleration", 1.0), ("g", "acceleration", 9.80665),
         ("mN", "force", 1e-3), ("MN", "force", 1e6), ("[kN]", "force", 1e3), ("ms", "time", 1e-3),
-        ("pulses", "count", 1.0),
+        ("pulses", "count", 1.0), ("ft-lb", "torque", 1.3558179483), ("lb-ft", "torque", 1.3558179483),
+        ("ft lbf", "torque", 1.3558179483), ("in-lb", "torque", 0.1129848290), ("lb-in", "torque", 0.1129848290),
+        ("oz-in", "torque", 0.00706155), ("FT-LB", "torque", 1.3558179483), ("cNm", "torque", 1e-2),
+        ("daNm", "torque", 10.0), ("inch", "length", 0.0254), ("Inches", "length", 0.0254), ("mils", "length", 2.54e-5),
+        ("µin", "length", 2.54e-8), ("uin", "length", 2.54e-8), ("radians", "angle", 1.0), ("RAD", "angle", 1.0),
+        ("Degrees", "angle", pi / 180), ("Deg", "angle", pi / 180), ("º", "angle", pi / 180), ("Rev", "angle", 2 * pi),
+        ("seconds", "time", 1.0), ("Sec", "time", 1.0), ("msec", "time", 1e-3), ("usec", "time", 1e-6),
+        ("µsec", "time", 1e-6), ("Rpm", "angular speed", pi / 30), ("rad/sec", "angular speed", 1.0),
+        ("Deg/Sec", "angular speed", pi / 180), ("º/s", "angular speed", pi / 180), ("1/Min", "angular speed", pi / 30),
+        ("m/sec^2", "acceleration", 1.0), ("m/sec²", "acceleration", 1.0), ("m·s⁻²", "acceleration", 1.0),
+        ("m/s/s", "acceleration", 1.0),
     ],
 )  # fmt: skip
 def test_unit_words(word: str, quantity: str, size: float) -> None:
     unit = unit_of(word, "here")
     assert (unit.quantity, unit.factor) == (quantity, pytest.approx(size))
+
+
+@pytest.mark.parametrize("word", ["M", "NM", "MM", "Mm", "KN", "Kn", "mn", "S", "MS", "G", "MRAD", "IN", "lb", "LB"])
+def test_case_counts_where_it_means_something_and_a_pound_may_be_a_mass(word: str) -> None:
+    with pytest.raises(RecordError, match="which is not known"):
+        unit_of(word, "here")
+
+
+def test_a_pound_is_a_force_where_a_force_is_asked_for() -> None:
+    assert unit_of("lb", "here", "force").factor == pytest.approx(4.4482216152605)
+    with pytest.raises(RecordError, match="'lb', which is not known"):
+        unit_of("lb", "here", "torque")
+    found = guess_map(source(("force", "lb"), ("torque_driver", "lb")), KNOWN)
+    assert set(found.channel_map.channels) == {"force"}
+
+
+@pytest.mark.parametrize(
+    ("word", "quantity", "hint"),
+    [
+        ("Newtn m", "torque", None), ("lbs-ft", "torque", "lb ft"), ("degre", "angle", "degree"),
+        ("rad/ss", "angular speed", "rad/s"), ("micrn", "length", "micron"), ("secnds", "time", "seconds"),
+        ("dNm", "torque", None), ("uNm", "torque", None), ("NM", "torque", None), ("mkm", "length", None),
+        ("nsec", "time", None), ("grad", "angle", None), ("thou", "length", None),
+    ],
+)  # fmt: skip
+def test_hints_stay_within_a_quantity_and_never_change_a_prefix(word: str, quantity: str, hint: str | None) -> None:
+    with pytest.raises(RecordError) as caught:
+        unit_of(word, "here", quantity)
+    said = str(caught.value).partition("which is not known; ")[2]
+    listed = f"units of {quantity} are {si_word(quantity)}, "
+    assert said == f"did you mean {hint!r}?" if hint else said.startswith(listed)
 
 
 def test_temperatures_have_a_zero() -> None:
