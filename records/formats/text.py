@@ -2,11 +2,13 @@
 
 The head names the columns, with units in brackets behind the names (`angle [deg]`, `M1 (Nm)`), or in a row of
 their own below. Lines above it and comments (`#`, `%`) are passed over. A comma may be the decimal sign where it
-is not the separator.
+is not the separator, or where cells are in quotes; exponents may be written with D.
 """
 
 from __future__ import annotations
 
+import contextlib
+import csv
 import io
 import re
 from dataclasses import dataclass
@@ -22,6 +24,9 @@ from gearbench.records.formats.unit_words import is_unit
 _LONGEST_HEAD = 200  # lines
 _COMMENTS = ("#", "%", "//")
 _NAME_UNIT = re.compile(r"^(?P<name>.*?)\s*(?:\[(?P<square>[^\]]*)\]|\((?P<round>[^)]*)\))\s*$")
+# A unit in brackets, or a name with its unit behind it, in a head whose cells are divided by blanks.
+_BETWEEN_BLANKS = re.compile(r"[\[(][^\])]*[\])]|[^\s\[(]+(?:\s*(?:\[[^\]]*\]|\([^)]*\)))?")
+_FORTRAN = re.compile(r"(?<=[0-9.])[dD](?=[+-]?[0-9])")
 _NO_NUMBER = ("", "nan", "na", "n/a", "-", "inf", "-inf", "+inf")
 
 
@@ -36,6 +41,9 @@ class _Layout:
     def cells(self, line: str) -> list[str]:
         """Cells of a line, without quotes and blanks around them."""
         parts = line.split(self.separator)
+        if '"' in line and self.separator is not None:  # a separator within quotes is none
+            with contextlib.suppress(csv.Error):  # of a quote that a long line does not close
+                parts = next(csv.reader([line], delimiter=self.separator, skipinitialspace=True))
         return [part.strip().strip("\"'").strip() for part in parts]
 
     def numbers(self, line: str) -> list[float] | None:
@@ -49,8 +57,9 @@ class _Layout:
         return found
 
     def plain(self, text: str) -> str:
-        """Text with a decimal point."""
-        return text.replace(",", ".") if self.comma else text
+        """Text with a decimal point and exponents with E."""
+        text = text.replace(",", ".") if self.comma else text
+        return _FORTRAN.sub("E", text)
 
 
 def read_text(path: Path) -> Source:
@@ -58,7 +67,8 @@ def read_text(path: Path) -> Source:
     text = _decoded(path)
     lines = text.splitlines()
     layout = _layout(path, lines)
-    names, units = _head(path, lines[: layout.first], layout)
+    width = len(layout.numbers(lines[layout.first]) or ())
+    names, units = _head(path, lines[: layout.first], layout, width)
     rows = [line for line in lines[layout.first :] if line.strip() and not line.lstrip().startswith(_COMMENTS)]
     data = _numbers(path, rows, layout, names)
     columns = [
@@ -83,7 +93,8 @@ def _decoded(path: Path) -> str:
 def _layout(path: Path, lines: list[str]) -> _Layout:
     """The layout under which two successive lines hold the same, largest number of numbers."""
     best: tuple[int, _Layout] | None = None
-    for separator, comma in (("\t", False), (";", False), (",", False), ("\t", True), (";", True), (None, False)):
+    layouts = (("\t", False), (";", False), (",", False), ("\t", True), (";", True), (",", True), (None, False))
+    for separator, comma in layouts:
         layout = _Layout(separator, comma, 0)
         for number in range(min(len(lines) - 1, _LONGEST_HEAD)):
             here, below = layout.numbers(lines[number]), layout.numbers(lines[number + 1])
@@ -97,16 +108,16 @@ def _layout(path: Path, lines: list[str]) -> _Layout:
     return best[1]
 
 
-def _head(path: Path, lines: list[str], layout: _Layout) -> tuple[list[str], list[str | None]]:
+def _head(path: Path, lines: list[str], layout: _Layout, width: int) -> tuple[list[str], list[str | None]]:
     """Names and units from the lines above the numbers."""
     above = [line for line in lines if line.strip()]
     texts = [line.strip().lstrip("#%").strip() for line in above]
     if not texts:
         raise RecordError(f"{path} has no head: the first line must name the columns, like `time [s], angle [deg]`")
-    last = layout.cells(texts[-1])
+    last = _head_cells(texts[-1], layout, width)
     while last and not last[-1]:
         last.pop()  # a separator at the end of every line
-    before = layout.cells(texts[-2]) if len(texts) > 1 else []
+    before = _head_cells(texts[-2], layout, width) if len(texts) > 1 else []
     while before and not before[-1]:
         before.pop()
     if 1 < len(last) < len(before) and _are_units(last):
@@ -126,6 +137,12 @@ def _head(path: Path, lines: list[str], layout: _Layout) -> tuple[list[str], lis
     return names, units
 
 
+def _head_cells(line: str, layout: _Layout, width: int) -> list[str]:
+    """Cells of a line of the head; blanks that do not divide it into so many columns stand before or within units."""
+    cells = layout.cells(line)
+    return cells if layout.separator is not None or len(cells) == width else _BETWEEN_BLANKS.findall(line)
+
+
 def _are_units(cells: list[str]) -> bool:
     """Whether a row below the names holds units: in brackets, or words that are units."""
     filled = [cell for cell in cells if cell not in ("", "-")]
@@ -133,6 +150,8 @@ def _are_units(cells: list[str]) -> bool:
 
 
 def _numbers(path: Path, rows: list[str], layout: _Layout, names: list[str]) -> NDArray[np.float64]:
+    if layout.separator == "," and layout.comma:
+        return _slowly(path, rows, layout, len(names))
     text = layout.plain("\n".join(rows))
     try:
         data = np.loadtxt(io.StringIO(text), delimiter=layout.separator, ndmin=2, comments=None)

@@ -261,6 +261,11 @@ TABLES = {
     "tabs and comments": "% made by a logger\n% time [s]\ttheta1 (deg)\tM1\n0.0\t1.5\t2\n0.001\t2.5\t3\n",
     "decimal comma": '"time [s]";"theta1 [deg]";"M1"\r\n0,0;1,5;2\r\n0,001;2,5;3\r\n',
     "blanks": "time[s]  theta1[deg]  M1\n 0.0    1.5  2\n 1e-3 2.5  3\n",
+    "blanks before units": "time [s] theta1 [deg] M1\n 0.0    1.5  2\n 1e-3 2.5  3\n",
+    "blanks and a row of units": "time theta1 M1\n[s] [deg] []\n 0.0    1.5  2\n 1e-3 2.5  3\n",
+    "decimal commas in quotes": '"time [s]","theta1 [deg]","M1"\r\n"0,0","1,5","2"\r\n"0,001","2,5","3"\r\n',
+    "semicolons and quotes": '"time [s]";"theta1 [deg]";"M1"\r\n"0,0";"1,5";"2,0"\r\n"0,001";"2,5";"3,0"\r\n',
+    "Fortran": "time [s],theta1 [deg],M1\n0.0D+00,1.5D0,2\n1.0d-03,.25D+1,3\n",
     "separator at the end": "time [s],theta1 [deg],M1,\n0.0,1.5,2,\n0.001,2.5,3,\n",
 }
 
@@ -284,6 +289,12 @@ def test_text_keeps_every_digit_and_old_encodings(tmp_path: Path) -> None:
     source = read_source(path)
     np.testing.assert_array_equal(column(source, "Winkel An"), [SIGNAL])
     assert source.columns[1].unit == "\u00b0"
+
+
+def test_units_with_blanks_stay_whole_in_a_head_with_blanks(tmp_path: Path) -> None:
+    (tmp_path / "m.txt").write_text("t [s] M1 [N m] M2 (kN m)\n0 1 2\n1 2 3\n")
+    source = read_source(tmp_path / "m.txt")
+    assert source.names == ("t", "M1", "M2") and [one.unit for one in source.columns] == ["s", "N m", "kN m"]
 
 
 def test_missing_cells_are_not_a_number(tmp_path: Path) -> None:
