@@ -79,7 +79,7 @@ def put_on_clock(work: Assembly, signal: Signal, mesh_period: float | None, prog
 def mesh_period_of(work: Assembly, declared: float | None) -> float | None:
     """The mesh period [s]: declared and held against what turns, or taken from it; of a speed that varies the mean one.
     Raises RecordError."""
-    found, varies = None, False
+    found, measured, varies = None, None, False
     for signal in work.signals:
         teeth = work.teeth(signal)
         if teeth is None or signal.integrals == 2:
@@ -105,6 +105,15 @@ def mesh_period_of(work: Assembly, declared: float | None) -> float | None:
                 f"{signal.name} turns at a mesh frequency of {1 / own:.5g} Hz, but {1 / declared:.5g} Hz is declared"
                 f" (limit {SPEED:.0%}): wrong unit, pulses per revolution, teeth or sampling rate"
             )
+        if not signal.integrals:
+            # Where the speed varies nothing is declared, but the gears keep step: saw-teeth of a counter do not.
+            first, measured = measured or (signal.name, own), (signal.name, own)
+            if abs(own / first[1] - 1) > SPEED:
+                raise RecordError(
+                    f"{first[0]} turns at a mean mesh frequency of {1 / first[1]:.5g} Hz, but {signal.name} at"
+                    f" {1 / own:.5g} Hz (limit {SPEED:.0%}): wrong pulses per revolution or teeth, or a counter that"
+                    " starts again"
+                )
         found = found or own
     if found is not None and varies:
         return found

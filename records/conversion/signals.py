@@ -11,6 +11,7 @@ import numpy as np
 from gearbench.records.channels import unit_of_channel
 from gearbench.records.conversion.channel_map import ChannelSpec
 from gearbench.records.conversion.clock import Clock, clock_of_times, roundest
+from gearbench.records.conversion.counters import counted_on
 from gearbench.records.conversion.rotation import pulse_angle, quadrature_counts, rising_edges, unwrapped
 from gearbench.records.errors import RecordError
 from gearbench.records.formats.source import Array, Column, Source
@@ -201,7 +202,7 @@ def _encoder(
             raise RecordError(f"{where}: the two tracks have {columns[0].samples} and {columns[1].samples} samples")
         counts = np.array([quadrature_counts(a, b, where) for a, b in zip(values, columns[1].values, strict=True)])
     else:
-        counts = values - spec.offset
+        counts = counted_on(values - spec.offset, pulses, where, notes)
     size = 2 * pi / (pulses * (4 if len(columns) == 2 or unit.quantity == "quadrature count" else 1))
     return Signal(name, spec.sign * counts * size, clock, turns=True, absolute=len(columns) == 1, resolution=size)
 
