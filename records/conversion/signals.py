@@ -59,6 +59,7 @@ def signal_of(
     columns = [find_column(source, column, f"channel.{name}.column") for column in spec.column]
     where = f"channel {name} (column {' and '.join(spec.column)})"
     unit = _unit(name, spec, columns[0], where)
+    _check_scaling(spec, unit, where)
     if unit.quantity == "pulse time":
         return _pulses(name, spec, columns[0], unit, where, notes)
     for column in columns:
@@ -205,6 +206,17 @@ def _encoder(
         counts = counted_on(values - spec.offset, pulses, where, notes)
     size = 2 * pi / (pulses * (4 if len(columns) == 2 or unit.quantity == "quadrature count" else 1))
     return Signal(name, spec.sign * counts * size, clock, turns=True, absolute=len(columns) == 1, resolution=size)
+
+
+def _check_scaling(spec: ChannelSpec, unit: Unit, where: str) -> None:
+    """Refuse a gain of what is counted, and an offset of all but counts."""
+    words = {"pulse time": "pulse times (delay_s takes off a lag)", "level": "an encoder track"}
+    for key, given, neutral in (("gain", spec.gain, 1.0), ("offset", spec.offset, 0.0)):
+        if unit.quantity in PULSES and given != neutral and (key == "gain" or unit.quantity in words):
+            raise RecordError(
+                f"{where}: {key} = {given:g} means nothing for {words.get(unit.quantity, 'counts')}, must be"
+                f" {neutral:g} or left out"
+            )
 
 
 def _per_turn(spec: ChannelSpec, where: str) -> float:

@@ -48,6 +48,14 @@ def test_counts_that_do_not_start_again_are_left(tmp_path: Path) -> None:
     np.testing.assert_array_equal(counted_on(rising, 1024.0, "channel a", []), rising)
 
 
+@pytest.mark.parametrize("changed", [{"gain": 2.0}, {"offset": 0.1}])
+def test_gain_and_offset_of_pulse_times_are_refused(tmp_path: Path, changed: dict[str, float]) -> None:
+    times = (np.arange(400) - 3) / 400
+    spec = {"unit": "pulse times s", "pulses_per_revolution": 200.0}
+    with pytest.raises(RecordError, match=rf"{next(iter(changed))} = \S+ means nothing for pulse times"):
+        convert(tmp_path, whole(angle_driver=times), angle_driver=spec | changed)
+
+
 def test_a_record_of_a_counter_that_starts_again(tmp_path: Path) -> None:
     angle = signals(TIME)["angle_driver"]
     raw = np.mod(np.floor(angle / (2 * pi) * 4 * LINES), 2**16)
