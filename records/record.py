@@ -178,7 +178,8 @@ def _check_time(record: xr.Dataset) -> None:
             f" ({record.attrs['samples_per_period']} x {record.attrs['periods']})"
         )
     error = np.abs((time - time[0]) * rate - np.arange(time.size)).max()
-    if not error <= TIME_TOLERANCE:
+    # Times since an epoch have no more digits than this.
+    if not error <= TIME_TOLERANCE + rate * float(np.spacing(np.abs(time).max())):
         raise RecordError(
             f"time is not uniform at sampling_rate = {rate:g} Hz: it departs by {error:.3g} samples"
             f" (limit {TIME_TOLERANCE:g})"

@@ -14,12 +14,16 @@ from gearbench.records.formats.source import Array
 
 # Departure from a uniform clock [samples] that is none.
 UNIFORM = 1e-3
+# Coarsest digits [samples] within which a clock may be seen to be uniform: a missing sample is seen beside them.
+COARSEST = 0.5
 # Longest gap in a time vector [mean steps] that is bridged.
 LONGEST_GAP = 4.0
 # Half the width of the interpolation kernel [samples of the slower clock], and its Kaiser shape (100 dB).
 HALF_WIDTH, KAISER = 32, 10.0
 # What varies by less than this part of a signal's size is rounding.
 ROUNDING = 1e-11
+# Rounding of a decimal [its last digit] beyond which it tells nothing.
+_SEEN = 0.3
 _CHUNK = 8192
 # So many samples of the way back tell the error.
 _TRIED = 20_000
@@ -70,9 +74,9 @@ def clock_of_times(time: Array, name: str, notes: list[str]) -> Clock:
     # The ends, between which the rate is taken, are rounded too.
     rate = roundest((time.size - 1) / span, max(2 * quantum / span, 1e-12))
     departure = float(np.abs(time - time[0] - np.arange(time.size) / rate).max())
-    if departure * rate <= UNIFORM or departure <= 1.01 * quantum < 0.25 / rate:
+    if departure * rate <= UNIFORM or departure <= 1.01 * quantum < COARSEST / rate:
         if departure * rate > UNIFORM:
-            notes.append(f"{name} is uniform within its printed digits ({quantum:g} s): taken as {rate:.9g} Hz")
+            notes.append(f"{name} is uniform within its digits ({quantum:.3g} s): taken as {rate:.9g} Hz")
         return Clock(float(time[0]), rate, time.size)
     usual = float(np.median(steps))
     longest = int(steps.argmax())
@@ -194,12 +198,40 @@ def _whole_samples(period: float | None, rate: float, samples: int) -> int | Non
 
 
 def _quantum(time: Array) -> float:
-    """The step 10^-d of which all times are multiples, as printed numbers are; 0 if there is none to 1 ns."""
+    """What times (n,) [s] are rounded to at most: by single or double precision, by printed decimals or digits."""
+    largest = float(np.abs(time).max())
+    double = float(np.spacing(largest))
+    steps = [0.0]
+    for scale in (1.0, 1e3, 1e6):  # of s, ms, us
+        scaled = time * scale
+        single = scaled.astype(np.float32)
+        if np.isfinite(single).all() and (np.abs(single - scaled) <= 4 * np.spacing(np.abs(scaled))).all():
+            steps.append(float(np.spacing(np.abs(single).max())) / scale)
+    elapsed = time - time[0]
     for digits in range(10):
-        scaled = time * 10.0**digits
-        if np.abs(scaled - np.round(scaled)).max() < 1e-4:
-            return 10.0**-digits
-    return 0.0
+        # Beside the epoch of a computer's clock double precision is no exact decimal.
+        tolerance = 1e-4 + 10.0**digits * double
+        if tolerance > _SEEN:
+            break
+        scaled = elapsed * 10.0**digits
+        if np.abs(scaled - np.round(scaled)).max() < tolerance:
+            steps.append(10.0**-digits)
+            break
+    usual = float(np.median(np.diff(time)))
+    return max(step for step in (*steps, *_significant(time, usual)) if step < usual) + double
+
+
+def _significant(time: Array, step: float) -> list[float]:
+    """The last digit of the largest of times, if all are printed with so many significant ones, 4 to 9, that it is less
+    than a `step`."""
+    known = np.abs(time[time != 0.0])
+    power = np.floor(np.log10(known) + 1e-12)
+    found = []
+    for digits in range(4, 10):
+        last = 10.0 ** (power - digits + 1)
+        if last.max() < step and np.abs(known / last - np.round(known / last)).max() < 1e-4:
+            found.append(float(last.max()))
+    return found[:1]
 
 
 def _all_finite(values: Array, name: str) -> None:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil, floor
 
+import numpy as np
+
 from gearbench.records.conversion.clock import UNIFORM, Clock, roundest
-from gearbench.records.conversion.signals import Signal
+from gearbench.records.conversion.signals import Signal, replace_start
 from gearbench.records.errors import RecordError
 
 # What a delayed channel lacks at an end may be taken from one excitation period further up to this part of a period.
@@ -91,6 +93,7 @@ def _rate(signals: Sequence[Signal], attributes: Mapping[str, float | str], note
         # Samples of which clock? Where there are several, only a declared rate tells.
         one_clock = bool(uniform) and max(uniform) - min(uniform) <= 1e-9 * rate
         if "sampling_rate" not in attributes and not one_clock:
+            _refuse_uneven([signal.clock for signal in signals])
             given = ", ".join(f"{name} {clock}" for name, clock in _clocks_in_words(signals))
             raise RecordError(
                 f"the channels have different clocks ({given}): say sampling_rate_hz beside samples_per_period, or"
@@ -106,6 +109,33 @@ def _rate(signals: Sequence[Signal], attributes: Mapping[str, float | str], note
         return rate, samples
     notes.append(f"the clock is {exact:.9g} Hz, so that an excitation period has {samples} samples")
     return exact, samples
+
+
+def _refuse_uneven(clocks: Sequence[Clock]) -> None:
+    """Raise RecordError where all clocks are the same single times: then these are what is wrong."""
+    time = clocks[0].time
+    if time is None:
+        return
+    for other in clocks[1:]:
+        if other.time is None or other.samples != time.size or np.ptp(other.time - time) * other.rate > UNIFORM:
+            return
+    rate = (time.size - 1) / (time[-1] - time[0])
+    departure = np.abs((time - time[0]) * rate - np.arange(time.size))
+    worst = int(departure.argmax())
+    raise RecordError(
+        f"the times are not uniform: sample {worst} departs by {departure[worst] / rate:.4g} s, {departure[worst]:.3g}"
+        f" samples, from an even clock of {rate:.6g} Hz (limit {UNIFORM:g}): say sampling_rate_hz beside"
+        " samples_per_period, or excitation_period_s in its place"
+    )
+
+
+def from_a_near_origin(signals: Sequence[Signal], notes: list[str]) -> list[Signal]:
+    """The signals on clocks that begin near 0, where times are so large that their digits no longer tell samples."""
+    first = min(signal.clock.start for signal in signals)
+    if max(float(np.spacing(abs(first))) * signal.clock.rate for signal in signals) < UNIFORM / 10:
+        return list(signals)
+    notes.append(f"times are counted from the first one, {first:.6f} s")
+    return [replace(signal, clock=replace_start(signal.clock, -first)) for signal in signals]
 
 
 def _clocks_in_words(signals: Sequence[Signal]) -> list[tuple[str, str]]:

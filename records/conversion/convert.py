@@ -21,7 +21,7 @@ from gearbench.records.conversion.attributes import (
     record_attributes,
 )
 from gearbench.records.conversion.channel_map import ChannelMap, map_text
-from gearbench.records.conversion.common import common_clock
+from gearbench.records.conversion.common import common_clock, from_a_near_origin
 from gearbench.records.conversion.derive import (
     Assembly,
     add_mesh_phase,
@@ -93,6 +93,7 @@ def convert_sources(
     runs = {signal.name: signal.values.shape[0] for signal in signals}
     if len(set(runs.values())) > 1:
         raise RecordError(f"channels differ in their number of runs: {runs}")
+    signals = from_a_near_origin(signals, notes)
     signals, details = taken_off(signals, channel_map.channels, notes, attributes)
     signals = clocks_by_teeth(signals, channel_map.channels, attributes, notes)
     common = common_clock(signals, reference_rate(signals, channel_map.channels) | attributes, notes)
