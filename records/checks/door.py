@@ -41,7 +41,7 @@ from gearbench.records.checks.finding import Finding
 from gearbench.records.checks.lag import force_and_dte_in_step
 from gearbench.records.checks.late import clocks_agree
 from gearbench.records.checks.look import Look
-from gearbench.records.checks.lost import channels_keep_step
+from gearbench.records.checks.lost import channels_keep_step, periods_keep_step
 from gearbench.records.checks.mesh_lines import mesh_lines_stand_out
 from gearbench.records.checks.passive import force_feeds_the_rig
 from gearbench.records.checks.periods import force_repeats_as_declared, periods_repeat
@@ -89,6 +89,7 @@ CHECKS: tuple[Check, ...] = (
     sampled_fast_enough,
     clocks_agree,
     channels_keep_step,
+    periods_keep_step,
     force_and_dte_in_step,
     clocks_keep_pace,
     periods_repeat,

@@ -8,10 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.records.checks.devices import groups_of
+from gearbench.records.checks.drift import delay_between
 from gearbench.records.checks.finding import Finding
 from gearbench.records.checks.late import SUSPICIOUS, delays_of, lag_of
-from gearbench.records.checks.look import Look
+from gearbench.records.checks.look import EXCITED, Look
 from gearbench.records.checks.mesh_force import AGREE, Accounts, accounts_of
+from gearbench.records.checks.periods import joint_samples
 
 Array = NDArray[np.float64]
 
@@ -20,6 +22,8 @@ STRETCHES, FEWEST = (8, 4), 1024
 # Samples by which a delay leaps at least, in deviations of the stretches on either side, of LEAST samples at least; and
 # part of the disagreement's power that a leap may leave.
 LEAP, SURE, LEAST, LEFT = 0.5, 6.0, 0.05, 0.8
+# Lines that a period needs at least, and how much less of what it differs by from the first one a shift must leave.
+LINES, EXPLAINED = 120, 0.5
 
 
 @dataclass(frozen=True)
@@ -94,6 +98,35 @@ def _delay(piece: Look, accounts: Accounts, names: frozenset[str]) -> tuple[floa
         found = np.max([accounts.misfit(one, names, turn) for one in apart], axis=0) if apart else np.zeros(1)
         best += float(delays[int(np.argmin(found))]) if apart else 0.0
     return best, max(float(found.min()), fixed), accounts.worst
+
+
+def periods_keep_step(look: Look) -> list[Finding]:
+    """No period of excitation and mesh is the first one shifted in time. For force and dte each by itself, which is all
+    that a record without channels of its gears can tell."""
+    joint, force, error = joint_samples(look), look.force, look.stored_or_own_dte
+    if joint is None or force is None or error is None or not np.ptp(force) > 0:
+        return []
+    driving = np.abs(np.fft.rfft(force.reshape(-1, joint)[0] - force.mean()))
+    lines = np.flatnonzero(driving >= EXCITED * driving.max())
+    omega = 2 * np.pi * lines * look.rate / joint
+    for name, values in (("dte", error), ("force", force)):
+        first, *others = np.fft.rfft(values.reshape(-1, joint) - values.mean(), axis=1)
+        for number, other in enumerate(others, start=1):
+            found = delay_between(omega, first[lines].conj() * other[lines]) if lines.size >= LINES else None
+            if found is None or abs(found[0]) * look.rate < LEAP:
+                continue
+            back = other[lines] * np.exp(1j * omega * found[0])
+            if np.linalg.norm(back - first[lines]) > EXPLAINED * np.linalg.norm(other[lines] - first[lines]):
+                continue
+            late = found[0] * look.rate
+            return [
+                Finding(
+                    f"the {name} of samples {number * joint} to {(number + 1) * joint} is that of the first"
+                    f" {joint} {abs(late):.3g} samples {'later' if late > 0 else 'earlier'} (limit {LEAP:g}):"
+                    f" have samples been {'doubled' if late > 0 else 'lost'}, or is mesh_period another one?"
+                )
+            ]
+    return []
 
 
 def _finding(look: Look, leap: Leap) -> Finding:

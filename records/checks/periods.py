@@ -26,7 +26,7 @@ COMPARED, PART = 0.25, 0.1
 def periods_repeat(look: Look) -> list[Finding]:
     """Periods are alike; what differs from one to the next is said as a share. It is noise to an identification, which
     finds it in its residual and counts it in its variance."""
-    joint = _joint_samples(look)
+    joint = joint_samples(look)
     if joint is None:
         return []
     found = []
@@ -55,7 +55,7 @@ def force_repeats_as_declared(look: Look) -> list[Finding]:
     force, declared = look.force, int(look.record.attrs["samples_per_period"])
     if force is None or not look.steady or not np.ptp(force) > 1e-9 * np.abs(force).max():
         return []
-    joint = _joint_samples(look)
+    joint = joint_samples(look)
     differs = differences(force - force.mean())
     own = float(differs[joint]) if joint is not None and joint < differs.size else None
     limit = REPEATS if own is not None and own > OTHER else ALONE
@@ -113,7 +113,7 @@ def _whole(times: float, period: int) -> bool:
     return abs(times - round(times)) < max(PART, 0.6 * times / period) and round(times) >= 1
 
 
-def _joint_samples(look: Look) -> int | None:
+def joint_samples(look: Look) -> int | None:
     """Samples of the shortest run of excitation periods that holds whole mesh periods, if there are two such runs and
     the speed is constant."""
     period, periods = int(look.record.attrs["samples_per_period"]), int(look.record.attrs["periods"])

@@ -9,7 +9,7 @@ from shared.spoilt import RIGS, bare, simulated, with_values
 
 from gearbench.records.checks.late import clocks_agree
 from gearbench.records.checks.look import Look
-from gearbench.records.checks.lost import channels_keep_step
+from gearbench.records.checks.lost import channels_keep_step, periods_keep_step
 from gearbench.records.checks.slips import no_gap_in_all_channels
 
 
@@ -71,3 +71,26 @@ def test_samples_that_all_channels_lost_are_missed(record: xr.Dataset, count: in
     (found,) = no_gap_in_all_channels(look)
     assert f"about {count} samples are missing in the angles, or in all" in found.sentence
     assert f"samples {int(0.4 * look.samples) - 1} and" in found.sentence
+
+
+@pytest.mark.parametrize("name", ["dte", "force"])
+@pytest.mark.parametrize("noise", [0.0, 0.3])
+def test_periods_that_come_early_are_named_without_channels_of_the_gears(name: str, noise: float) -> None:
+    """Three periods of dte and force alone, five samples of one lost in the second."""
+    whole = simulated("free")
+    size = whole.sizes["time"] // int(whole.attrs["periods"])
+    assert periods_keep_step(Look(whole)) == []
+    random, rows = np.random.default_rng(2), {}
+    for one in ("dte", "force"):
+        values = np.tile(whole[one].values[0, :size], 4)
+        values = np.delete(values, np.s_[int(1.4 * size) : int(1.4 * size) + 5]) if one == name else values
+        rows[one] = values[: 3 * size] + noise * values.std() * random.standard_normal(3 * size)
+    time = ("time", np.arange(3 * size) / whole.attrs["sampling_rate"], whole.time.attrs)
+    given = xr.Dataset(
+        {one: (("realisation", "time"), row[None], whole[one].attrs) for one, row in rows.items()}, {"time": time},
+        whole.attrs | {"periods": 3, "samples_per_period": size},
+    )  # fmt: skip
+    (found,) = periods_keep_step(Look(given))
+    assert f"the {name} of samples {2 * size} to {3 * size} is that of the first" in found.sentence
+    assert float(found.sentence.split(f"first {size} ")[1].split()[0]) == pytest.approx(5.0, abs=0.1)
+    assert "earlier" in found.sentence and "lost" in found.sentence
