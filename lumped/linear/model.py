@@ -147,6 +147,13 @@ def equivalent_mass(
     return j1 * j2 / (j1 * r2**2 + j2 * r1**2)
 
 
+def mesh_mass_of(rig: Rig, base_radii: tuple[float, float], inertias: tuple[float, float]) -> float:
+    """m_e [kg] of both sides' whole inertias [kg m^2]; a side whose speed is prescribed counts as infinitely heavy."""
+    if rig.drive.boundary == "speed":
+        return inertias[1] / base_radii[1] ** 2
+    return equivalent_mass(base_radii, inertias, rig.load.boundary)
+
+
 def lumped_model(
     rig: Rig,
     meshing: Pair,

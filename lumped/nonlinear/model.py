@@ -56,7 +56,7 @@ from numpy.typing import NDArray
 
 from gearbench.geometry import Pair, body
 from gearbench.lumped.errors import LumpedError
-from gearbench.lumped.linear.model import equivalent_mass
+from gearbench.lumped.linear.model import mesh_mass_of
 from gearbench.lumped.nonlinear.constants import Constants, Rubbing
 from gearbench.lumped.nonlinear.coordinates import Coordinates, Further, leaning_of
 from gearbench.lumped.nonlinear.law import MeshLaw
@@ -393,10 +393,3 @@ def nonlinear_model(rig: Rig, meshing: Pair, law: MeshLaw) -> NonLinear:
         path=meshing.path,
         outer=output / r2**2 if twists and rig.load.boundary != "speed" else 0.0,
     )
-
-
-def mesh_mass_of(rig: Rig, base_radii: tuple[float, float], inertias: tuple[float, float]) -> float:
-    """m_e [kg] of both sides' whole inertias [kg m^2]; a side whose speed is prescribed counts as infinitely heavy."""
-    if rig.drive.boundary == "speed":
-        return inertias[1] / base_radii[1] ** 2
-    return equivalent_mass(base_radii, inertias, rig.load.boundary)
