@@ -23,6 +23,7 @@ def mesh_phase(record: xr.Dataset) -> Array | None:
 
 
 def departure(phase: Array) -> float:
-    """Largest departure [cycles] of a mesh phase (N,) from that of a constant speed, by least squares."""
-    steps = np.arange(phase.size)
-    return float(np.abs(phase - np.polyval(np.polyfit(steps, phase, 1), steps)).max())
+    """Largest departure [cycles] of mesh phases (N,) or (E, N) from those of constant speeds, by least squares."""
+    rows = np.atleast_2d(phase)
+    steps = np.arange(rows.shape[1])
+    return max(float(np.abs(row - np.polyval(np.polyfit(steps, row, 1), steps)).max()) for row in rows)

@@ -48,7 +48,7 @@ class Course:
 def speed_varies(records: Sequence[xr.Dataset], limit: float = VARIES) -> bool:
     """Whether the mesh phase of a record departs from constant speed by more than `limit` [cycles]."""
     phases = (mesh_phase(record) for record in records)
-    return any(departure(row) > limit for phase in phases if phase is not None for row in phase)
+    return any(departure(phase) > limit for phase in phases if phase is not None)
 
 
 def excited_rows(records: Sequence[xr.Dataset]) -> tuple[list[tuple[Floats, Floats, Floats]], float, int, int]:

@@ -77,9 +77,10 @@ def accelerations_as_torques(look: Look) -> list[Finding]:
     The response is that many times too small if the torques have it. Where the number is known it is refused.
     """
     balance = _balance(look)
-    found = [] if balance is None or balance[1] < OFF else _of_another_unit(*balance)
-    balance = None if found else _on_supports(look)
-    return found if balance is None else _of_another_unit(*balance)
+    if balance is not None and balance[1] >= OFF and (found := _of_another_unit(*balance)):
+        return found
+    balance = _on_supports(look)
+    return [] if balance is None else _of_another_unit(*balance)
 
 
 def _of_another_unit(found: Array, before: float, after: float) -> list[Finding]:

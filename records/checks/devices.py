@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from gearbench.records.checks.delays import Delays, least
 from gearbench.records.checks.look import EXCITED, GEARS, Complexes, Look
 from gearbench.records.checks.mesh_force import Accounts
 
@@ -34,13 +35,11 @@ def groups_of(accounts: Accounts) -> Iterator[tuple[str, frozenset[str]]]:
             yield words, found
 
 
-def late_device(accounts: Accounts, delays: Array) -> tuple[float, str, frozenset[str], float] | None:
-    """What a device that is late leaves of the misfit, its name, its channels and the delay [s]; None if there is none.
-
-    `delays` [s]: evenly spaced ones to try.
-    """
+def late_device(delays: Delays) -> tuple[float, str, frozenset[str], float] | None:
+    """What a device that is late leaves of the misfit, its name, its channels and the delay [s]; None if there is
+    none."""
+    accounts = delays.accounts
     best: tuple[float, str, frozenset[str], float] | None = None
-    step = float(delays[1] - delays[0])
     for words, names in groups_of(accounts):
         relations = [one for one in accounts.relations() if names & accounts.channels(one)]
         relations = [one for one in relations if not accounts.channels(one) <= names]
@@ -49,10 +48,7 @@ def late_device(accounts: Accounts, delays: Array) -> tuple[float, str, frozense
         now = max(float(accounts.misfit(relation)[0]) for relation in relations)
         if now < SUSPICIOUS:
             continue
-        coarse = float(delays[int(np.argmin(_worst(accounts, relations, names, delays)))])
-        fine = coarse + step * np.linspace(-1.0, 1.0, 41)
-        found = _worst(accounts, relations, names, fine)
-        after, delay = float(found.min()), float(fine[int(np.argmin(found))])
+        delay, after = delays.best(relations, names)
         if after < EXACT and after < EXPLAINED * now and (best is None or after < best[0]):
             best = (after, words, names, delay)
     return best
@@ -72,9 +68,7 @@ def far_side(look: Look, accounts: Accounts) -> tuple[float, str, frozenset[str]
         product = product.reshape(-1, period).sum(axis=0)
     late = int(np.argmax(product))
     late -= product.size * (late > product.size // 2)
-    fine = (late + np.linspace(-1.0, 1.0, 81)) / look.rate
-    found = _worst(accounts, [GEARS], names, fine)
-    after, delay = float(found.min()), float(fine[int(np.argmin(found))])
+    delay, after = least(accounts, [GEARS], names, (late + np.linspace(-1.0, 1.0, 81)) / look.rate)
     if after >= EXACT or after >= EXPLAINED * float(accounts.misfit(GEARS)[0]):
         return None
     return after, "driver's channels", names, delay
@@ -92,11 +86,6 @@ def _force(look: Look, gear: str) -> Complexes:
     total[int(look.lines[-1]) + 1 :] = 0.0
     total[: look.lowest] = 0.0
     return np.asarray(total / radius)
-
-
-def _worst(accounts: Accounts, relations: list[tuple[str, str]], names: frozenset[str], at: Array) -> Array:
-    turn = np.exp(1j * np.outer(at, accounts.omega))
-    return np.asarray(np.max([accounts.misfit(relation, names, turn) for relation in relations], axis=0))
 
 
 def error_of_lag(look: Look, names: frozenset[str], delay: float) -> float:

@@ -100,8 +100,9 @@ def delay_between(omega: Array, turned: NDArray[np.complex128]) -> tuple[float, 
     """
     unit = turned / np.maximum(np.abs(turned), np.finfo(float).tiny)
     blocks = np.array_split(np.arange(omega.size), BLOCKS)
-    resultant, middle, count = (np.array([part(own) for own in blocks]) for part in (
-        lambda own: unit[own].sum(), lambda own: omega[own].mean(), len))  # fmt: skip
+    resultant = np.array([unit[own].sum() for own in blocks])
+    middle = np.array([omega[own].mean() for own in blocks])
+    count = np.array([own.size for own in blocks])
     kept = np.abs(resultant) > COHERENT * np.sqrt(count)
     if np.count_nonzero(kept) < FEWEST_BLOCKS:
         return None

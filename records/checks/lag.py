@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from gearbench.records.checks.delays import delays_of
 from gearbench.records.checks.finding import Finding
-from gearbench.records.checks.late import LONGEST, STEPS
 from gearbench.records.checks.look import EXCITED, Look
 from gearbench.records.checks.mesh_force import accounts_of
 
@@ -34,9 +34,7 @@ def force_and_dte_in_step(look: Look) -> list[Finding]:
     omega, work = _work(look, force, error)
     if omega.size < BANDS * FEWEST:
         return []
-    top = float(omega[-1]) / (2 * np.pi)
-    step = min(1 / (STEPS * top), 1 / look.rate)
-    delays = np.arange(-np.ceil(LONGEST / look.rate / step), np.ceil(LONGEST / look.rate / step) + 1) * step
+    delays = delays_of(look, omega)
     before = _negative(omega, work, 0.0)[1]
     if before <= LIMIT:
         return []

@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import pi
 
-import numpy as np
-from numpy.typing import NDArray
-
+from gearbench.records.checks.delays import Delays, delays_of
 from gearbench.records.checks.devices import error_of_lag, far_side, late_device
 from gearbench.records.checks.finding import Finding
-from gearbench.records.checks.look import Complexes, Look
+from gearbench.records.checks.look import Look
 from gearbench.records.checks.mesh_force import Accounts, accounts_of, explains
 
-Array = NDArray[np.float64]
-
-# Delays that are looked for [samples], steps to the shortest period in the band, and the error that counts.
-LONGEST, STEPS, MATTERS = 100, 8, 0.02
+# Error of the response that counts.
+MATTERS = 0.02
 # A delay is believed when it leaves no more than EXACT, or FLOOR times the misfit of accounts without that channel:
 # what lies between a torque and its gear, such as a soft coupling, looks like a delay in part only. Under noise the
 # accounts that it repairs are left with what the others have, NOISE times at most, and were CLEARLY worse before.
@@ -42,26 +37,18 @@ class Lag:
 
 def lag_of(look: Look, accounts: Accounts) -> Lag | None:
     """The channel, or the device, whose lag makes the accounts of the mesh force agree; None where none does."""
-    delays = delays_of(look, accounts)
-    best = _late_channel(accounts, delays)
-    device = late_device(accounts, delays)
+    delays = Delays(accounts, delays_of(look, accounts.omega))
+    best = _late_channel(delays)
+    device = late_device(delays)
     device = far_side(look, accounts) if device is None and best is None else device
     if device is not None and (best is None or device[0] < BETTER * best.left):
         return Lag(f"the {device[1]} ({', '.join(sorted(device[2]))})", device[2], device[3], device[0])
     return best
 
 
-def delays_of(look: Look, accounts: Accounts) -> Array:
-    """Delays (D,) [s] that are tried, evenly spaced, up to LONGEST samples either way."""
-    top = float(accounts.omega[-1]) / (2 * pi)
-    step = min(1 / (STEPS * top), 1 / look.rate)
-    return np.arange(-np.ceil(LONGEST / look.rate / step), np.ceil(LONGEST / look.rate / step) + 1) * step
-
-
-def _late_channel(accounts: Accounts, delays: Array) -> Lag | None:
-    """The single channel that is late, of evenly spaced `delays` [s]."""
-    step = float(delays[1] - delays[0])
-    turns: Complexes | None = None  # the same for every channel
+def _late_channel(delays: Delays) -> Lag | None:
+    """The single channel that is late, if one is."""
+    accounts = delays.accounts
     best: Lag | None = None
     for name in _suspects(accounts):
         relations = [relation for relation in accounts.relations() if name in accounts.channels(relation)]
@@ -73,11 +60,7 @@ def _late_channel(accounts: Accounts, delays: Array) -> Lag | None:
         if now < (SUSPICIOUS_Y if y else SUSPICIOUS):
             continue
 
-        turns = np.exp(1j * np.outer(delays, accounts.omega)) if turns is None else turns
-        coarse = float(delays[int(np.argmin(_after(accounts, relations, name, turns)))])
-        fine = coarse + step * np.linspace(-1.0, 1.0, 41)
-        found = _after(accounts, relations, name, np.exp(1j * np.outer(fine, accounts.omega)))
-        after, delay = float(found.min()), float(fine[int(np.argmin(found))])
+        delay, after = delays.best(relations, frozenset([name]))
         others = [relation for relation in accounts.relations() if relation not in relations]
         floor = max((float(accounts.misfit(relation)[0]) for relation in others), default=0.0)
         # Accounts that disagree as much without the channel do not say that it is late: bodies that twist do that.
@@ -114,12 +97,6 @@ def clocks_agree(look: Look) -> list[Finding]:
             error=error,
         )
     ]
-
-
-def _after(accounts: Accounts, relations: list[tuple[str, str]], name: str, turns: Complexes) -> Array:
-    """The worst misfit (D,) of the relations once a channel is turned."""
-    own = frozenset([name])
-    return np.asarray(np.max([accounts.misfit(relation, own, turns) for relation in relations], axis=0))
 
 
 def _suspects(accounts: Accounts) -> list[str]:

@@ -114,7 +114,7 @@ class Look:
         values, teeth = self.channel(f"angle_{gear}"), self.number(f"teeth_{gear}")
         if values is not None and self.tapered:
             steps = np.arange(values.size) - 0.5 * (values.size - 1)
-            return np.asarray(values - values.mean() - float(steps @ values) / float(steps @ steps) * steps)
+            return np.asarray(values - values.mean() - mean_rate(values, 1.0, 1) * steps)
         if values is None or teeth is None or self.mesh_period is None:
             return None
         ramp = 2 * pi / (teeth * self.mesh_period * self.rate) * np.arange(values.size)

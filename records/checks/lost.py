@@ -7,12 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gearbench.records.checks.delays import Delays, delays_of
 from gearbench.records.checks.devices import groups_of
 from gearbench.records.checks.drift import delay_between
 from gearbench.records.checks.finding import Finding
-from gearbench.records.checks.late import SUSPICIOUS, delays_of, lag_of
+from gearbench.records.checks.late import SUSPICIOUS, lag_of
 from gearbench.records.checks.look import EXCITED, Look
-from gearbench.records.checks.mesh_force import AGREE, Accounts, accounts_of
+from gearbench.records.checks.mesh_force import AGREE, accounts_of
 from gearbench.records.checks.periods import joint_samples
 
 Array = NDArray[np.float64]
@@ -60,18 +61,19 @@ def _largest(look: Look, count: int) -> Leap | None:
     accounts = [found for piece in pieces if (found := accounts_of(piece)) is not None]
     if len(accounts) < count or len({tuple(one.relations()) for one in accounts}) > 1:
         return None
+    delays = [Delays(one, delays_of(piece, one.omega)) for piece, one in zip(pieces, accounts, strict=True)]
     every = sorted(set().union(*(accounts[0].channels(relation) for relation in accounts[0].relations())))
     groups = [(name, frozenset([name])) for name in every]
     groups += [(f"the {words} ({', '.join(sorted(names))})", names) for words, names in groups_of(accounts[0])]
-    leaps = [_leap(pieces, accounts, what, names) for what, names in groups]
+    leaps = [_leap(delays, look.rate, what, names) for what, names in groups]
     return min((leap for leap in leaps if leap is not None), key=lambda leap: leap.left, default=None)
 
 
-def _leap(pieces: list[Look], accounts: list[Accounts], what: str, names: frozenset[str]) -> Leap | None:
-    """The leap of some channels; None where there is none that is sure."""
-    told = [_delay(piece, one, names) for piece, one in zip(pieces, accounts, strict=True)]
-    delay, least, now = (np.array(column) for column in zip(*told, strict=True))
-    delay, count = delay * pieces[0].rate, len(pieces)
+def _leap(delays: list[Delays], rate: float, what: str, names: frozenset[str]) -> Leap | None:
+    """The leap of some channels, whose delays are tried in each stretch of a record of `rate` [Hz]; None where there
+    is none that is sure."""
+    delay, least = np.array([_best(one, names) for one in delays]).T
+    now, delay, count = np.array([one.accounts.worst for one in delays]), delay * rate, len(delays)
     rest = [np.delete(np.arange(count), stretch) for stretch in range(1, count - 1)]
     power = [float(np.mean(least[kept] ** 2)) for kept in rest]
     stretch = 1 + int(np.argmin(power))
@@ -85,19 +87,16 @@ def _leap(pieces: list[Look], accounts: list[Accounts], what: str, names: frozen
     return Leap(what, len(names) > 1, count, stretch, size, left)
 
 
-def _delay(piece: Look, accounts: Accounts, names: frozenset[str]) -> tuple[float, float, float]:
-    """The delay [s] of some channels with which all accounts agree best in a stretch, and the worst misfit with and
-    without it."""
+def _best(delays: Delays, names: frozenset[str]) -> tuple[float, float]:
+    """The delay [s] of some channels with which all accounts agree best in a stretch, and the worst misfit with it."""
+    accounts = delays.accounts
     both = [(relation, accounts.channels(relation)) for relation in accounts.relations()]
     apart = [relation for relation, channels in both if names & channels and not channels <= names]
-    fixed = max((float(accounts.misfit(one)[0]) for one in accounts.relations() if one not in apart), default=0.0)
-    coarse = delays_of(piece, accounts)
-    best, found = 0.0, np.zeros(1)
-    for delays in (coarse, (coarse[1] - coarse[0]) * np.linspace(-1.0, 1.0, 41)):
-        turn = np.exp(1j * np.outer(best + delays, accounts.omega))
-        found = np.max([accounts.misfit(one, names, turn) for one in apart], axis=0) if apart else np.zeros(1)
-        best += float(delays[int(np.argmin(found))]) if apart else 0.0
-    return best, max(float(found.min()), fixed), accounts.worst
+    if not apart:
+        return 0.0, accounts.worst
+    fixed = [float(accounts.misfit(relation)[0]) for relation, _ in both if relation not in apart]
+    delay, left = delays.best(apart, names)
+    return delay, max([left, *fixed])
 
 
 def periods_keep_step(look: Look) -> list[Finding]:

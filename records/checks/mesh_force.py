@@ -72,7 +72,7 @@ class Accounts:
         total = _size(first, turn)
         return np.asarray(np.sqrt(np.maximum(total**2 - (inside**2).sum(axis=1), 0.0)) / np.maximum(total, NOTHING))
 
-    @property
+    @cached_property
     def worst(self) -> float:
         """The largest misfit of all relations."""
         return max(float(self.misfit(relation)[0]) for relation in self.relations())

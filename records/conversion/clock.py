@@ -39,6 +39,11 @@ class Clock:
     time: Array | None = None
 
     @property
+    def times(self) -> Array:
+        """Times (samples,) [s]."""
+        return self.time if self.time is not None else self.start + np.arange(self.samples) / self.rate
+
+    @property
     def end(self) -> float:
         """Time of the last sample [s]."""
         return float(self.time[-1]) if self.time is not None else self.start + (self.samples - 1) / self.rate

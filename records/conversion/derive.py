@@ -86,7 +86,7 @@ def mesh_period_of(work: Assembly, declared: float | None) -> float | None:
             continue
         values = work.channels[signal.name]
         angle = np.cumsum(values, axis=1) / work.common.rate if signal.integrals else values
-        departs = max(departure(row) for row in angle * teeth / (2 * pi))
+        departs = departure(angle * teeth / (2 * pi))
         if signal.integrals and departs > LOST:
             raise RecordError(
                 f"{signal.name} is integrated from speed, which varies by {departs:.3g} cycles of the mesh from a"
@@ -185,7 +185,7 @@ def add_mesh_phase(work: Assembly, mesh_period: float | None) -> float | None:
     turning = [(signal, teeth) for signal in work.signals if (teeth := work.teeth(signal)) is not None]
     cycles = [work.channels[signal.name] * teeth / (2 * pi) for signal, teeth in turning]
     given = work.channels.get("mesh_phase")
-    departs = max((departure(row) for rows in (cycles if given is None else [given]) for row in rows), default=0.0)
+    departs = max((departure(rows) for rows in (cycles if given is None else [given])), default=0.0)
     period = None if departs > LOST else mesh_period
     if departs > VARIES:
         work.notes.append(
@@ -246,7 +246,7 @@ def say_locations(work: Assembly) -> None:
 def _slope(work: Assembly, signal: Signal, mesh_period: float | None) -> float:
     """Mean speed [rad/s] of an angle: the declared one where it is near, else a linear fit."""
     clock, teeth = signal.clock, work.teeth(signal)
-    times = clock.time if clock.time is not None else np.arange(clock.samples) / clock.rate
+    times = clock.times
     fitted = float(np.polyfit(times - times.mean(), signal.values.mean(axis=0), 1)[0])
     if mesh_period is not None and teeth is not None:
         declared = 2 * pi / (teeth * mesh_period)

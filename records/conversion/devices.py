@@ -84,11 +84,6 @@ def _faster(clock: Clock, factor: float) -> Clock:
     return Clock(clock.start, clock.rate * factor, clock.samples, time)
 
 
-def _times(signal: Signal) -> np.ndarray:
-    clock = signal.clock
-    return clock.time if clock.time is not None else clock.start + np.arange(clock.samples) / clock.rate
-
-
 def _line(time: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Straight line with weights that fade out at the ends, so that vibrations do not tilt it."""
     size = time.size
@@ -98,7 +93,7 @@ def _line(time: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 def _speed(signal: Signal) -> float:
     """Mean speed [rad/s] of all runs."""
-    time = _times(signal)
+    time = signal.clock.times
     return float(np.mean([_line(time, row)[0] for row in signal.values]))
 
 
@@ -106,7 +101,7 @@ def _shows(angles: Mapping[str, Signal], teeth: Sequence[float], departure: floa
     """Whether a departure of the ratio makes the teeth passed drift by more than they swing about a steady rotation."""
     swing, passed = 0.0, 0.0
     for gear, number in zip(GEARS, teeth, strict=True):
-        time = _times(angles[gear])
+        time = angles[gear].clock.times
         for row in angles[gear].values:
             swing = max(swing, number * float(np.std(row - np.polyval(_line(time, row), time - time[0]))))
             passed = max(passed, number * float(np.ptp(row)))

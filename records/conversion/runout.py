@@ -111,7 +111,7 @@ def _pair(signals: list[Signal], attributes: Mapping[str, float | str]) -> list[
     if not {"angle_driver", "angle_driven"} <= set(angles) or not {"teeth_driver", "teeth_driven"} <= set(attributes):
         return None
     first, second = angles["angle_driver"], angles["angle_driven"]
-    if first.values.shape != second.values.shape or not np.array_equal(_times(first), _times(second)):
+    if first.values.shape != second.values.shape or not np.array_equal(first.clock.times, second.clock.times):
         return None
     return [(first, float(attributes["teeth_driver"])), (second, -float(attributes["teeth_driven"]))]
 
@@ -135,7 +135,7 @@ def _both(pair: list[tuple[Signal, float]], wanted: list[_Turning]) -> list[_Tur
 
 def _require_steady(signal: Signal, attributes: Mapping[str, float | str]) -> None:
     teeth = attributes.get(f"teeth_{signal.name.removeprefix('angle_')}")
-    departs = 0.0 if teeth is None else max(departure(row) for row in signal.values) * float(teeth) / (2 * pi)
+    departs = 0.0 if teeth is None else departure(signal.values) * float(teeth) / (2 * pi)
     if departs > VARIES:
         raise RecordError(
             f"channel.{signal.name}.runout_orders: the speed varies, by {departs:.3g} cycles of the mesh from a"
@@ -143,18 +143,12 @@ def _require_steady(signal: Signal, attributes: Mapping[str, float | str]) -> No
         )
 
 
-def _times(signal: Signal) -> Array:
-    """Times (n,) [s] of a signal's samples."""
-    clock = signal.clock
-    return clock.time if clock.time is not None else clock.start + np.arange(clock.samples) / clock.rate
-
-
 def _without(
     parts: list[_Turning], values: Array
 ) -> Iterator[tuple[_Turning, Array, str, dict[str, float | str]]]:
     """Each angle without the orders that stand out of `values` (runs, n), the sum in which they are looked for, what is
     said of them in words, and the first one's size and phase."""
-    time = _times(parts[0].signal)
+    time = parts[0].signal.clock.times
     rotations = [part.signal.values for part in parts]
     found = [np.zeros(part.orders.size, dtype=complex) for part in parts]
     for _ in range(ROUNDS):

@@ -194,8 +194,7 @@ def _encoder(
     if unit.quantity == "level" and len(columns) == 1:
         if columns[0].runs > 1:
             raise RecordError(f"{where} has {columns[0].runs} runs of an encoder track; convert them one by one")
-        times = clock.time if clock.time is not None else clock.start + np.arange(clock.samples) / clock.rate
-        edges, angle = pulse_angle(rising_edges(values[0], times, where), pulses, where, notes)
+        edges, angle = pulse_angle(rising_edges(values[0], clock.times, where), pulses, where, notes)
         track = Clock(float(edges[0]), 1 / float(np.median(np.diff(edges))), edges.size, edges)
         return Signal(name, spec.sign * angle[np.newaxis], track, turns=True, absolute=False)
     if len(columns) == 2:
