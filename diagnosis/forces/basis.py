@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 
 SHAPE_ORDERS = 6  # mesh orders of the free part of stiffness shape and profile error
 # Where the pieces meet, as parts of the band: denser at low frequencies, where the supports resonate.
@@ -19,6 +20,15 @@ PLACES_ON_PATH = (0.0, 0.1, 0.25, 0.5, 0.75, 0.9, 1.0)
 def hats(frequency: Array, band: float) -> Array:
     """Piecewise linear basis (knots, K) over frequencies [Hz] of 0 .. `band`; constant beyond the last knot."""
     return np.stack([np.interp(frequency, band * np.array(KNOTS), column) for column in np.eye(len(KNOTS))])
+
+
+def smooth(values: Array, basis: Array) -> Complex:
+    """Complex functions (..., K) on a basis (knots, K) of weights (..., 2 knots): all real parts, then the imaginary
+    ones."""
+    real, imaginary = np.split(values, 2, axis=-1)
+    out = np.empty((*values.shape[:-1], basis.shape[1]), dtype=complex)
+    out.real, out.imag = real @ basis, imaginary @ basis
+    return out
 
 
 def on_path(travel: Array, path: tuple[float, float]) -> Array:

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.diagnosis.forces.basis import KNOTS
+from gearbench.diagnosis.forces.basis import smooth
 from gearbench.diagnosis.forces.condition import CHANNELS, Condition
 from gearbench.diagnosis.forces.departures import Departures
 from gearbench.diagnosis.forces.equations import DELAYED
@@ -146,9 +146,7 @@ def radial_impedance(
 
 def _yielding(model: NominalModel, condition: Condition, departures: Departures) -> Complex:
     """Departure of the deflection's spectrum by what moves no measured channel: radial supports, webs and shafts."""
-    values = departures.yielding
-    count = len(KNOTS)
-    compliance = (values[:count] + 1j * values[count:]) @ condition.hats_full / condition.stiffness_level
+    compliance = smooth(departures.yielding, condition.hats_full) / condition.stiffness_level
     impedance, _, _ = radial_impedance(model, condition, departures)
     compliance = compliance - model.transverse_factor**2 * (1 / impedance).sum(axis=0)
     return np.asarray(compliance * condition.force_full)

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.diagnosis.forces.basis import KNOTS
+from gearbench.diagnosis.forces.basis import smooth
 from gearbench.diagnosis.forces.condition import Condition
 from gearbench.diagnosis.forces.departures import Departures
 from gearbench.diagnosis.forces.equations import SUPPORTS, Equation
@@ -134,6 +134,4 @@ def _support(model: NominalModel, condition: Condition, departures: Departures, 
 
 def _filters(condition: Condition, departures: Departures) -> Complex:
     """Part (4, K) of the mesh force that each equation misses."""
-    count = len(KNOTS)
-    basis = condition.hats_full[:, : condition.bins]
-    return np.stack([(values[:count] + 1j * values[count:]) @ basis for values in departures.filters])
+    return smooth(departures.filters, condition.hats_full[:, : condition.bins])

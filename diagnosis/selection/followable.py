@@ -24,12 +24,13 @@ def followable(
     rigs: Sequence[Case], measurements: Sequence[Measurement], problem: Problem, simulate: Replay
 ) -> tuple[list[int], Mapping[str, float], frozenset[str]]:
     """Numbers of the records that a fit can follow, what nudges the driver in each that parts its flanks, by its name
-    [N s/m], and the names of those that part for long: those whose flanks stay together on the first rig, else all,
-    nudged."""
+    [N s/m], and the names of those that part for long: those whose flanks stay together on the first rig that has any
+    (the nominal one may resonate where the records' does not), else all, nudged."""
+    for rig in rigs:
+        smooth = _below(lost_contact(rig, measurements, simulate), LOSING)
+        if smooth:
+            return smooth, {}, frozenset()
     lost = lost_contact(rigs[0], measurements, simulate)
-    smooth = [number for number, part in enumerate(lost) if part < LOSING]
-    if smooth:
-        return smooth, {}, frozenset()
     nudges = nudges_of(problem.model, problem.conditions)
     if not lost or len(nudges) < len(measurements):
         return smooth_records(rigs, measurements, simulate), {}, frozenset()
@@ -52,10 +53,15 @@ def smooth_records(rigs: Sequence[Case], measurements: Sequence[Measurement], si
     for rig in rigs:
         lost = lost_contact(rig, measurements, simulate)
         for limit in (LOSING, LOSING_MORE):
-            smooth = [number for number, part in enumerate(lost) if part < limit]
+            smooth = _below(lost, limit)
             if smooth:
                 return smooth
     return []
+
+
+def _below(lost: Sequence[float], limit: float) -> list[int]:
+    """Numbers of the records that are without contact for a smaller part of their time."""
+    return [number for number, part in enumerate(lost) if part < limit]
 
 
 def parts(rig: Case, measured: Measurement, simulate: Replay) -> bool:

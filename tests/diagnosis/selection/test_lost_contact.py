@@ -85,3 +85,15 @@ def test_records_are_nudged_where_flanks_part_in_all(
     assert restless == {one for one in nudges if (lost[int(one)] or 0) >= 1000 * LOSING_MORE}
     assert sorted(nudges) == nudged
     assert all(value == pytest.approx(np.sqrt(4e8 * 6e-3 / 0.1**2)) for value in nudges.values())
+
+
+def test_records_are_not_nudged_that_the_rig_of_the_forces_holds_together() -> None:
+    """A nominal rig that resonates where the records' does not parts flanks that stay together."""
+    records: Any = [SimpleNamespace(name=str(number), phase_known=True, record=number) for number in range(2)]
+
+    def of_rig(rig: Any, record: Any) -> xr.Dataset:
+        return answer(rig, rig[record])
+
+    rigs: Any = [[12, 209], [2, 193]]
+    problem: Any = None
+    assert followable(rigs, records, problem, of_rig) == ([0], {}, frozenset())
