@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
-from gearbench.diagnosis.fitting.beginning import Around, beginning, nearest
+from gearbench.diagnosis.fitting.beginning import beginning, nearest
 from gearbench.diagnosis.fitting.fit import Optimum, fit, fit_afresh
 from gearbench.diagnosis.fitting.restructured import better, is_close
+from gearbench.diagnosis.fitting.shown import Shown
 from gearbench.diagnosis.simulation.simulator import Simulator
 
 Array = NDArray[np.float64]
@@ -23,18 +24,18 @@ RENEWALS, RENEWALS_FIRST = 8, 2
 def background(
     simulator: Simulator,
     beginnings: Sequence[Array],
-    around: Around | None = None,
+    shown: Shown | None = None,
     report: Report = lambda step: None,
 ) -> Optimum | None:
     """The optimum without any effect, from the best of these `beginnings` (size,), the first of which is the nominal
-    rig; `around`: the rig around its mesh, as the records show it. None where no beginning is a rig."""
+    rig; `shown`: what the records show without simulation. None where no beginning is a rig."""
     sd = prior_of(simulator, simulator.layout.unknowns.prior())
     report("simulating: background")
     nominal, begin = beginnings[0], nearest(simulator, beginnings, sd)
-    base = fit_afresh(simulator, beginning(simulator, begin, around, sd), sd, renewals=RENEWALS)
+    base = fit_afresh(simulator, beginning(simulator, begin, shown, sd), sd, renewals=RENEWALS)
     # What the force residuals make of a rig beside a large effect can lead astray: then from the nominal one.
     if base is not None and begin is not nominal and not is_close(simulator, base):
-        other = beginning(simulator, nominal, around, sd)
+        other = beginning(simulator, nominal, shown, sd)
         base = _raced(simulator, base, fit_afresh(simulator, other, sd, renewals=RENEWALS_FIRST))
     return base
 

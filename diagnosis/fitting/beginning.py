@@ -7,7 +7,7 @@ structure beside whatever is wrong with its gears.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from itertools import product
 
 import numpy as np
@@ -16,6 +16,7 @@ from scipy.optimize import minimize
 
 from gearbench.bench.plan.workers import side_by_side
 from gearbench.diagnosis.fitting.fit import cost_of
+from gearbench.diagnosis.fitting.shown import Shown
 from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.simulation.quadratic import prior_cost
 from gearbench.diagnosis.simulation.simulator import Simulator
@@ -23,8 +24,6 @@ from gearbench.diagnosis.structure.structure import ACROSS, CROSS, MOTIONS, hous
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
-# From unknowns (size,) that are held: the same with the rig around the mesh as the records show it.
-Around = Callable[[Array], Array | None]
 
 # What the answer of the rig to the force in the mesh does not show: compliance across over along, and the stiffness of
 # the mesh, in standard deviations of the nominal one, that goes with it.
@@ -38,13 +37,13 @@ def nearest(simulator: Simulator, trials: Sequence[Array], sd: Array) -> Array:
     return min(trials, key=lambda p: cost_of(simulator, p, sd))
 
 
-def beginning(simulator: Simulator, begin: Array, around: Around | None, sd: Array) -> Array:
-    """The unknowns (size,) that come closest under the prior `sd` (size,), of `begin` and of what `around` says."""
+def beginning(simulator: Simulator, begin: Array, shown: Shown | None, sd: Array) -> Array:
+    """The unknowns (size,) that come closest under the prior `sd` (size,), of `begin` and of what is `shown`."""
     unknowns = simulator.layout.unknowns
     yielding = begin.copy()
     if ACROSS in unknowns.slices:
         yielding[unknowns[ACROSS]] = SOFT[2]
-    seen = seen_by(around, unknowns, yielding)
+    seen = seen_by(shown, unknowns, yielding)
     if seen is None:
         for _ in MOTIONS:
             begin = nearest(simulator, housings(unknowns, begin), sd)
@@ -53,9 +52,10 @@ def beginning(simulator: Simulator, begin: Array, around: Around | None, sd: Arr
     return min((begin, found), key=lambda p: linear_cost(simulator, p, sd))
 
 
-def seen_by(around: Around | None, unknowns: Unknowns, held: Array) -> Array | None:
-    """What `around` makes of `held` (size,); None without one, or for rigs that are no question to it."""
-    return around(held) if around is not None and ACROSS in unknowns.slices else None
+def seen_by(shown: Shown | None, unknowns: Unknowns, held: Array) -> Array | None:
+    """`held` (size,) with the rig around the mesh as it is `shown`; None where it is not, or for rigs that are no
+    question to it."""
+    return shown.around(held) if shown is not None and ACROSS in unknowns.slices else None
 
 
 def levelled(simulator: Simulator, seen: Array, p: Array, sd: Array) -> Array:

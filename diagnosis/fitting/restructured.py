@@ -14,9 +14,10 @@ from gearbench.diagnosis.effects.encoder_runout import KEYS as ENCODERS
 from gearbench.diagnosis.effects.pitch_error import KEYS as PITCHES
 from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
 from gearbench.diagnosis.effects.torque_ripple import KEY as RIPPLE
-from gearbench.diagnosis.fitting.beginning import Around, levelled, linear_cost, seen_by
+from gearbench.diagnosis.fitting.beginning import levelled, linear_cost, seen_by
 from gearbench.diagnosis.fitting.fit import Optimum, cost_of, fit, fit_afresh, gone_on
 from gearbench.diagnosis.fitting.hidden_housing import on_a_housing
+from gearbench.diagnosis.fitting.shown import Shown
 from gearbench.diagnosis.simulation.simulator import Simulator
 from gearbench.diagnosis.structure.structure import SEAT, otherwise
 
@@ -36,13 +37,13 @@ NEAR = 1.5
 ROTATION = (*RUNOUTS.values(), *PITCHES.values(), CRACK, RIPPLE, *ENCODERS.values())
 
 
-def restructured(simulator: Simulator, found: Optimum, around: Around | None, report: Report) -> Optimum:
-    """The optimum begun again with a structure that its fit could not walk to, where that comes closer; `around` finds
-    a part of it (None: nothing does)."""
+def restructured(simulator: Simulator, found: Optimum, shown: Shown | None, report: Report) -> Optimum:
+    """The optimum begun again with a structure that its fit could not walk to, where that comes closer; a part of it
+    may be `shown` without a simulation."""
     if not is_close(simulator, found):
-        found = better(found, _from_around(simulator, found, around, report))
+        found = better(found, _from_around(simulator, found, shown, report))
     if not is_close(simulator, found):
-        found = better(found, on_a_housing(simulator, found, partial(report, "simulating: sensors on a housing")))
+        found = _on_a_housing(simulator, found, shown, report)
     if not is_close(simulator, found):
         found = better(found, _otherwise(simulator, found, report))
     return found
@@ -70,14 +71,14 @@ def is_close(simulator: Simulator, found: Optimum) -> bool:
     return bool(np.median(left) < CLOSE and not (target.excited & (left > FAR)).any())
 
 
-def _from_around(simulator: Simulator, found: Optimum, around: Around | None, report: Report) -> Optimum | None:
+def _from_around(simulator: Simulator, found: Optimum, shown: Shown | None, report: Report) -> Optimum | None:
     """The fit begun with what the records show of the rig around its mesh, beside the effects that were widened."""
     unknowns = simulator.layout.unknowns
     widened = found.sd > unknowns.prior()
     chosen = widened | ~unknowns.of(ROTATION)
     # Effects stay; what was fitted around the wrong structure goes.
     held = np.where(widened | unknowns.of((SEAT,)), found.p, 0.0)
-    seen = seen_by(around, unknowns, held)
+    seen = seen_by(shown, unknowns, held)
     if seen is None:
         return None
     report("simulating: the rig around its mesh")
@@ -87,6 +88,18 @@ def _from_around(simulator: Simulator, found: Optimum, around: Around | None, re
     if best is None or linear_cost(simulator, best.p, found.sd) > linear_cost(simulator, found.p, found.sd):
         return None
     return fit_afresh(simulator, best.p, found.sd, renewals=RENEWALS)
+
+
+def _on_a_housing(simulator: Simulator, found: Optimum, shown: Shown | None, report: Report) -> Optimum:
+    """The optimum, or with sensors on a housing whose first motion is the one that the forces show, or else the one
+    that simulation does."""
+    tell = partial(report, "simulating: sensors on a housing")
+    hidden = shown.hidden() if shown is not None else None
+    if hidden is not None:
+        found = better(found, on_a_housing(simulator, found, hidden, tell))
+        if is_close(simulator, found):
+            return found
+    return better(found, on_a_housing(simulator, found, tell=tell))
 
 
 def _otherwise(simulator: Simulator, found: Optimum, report: Report) -> Optimum | None:

@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.diagnosis.effects.effect import BEYOND, Hypothesis
-from gearbench.diagnosis.fitting.beginning import Around
 from gearbench.diagnosis.fitting.fit import Optimum, fit, fit_afresh, gone_on, refreshed
 from gearbench.diagnosis.fitting.reshaped import has_shapes
 from gearbench.diagnosis.fitting.restructured import begun_at_nominal, is_close, restructured
+from gearbench.diagnosis.fitting.shown import Shown
 from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.selection.by_forces import Start
 from gearbench.diagnosis.selection.needed import beside, held_against_background, needed
@@ -58,12 +58,12 @@ def select(
     hypotheses: Sequence[Hypothesis],
     starts: Mapping[str, Start],
     report: Report = lambda step: None,
-    around: Around | None = None,
+    shown: Shown | None = None,
     *,
     apart: bool = False,
 ) -> Selection:
     """The effects of the hypotheses that the records call for beside the background's optimum `base`; `starts`: by a
-    hypothesis' name; `around`: the rig around its mesh, as the records show it; `apart`: a record that has no part in
+    hypothesis' name; `shown`: what the records show without simulation; `apart`: a record that has no part in
     this judges what enters."""
     unknowns = simulator.layout.unknowns
     if not is_close(simulator, base):
@@ -72,7 +72,7 @@ def select(
     best, entered, weighed = _forward(simulator, base, [], hypotheses, starts, report, apart=apart)
 
     def begun_elsewhere(best: Optimum, kept: Sequence[Weighed]) -> Optimum:
-        best = restructured(simulator, best, around, report)
+        best = restructured(simulator, best, shown, report)
         report("simulating: all together, from the nominal rig")
         return begun_at_nominal(simulator, best, _entries(unknowns, kept))
 

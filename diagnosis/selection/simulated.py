@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,13 +13,16 @@ from gearbench.diagnosis.effects.backlash import KEY as BACKLASH
 from gearbench.diagnosis.effects.effect import Hypothesis
 from gearbench.diagnosis.effects.library import hypotheses as library
 from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
+from gearbench.diagnosis.evidence.decision import named
 from gearbench.diagnosis.evidence.prediction import predicted_factors
 from gearbench.diagnosis.evidence.problem import Problem
 from gearbench.diagnosis.evidence.search import Search
 from gearbench.diagnosis.fitting.around import around
 from gearbench.diagnosis.fitting.background import background
 from gearbench.diagnosis.fitting.fit import Optimum, fit_afresh
+from gearbench.diagnosis.fitting.hidden_by_forces import motion_by_forces
 from gearbench.diagnosis.fitting.likely_teeth import with_likely_teeth, with_small_cracks
+from gearbench.diagnosis.fitting.shown import Shown
 from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.replay.replays import Replay
@@ -127,11 +131,11 @@ def simulated(
     noises = [noise_left(layout.case(np.zeros(layout.size), one.name), one, simulate) for one in chosen]
     simulator = Simulator(layout, target_of(chosen, conditions, noises), simulate, nudges)
 
-    def seen(held: Array) -> Array | None:
-        # What acts in the mesh may be anything, an impact too.
-        return around(layout, problem.conditions, held)
-
-    base = background(simulator, _beginnings(layout, by_forces), seen, report)
+    best = named(found)
+    fit = best.fit if best is not None and best.fit is not None else found.base
+    # What acts in the mesh may be anything for the one, an impact too, and is measured for the other.
+    shown = Shown(lambda held: around(layout, problem.conditions, held), cache(lambda: motion_by_forces(problem, fit)))
+    base = background(simulator, _beginnings(layout, by_forces), shown, report)
     if base is None:
         return None
     ranked = _cracked_by_forces(problem, found, cracks) if cracks else []
@@ -143,11 +147,11 @@ def simulated(
             base = with_small_cracks(simulator, base)
         if teeth_first:
             here = base
-            base, starts = begun_by_forces(simulator, base, _weighed(listed, simulator.layout), starts, seen, report)
+            base, starts = begun_by_forces(simulator, base, _weighed(listed, simulator.layout), starts, shown, report)
             if base is here:
                 break
     weighed = _weighed(listed, simulator.layout)
-    selection = select(simulator, base, weighed, starts, report, seen, apart=apart)
+    selection = select(simulator, base, weighed, starts, report, shown, apart=apart)
     rough = [number for number, one in enumerate(measurements) if number not in smooth or one.name in nudges]
     if rough:
         conditions = [problem.conditions[number] for number in rough]

@@ -182,7 +182,7 @@ def housing_of(
 ) -> Housing:
     """The housing of compliances (2,), frequencies and dampings (4,), shapes (2,), shares across (4,) and the sensors'
     seat (1,) as unknowns, one compliance at least above `NONE`."""
-    mean, pace = _mean(model), pace_of(model)
+    mean, pace = mean_stiffness(model), pace_of(model)
     motions = []
     for number in np.flatnonzero(compliance > NONE):
         frequency, damping = (float(value) for value in modes[2 * number : 2 * number + 2])
@@ -205,10 +205,10 @@ def housing_of(
 
 def pace_of(model: NominalModel) -> float:
     """Angular frequency [rad/s] of a gear on its support, that of a housing is told by: of the means of both."""
-    return sqrt(_mean(model) / (0.5 * (model.mass[0] + model.mass[1])))
+    return sqrt(mean_stiffness(model) / (0.5 * (model.mass[0] + model.mass[1])))
 
 
-def _mean(model: NominalModel) -> float:
+def mean_stiffness(model: NominalModel) -> float:
     """Stiffness [N/m] of the mean compliance of both supports."""
     return 2.0 / (1.0 / model.stiffness[0] + 1.0 / model.stiffness[1])
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from gearbench.diagnosis.effects.effect import Hypothesis
 from gearbench.diagnosis.fitting.background import background
-from gearbench.diagnosis.fitting.beginning import Around
+from gearbench.diagnosis.fitting.shown import Shown
 from gearbench.diagnosis.forces.unknowns import Unknowns, group, unknowns_of
 from gearbench.diagnosis.selection.by_forces import Start, begun_by_forces
 from gearbench.diagnosis.selection.selection import Selection, select
@@ -55,17 +55,17 @@ def chosen(
     hypotheses: Sequence[Hypothesis],
     beginnings: Sequence[np.ndarray],
     starts: Mapping[str, Start],
-    around: Around | None = None,
+    shown: Shown | None = None,
     *,
     apart: bool = False,
 ) -> Selection | None:
     """The selection beside the background's optimum; None without one."""
     here: Any = simulator
-    base = background(here, beginnings, around)
+    base = background(here, beginnings, shown)
     if base is None:
         return None
-    base, begun = begun_by_forces(here, base, hypotheses, starts, around)
-    return select(here, base, hypotheses, begun, around=around, apart=apart)
+    base, begun = begun_by_forces(here, base, hypotheses, starts, shown)
+    return select(here, base, hypotheses, begun, shown=shown, apart=apart)
 
 
 def sensitivities(seed: int = 0) -> np.ndarray:

@@ -9,6 +9,7 @@ from shared.fake_simulator import LINES, FakeSimulator, sensitivities, target, u
 from gearbench.diagnosis.effects.effect import Hypothesis, Wide
 from gearbench.diagnosis.fitting.background import prior_of
 from gearbench.diagnosis.fitting.fit import Optimum, fit, sensitivity_of
+from gearbench.diagnosis.fitting.shown import Shown
 from gearbench.diagnosis.selection import by_forces
 from gearbench.diagnosis.selection.by_forces import SPEAKS, Start, begun_by_forces
 
@@ -85,8 +86,8 @@ def test_where_the_forces_own_rig_is_none_the_effect_alone_is_begun_with_what_is
         asked.append(held)
         return np.where(np.arange(8) == 1, TRUE, held)
 
-    monkeypatch.setattr(by_forces, "seen_by", lambda around, unknowns, held: around(held))
+    monkeypatch.setattr(by_forces, "seen_by", lambda shown, unknowns, held: shown.around(held))
     monkeypatch.setattr(by_forces, "levelled", lambda simulator, seen, held, sd: seen)
-    better, begun = begun_by_forces(simulator, base, (FRICTION,), {"friction": start}, around)  # type: ignore[arg-type]
+    better, begun = begun_by_forces(simulator, base, (FRICTION,), {"friction": start}, Shown(around))  # type: ignore[arg-type]
     assert asked[0] == pytest.approx(np.where(own, TRUE, 0.0))
     assert begun["friction"].p == pytest.approx(TRUE, abs=0.03) and better.evidence > base.evidence + 3.0

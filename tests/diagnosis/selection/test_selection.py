@@ -11,6 +11,7 @@ import pytest
 from shared.fake_simulator import LINES, FakeSimulator, chosen, sensitivities, target
 
 from gearbench.diagnosis.effects.effect import Hypothesis, Wide, twins_of
+from gearbench.diagnosis.fitting.shown import Shown
 from gearbench.diagnosis.forces.unknowns import group, unknowns_of
 from gearbench.diagnosis.selection import selection as module
 from gearbench.diagnosis.selection import weighing
@@ -253,7 +254,7 @@ def test_structure_that_the_rig_shows_around_its_mesh_is_begun_from() -> None:
         out[[0, 1, 3]] = true[[0, 1, 3]] + 0.01
         return out
 
-    without, found = (chosen(simulator, (), [np.zeros(11)], {}, around=around) for around in (None, read))
+    without, found = (chosen(simulator, (), [np.zeros(11)], {}, shown=shown) for shown in (None, Shown(read)))
     assert without is not None and abs(without.base.p[3] + 1.0) > 0.3
     assert found is not None
     assert found.base.p[[0, 1, 2, 3]] == pytest.approx(true[:4], abs=0.01)
