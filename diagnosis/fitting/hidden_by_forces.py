@@ -34,6 +34,9 @@ Complex = NDArray[np.complex128]
 
 SMOOTH = "compliance"  # what yields by a smooth function of frequency, which would make up for a part of a resonance
 CLEAR = 10.0  # nats by which a resonance must explain more
+# Logarithm of the frequency over the supports' above which gears resonate across their supports, which the forces show
+# as well; and motions that are compared.
+HIGHEST, COMPARED = 0.0, 4
 
 
 def motion_by_forces(problem: Problem, fit: Fit) -> Motion | None:
@@ -52,7 +55,8 @@ def motion_by_forces(problem: Problem, fit: Fit) -> Motion | None:
 
     others = np.concatenate([one.slopes for one in records], axis=1)[kept] * fit.sd[kept, None]
     left = p[kept] / fit.sd[kept] @ others - np.concatenate([one.left for one in records])
-    return next((motion for gain, motion in likeliest(made_of, left, others) if gain > CLEAR), None)
+    found = likeliest(made_of, left, others, COMPARED)
+    return next((motion for gain, motion in found if gain > CLEAR and motion.resonance.at < HIGHEST), None)
 
 
 @dataclass(frozen=True)
