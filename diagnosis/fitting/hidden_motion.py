@@ -34,7 +34,7 @@ Complex = NDArray[np.complex128]
 SOUGHT_AT = tuple(float(at) for at in np.linspace(-MODE_LARGEST, 1.0, 121))
 RATIOS = (0.02, 0.035, 0.06)
 # Of those logarithms, from which resonances are two, and above which it is a gear that resonates across its support.
-APART, LIGHTEST = 0.3, 0.4
+APART, LIGHTEST = 0.2, 0.4
 # Compliance that a motion begins with at least: fits let stand what a rig does not feel.
 LEAST = 2 * LEAST_STEP[HOUSING]
 # Shares that are compared: angles along and across, and root mean squares across over those along.

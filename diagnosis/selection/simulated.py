@@ -14,6 +14,7 @@ from gearbench.diagnosis.effects.effect import Hypothesis
 from gearbench.diagnosis.effects.library import hypotheses as library
 from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
 from gearbench.diagnosis.evidence.decision import named
+from gearbench.diagnosis.evidence.fit import Fit
 from gearbench.diagnosis.evidence.prediction import predicted_factors
 from gearbench.diagnosis.evidence.problem import Problem
 from gearbench.diagnosis.evidence.search import Search
@@ -21,6 +22,7 @@ from gearbench.diagnosis.fitting.around import around
 from gearbench.diagnosis.fitting.background import background
 from gearbench.diagnosis.fitting.fit import Optimum, fit_afresh
 from gearbench.diagnosis.fitting.hidden_by_forces import motion_by_forces
+from gearbench.diagnosis.fitting.hidden_motion import Motion
 from gearbench.diagnosis.fitting.likely_teeth import with_likely_teeth, with_small_cracks
 from gearbench.diagnosis.fitting.shown import Shown
 from gearbench.diagnosis.forces.unknowns import Unknowns
@@ -134,7 +136,7 @@ def simulated(
     best = named(found)
     fit = best.fit if best is not None and best.fit is not None else found.base
     # What acts in the mesh may be anything for the one, an impact too, and is measured for the other.
-    shown = Shown(lambda held: around(layout, problem.conditions, held), cache(lambda: motion_by_forces(problem, fit)))
+    shown = Shown(lambda held: around(layout, problem.conditions, held), cache(lambda: _hidden(problem, fit)))
     base = background(simulator, _beginnings(layout, by_forces), shown, report)
     if base is None:
         return None
@@ -163,6 +165,14 @@ def simulated(
             simulator, alone, selection, weighed, starts, report, wanted=wanted, apart=apart
         )
     return Simulated(simulator.layout, simulator, selection, restless)
+
+
+def _hidden(problem: Problem, fit: Fit) -> Motion | None:
+    """The motion of a housing under the sensors that the forces show."""
+    try:
+        return motion_by_forces(problem, fit)
+    except ValueError:  # a reading that cannot be made costs a beginning, not the verdict
+        return None
 
 
 def _weighed(listed: Sequence[Hypothesis], layout: Layout) -> list[Hypothesis]:
