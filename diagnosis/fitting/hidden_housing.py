@@ -45,6 +45,7 @@ Complex = NDArray[np.complex128]
 STIFF_AT, STIFF = 1.8, 0.01
 RENEWALS = 3
 BEGUN = 1, 3  # frequencies at which a first and a second motion are begun: beside another it is seen less well
+CLEAR = 0.01  # compliance of the second that shows
 # Shares of driver and driven along, then across: ten whose products with themselves tell those of any.
 TOLD_BY = np.array([
     (1, 0, 0, 0), (0, 1, 0, 0), (1, 1, 0, 0), (1, 0, 1, 0), (1, 0, -1, 0),
@@ -96,8 +97,8 @@ def without_housing(simulator: Simulator, p: Array) -> Array | None:
 
 def with_hidden_motions(simulator: Simulator, p: Array, sd: Array, number: int) -> list[Array]:
     """`p` (size,) with that motion of a housing its sensors stand on, where its resonance explains the excited lines
-    best under the prior `sd` (size,), and, of a second one, where it does so next, twice; none where no line is
-    excited, or no such rig can be."""
+    best under the prior `sd` (size,), and, of a second one, without shares across there and where it does so next; none
+    where no line is excited, or no such rig can be."""
     whole = simulator.target
     if not whole.excited.any():
         return []
@@ -111,7 +112,10 @@ def with_hidden_motions(simulator: Simulator, p: Array, sd: Array, number: int) 
     if told is None or sensitivity is None:
         return []
     found = _likeliest(excited, p, sd, told, sensitivity, over, most=BEGUN[number])
-    return [with_hidden(simulator.layout.unknowns, p, number, one) for one in found]
+    # Beside another its shares across are told badly, and a fit lets stand what a rig hardly feels.
+    plain = [Motion(one.resonance, one.shares * (1, 1, 0, 0), max(one.compliance, CLEAR)) for one in found]
+    begun = [*found[:1], *(plain if number > 0 else ())]
+    return [with_hidden(simulator.layout.unknowns, p, number, one) for one in begun]
 
 
 def _told(excited: Simulator, p: Array, number: int, over: Array) -> Complex | None:
