@@ -7,7 +7,7 @@ from typing import Any
 
 from gearbench.diagnosis.advice import PARTED
 from gearbench.diagnosis.effects.recalibrated import recalibrated
-from gearbench.diagnosis.evidence.decision import decide, named
+from gearbench.diagnosis.evidence.decision import decide, likeliest_fit
 from gearbench.diagnosis.evidence.problem import problem_of
 from gearbench.diagnosis.evidence.search import missing_by_equation, search
 from gearbench.diagnosis.evidence.separable import alike, representatives
@@ -43,8 +43,7 @@ def find_cause(
     """
     problem = problem_of(measurements, nominal)
     result = search(problem, without, report)
-    best = named(result)
-    fit = best.fit if best and best.fit else result.base
+    fit = likeliest_fit(result)
     simulate = Replays(problem.model.sound, COARSER)
     judged = held_out if held_out is not None and held_out.phase_known else None
     found = simulated(problem, result, measurements, nominal, simulate, without, report, judged=judged)

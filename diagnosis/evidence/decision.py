@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.diagnosis.evidence.calibration import LIMITS, Limits
+from gearbench.diagnosis.evidence.fit import Fit
 from gearbench.diagnosis.evidence.search import Search, Tried
 from gearbench.diagnosis.forces.equations import PLACES
 from gearbench.diagnosis.verdict import Outcome
@@ -74,6 +75,12 @@ def named(search: Search, limits: Limits = LIMITS) -> Tried | None:
     if best is None or best.log_bayes_factor < limits.rival * max(one.log_bayes_factor for one in large):
         return None
     return best
+
+
+def likeliest_fit(search: Search) -> Fit:
+    """The fit of the effect that is named, or of the background."""
+    best = named(search)
+    return best.fit if best is not None and best.fit is not None else search.base
 
 
 def worst(values: Array, limits: Mapping[str, float]) -> tuple[Place, float]:

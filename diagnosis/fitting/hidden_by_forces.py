@@ -23,9 +23,9 @@ from gearbench.diagnosis.forces.covariance import Blocks, whitened
 from gearbench.diagnosis.forces.departures import Departures
 from gearbench.diagnosis.forces.equations import SUPPORTS
 from gearbench.diagnosis.forces.jacobian import linearised
-from gearbench.diagnosis.forces.mesh import corrected, mesh, radial_impedance
+from gearbench.diagnosis.forces.mesh import radial_impedance
 from gearbench.diagnosis.forces.nominal import NominalModel
-from gearbench.diagnosis.forces.residuals import Residuals
+from gearbench.diagnosis.forces.residuals import Residuals, transform
 from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.structure.structure import HOUSING_SD, mean_stiffness, pace_of
 
@@ -35,8 +35,8 @@ Complex = NDArray[np.complex128]
 SMOOTH = "compliance"  # what yields by a smooth function of frequency, which would make up for a part of a resonance
 CLEAR = 10.0  # nats by which a resonance must explain more
 # Logarithm of the frequency over the supports' above which gears resonate across their supports, which the forces show
-# as well; and motions that are compared.
-HIGHEST, COMPARED = 0.0, 4
+# as well.
+HIGHEST = 0.0
 
 
 def motion_by_forces(problem: Problem, fit: Fit) -> Motion | None:
@@ -55,8 +55,7 @@ def motion_by_forces(problem: Problem, fit: Fit) -> Motion | None:
 
     others = np.concatenate([one.slopes for one in records], axis=1)[kept] * fit.sd[kept, None]
     left = p[kept] / fit.sd[kept] @ others - np.concatenate([one.left for one in records])
-    found = likeliest(made_of, left, others, COMPARED)
-    return next((motion for gain, motion in found if gain > CLEAR and motion.resonance.at < HIGHEST), None)
+    return next((motion for gain, motion in likeliest(made_of, left, others, highest=HIGHEST) if gain > CLEAR), None)
 
 
 @dataclass(frozen=True)
@@ -66,6 +65,7 @@ class _Record:
     forces would close the mesh if it were as stiff as the supports, at frequencies `over` theirs, and the `tangent`
     (N,) [N/m] of the mesh."""
 
+    condition: Condition
     blocks: Blocks
     residuals: Residuals
     factor: Array
@@ -77,9 +77,9 @@ class _Record:
 
     def made_of(self, found: Resonance) -> Array:
         """What a motion adds to the residuals (10, R), by PAIRS, for a compliance of one."""
-        n = self.tangent.size
+        n = self.condition.samples
         closed = np.fft.irfft(self.closing * answer_of(self.over, found), n, axis=-1) * n
-        force = np.fft.rfft(self.tangent * closed, axis=-1)[:, self.blocks.used] / n
+        force = transform(self.condition, self.tangent * closed)[:, self.blocks.used]
         return _whitened(self.blocks, self.residuals, -self.residuals.mesh_factor[..., None] * force.T, self.factor)[1]
 
 
@@ -88,10 +88,9 @@ def _record_of(
 ) -> _Record:
     at = linearised(model, condition, unknowns, p, blocks.used)
     left, slopes = _whitened(blocks, at.residuals, at.jacobian, factor)
-    spectra = corrected(condition, at.departures)
-    closing = _closing(model, condition, at.departures, spectra) / mean_stiffness(model)
-    tangent = mesh(model, condition, at.departures, spectra).tangent
-    return _Record(blocks, at.residuals, factor, left, slopes, closing, condition.omega / pace_of(model), tangent)
+    closing = _closing(model, condition, at.departures, at.spectra) / mean_stiffness(model)
+    over = condition.omega / pace_of(model)
+    return _Record(condition, blocks, at.residuals, factor, left, slopes, closing, over, at.mesh.tangent)
 
 
 def _whitened(blocks: Blocks, residuals: Residuals, jacobian: Complex, factor: Array) -> tuple[Array, Array]:

@@ -45,7 +45,7 @@ Complex = NDArray[np.complex128]
 STIFF_AT, STIFF = 1.8, 0.01
 RENEWALS = 3
 BEGUN = 1, 3  # frequencies at which a first and a second motion are begun: beside another it is seen less well
-CLEAR = 0.01  # compliance of the second that shows
+SHOWS = 0.01  # compliance from which a second one does
 # Shares of driver and driven along, then across: ten whose products with themselves tell those of any.
 TOLD_BY = np.array([
     (1, 0, 0, 0), (0, 1, 0, 0), (1, 1, 0, 0), (1, 0, 1, 0), (1, 0, -1, 0),
@@ -111,10 +111,11 @@ def with_hidden_motions(simulator: Simulator, p: Array, sd: Array, number: int) 
         return []
     if told is None or sensitivity is None:
         return []
-    found = _likeliest(excited, p, sd, told, sensitivity, over, most=BEGUN[number])
-    # Beside another its shares across are told badly, and a fit lets stand what a rig hardly feels.
-    plain = [Motion(one.resonance, one.shares * (1, 1, 0, 0), max(one.compliance, CLEAR)) for one in found]
-    begun = [*found[:1], *(plain if number > 0 else ())]
+    begun = _likeliest(excited, p, sd, told, sensitivity, over, most=BEGUN[number])
+    if number > 0:
+        # Beside another its shares across are told badly, and a fit lets stand what a rig hardly feels.
+        plain = [Motion(one.resonance, one.shares * (1, 1, 0, 0), max(one.compliance, SHOWS)) for one in begun]
+        begun = [*begun[:1], *plain]
     return [with_hidden(simulator.layout.unknowns, p, number, one) for one in begun]
 
 

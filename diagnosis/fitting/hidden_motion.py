@@ -70,12 +70,12 @@ def products_of(shares: Array) -> Array:
 
 
 def likeliest(
-    made_of: Callable[[Resonance], Array], left: Array, others: Array, most: int = 1
+    made_of: Callable[[Resonance], Array], left: Array, others: Array, most: int = 1, highest: float = LIGHTEST
 ) -> list[tuple[float, Motion]]:
-    """At most so many motions of the housing that explain most of what is `left` (R,), at frequencies apart, the best
-    first, and by how many nats. `made_of` a resonance are the real parts (10, R) that each of PAIRS adds to it per
-    standard deviation of its compliance; `others` (n, R): what the other unknowns do, each by its own, `left` being
-    about the centre of their priors."""
+    """At most so many motions of the housing that explain most of what is `left` (R,), at frequencies apart and below
+    the `highest`, the best first, and by how many nats. `made_of` a resonance are the real parts (10, R) that each of
+    PAIRS adds to it per standard deviation of its compliance; `others` (n, R): what the other unknowns do, each by its
+    own, `left` being about the centre of their priors."""
     inner = cho_factor(np.eye(len(others)) + others @ others.T, lower=True)
     shares = _compared()
     products, across = products_of(shares), 0.5 * (shares[:, 2:] ** 2).sum(axis=1) / OBLIQUE_SD**2
@@ -94,7 +94,7 @@ def likeliest(
     for gain, motion in sorted(compared, key=lambda one: -one[0]):
         if all(abs(motion.resonance.at - one.resonance.at) > APART for _, one in peaks):
             peaks.append((gain, motion))
-    return [one for one in peaks if one[1].resonance.at < LIGHTEST][:most]
+    return [one for one in peaks if one[1].resonance.at < highest][:most]
 
 
 def _compared() -> Array:

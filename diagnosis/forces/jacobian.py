@@ -50,10 +50,12 @@ BACKLASH_STEP = 1e-11  # [m]; beyond a nanometre samples cease to touch
 
 @dataclass(frozen=True)
 class Linearised:
-    """Residuals in B used bins under `departures`, their Jacobian (4, B, unknowns), and that (B, unknowns) of the mesh
-    force."""
+    """Residuals in B used bins under `departures`, with the `spectra` (N/2 + 1,) of the channels and the mesh that they
+    make, their Jacobian (4, B, unknowns), and that (B, unknowns) of the mesh force."""
 
     departures: Departures
+    spectra: Mapping[str, Complex]
+    mesh: Mesh
     residuals: Residuals
     jacobian: Complex
     mesh_jacobian: Complex
@@ -80,7 +82,7 @@ def linearised(
     _support_columns(at, put)
     _drive_columns(at, put)
     _friction_columns(at, put)
-    return Linearised(departures, residuals.at(used), out, mesh_jacobian)
+    return Linearised(departures, spectra, state, residuals.at(used), out, mesh_jacobian)
 
 
 @dataclass(frozen=True)

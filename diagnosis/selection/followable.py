@@ -4,6 +4,7 @@ the driver nudged along the measured motion."""
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import chain
 
 import numpy as np
 
@@ -26,11 +27,12 @@ def followable(
     """Numbers of the records that a fit can follow, what nudges the driver in each that parts its flanks, by its name
     [N s/m], and the names of those that part for long: those whose flanks stay together on the first rig that has any
     (the nominal one may resonate where the records' does not), else all, nudged."""
-    for rig in rigs:
-        smooth = _below(lost_contact(rig, measurements, simulate), LOSING)
+    lost = lost_contact(rigs[0], measurements, simulate)
+    others = (lost_contact(rig, measurements, simulate) for rig in rigs[1:])
+    for one in chain([lost], others):
+        smooth = _below(one, LOSING)
         if smooth:
             return smooth, {}, frozenset()
-    lost = lost_contact(rigs[0], measurements, simulate)
     nudges = nudges_of(problem.model, problem.conditions)
     if not lost or len(nudges) < len(measurements):
         return smooth_records(rigs, measurements, simulate), {}, frozenset()

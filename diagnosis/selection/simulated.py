@@ -13,8 +13,7 @@ from gearbench.diagnosis.effects.backlash import KEY as BACKLASH
 from gearbench.diagnosis.effects.effect import Hypothesis
 from gearbench.diagnosis.effects.library import hypotheses as library
 from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
-from gearbench.diagnosis.evidence.decision import named
-from gearbench.diagnosis.evidence.fit import Fit
+from gearbench.diagnosis.evidence.decision import likeliest_fit
 from gearbench.diagnosis.evidence.prediction import predicted_factors
 from gearbench.diagnosis.evidence.problem import Problem
 from gearbench.diagnosis.evidence.search import Search
@@ -133,10 +132,8 @@ def simulated(
     noises = [noise_left(layout.case(np.zeros(layout.size), one.name), one, simulate) for one in chosen]
     simulator = Simulator(layout, target_of(chosen, conditions, noises), simulate, nudges)
 
-    best = named(found)
-    fit = best.fit if best is not None and best.fit is not None else found.base
     # What acts in the mesh may be anything for the one, an impact too, and is measured for the other.
-    shown = Shown(lambda held: around(layout, problem.conditions, held), cache(lambda: _hidden(problem, fit)))
+    shown = Shown(lambda held: around(layout, problem.conditions, held), cache(lambda: _hidden(problem, found)))
     base = background(simulator, _beginnings(layout, by_forces), shown, report)
     if base is None:
         return None
@@ -167,10 +164,10 @@ def simulated(
     return Simulated(simulator.layout, simulator, selection, restless)
 
 
-def _hidden(problem: Problem, fit: Fit) -> Motion | None:
+def _hidden(problem: Problem, found: Search) -> Motion | None:
     """The motion of a housing under the sensors that the forces show."""
     try:
-        return motion_by_forces(problem, fit)
+        return motion_by_forces(problem, likeliest_fit(found))
     except ValueError:  # a reading that cannot be made costs a beginning, not the verdict
         return None
 
