@@ -21,7 +21,7 @@ from gearbench.diagnosis.finding import Finding
 from gearbench.diagnosis.forces.equations import PLACES
 from gearbench.diagnosis.forces.steadiness import changing_parts
 from gearbench.diagnosis.intake.measurements import Measurement
-from gearbench.diagnosis.intake.signals import measured_channels
+from gearbench.diagnosis.judging.candidates import candidates_of
 from gearbench.diagnosis.judging.chances import chances_of, sentence_of_doubt, unlikely
 from gearbench.diagnosis.judging.decided import decide_simulated
 from gearbench.diagnosis.judging.drift import drift_of
@@ -36,7 +36,6 @@ from gearbench.diagnosis.selection.simulated import Simulated
 from gearbench.diagnosis.selection.weighing import Weighed
 from gearbench.diagnosis.structure.contrast import other_flanks
 from gearbench.diagnosis.structure.structure import structure_found
-from gearbench.diagnosis.verdict import Candidate
 from gearbench.rig import Case
 from gearbench.rig.contract import rank_of
 
@@ -97,7 +96,7 @@ def by_simulation(
         probability=known.probabilities(chances.best, decided.sign),
         signs=signs,
         effects=(*effects_of(judged, decided, chances), *drifts_of(decided, changing, chances)),
-        candidates=_candidates(found, held_out if held_out is not None and held_out.phase_known else None),
+        candidates=candidates_of(judged, held_out),
         place=decided.place,
         where=places_of(judged, kept, missing),
         recalibrated=found.recalibrated if kept else found.without_any,
@@ -177,37 +176,3 @@ def _why(judged: Judged, kept: Sequence[Hypothesis]) -> tuple[str, ...]:
         noun = weighed.hypothesis.effect.noun
         said.append(f"The records of the search speak for {noun}, but the judged record's gap stays as it was with it")
     return tuple(said)
-
-
-def _candidates(found: Simulated, judged: Measurement | None) -> tuple[Candidate, ...]:
-    """The best hypothesis of each effect, the background alone, and what is named together, with the relative gap that
-    each leaves on the held-out record. Evidence is that over the background alone, or beside what else is named where
-    only that shows an effect."""
-    selection = found.selection
-    measured = measured_channels(judged)["dte"].mean(axis=0) if judged is not None else None
-
-    def left(p: Array | None) -> float | None:
-        if judged is None or measured is None or p is None:
-            return None
-        try:
-            rest = measured - found.simulator.free.channels(p, judged)["dte"]
-        except ValueError:
-            return None
-        return float(np.std(rest) / np.std(measured))
-
-    best: dict[tuple[str, ...], tuple[float, Array | None]] = {(): (0.0, selection.base.p)}
-    for one in selection.weighed:  # the best first
-        assert one.hypothesis.effect is not None
-        p = one.optimum.p if one.optimum and one.log_bayes_factor > 0.0 else None
-        best.setdefault((one.hypothesis.effect.name,), (one.log_bayes_factor, p))
-    for one in selection.entered:
-        assert one.hypothesis.effect is not None
-        alone, p = best.get((one.hypothesis.effect.name,), (-np.inf, None))
-        best[(one.hypothesis.effect.name,)] = (max(alone, one.log_bayes_factor), p)
-    names = tuple(dict.fromkeys(one.hypothesis.effect.name for one in selection.entered if one.hypothesis.effect))
-    if len(names) > 1:
-        best[names] = (selection.best.evidence - selection.base.evidence, selection.best.p)
-    listed = [
-        Candidate(effects=effects, log_evidence=float(value), held_out=left(p)) for effects, (value, p) in best.items()
-    ]
-    return tuple(sorted(listed, key=lambda candidate: -candidate.log_evidence))

@@ -56,8 +56,7 @@ def true_of_named(outcomes: Sequence[Outcome]) -> Rate:
     for outcome in outcomes:
         for name in named_effects(outcome.verdict) if outcome.verdict else ():
             total += 1
-            at_work = outcome.answer.kind == "effect" and name in outcome.answer.effects
-            true += at_work or outcome.result == "class"
+            true += outcome.at_work(name) or outcome.result == "class"
     return Rate(true, total)
 
 

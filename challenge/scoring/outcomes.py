@@ -38,6 +38,15 @@ class Outcome:
     result: str
     place_right: bool
 
+    def at_work(self, effect: str) -> bool:
+        """Whether a named effect was at work: a foreign one, too, if the library has it after all."""
+        return effect in self.answer.effects
+
+    @property
+    def true_verdict(self) -> str:
+        """The verdict that was right here: of a foreign effect unknown, or what it is."""
+        return "effect" if self.result == "right" and self.answer.kind == "foreign" else TRUE_VERDICT[self.answer.kind]
+
 
 def without(answer: Answer, effect: str | None) -> Answer:
     """The answer when `effect` is not in the library: a case that it made counts as foreign."""

@@ -11,14 +11,14 @@ import numpy as np
 
 from gearbench.challenge.scoring.due import found_of_due, shown_of, true_of_named, within_intervals
 from gearbench.challenge.scoring.intervals import COVERAGE, Rate, brier, calibration_error, middle, reliability
-from gearbench.challenge.scoring.outcomes import TRUE_VERDICT, VERDICTS, Outcome, named_effects, said
+from gearbench.challenge.scoring.outcomes import VERDICTS, Outcome, named_effects, said
 from gearbench.challenge.scoring.reach import reach_table
 from gearbench.challenge.truth.effects import EFFECTS, SEVERITY
 from gearbench.rig.contract import rank_of
 
 EFFECT_RESULTS = ("right", "class", "part", "wrong", "missed", "refused", "failed")
 CONTROL_RESULTS = ("right", "named", "flagged", "failed")
-FOREIGN_RESULTS = ("refused", "blamed", "missed", "failed")
+FOREIGN_RESULTS = ("refused", "right", "blamed", "missed", "failed")
 THIRDS = ("light", "medium", "severe")
 
 Table = dict[str, Any]
@@ -38,7 +38,7 @@ def score(outcomes: Sequence[Outcome]) -> Table:
             **_rates(foreign, FOREIGN_RESULTS),
             "place_right": _place(foreign).plain(),
             "refused_at_right_place": _rate(
-                [o for o in foreign if shown_of(o.answer)], lambda o: o.result == "refused" and o.place_right
+                [o for o in foreign if shown_of(o.answer)], lambda o: o.result in ("refused", "right") and o.place_right
             ).plain(),
         },
         "by_effect": {name: _effect_rows(name, group) for name, group in grouped([*effects, *foreign]).items()},
@@ -131,14 +131,13 @@ def _calibration(outcomes: Sequence[Outcome]) -> Table:
     (whether it is the right one of the three) and of the named effect."""
     given = [o for o in outcomes if o.verdict is not None]
     stated = [[float(o.verdict["probability"][key]) for key in VERDICTS] for o in given if o.verdict is not None]
-    truth = [VERDICTS.index(TRUE_VERDICT[o.answer.kind]) for o in given]
+    truth = [VERDICTS.index(o.true_verdict) for o in given]
     told = [VERDICTS.index(said(o.verdict)) for o in given if o.verdict is not None]
     named: list[tuple[float, bool]] = []
     for outcome in given:
         assert outcome.verdict is not None
         for effect in outcome.verdict.get("effects", ()):
-            true = outcome.answer.kind == "effect" and effect["name"] in outcome.answer.effects
-            named.append((float(effect["probability"]), true))
+            named.append((float(effect["probability"]), outcome.at_work(effect["name"])))
     chosen = [p[i] for p, i in zip(stated, told, strict=True)]
     verdict = reliability(chosen, [a == b for a, b in zip(told, truth, strict=True)])
     effect = reliability([p for p, _ in named], [hit for _, hit in named])

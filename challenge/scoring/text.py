@@ -21,8 +21,10 @@ WORDS = {
     "flagged": "false alarm, flagged",
     "blamed": "blamed on an effect",
     "place_right": "place right",
-    "refused_at_right_place": "refused, right place",
+    "refused_at_right_place": "place right, no blame",
 }
+# Results that are told only where there are any.
+RARE = ("class", "part", "failed")
 
 
 def score_text(score: Table) -> str:
@@ -54,7 +56,7 @@ def _kinds(score: Table) -> str:
             lines += [
                 f"    {WORDS[result]:22} {rate_text(score[kind][result])}"
                 for result in results
-                if score[kind][result]["count"] or result not in ("class", "part", "failed")
+                if score[kind][result]["count"] or not (result in RARE or (kind, result) == ("foreign", "right"))
             ]
     return "\n".join(lines)
 
@@ -73,8 +75,8 @@ def _due(due: Table, several: Table) -> str:
 def _by_effect(score: Table) -> str:
     lines = [f"{'effect':24}{'right':28}{'wrong':>6}{'missed':>8}{'refused':>9}{'place':>7}"]
     for name, rows in score["by_effect"].items():
-        good = "right" if "right" in rows else "refused"
-        bad = rows["wrong" if "wrong" in rows else "blamed"]["count"]
+        good, worst = ("right", "wrong") if "wrong" in rows else ("refused", "blamed")
+        bad = rows[worst]["count"]
         place = rows["place_right"]["count"]
         right = rate_text(rows[good]) + ("" if good == "right" else " refused")
         lines.append(
@@ -94,7 +96,7 @@ def _by_severity(score: Table) -> str:
             for third, row in thirds.items()
             if row["right"]["total"]
         ]
-        if told and "right" in rows:
+        if told and "wrong" in rows:
             lines.append(f"    {name:22} {', '.join(told)}")
     return "\n".join(lines)
 

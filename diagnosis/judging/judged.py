@@ -161,6 +161,13 @@ class Judged:
             back += (self._rms(mean - without[channel]) ** 2 - one.final**2) / one.fluctuation**2
         return float(np.clip(back / gap, 0.0, 1.0)) if gap > 0.0 else 0.0
 
+    def part_left(self, channel: str, signals: Mapping[str, Array]) -> float | None:
+        """Part of a channel's fluctuation that a rig with those signals leaves, rms over rms; None where it was not
+        measured."""
+        if channel not in self.sizes:
+            return None
+        mean = measured_channels(self.measured)[channel].mean(axis=0)
+        return self._rms(mean - signals[channel]) / self.sizes[channel].fluctuation
 
     def grown(self, without: Mapping[str, Array]) -> float:
         """Factor by which all that is left grows in a rig with those signals, rms over rms."""

@@ -87,3 +87,16 @@ def test_the_place_of_any_of_the_effects_is_right() -> None:
         given = verdict("effect", "coupling") | {"place": place}
         assert judge("x", answer, given).place_right is right
         assert judge("x", TWO, given).place_right is (place == "mesh")
+
+
+def test_a_foreign_effect_that_the_library_has_after_all_is_named_rightly() -> None:
+    drift = Answer("foreign", ("temperature-drift",), "mesh", {})
+    names = (*drift.effects, "friction")
+    known, blamed = (judge("x", drift, verdict("effect", name) | {"place": "mesh"}) for name in names)
+    table = score([known, blamed])
+    assert (known.result, blamed.result) == ("right", "blamed")
+    assert (table["due"]["true"]["count"], table["due"]["true"]["total"]) == (1, 2)
+    assert (table["foreign"]["refused_at_right_place"]["count"], table["foreign"]["blamed"]["count"]) == (1, 1)
+    assert [known.true_verdict, blamed.true_verdict] == ["effect", "unknown"]
+    assert table["calibration"]["effect"][0]["count"] == 1
+    assert "    right                  1 of 2" in score_text(table)

@@ -209,7 +209,7 @@ def test_reach_is_met_by_the_unfavourable_end(right: int, total: int, status: st
 
 def test_text_says_the_figures() -> None:
     text = score_text(score(outcomes_by_hand()))
-    for words in ("1 of 2, 50 % (3-97)", "friction", "Brier", "refused, right place", "point estimate"):
+    for words in ("1 of 2, 50 % (3-97)", "friction", "Brier", "place right, no blame", "point estimate"):
         assert words in text
     assert "no cases" in score_text(score(outcomes_by_hand()[:2]))
 

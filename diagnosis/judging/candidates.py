@@ -1,0 +1,80 @@
+"""What was weighed, as a verdict lists it: its evidence, and the part of the judged record that it leaves."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.diagnosis.intake.measurements import Measurement
+from gearbench.diagnosis.judging.judged import Judged
+from gearbench.diagnosis.selection.weighing import Weighed
+from gearbench.diagnosis.verdict import Candidate
+
+Array = NDArray[np.float64]
+Effects = tuple[str, ...]
+
+
+def candidates_of(judged: Judged, held_out: Measurement | None) -> tuple[Candidate, ...]:
+    """The background alone, the best hypothesis of each effect, what entered together and the same without each one of
+    it, with the part of the transmission error's fluctuation that each leaves on the held-out record; the best first.
+    Evidence is that over the background alone, or beside what else entered where only that shows an effect. Beside
+    effects that entered, the background has no part of them."""
+    selection, base = judged.found.selection, judged.found.selection.base.evidence
+    entered = tuple(dict.fromkeys(name_of(one) for one in selection.entered))
+    evidence: dict[Effects, float] = {(): 0.0}
+    for one in selection.weighed:  # the best first
+        evidence.setdefault((name_of(one),), one.log_bayes_factor)
+    for one in selection.entered:
+        alone = evidence.get((name_of(one),), -np.inf)
+        evidence[(name_of(one),)] = max(alone, one.log_bayes_factor)
+    if len(entered) > 1:
+        evidence[entered] = selection.best.evidence - base
+    left = _left(judged, entered) if judged.measured is held_out else {}
+    for effects, optimum in _without_each(judged).items():
+        evidence.setdefault(effects, optimum - base)
+    listed = [Candidate(effects=e, log_evidence=float(value), held_out=left.get(e)) for e, value in evidence.items()]
+    return tuple(sorted(listed, key=lambda candidate: -candidate.log_evidence))
+
+
+def name_of(one: Weighed) -> str:
+    """The effect of what was weighed."""
+    assert one.hypothesis.effect is not None
+    return one.hypothesis.effect.name
+
+
+def _single(judged: Judged) -> dict[str, Effects]:
+    """What else entered, by the name of each hypothesis whose effect is at work in one place."""
+    entered = judged.found.selection.entered
+    names = [name_of(one) for one in entered]
+    count = Counter(names)
+    return {
+        one.hypothesis.name: tuple(dict.fromkeys(name for name in names if name != name_of(one)))
+        for one in entered
+        if count[name_of(one)] == 1
+    }
+
+
+def _without_each(judged: Judged) -> dict[Effects, float]:
+    """Evidence of what entered without each one of it, by the effects that stay."""
+    optima = {effects: judged.closings[name].optimum for name, effects in _single(judged).items()}
+    return {effects: optimum.evidence for effects, optimum in optima.items() if effects and optimum is not None}
+
+
+def _left(judged: Judged, entered: Effects) -> dict[Effects, float | None]:
+    """Part of the fluctuation that each leaves, by its effects; what is not in it was not simulated. Where all records
+    are nudged, what else was weighed has not been fitted as it goes its own way."""
+    simulator = judged.found.simulator
+    signals: dict[Effects, Mapping[str, Array]] = {(): judged.plain, entered: judged.signals}
+    for name, effects in _single(judged).items():
+        signals.setdefault(effects, judged.closings[name].without)
+    for one in judged.found.selection.weighed if simulator.anchored else ():
+        if (name_of(one),) in signals or one.optimum is None or one.log_bayes_factor <= 0.0:
+            continue
+        try:
+            signals[(name_of(one),)] = simulator.free.channels(one.optimum.p, judged.measured)
+        except ValueError:  # a rig that cannot answer the record leaves a number out
+            continue
+    return {effects: judged.part_left("dte", values) for effects, values in signals.items()}
