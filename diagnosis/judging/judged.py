@@ -208,9 +208,11 @@ def judged_on(
     rough = [one for one in searched if not any(one is own for own in found.simulator.held_by)]
     parted = [target_of([one], [prepare(one, problem.model, band)]) for one in rough]
     dropped: list[Weighed] = []
+    seen: set[frozenset[str]] = set()
     # A record that had part in the search cannot make up for what it lacked.
     apart = not any(measured is searched for searched in fitted)
     while True:
+        seen.add(_names(found.selection.entered))
         try:
             judged = _closings(found, target, measured, parted, noise, apart=apart)
         except ValueError:
@@ -223,10 +225,15 @@ def judged_on(
             selection = only(found.simulator, found.selection, kept)
         else:
             more = further(found.simulator, found.selection, (*found.out, *dropped), report, apart=apart)
-            if more is None:
+            # Effects may take turns, each needless beside the other: what was judged already is judged no more.
+            if more is None or _names(more.entered) in seen:
                 return replace(judged, dropped=tuple(dropped))
             selection = more
         found = found.with_selection(selection)
+
+
+def _names(entered: Sequence[Weighed]) -> frozenset[str]:
+    return frozenset(one.hypothesis.name for one in entered)
 
 
 def _stays(judged: Judged, one: Weighed) -> bool:

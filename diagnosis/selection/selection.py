@@ -89,7 +89,7 @@ def further(
     apart: bool = False,
 ) -> Selection | None:
     """The selection with what the records call for besides when these effects are `out`, which had the place of others;
-    None where nothing more enters."""
+    None where nothing more enters, or none of that stays."""
     tried = [one.hypothesis for one in (*selection.entered, *out)]
     left = [one for one in selection.weighed if not any(is_like(one.hypothesis, other) for other in tried)]
     if not out or not any(entering(simulator.layout.unknowns, one, apart) for one in left):
@@ -101,6 +101,9 @@ def further(
     if len(entered) == len(selection.entered):
         return None
     base, best, kept = _together(simulator, selection.base, best, entered, report, apart=apart)
+    # Nothing would tell the next time that the same was tried.
+    if {one.hypothesis.name for one in kept} <= {one.hypothesis.name for one in selection.entered}:
+        return None
     return replace(selection, base=base, bare=_without(simulator, base, kept), best=best, entered=kept)
 
 

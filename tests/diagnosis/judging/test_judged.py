@@ -206,6 +206,22 @@ def test_a_record_of_the_search_makes_up_for_nothing(monkeypatch: pytest.MonkeyP
     assert again is not None and names(again.dropped) == ["friction"]
 
 
+def test_effects_that_take_turns_are_judged_once_each(monkeypatch: pytest.MonkeyPatch) -> None:
+    both = {3: 0.5, 4: 0.2, 5: -0.15}
+    (friction, ripple), turns = judged(both, both, monkeypatch).found.selection.entered, list[str]()
+
+    def other(simulator: Any, selection: Selection, *_: Any, **__: Any) -> Selection:
+        taken = ripple if names(selection.entered) == ["friction"] else friction
+        assert len(turns) < 5
+        turns.append(taken.hypothesis.name)
+        return replace(selection, entered=(taken,))
+
+    monkeypatch.setattr(module, "further", other)
+    found = judged(both, both, monkeypatch)
+    assert turns == ["friction", "torque-ripple", "friction"]
+    assert names(found.found.selection.entered) == ["torque-ripple"]
+
+
 def test_each_of_two_effects_is_taken_out_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     found = judged({3: 0.5, 4: 0.2, 5: -0.15}, {3: 0.5, 4: 0.2, 5: -0.15}, monkeypatch)
     assert set(names(found.found.selection.entered)) == {"friction", "torque-ripple"}

@@ -106,6 +106,9 @@ def test_what_had_no_place_enters_when_another_is_out(monkeypatch: pytest.Monkey
     assert more.best.p[4:6] == pytest.approx([0.3, -0.2], abs=0.1) and not more.bare.p[4:6].any()
     # Nothing that is out is tried again, and what was worth nothing is not tried at all.
     assert module.further(simulator, bare, (*found.entered, *more.entered)) is None  # type: ignore[arg-type]
+    # What enters and does not stay would be tried for ever.
+    monkeypatch.setattr(module, "needed", lambda simulator, best, entered, apart: ())
+    assert module.further(simulator, bare, found.entered) is None  # type: ignore[arg-type]
 
 
 def test_a_rare_effect_gives_way_to_a_usual_one_that_explains_nearly_as_much() -> None:
