@@ -45,7 +45,7 @@ def by_forces_alone(
             Effect(
                 name=effect.name,
                 probability=probability["effect"],
-                parameters=parameters_of(effect, estimates),
+                parameters=parameters_of(effect, estimates, by_forces=True),
             ),
         )
     tried: dict[tuple[str, ...], float] = {(): 0.0}

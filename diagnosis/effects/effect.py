@@ -167,7 +167,8 @@ class Effect:
     the group that simulation begins from where following the slope from zero does not get there. Search: it is
     refitted whatever the background's quadratic predicts (`always`), in `most_refits` of its hypotheses at most.
     Decision: `limit` of its evidence and `least_size`, if they are not those of all effects. `model_error`:
-    relative error of a rightly named one beyond that of the fit.
+    relative error of a rightly named one beyond that of the fit; `force_error`: the same where the force residuals
+    alone name it, if it is larger.
     """
 
     name: str
@@ -186,14 +187,17 @@ class Effect:
     limit: float | None = None
     least_size: float | None = None
     model_error: float = LEAST_MODEL_ERROR
+    force_error: float = 0.0
 
     def hypotheses(self, model: NominalModel) -> tuple[Hypothesis, ...]:
         """The effect in every place where it may be."""
         return tuple(replace(one, effect=self) for one in self.hypotheses_of(model))
 
-    def stated(self, estimate: Estimate) -> float:
-        """Standard deviation to state for a parameter: the fit's and, for a size, the model's error."""
-        return hypot(estimate.std, self.model_error * estimate.value) if estimate.sized else estimate.std
+    def stated(self, estimate: Estimate, *, by_forces: bool = False) -> float:
+        """Standard deviation to state for a parameter: the fit's and, for a size, the model's error, which is that of
+        the force residuals alone where it was found `by_forces`."""
+        error = max(self.model_error, self.force_error) if by_forces else self.model_error
+        return hypot(estimate.std, error * estimate.value) if estimate.sized else estimate.std
 
 
 def added(case: Case, hypothesis: Hypothesis, fitted: Fitted) -> tuple[Case, tuple[Estimate, ...]]:

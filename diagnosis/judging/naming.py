@@ -15,11 +15,14 @@ from gearbench.diagnosis.verdict import NINE_OF_TEN, Effect, Parameter, Range
 from gearbench.diagnosis.words import SHOWN_UNITS
 
 
-def parameters_of(effect: Library, estimates: Sequence[Estimate]) -> dict[str, Parameter]:
-    """Values with the interval that a normal distribution of the stated deviation has."""
+def parameters_of(
+    effect: Library, estimates: Sequence[Estimate], *, by_forces: bool = False
+) -> dict[str, Parameter]:
+    """Values with the interval that a normal distribution of the stated deviation has; `by_forces`: found by the force
+    residuals alone."""
     out = {}
     for e in estimates:
-        reach = NINE_OF_TEN * effect.stated(e)
+        reach = NINE_OF_TEN * effect.stated(e, by_forces=by_forces)
         out[e.name] = Parameter(value=e.value, low=e.value - reach, high=e.value + reach, unit=e.unit)
     return out
 

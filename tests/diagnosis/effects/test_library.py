@@ -126,6 +126,8 @@ def test_the_models_error_is_added_in_squares_to_sizes() -> None:
         assert effect.stated(Estimate("a", 0.05, 0.0, "1")) == pytest.approx(0.05 * effect.model_error)
         assert effect.stated(Estimate("a", 0.0, 0.002, "1")) == pytest.approx(0.002)
         assert effect.stated(Estimate("a", 3.0 / effect.model_error, 4.0, "um")) == pytest.approx(5.0)
+        by_forces = effect.stated(Estimate("a", 0.05, 0.0, "1"), by_forces=True)
+        assert by_forces == pytest.approx(0.05 * max(effect.model_error, effect.force_error))
         # Numbers of teeth and phases keep what the fit says.
         assert effect.stated(Estimate("tooth", 8.0, 0.0, "1", sized=False)) == 0.0
 
