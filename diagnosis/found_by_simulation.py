@@ -21,6 +21,7 @@ from gearbench.diagnosis.finding import Finding
 from gearbench.diagnosis.forces.equations import PLACES
 from gearbench.diagnosis.forces.steadiness import changing_parts
 from gearbench.diagnosis.intake.measurements import Measurement
+from gearbench.diagnosis.judging.along import sentences_along
 from gearbench.diagnosis.judging.candidates import candidates_of
 from gearbench.diagnosis.judging.chances import chances_of, sentence_of_doubt, unlikely
 from gearbench.diagnosis.judging.decided import decide_simulated
@@ -102,7 +103,7 @@ def by_simulation(
         recalibrated=found.recalibrated if kept else found.without_any,
         with_effect=found.with_effects if decided.named else None,
         because=(*decided.because, *_why(judged, kept), *doubts, *flanks,
-                 *sentences_of_others(of.measurements, of.steady, band)),
+                 *sentences_along(of.problem, judged), *sentences_of_others(of.measurements, of.steady, band)),
         structure=structure_found(found.layout.unknowns, found.selection.best.p, found.std),
         missing=missing,
         places=tuple(one.place for one in kept),

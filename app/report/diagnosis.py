@@ -181,7 +181,7 @@ def _candidates(verdict: Verdict) -> list[str]:
     for place, one in enumerate(ranked[:CANDIDATES]):
         if set(one.effects) == chosen and (chosen or verdict.verdict == "none") and bold is None:
             bold = place
-        held_out = () if not judged else ("–" if one.held_out is None else number(one.held_out),)
+        held_out = () if not judged else ("–" if one.held_out is None else percent(one.held_out),)
         rows.append((effects_in_words(one.effects), number(one.log_evidence - best), *held_out))
     more = len(ranked) - len(rows)
     return [
@@ -189,8 +189,9 @@ def _candidates(verdict: Verdict) -> list[str]:
         text(
             "Each cause against the best one, by log evidence: the natural logarithm of how much less likely the"
             " records are if it is the cause (-3: one in twenty), whatever its size. In bold: the verdict."
+            + (" Beside it, the part of the held-out transmission error that each leaves." if judged else "")
         ),
-        table(("cause", "log evidence", *(("gap on held-out",) if judged else ())), rows, numbers=(1, 2), best=bold),
+        table(("cause", "log evidence", *(("left on held-out",) if judged else ())), rows, numbers=(1, 2), best=bold),
         text(f"{more} less likely ones are left out.", style="small") if more else "",
     ]
 
