@@ -21,7 +21,7 @@ from gearbench.diagnosis.finding import Finding
 from gearbench.diagnosis.forces.equations import PLACES
 from gearbench.diagnosis.forces.steadiness import changing_parts
 from gearbench.diagnosis.intake.measurements import Measurement
-from gearbench.diagnosis.judging.along import sentences_along
+from gearbench.diagnosis.judging.along import along
 from gearbench.diagnosis.judging.candidates import candidates_of
 from gearbench.diagnosis.judging.chances import chances_of, sentence_of_doubt, unlikely
 from gearbench.diagnosis.judging.decided import decide_simulated
@@ -91,6 +91,8 @@ def by_simulation(
         judged = judged_of_size(of.problem, left_out(found, (doubtful,)), held_out, of.measurements, report)
     kept = [one.hypothesis for one in decided.named]
     flanks = other_flanks(found.layout.unknowns, found.selection.best.p)
+    way = along(of.problem, judged)
+    signs |= {"along": way.kept / way.own} if way else {}
     common["indistinguishable"] = with_rivals(common["indistinguishable"], decided.named)
     return Finding(
         verdict=decided.verdict,
@@ -103,7 +105,7 @@ def by_simulation(
         recalibrated=found.recalibrated if kept else found.without_any,
         with_effect=found.with_effects if decided.named else None,
         because=(*decided.because, *_why(judged, kept), *doubts, *flanks,
-                 *sentences_along(of.problem, judged), *sentences_of_others(of.measurements, of.steady, band)),
+                 *([way.sentence()] if way else []), *sentences_of_others(of.measurements, of.steady, band)),
         structure=structure_found(found.layout.unknowns, found.selection.best.p, found.std),
         missing=missing,
         places=tuple(one.place for one in kept),

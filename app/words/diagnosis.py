@@ -170,8 +170,13 @@ def shrinkage(verdict: Verdict) -> str:
     floor = f" (noise floor {length(scale * gap.floor.value)} {unit})" if gap.floor else ""
     rest = ""
     if gap.with_effect is not None and gap.floor is not None and not explained(verdict):
-        times = number(gap.with_effect.value / max(gap.floor.value, 1e-300), 2)
-        rest = f" What remains is {times} times the floor: the rig's own structure, or another cause."
+        times = gap.with_effect.value / max(gap.floor.value, 1e-300)
+        rest = f" What remains is {number(times, 2)} times the floor: the rig's own structure, or another cause."
+        if (kept := verdict.signs.get("along")) is not None:
+            rest = (
+                f" What remains is {number(times, 2)} times the floor, and {number(kept * times, 2)} times it where the"
+                " rig is kept on the record's way, in which flanks part."
+            )
     return (
         f"On {record} the rms gap of the {CHANNELS.get(gap.channel, gap.channel)} goes from"
         f" {length(scale * gap.nominal.value)} {unit} {steps}{floor}.{rest}"

@@ -6,6 +6,8 @@ at an impact. Whether the rig or only its way is another is told by a damper bet
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from gearbench.diagnosis.evidence.problem import Problem
 from gearbench.diagnosis.forces.condition import prepare
 from gearbench.diagnosis.judging.judged import Judged
@@ -20,27 +22,38 @@ CLOSER = 0.25
 FLOORS = 2.0
 
 
-def sentences_along(problem: Problem, judged: Judged) -> tuple[str, ...]:
-    """What the rig leaves of the transmission error when it is kept on the judged record's way, where that is far less
-    than by itself; nothing elsewhere."""
+class Along(NamedTuple):
+    """Rms of the transmission error [m] that a rig leaves of a record, kept on its way and by its own motion."""
+
+    record: str
+    kept: float
+    own: float
+
+    def sentence(self) -> str:
+        """What that says."""
+        return (
+            f"Flanks part in the record {self.record}: kept on its way by a damper between the driver and its measured"
+            f" motion, the same rig leaves {length(1e6 * self.kept)} um rms of the transmission error in place of"
+            f" {length(1e6 * self.own)} um. Its own motion goes another way after an impact, which takes little: most"
+            " of what remains says nothing of a cause"
+        )
+
+
+def along(problem: Problem, judged: Judged) -> Along | None:
+    """What the rig leaves when it is kept on the judged record's way, where flanks part and that is far less than by
+    itself; None elsewhere."""
     size, measured, found = judged.sizes.get("dte"), judged.measured, judged.found
     if size is None or size.final <= FLOORS * size.noise:
-        return ()
+        return None
     nudges = nudges_of(problem.model, [prepare(measured, problem.model, problem.conditions[0].band)])
     simulator, p = found.simulator, found.end_of(found.selection.best)
     if not nudges or not parts(found.layout.case(p, measured.name), measured, simulator.simulate):
-        return ()
+        return None
     try:
         kept = Simulator(found.layout, simulator.target, simulator.simulate, nudges).channels(p, measured)
     except ValueError:  # a rig that cannot be kept there costs a sentence
-        return ()
+        return None
     part = judged.part_left("dte", kept)
-    left = size.fluctuation * part if part is not None else size.final
-    if left > CLOSER * size.final:
-        return ()
-    return (
-        f"Flanks part in the record {measured.name}: kept on its way by a damper between the driver and its measured"
-        f" motion, the same rig leaves {length(1e6 * left)} um rms of the transmission error in place of"
-        f" {length(1e6 * size.final)} um. Its own motion goes another way after an impact, which takes little: most of"
-        " what remains says nothing of a cause",
-    )
+    if part is None or part * size.fluctuation > CLOSER * size.final:
+        return None
+    return Along(measured.name, part * size.fluctuation, size.final)

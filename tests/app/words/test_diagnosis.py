@@ -136,6 +136,10 @@ def test_the_sentences_of_a_verdict() -> None:
         "1.00 um with the effect (noise floor 0.0500 um). What remains is 20 times the floor: the rig's own structure,"
         " or another cause."
     )
+    assert confidence(partly.model_copy(update={"signs": {"along": 0.15}})).endswith(
+        "What remains is 20 times the floor, and 3.0 times it where the rig is kept on the record's way, in which"
+        " flanks part."
+    )
     small = gaps[1].model_copy(update={"recalibrated": Range(value=5e-7, low=5e-7, high=5e-7)})
     beside = partly.model_copy(update={"gap": (small,)})
     assert headline(beside) == (

@@ -15,8 +15,8 @@ PROBLEM: Any = SimpleNamespace(model=None, conditions=[SimpleNamespace(band=1.0)
 
 def said(
     monkeypatch: pytest.MonkeyPatch, *, kept: float, final: float = 8e-6, parts: bool = True, angle: bool = True
-) -> tuple[str, ...]:
-    """What is said of a rig that leaves `final` [m] by itself and `kept` [m] on the record's way, of 20 um."""
+) -> module.Along | None:
+    """What is found of a rig that leaves `final` [m] by itself and `kept` [m] on the record's way, of 20 um."""
     nudged: list[Any] = []
 
     class Kept:
@@ -44,19 +44,21 @@ def said(
             end_of=lambda best: "its own end",
         ),
     )
-    return module.sentences_along(PROBLEM, judged)
+    return module.along(PROBLEM, judged)
 
 
 def test_a_rig_that_is_right_but_goes_another_way_is_told_from_a_wrong_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    (sentence,) = said(monkeypatch, kept=0.4e-6)
+    found = said(monkeypatch, kept=0.4e-6)
+    assert found is not None and found[1:] == pytest.approx((0.4e-6, 8e-6))
+    sentence = found.sentence()
     assert "heavy" in sentence and "leaves 0.400 um rms" in sentence and "in place of 8.00 um" in sentence
     # A rig that lacks something is as far off there as by itself, but for what the damper takes.
-    assert said(monkeypatch, kept=4e-6) == ()
+    assert said(monkeypatch, kept=4e-6) is None
 
 
 def test_it_is_said_only_where_flanks_part_and_something_remains(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert said(monkeypatch, kept=0.4e-6, parts=False) == ()
-    assert said(monkeypatch, kept=0.01e-6, final=0.15e-6) == ()
+    assert said(monkeypatch, kept=0.4e-6, parts=False) is None
+    assert said(monkeypatch, kept=0.01e-6, final=0.15e-6) is None
     # Without the driver's angle nothing keeps it there; a rig that cannot be kept costs no verdict.
-    assert said(monkeypatch, kept=0.4e-6, angle=False) == ()
-    assert said(monkeypatch, kept=-1.0) == ()
+    assert said(monkeypatch, kept=0.4e-6, angle=False) is None
+    assert said(monkeypatch, kept=-1.0) is None
