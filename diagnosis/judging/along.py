@@ -53,7 +53,5 @@ def along(problem: Problem, judged: Judged) -> Along | None:
         kept = Simulator(found.layout, simulator.target, simulator.simulate, nudges).channels(p, measured)
     except ValueError:  # a rig that cannot be kept there costs a sentence
         return None
-    part = judged.part_left("dte", kept)
-    if part is None or part * size.fluctuation > CLOSER * size.final:
-        return None
-    return Along(measured.name, part * size.fluctuation, size.final)
+    left = judged.rms_left("dte", kept)
+    return Along(measured.name, left, size.final) if left <= CLOSER * size.final else None

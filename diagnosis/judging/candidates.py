@@ -63,10 +63,12 @@ def _without_each(judged: Judged) -> dict[Effects, float]:
     return {effects: optimum.evidence for effects, optimum in optima.items() if effects and optimum is not None}
 
 
-def _left(judged: Judged, entered: Effects) -> dict[Effects, float | None]:
+def _left(judged: Judged, entered: Effects) -> dict[Effects, float]:
     """Part of the fluctuation that each leaves, by its effects; what is not in it was not simulated. Where all records
     are nudged, what else was weighed has not been fitted as it goes its own way."""
-    simulator = judged.found.simulator
+    simulator, size = judged.found.simulator, judged.sizes.get("dte")
+    if size is None:
+        return {}
     signals: dict[Effects, Mapping[str, Array]] = {(): judged.plain, entered: judged.signals}
     for name, effects in _single(judged).items():
         signals.setdefault(effects, judged.closings[name].without)
@@ -77,4 +79,4 @@ def _left(judged: Judged, entered: Effects) -> dict[Effects, float | None]:
             signals[(name_of(one),)] = simulator.free.channels(one.optimum.p, judged.measured)
         except ValueError:  # a rig that cannot answer the record leaves a number out
             continue
-    return {effects: judged.part_left("dte", values) for effects, values in signals.items()}
+    return {effects: judged.rms_left("dte", values) / size.fluctuation for effects, values in signals.items()}

@@ -156,18 +156,13 @@ class Judged:
         with those signals."""
         gap = back = 0.0
         for channel, one in self.sizes.items():
-            mean = measured_channels(self.measured)[channel].mean(axis=0)
             gap += max(one.nominal**2 - one.noise**2, 0.0) / one.fluctuation**2
-            back += (self._rms(mean - without[channel]) ** 2 - one.final**2) / one.fluctuation**2
+            back += (self.rms_left(channel, without) ** 2 - one.final**2) / one.fluctuation**2
         return float(np.clip(back / gap, 0.0, 1.0)) if gap > 0.0 else 0.0
 
-    def part_left(self, channel: str, signals: Mapping[str, Array]) -> float | None:
-        """Part of a channel's fluctuation that a rig with those signals leaves, rms over rms; None where it was not
-        measured."""
-        if channel not in self.sizes:
-            return None
-        mean = measured_channels(self.measured)[channel].mean(axis=0)
-        return self._rms(mean - signals[channel]) / self.sizes[channel].fluctuation
+    def rms_left(self, channel: str, signals: Mapping[str, Array]) -> float:
+        """Rms that a rig with those signals leaves of a measured channel."""
+        return self._rms(measured_channels(self.measured)[channel].mean(axis=0) - signals[channel])
 
     def grown(self, without: Mapping[str, Array]) -> float:
         """Factor by which all that is left grows in a rig with those signals, rms over rms."""

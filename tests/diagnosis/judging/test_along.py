@@ -27,7 +27,7 @@ def said(
             assert p == "its own end" and nudged == [{"heavy": 3.0}]
             if kept < 0.0:
                 raise ValueError("no such motion")
-            return {"dte": kept / 20e-6}
+            return {"dte": kept}
 
     monkeypatch.setattr(module, "Simulator", Kept)
     monkeypatch.setattr(module, "prepare", lambda measured, model, band: None)
@@ -36,7 +36,7 @@ def said(
     judged: Any = SimpleNamespace(
         measured=SimpleNamespace(name="heavy"),
         sizes={"dte": Sizes(20e-6, 15e-6, 9e-6, final, 0.1e-6)},
-        part_left=lambda channel, signals: signals[channel],
+        rms_left=lambda channel, signals: signals[channel],
         found=SimpleNamespace(
             layout=SimpleNamespace(case=lambda p, name: (p, name)),
             simulator=SimpleNamespace(target=None, simulate=None),

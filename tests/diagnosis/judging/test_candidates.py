@@ -13,6 +13,7 @@ from gearbench.diagnosis.effects.friction import FRICTION
 from gearbench.diagnosis.effects.pitch_error import PITCH_ERROR
 from gearbench.diagnosis.effects.torque_ripple import TORQUE_RIPPLE
 from gearbench.diagnosis.judging.candidates import candidates_of
+from gearbench.diagnosis.judging.judged import Sizes
 from gearbench.diagnosis.selection.weighing import Weighed
 
 HELD_OUT: Any = SimpleNamespace(name="heavy")
@@ -53,7 +54,8 @@ def listed(
             name: SimpleNamespace(optimum=optimum(evidence), without={"dte": left})
             for name, (evidence, left) in without.items()
         },
-        part_left=lambda channel, signals: signals[channel],
+        sizes={"dte": Sizes(1.0, 1.0, 0.9, 0.1, 0.01)},
+        rms_left=lambda channel, signals: signals[channel],
         found=SimpleNamespace(
             simulator=SimpleNamespace(anchored=not nudged, free=SimpleNamespace(channels=channels)),
             selection=SimpleNamespace(
