@@ -6,12 +6,12 @@ from collections.abc import Callable, Sequence
 
 from gearbench.bench.nonlinear.followed import follows
 from gearbench.diagnosis.account import LINES
-from gearbench.diagnosis.effects.effect import Hypothesis
 from gearbench.diagnosis.effects.library import LIBRARY
 from gearbench.diagnosis.judging.elements import HELD, ByElements, by_elements
 from gearbench.diagnosis.judging.judged import Closing, Judged
 from gearbench.diagnosis.judging.naming import parameters_of
 from gearbench.diagnosis.replay.gap import gaps_of
+from gearbench.diagnosis.selection.weighing import Weighed
 from gearbench.diagnosis.verdict import Confirmation, Confirmed, Effect, Gap, Parameter
 from gearbench.diagnosis.words import CHANNELS, SHOWN_UNITS, length, number
 
@@ -51,11 +51,11 @@ def _effects(judged: Judged, found: ByElements) -> tuple[Confirmation, ...]:
     """Each named effect by finite elements; one at work in two places counts once, by the one that shows it better."""
     out: dict[str, Confirmation] = {}
     for one in judged.found.selection.entered:
-        effect, closing = one.hypothesis.effect, found.closings.get(one.hypothesis.name)
-        if effect is None or closing is None:
+        effect, closing = one.effect, found.closings.get(one.hypothesis.name)
+        if closing is None:
             continue
         before = out.get(effect.name)
-        parameters = {**(before.parameters if before else {}), **_parameters(judged, found, one.hypothesis)}
+        parameters = {**(before.parameters if before else {}), **_parameters(judged, found, one)}
         if before is not None and before.growth > closing.growth:
             out[effect.name] = before.model_copy(update={"parameters": parameters})
             continue
@@ -65,13 +65,13 @@ def _effects(judged: Judged, found: ByElements) -> tuple[Confirmation, ...]:
     return tuple(out.values())
 
 
-def _parameters(judged: Judged, found: ByElements, hypothesis: Hypothesis) -> dict[str, Parameter]:
+def _parameters(judged: Judged, found: ByElements, one: Weighed) -> dict[str, Parameter]:
     """Parameters of an effect as finite elements fit them; none of one that they hold as the lumped model has it."""
     layout, best = judged.found.layout, found.optimum
-    if best is None or hypothesis.effect is None or hypothesis.wide[0].key in HELD:
+    if best is None or one.hypothesis.wide[0].key in HELD:
         return {}
-    estimates = hypothesis.effect.add(layout.nominal.rig, hypothesis, layout.fitted(best.p, best.std))[1]
-    return parameters_of(hypothesis.effect, estimates)
+    estimates = one.effect.add(layout.nominal.rig, one.hypothesis, layout.fitted(best.p, best.std))[1]
+    return parameters_of(one.effect, estimates)
 
 
 def _sentences(judged: Judged, found: ByElements) -> list[str]:
@@ -79,9 +79,9 @@ def _sentences(judged: Judged, found: ByElements) -> list[str]:
     said = []
     for one in judged.found.selection.entered:
         closing = found.closings.get(one.hypothesis.name)
-        if closing is None or one.hypothesis.effect is None:
+        if closing is None:
             continue
-        noun = one.hypothesis.effect.noun
+        noun = one.effect.noun
         if closing.due:
             times = f"the gap of the {_part(closing)} is {number(closing.growth, 2)} times as large"
             said.append(f"finite elements confirm {noun}: fitted again without it, {times}")

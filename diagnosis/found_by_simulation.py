@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from gearbench.diagnosis.account import places_of, sentence_of_effect, sentence_of_only, sentence_of_rivals
 from gearbench.diagnosis.effects.backlash import BACKLASH
-from gearbench.diagnosis.effects.effect import Hypothesis
 from gearbench.diagnosis.effects.temperature_drift import TEMPERATURE_DRIFT
 from gearbench.diagnosis.evidence.fit import Fit
 from gearbench.diagnosis.evidence.problem import Problem
@@ -104,7 +103,7 @@ def by_simulation(
         where=places_of(judged, kept, missing),
         recalibrated=found.recalibrated if kept else found.without_any,
         with_effect=found.with_effects if decided.named else None,
-        because=(*decided.because, *_why(judged, kept), *doubts, *flanks,
+        because=(*decided.because, *_why(judged, decided.named), *doubts, *flanks,
                  *([way.sentence()] if way else []), *sentences_of_others(of.measurements, of.steady, band)),
         structure=structure_found(found.layout.unknowns, found.selection.best.p, found.std),
         missing=missing,
@@ -164,18 +163,15 @@ def changing_of(judged: Judged, parts: Mapping[str, float]) -> float:
     return max((rms / one.nominal for rms, one in sizes.values() if rms > seen * one.final), default=0.0)
 
 
-def _why(judged: Judged, kept: Sequence[Hypothesis]) -> tuple[str, ...]:
+def _why(judged: Judged, named: Sequence[Weighed]) -> tuple[str, ...]:
     """What each named effect closes, and what closes nothing."""
     said = []
-    for one in kept:
-        assert one.effect is not None
-        closing = judged.closings[one.name]
+    for one in named:
+        closing = judged.closings[one.hypothesis.name]
         said.append(sentence_of_effect(one.effect.noun, closing, judged.share(closing.without)))
-    said += [sentence_of_only(one.hypothesis.effect.noun, one.only_in)
-             for one in judged.found.selection.entered if one.only_in and one.hypothesis.effect]
-    said += [sentence_of_rivals(one.causes) for one in judged.found.selection.entered if one.rivals]
+    said += [sentence_of_only(one.effect.noun, one.only_in) for one in named if one.only_in]
+    said += [sentence_of_rivals(one.causes) for one in named if one.rivals]
     for weighed in judged.dropped:
-        assert weighed.hypothesis.effect is not None
-        noun = weighed.hypothesis.effect.noun
+        noun = weighed.effect.noun
         said.append(f"The records of the search speak for {noun}, but the judged record's gap stays as it was with it")
     return tuple(said)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.judging.judged import Judged
-from gearbench.diagnosis.selection.weighing import Weighed
+from gearbench.diagnosis.selection.weighing import best_evidence
 from gearbench.diagnosis.verdict import Candidate
 
 Array = NDArray[np.float64]
@@ -23,13 +23,9 @@ def candidates_of(judged: Judged, held_out: Measurement | None) -> tuple[Candida
     Evidence is that over the background alone, or beside what else entered where only that shows an effect. Beside
     effects that entered, the background has no part of them."""
     selection, base = judged.found.selection, judged.found.selection.base.evidence
-    entered = tuple(dict.fromkeys(name_of(one) for one in selection.entered))
-    evidence: dict[Effects, float] = {(): 0.0}
-    for one in selection.weighed:  # the best first
-        evidence.setdefault((name_of(one),), one.log_bayes_factor)
-    for one in selection.entered:
-        alone = evidence.get((name_of(one),), -np.inf)
-        evidence[(name_of(one),)] = max(alone, one.log_bayes_factor)
+    entered = tuple(dict.fromkeys(one.effect.name for one in selection.entered))
+    single = best_evidence(selection.weighed, selection.entered)
+    evidence: dict[Effects, float] = {(): 0.0, **{(name,): value for name, value in single.items()}}
     if len(entered) > 1:
         evidence[entered] = selection.best.evidence - base
     left = _left(judged, entered) if judged.measured is held_out else {}
@@ -39,21 +35,15 @@ def candidates_of(judged: Judged, held_out: Measurement | None) -> tuple[Candida
     return tuple(sorted(listed, key=lambda candidate: -candidate.log_evidence))
 
 
-def name_of(one: Weighed) -> str:
-    """The effect of what was weighed."""
-    assert one.hypothesis.effect is not None
-    return one.hypothesis.effect.name
-
-
 def _single(judged: Judged) -> dict[str, Effects]:
     """What else entered, by the name of each hypothesis whose effect is at work in one place."""
     entered = judged.found.selection.entered
-    names = [name_of(one) for one in entered]
+    names = [one.effect.name for one in entered]
     count = Counter(names)
     return {
-        one.hypothesis.name: tuple(dict.fromkeys(name for name in names if name != name_of(one)))
+        one.hypothesis.name: tuple(dict.fromkeys(name for name in names if name != one.effect.name))
         for one in entered
-        if count[name_of(one)] == 1
+        if count[one.effect.name] == 1
     }
 
 
@@ -73,10 +63,10 @@ def _left(judged: Judged, entered: Effects) -> dict[Effects, float]:
     for name, effects in _single(judged).items():
         signals.setdefault(effects, judged.closings[name].without)
     for one in judged.found.selection.weighed if simulator.anchored else ():
-        if (name_of(one),) in signals or one.optimum is None or one.log_bayes_factor <= 0.0:
+        if (one.effect.name,) in signals or one.optimum is None or one.log_bayes_factor <= 0.0:
             continue
         try:
-            signals[(name_of(one),)] = simulator.free.channels(one.optimum.p, judged.measured)
+            signals[(one.effect.name,)] = simulator.free.channels(one.optimum.p, judged.measured)
         except ValueError:  # a rig that cannot answer the record leaves a number out
             continue
     return {effects: judged.rms_left("dte", values) / size.fluctuation for effects, values in signals.items()}

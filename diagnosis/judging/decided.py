@@ -187,7 +187,7 @@ def _nothing(judged: Judged, known: Calibration) -> str:
 
 
 def _nouns(named: tuple[Weighed, ...]) -> str:
-    return " and ".join(one.hypothesis.effect.noun for one in named if one.hypothesis.effect is not None)
+    return " and ".join(one.effect.noun for one in named)
 
 
 def _made_up(missing: Missing, named: tuple[Weighed, ...]) -> str:
@@ -240,8 +240,7 @@ def _leading(missing: Missing) -> Place:
 
 def size_needed(one: Weighed, limits: Limits) -> float:
     """Size, over that of a background, from which an effect is named."""
-    assert one.hypothesis.effect is not None
-    return limits.size_of(one.hypothesis.effect)
+    return limits.size_of(one.effect)
 
 
 def relative_size(found: Simulated, one: Weighed) -> float:
@@ -253,7 +252,7 @@ def relative_size(found: Simulated, one: Weighed) -> float:
 
 def _by_force(forces: Search, named: tuple[Weighed, ...]) -> float:
     """Most evidence that the force residuals have for what is named."""
-    names = {one.hypothesis.effect.name for one in named if one.hypothesis.effect}
+    names = {one.effect.name for one in named}
     found = [
         one.log_bayes_factor for one in forces.tried if one.hypothesis.effect and one.hypothesis.effect.name in names
     ]

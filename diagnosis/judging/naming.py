@@ -33,8 +33,7 @@ def effects_of(judged: Judged, decided: Decided, chances: Chances) -> tuple[Effe
     values = found.layout.fitted(found.selection.best.p, found.std)
     out: dict[str, Effect] = {}
     for one in decided.named:
-        effect = one.hypothesis.effect
-        assert effect is not None
+        effect = one.effect
         estimates = effect.add(found.layout.nominal.rig, one.hypothesis, values)[1]
         before = out[effect.name].parameters if effect.name in out else {}
         closing = judged.closings[one.hypothesis.name]

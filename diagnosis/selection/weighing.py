@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.bench.plan.workers import side_by_side
-from gearbench.diagnosis.effects.effect import Hypothesis, Wide
+from gearbench.diagnosis.effects.effect import Effect, Hypothesis, Wide
 from gearbench.diagnosis.fitting.fit import GAIN, Optimum, cost_of, fit, fit_afresh
 from gearbench.diagnosis.fitting.reshaped import has_shapes, reshaped
 from gearbench.diagnosis.fitting.restructured import better
@@ -54,9 +54,23 @@ class Weighed:
     only_in: str = ""
 
     @property
+    def effect(self) -> Effect:
+        """The effect of the hypothesis: nothing is weighed without one."""
+        assert self.hypothesis.effect is not None
+        return self.hypothesis.effect
+
+    @property
     def causes(self) -> tuple[Hypothesis, ...]:
         """The hypothesis and its rivals."""
         return (self.hypothesis, *self.rivals)
+
+
+def best_evidence(*lists: Sequence[Weighed]) -> dict[str, float]:
+    """Most evidence of each effect in what was weighed, by its name."""
+    out: dict[str, float] = {}
+    for one in (one for several in lists for one in several):
+        out[one.effect.name] = max(out.get(one.effect.name, -np.inf), one.log_bayes_factor)
+    return out
 
 
 def weigh(

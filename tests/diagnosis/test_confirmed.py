@@ -17,6 +17,7 @@ from gearbench.diagnosis.effects.friction import FRICTION
 from gearbench.diagnosis.intake.signals import measured_channels
 from gearbench.diagnosis.judging.elements import ByElements
 from gearbench.diagnosis.judging.judged import Closing
+from gearbench.diagnosis.selection.weighing import Weighed
 from gearbench.diagnosis.verdict import Confirmed, Effect, Probabilities, Verdict
 from gearbench.diagnosis.verdict_file import parse_verdict, verdict_json
 from gearbench.diagnosis.words import length
@@ -37,7 +38,7 @@ def asked(monkeypatch: pytest.MonkeyPatch, closing: Closing) -> Confirmed:
     }
     answer = ByElements({}, signals, {"friction": closing}, None, ("rig.damping.mesh_exponent",))
     monkeypatch.setattr(module, "by_elements", lambda judged, effects, report: answer)
-    selection = SimpleNamespace(entered=[SimpleNamespace(hypothesis=HYPOTHESIS)])
+    selection = SimpleNamespace(entered=[Weighed(HYPOTHESIS, 0.0, None)])
     layout = SimpleNamespace(nominal=nominal())
     judged: Any = SimpleNamespace(measured=measured, found=SimpleNamespace(selection=selection, layout=layout))
     return confirmed_by_elements(judged, NAMED, lambda step: None)

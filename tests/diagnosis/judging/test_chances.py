@@ -8,13 +8,14 @@ from typing import Any
 from gearbench.diagnosis.judging.chances import LIKELY, Chances, chances_of, sentence_of_doubt, unlikely
 from gearbench.diagnosis.odds import effect_signs
 from gearbench.diagnosis.population import POPULATION
+from gearbench.diagnosis.selection.weighing import Weighed
 
 LINES = 900.0
 
 
 def weighed(name: str, evidence: float) -> Any:
-    hypothesis = SimpleNamespace(name=name, effect=SimpleNamespace(name=name))
-    return SimpleNamespace(hypothesis=hypothesis, log_bayes_factor=evidence)
+    hypothesis: Any = SimpleNamespace(name=name, effect=SimpleNamespace(name=name))
+    return Weighed(hypothesis, evidence, None)
 
 
 def test_an_effect_that_entered_and_is_not_named_makes_none_likely() -> None:

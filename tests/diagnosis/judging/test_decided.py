@@ -19,6 +19,7 @@ from gearbench.diagnosis.judging.decided import GREATER, HIDING, PLAIN, VISIBLE,
 from gearbench.diagnosis.judging.drift import Drift
 from gearbench.diagnosis.judging.missing import OUTSTANDING, Missing
 from gearbench.diagnosis.population import POPULATION
+from gearbench.diagnosis.selection.weighing import Weighed
 from gearbench.diagnosis.structure.structure import LATE
 from gearbench.diagnosis.verdict import Outcome
 from gearbench.diagnosis.words import percent
@@ -51,7 +52,7 @@ def decided(
     whose noise may hide `hidden` of it; the drive acts `late` s, of sound rigs 1e-5."""
     entered: tuple[Any, ...] = ()
     if worth is not None:
-        entered = (SimpleNamespace(hypothesis=FRICTION, log_bayes_factor=worth),)
+        entered = (Weighed(FRICTION, worth, None),)
     judged: Any = SimpleNamespace(
         found=SimpleNamespace(
             selection=SimpleNamespace(entered=entered, weighed=entered, best=SimpleNamespace(p=np.array([late]))),
