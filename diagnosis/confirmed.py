@@ -7,8 +7,9 @@ from collections.abc import Callable, Sequence
 from gearbench.bench.nonlinear.followed import follows
 from gearbench.diagnosis.account import LINES
 from gearbench.diagnosis.effects.library import LIBRARY
+from gearbench.diagnosis.judging.closing import Closing
 from gearbench.diagnosis.judging.elements import HELD, ByElements, by_elements
-from gearbench.diagnosis.judging.judged import Closing, Judged
+from gearbench.diagnosis.judging.judged import Judged
 from gearbench.diagnosis.judging.naming import parameters_of
 from gearbench.diagnosis.replay.gap import gaps_of
 from gearbench.diagnosis.selection.weighing import Weighed

@@ -23,9 +23,10 @@ from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.judging.along import along
 from gearbench.diagnosis.judging.candidates import candidates_of
 from gearbench.diagnosis.judging.chances import chances_of, sentence_of_doubt, unlikely
+from gearbench.diagnosis.judging.closing import DUE
 from gearbench.diagnosis.judging.decided import decide_simulated
 from gearbench.diagnosis.judging.drift import drift_of
-from gearbench.diagnosis.judging.judged import DUE, Judged
+from gearbench.diagnosis.judging.judged import Judged
 from gearbench.diagnosis.judging.missing import Missing, missing_forces, nothing_missing
 from gearbench.diagnosis.judging.naming import drifts_of, effects_of
 from gearbench.diagnosis.judging.only_there import with_backlash_there

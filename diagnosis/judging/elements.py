@@ -20,7 +20,8 @@ from gearbench.diagnosis.effects.backlash import KEY as BACKLASH
 from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
 from gearbench.diagnosis.fitting.fit import Optimum, Sensitivity, fit
 from gearbench.diagnosis.intake.signals import simulated_channels
-from gearbench.diagnosis.judging.judged import Closing, Judged, closing_of
+from gearbench.diagnosis.judging.closing import Closing, closing_of
+from gearbench.diagnosis.judging.judged import Judged
 from gearbench.diagnosis.replay.replays import Replay
 from gearbench.diagnosis.simulation.quadratic import quadratic_of
 from gearbench.diagnosis.simulation.simulator import Simulator

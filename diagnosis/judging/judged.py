@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.diagnosis.evidence.problem import Problem
-from gearbench.diagnosis.fitting.fit import Optimum
 from gearbench.diagnosis.forces.condition import prepare
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.intake.signals import measured_channels
+from gearbench.diagnosis.judging.closing import DUE, GAIN, Closing, both, closing_of, energy_of, feels, free_closing
 from gearbench.diagnosis.selection.followable import nudges_of, parts
 from gearbench.diagnosis.selection.selection import further, only, taken_out
 from gearbench.diagnosis.selection.simulated import Simulated
@@ -32,38 +32,9 @@ from gearbench.diagnosis.simulation.target import FITTED, Target, target_of
 Array = NDArray[np.float64]
 Report = Callable[[str], None]
 
-# By how much the gap must grow without an effect for it to be named.
-DUE = 1.1
-# Nats by which the judged record must be more likely with it: odds of 20.
-GAIN = 3.0
 # Of the nominal gap, rms over rms and all channels in units of their own fluctuation: more than this part left is "the
 # greater part".
 GREATER = 0.5
-# Energy of what an effect changes over that of what is left, below which a record does not feel it.
-FELT = 0.1
-# Part of a channel's whole gap below which a part of it counts for nothing.
-SEEN = 0.05
-
-
-@dataclass(frozen=True)
-class Closing:
-    """What an effect closes of the judged record: nats gained, the largest factor by which the gap of some part grows
-    without it, that part in words (channel, kind of line or band), the signals (channel -> (N,)) without it, and the
-    nats that the search lacked up to its limit, which are to be gained here besides, the optimum without it, and the
-    `record` that tells where the judged one does not feel the effect."""
-
-    gain: float
-    growth: float
-    part: tuple[str, str]
-    without: Mapping[str, Array]
-    lacking: float = 0.0
-    optimum: Optimum | None = None
-    record: str = ""
-
-    @property
-    def due(self) -> bool:
-        """Whether the effect closes a part of the gap that the record can see."""
-        return self.gain > GAIN + self.lacking and self.growth > DUE
 
 
 @dataclass(frozen=True)
@@ -98,7 +69,7 @@ class Judged:
     def _rms(self, values: Array) -> float:
         """Rms of a signal (N,), or of parts (parts, N) that add up by their squares, up to the highest line that the
         search sees: beyond the excitation nothing determines the rig."""
-        return max(float(np.sqrt(sum(_energy(one)[: self._top].sum() for one in np.atleast_2d(values)))), 1e-300)
+        return max(float(np.sqrt(sum(energy_of(one)[: self._top].sum() for one in np.atleast_2d(values)))), 1e-300)
 
     @cached_property
     def _top(self) -> int | None:
@@ -281,7 +252,7 @@ def _closings(
             # Alone, an effect must do better than the rig that was found without any, too.
             others = [optimum, selection.bare] if len(selection.entered) == 1 else [optimum]
             without = [free.channels(found.end_of(other), measured) for other in others]
-            closing = _both(closing, *(free_closing(target, one, signals) for one in without))
+            closing = both(closing, *(free_closing(target, one, signals) for one in without))
         lacking = inf if one.lacking and not apart else one.lacking
         silent = silent or (not closing.due and closing.gain > -GAIN)
         if parted and not one.lacking and silent:
@@ -293,77 +264,8 @@ def _closings(
     return Judged(measured, found, closings, nominal, plain, signals, target=target, noise=noise)
 
 
-def free_closing(target: Target, without: Mapping[str, Array], with_all: Mapping[str, Array]) -> Closing:
-    """What an effect closes by simulations that go their own way: some part of the gap, and of the whole as much. Where
-    flanks part, one part or another is closer by chance."""
-    closing = closing_of(target, without, with_all)
-    lost, kept = (target.energies(target.lines - target.gathered([one])) for one in (without, with_all))
-    size = target.sizes / target.of_channels(target.energies(target.lines) * target.sizes)
-    whole = float(np.sqrt((lost * size).sum() / max(((kept + target.noise) * size).sum(), 1e-300)))
-    return replace(closing, growth=min(closing.growth, whole))
-
-
-def _both(nudged: Closing, *free: Closing) -> Closing:
-    """What an effect closes by simulations that are `nudged`, if it does so too where nothing holds them on the
-    record's way; the signals are those of the `free` ones."""
-    worst = min(free, key=lambda one: (one.due, one.gain))
-    if worst.due:
-        return replace(nudged, without=worst.without)
-    return replace(worst, gain=min(nudged.gain, worst.gain))
-
-
 def _closing_there(simulator: Simulator, target: Target, without: Array, with_all: Array) -> Closing:
     """What unknowns `with_all` (size,) close beside those `without` (size,) of the one record of a target."""
     (measured,) = target.measurements
     signals = [simulator.channels(p, measured) for p in (without, with_all)]
     return replace(closing_of(target, *signals), record=measured.name)
-
-
-def feels(target: Target, without: Mapping[str, Array], with_all: Mapping[str, Array]) -> bool:
-    """Whether a record can speak for or against an effect: some block's gap could grow by 5 % without it."""
-    one, other = (target.gathered([signals]) for signals in (without, with_all))
-    left = target.energies(target.lines - other) + target.noise
-    return bool((target.energies(one - other) > FELT * left).any())
-
-
-def closing_of(target: Target, without: Mapping[str, Array], with_all: Mapping[str, Array]) -> Closing:
-    """What an effect closes of a record, from the signals (channel -> (N,)) of the rigs without and with it."""
-    rest, final = (target.lines - target.gathered([signals]) for signals in (without, with_all))
-    growth, part = growth_of(target, target.energies(rest), target.energies(final))
-    return Closing(target.cost(rest) - target.cost(final), growth, part, without)
-
-
-def growth_of(target: Target, without: Array, with_all: Array) -> tuple[float, tuple[str, str]]:
-    """The largest factor between the rms gaps without and with an effect (blocks,), over the parts of each channel that
-    hold a visible part of the gap without it, and which part that is."""
-    lost, kept = without * target.sizes, with_all * target.sizes
-    noise = target.noise * target.sizes
-    best, where = 0.0, ("", "")
-    for channel in dict.fromkeys(block.channel for block in target.blocks):
-        inside = np.array([block.channel == channel for block in target.blocks])
-        whole = float(lost[inside].sum())
-        labels = [(block.kind, f"{block.band[0]:g}–{block.band[1]:g}") for block in target.blocks]
-        for label in sorted({one for part, here in zip(labels, inside, strict=True) if here for one in part}):
-            mine = inside & np.array([label in part for part in labels])
-            if float(lost[mine].sum()) < SEEN**2 * whole:
-                continue
-            factor = float(np.sqrt(lost[mine].sum() / max(float(kept[mine].sum()), float(noise[mine].sum()), 1e-300)))
-            if factor > best:
-                best, where = factor, (channel, label)
-    return best, where
-
-
-def rms_closed(measured: Measurement, channel: str, without: Array, with_all: Array) -> tuple[float, float, float]:
-    """Rms (value, low, high) by which a channel's gap grows without an effect, with its 90 % interval: the lines of the
-    difference of energies, each counted as one draw."""
-    real = measured_channels(measured)[channel].mean(axis=0)
-    energy = _energy(real - without) - _energy(real - with_all)
-    total, spread = float(energy.sum()), 1.6449 * float(np.sqrt(0.5 * (energy**2).sum()))
-    value, low, high = (float(np.sqrt(max(one, 0.0))) for one in (total, total - spread, total + spread))
-    return value, low, high
-
-
-def _energy(values: Array) -> Array:
-    energy = np.asarray(np.abs(np.fft.rfft(values) / values.size) ** 2, dtype=np.float64)
-    energy[1 : (values.size + 1) // 2] *= 2
-    return energy[1:]

@@ -9,8 +9,9 @@ from gearbench.diagnosis.effects.effect import Estimate
 from gearbench.diagnosis.effects.temperature_drift import TEMPERATURE_DRIFT
 from gearbench.diagnosis.intake.signals import UNITS
 from gearbench.diagnosis.judging.chances import Chances
+from gearbench.diagnosis.judging.closing import Closing, rms_closed
 from gearbench.diagnosis.judging.decided import Decided
-from gearbench.diagnosis.judging.judged import Closing, Judged, rms_closed
+from gearbench.diagnosis.judging.judged import Judged
 from gearbench.diagnosis.verdict import NINE_OF_TEN, Effect, Parameter, Range
 from gearbench.diagnosis.words import SHOWN_UNITS
 

@@ -10,7 +10,7 @@ from gearbench.diagnosis.effects.backlash import BACKLASH, KEY
 from gearbench.diagnosis.evidence.calibration import LIMITS
 from gearbench.diagnosis.forces.condition import Condition
 from gearbench.diagnosis.intake.measurements import Measurement
-from gearbench.diagnosis.judging.judged import DUE, FELT, GAIN, growth_of
+from gearbench.diagnosis.judging.closing import DUE, FELT, GAIN, growth_of
 from gearbench.diagnosis.planning.information import floors_of
 from gearbench.diagnosis.planning.planned import Planned
 from gearbench.diagnosis.selection.weighing import LIMIT

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from gearbench.diagnosis.effects.effect import Hypothesis
 from gearbench.diagnosis.evidence.calibration import LIMITS
 from gearbench.diagnosis.evidence.separable import APART
-from gearbench.diagnosis.judging.judged import DUE, GAIN, growth_of
+from gearbench.diagnosis.judging.closing import DUE, GAIN, growth_of
 from gearbench.diagnosis.planning.information import Known, Without
 from gearbench.diagnosis.selection.rivals import NEARLY
 from gearbench.diagnosis.selection.selection import known_within

@@ -22,7 +22,7 @@ from gearbench.diagnosis.effects.effect import Hypothesis
 from gearbench.diagnosis.effects.encoder_runout import ENCODER_RUNOUT
 from gearbench.diagnosis.effects.friction import FRICTION
 from gearbench.diagnosis.forces.equations import PLACES
-from gearbench.diagnosis.judging.judged import Closing
+from gearbench.diagnosis.judging.closing import Closing
 from gearbench.diagnosis.judging.missing import OUTSTANDING, SILENT, Missing, nothing_missing
 from gearbench.diagnosis.verdict import Gap, Range
 

@@ -15,8 +15,8 @@ from gearbench.diagnosis.diagnosis import take_in
 from gearbench.diagnosis.effects.effect import Hypothesis, Wide
 from gearbench.diagnosis.effects.friction import FRICTION
 from gearbench.diagnosis.intake.signals import measured_channels
+from gearbench.diagnosis.judging.closing import Closing
 from gearbench.diagnosis.judging.elements import ByElements
-from gearbench.diagnosis.judging.judged import Closing
 from gearbench.diagnosis.selection.weighing import Weighed
 from gearbench.diagnosis.verdict import Confirmed, Effect, Probabilities, Verdict
 from gearbench.diagnosis.verdict_file import parse_verdict, verdict_json

@@ -13,17 +13,10 @@ from shared.fake_simulator import LINES, FakeSimulator, chosen, sensitivities, t
 
 from gearbench.diagnosis.account import sentence_of_effect
 from gearbench.diagnosis.effects.effect import Hypothesis, Wide
+from gearbench.diagnosis.judging import closing as closing_module
 from gearbench.diagnosis.judging import judged as module
-from gearbench.diagnosis.judging.judged import (
-    GAIN,
-    GREATER,
-    Judged,
-    Sizes,
-    closing_of,
-    free_closing,
-    judged_on,
-    rms_closed,
-)
+from gearbench.diagnosis.judging.closing import GAIN, closing_of, free_closing, rms_closed
+from gearbench.diagnosis.judging.judged import GREATER, Judged, Sizes, judged_on
 from gearbench.diagnosis.selection import selection as selecting
 from gearbench.diagnosis.selection.selection import Selection
 from gearbench.diagnosis.selection.simulated import Simulated
@@ -232,7 +225,8 @@ def test_each_of_two_effects_is_taken_out_alone(monkeypatch: pytest.MonkeyPatch)
 def test_parts_of_the_gap_are_energies_beyond_noise_in_units_of_each_channel(monkeypatch: pytest.MonkeyPatch) -> None:
     rng = np.random.default_rng(2)
     measured = {name: size * rng.standard_normal((1, 4096)) for name, size in (("dte", 1.0), ("y_driver", 10.0))}
-    monkeypatch.setattr(module, "measured_channels", lambda one: measured)
+    for where in (module, closing_module):
+        monkeypatch.setattr(where, "measured_channels", lambda one: measured)
     gap = {name: values[0] - values[0].std() * rng.standard_normal(4096) for name, values in measured.items()}
     nominal = {name: values[0] - 0.5 * gap[name] for name, values in measured.items()}
     final = {name: values[0] - 0.1 * gap[name] for name, values in measured.items()}

@@ -1,0 +1,116 @@
+"""What an effect closes of the gap in a record: nats, and by how much some part of the gap grows without it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.diagnosis.fitting.fit import Optimum
+from gearbench.diagnosis.intake.measurements import Measurement
+from gearbench.diagnosis.intake.signals import measured_channels
+from gearbench.diagnosis.simulation.target import Target
+
+Array = NDArray[np.float64]
+
+# By how much the gap must grow without an effect for it to be named.
+DUE = 1.1
+# Nats by which the judged record must be more likely with it: odds of 20.
+GAIN = 3.0
+# Energy of what an effect changes over that of what is left, below which a record does not feel it.
+FELT = 0.1
+# Part of a channel's whole gap below which a part of it counts for nothing.
+SEEN = 0.05
+
+
+@dataclass(frozen=True)
+class Closing:
+    """What an effect closes of the judged record: nats gained, the largest factor by which the gap of some part grows
+    without it, that part in words (channel, kind of line or band), the signals (channel -> (N,)) without it, and the
+    nats that the search lacked up to its limit, which are to be gained here besides, the optimum without it, and the
+    `record` that tells where the judged one does not feel the effect."""
+
+    gain: float
+    growth: float
+    part: tuple[str, str]
+    without: Mapping[str, Array]
+    lacking: float = 0.0
+    optimum: Optimum | None = None
+    record: str = ""
+
+    @property
+    def due(self) -> bool:
+        """Whether the effect closes a part of the gap that the record can see."""
+        return self.gain > GAIN + self.lacking and self.growth > DUE
+
+
+def free_closing(target: Target, without: Mapping[str, Array], with_all: Mapping[str, Array]) -> Closing:
+    """What an effect closes by simulations that go their own way: some part of the gap, and of the whole as much. Where
+    flanks part, one part or another is closer by chance."""
+    closing = closing_of(target, without, with_all)
+    lost, kept = (target.energies(target.lines - target.gathered([one])) for one in (without, with_all))
+    size = target.sizes / target.of_channels(target.energies(target.lines) * target.sizes)
+    whole = float(np.sqrt((lost * size).sum() / max(((kept + target.noise) * size).sum(), 1e-300)))
+    return replace(closing, growth=min(closing.growth, whole))
+
+
+def both(nudged: Closing, *free: Closing) -> Closing:
+    """What an effect closes by simulations that are `nudged`, if it does so too where nothing holds them on the
+    record's way; the signals are those of the `free` ones."""
+    worst = min(free, key=lambda one: (one.due, one.gain))
+    if worst.due:
+        return replace(nudged, without=worst.without)
+    return replace(worst, gain=min(nudged.gain, worst.gain))
+
+
+def feels(target: Target, without: Mapping[str, Array], with_all: Mapping[str, Array]) -> bool:
+    """Whether a record can speak for or against an effect: some block's gap could grow by 5 % without it."""
+    one, other = (target.gathered([signals]) for signals in (without, with_all))
+    left = target.energies(target.lines - other) + target.noise
+    return bool((target.energies(one - other) > FELT * left).any())
+
+
+def closing_of(target: Target, without: Mapping[str, Array], with_all: Mapping[str, Array]) -> Closing:
+    """What an effect closes of a record, from the signals (channel -> (N,)) of the rigs without and with it."""
+    rest, final = (target.lines - target.gathered([signals]) for signals in (without, with_all))
+    growth, part = growth_of(target, target.energies(rest), target.energies(final))
+    return Closing(target.cost(rest) - target.cost(final), growth, part, without)
+
+
+def growth_of(target: Target, without: Array, with_all: Array) -> tuple[float, tuple[str, str]]:
+    """The largest factor between the rms gaps without and with an effect (blocks,), over the parts of each channel that
+    hold a visible part of the gap without it, and which part that is."""
+    lost, kept = without * target.sizes, with_all * target.sizes
+    noise = target.noise * target.sizes
+    best, where = 0.0, ("", "")
+    for channel in dict.fromkeys(block.channel for block in target.blocks):
+        inside = np.array([block.channel == channel for block in target.blocks])
+        whole = float(lost[inside].sum())
+        labels = [(block.kind, f"{block.band[0]:g}–{block.band[1]:g}") for block in target.blocks]
+        for label in sorted({one for part, here in zip(labels, inside, strict=True) if here for one in part}):
+            mine = inside & np.array([label in part for part in labels])
+            if float(lost[mine].sum()) < SEEN**2 * whole:
+                continue
+            factor = float(np.sqrt(lost[mine].sum() / max(float(kept[mine].sum()), float(noise[mine].sum()), 1e-300)))
+            if factor > best:
+                best, where = factor, (channel, label)
+    return best, where
+
+
+def rms_closed(measured: Measurement, channel: str, without: Array, with_all: Array) -> tuple[float, float, float]:
+    """Rms (value, low, high) by which a channel's gap grows without an effect, with its 90 % interval: the lines of the
+    difference of energies, each counted as one draw."""
+    real = measured_channels(measured)[channel].mean(axis=0)
+    energy = energy_of(real - without) - energy_of(real - with_all)
+    total, spread = float(energy.sum()), 1.6449 * float(np.sqrt(0.5 * (energy**2).sum()))
+    value, low, high = (float(np.sqrt(max(one, 0.0))) for one in (total, total - spread, total + spread))
+    return value, low, high
+
+
+def energy_of(values: Array) -> Array:
+    """Energies of the lines of a signal (N,), without its mean."""
+    energy = np.asarray(np.abs(np.fft.rfft(values) / values.size) ** 2, dtype=np.float64)
+    energy[1 : (values.size + 1) // 2] *= 2
+    return energy[1:]
