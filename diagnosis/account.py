@@ -134,8 +134,9 @@ def sentence_of_effect(noun: str, closing: Closing, share: float) -> str:
             f"Without {noun} the gap of the {where} {lines} is {number(closing.growth, 2)} times as large on record"
             f" {closing.record}, whose flanks part; the judged record does not feel it"
         )
+    kept = "" if closing.own is None else ", kept on the record's way,"
     return (
-        f"Without {noun} the gap of the {where} {lines} is {number(closing.growth, 2)} times as large; that is"
+        f"Without {noun} the gap of the {where} {lines}{kept} is {number(closing.growth, 2)} times as large; that is"
         f" {percent(share)} of the nominal rig's whole gap"
     )
 

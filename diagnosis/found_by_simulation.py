@@ -20,7 +20,6 @@ from gearbench.diagnosis.finding import Finding
 from gearbench.diagnosis.forces.equations import PLACES
 from gearbench.diagnosis.forces.steadiness import changing_parts
 from gearbench.diagnosis.intake.measurements import Measurement
-from gearbench.diagnosis.judging.along import along
 from gearbench.diagnosis.judging.candidates import candidates_of
 from gearbench.diagnosis.judging.chances import chances_of, sentence_of_doubt, unlikely
 from gearbench.diagnosis.judging.closing import DUE
@@ -91,7 +90,7 @@ def by_simulation(
         judged = judged_of_size(of.problem, left_out(found, (doubtful,)), held_out, of.measurements, report)
     kept = [one.hypothesis for one in decided.named]
     flanks = other_flanks(found.layout.unknowns, found.selection.best.p)
-    way = along(of.problem, judged)
+    way = judged.along
     signs |= {"along": way.kept / way.own} if way else {}
     common["indistinguishable"] = with_rivals(common["indistinguishable"], decided.named)
     return Finding(

@@ -61,7 +61,8 @@ def _left(judged: Judged, entered: Effects) -> dict[Effects, float]:
         return {}
     signals: dict[Effects, Mapping[str, Array]] = {(): judged.plain, entered: judged.signals}
     for name, effects in _single(judged).items():
-        signals.setdefault(effects, judged.closings[name].without)
+        closing = judged.closings[name]
+        signals.setdefault(effects, closing.own or closing.without)
     for one in judged.found.selection.weighed if simulator.anchored else ():
         if (one.effect.name,) in signals or one.optimum is None or one.log_bayes_factor <= 0.0:
             continue

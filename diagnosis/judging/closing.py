@@ -30,7 +30,8 @@ class Closing:
     """What an effect closes of the judged record: nats gained, the largest factor by which the gap of some part grows
     without it, that part in words (channel, kind of line or band), the signals (channel -> (N,)) without it, and the
     nats that the search lacked up to its limit, which are to be gained here besides, the optimum without it, and the
-    `record` that tells where the judged one does not feel the effect."""
+    `record` that tells where the judged one does not feel the effect. Where the rig is kept on the record's way, which
+    is not its own, `own` are the signals without the effect as that rig goes (None elsewhere)."""
 
     gain: float
     growth: float
@@ -39,6 +40,7 @@ class Closing:
     lacking: float = 0.0
     optimum: Optimum | None = None
     record: str = ""
+    own: Mapping[str, Array] | None = None
 
     @property
     def due(self) -> bool:

@@ -173,6 +173,7 @@ def _without(judged: Judged, missing: Missing, left: _Left, known: Calibration) 
 def _nothing(judged: Judged, known: Calibration) -> str:
     """Why no effect is needed, and what remains all the same."""
     because = "no effect brings the simulation closer to the records than a good rig's share of it; "
+    kept = "" if judged.kept is None else ", kept on the record's way"
     if judged.searched <= known.structure < judged.remains:
         return because + (
             f"it explains the records of the search to {percent(judged.searched)} of any channel's fluctuation: that"
@@ -181,7 +182,7 @@ def _nothing(judged: Judged, known: Calibration) -> str:
     sound = f"within the {percent(known.structure)} that sound rigs leave"
     small = judged.remains <= known.structure
     return because + (
-        f"what remains, at most {percent(judged.remains)} of any channel's fluctuation, is"
+        f"what remains{kept}, at most {percent(judged.remains)} of any channel's fluctuation, is"
         f" {sound if small else 'the smaller part of the gap'}"
     )
 

@@ -1,33 +1,21 @@
-"""Selection held against the record that had no part in it: what each effect closes there.
-
-Every effect that entered is taken out alone, the rig, its structure and the other effects that entered are fitted
-again on the records of the search, and both rigs answer the judged record. An effect is kept if the record is more
-likely with it, and if its gap grows by a tenth or more without it in some part that can be told apart: a channel in one
-band, or in one kind of line.
-"""
+"""A judged record, and what the rig that was found leaves of it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
-from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.diagnosis.evidence.problem import Problem
-from gearbench.diagnosis.forces.condition import prepare
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.intake.signals import measured_channels
-from gearbench.diagnosis.judging.closing import DUE, GAIN, Closing, both, closing_of, energy_of, feels, free_closing
-from gearbench.diagnosis.selection.followable import nudges_of, parts
-from gearbench.diagnosis.selection.selection import further, only, taken_out
+from gearbench.diagnosis.judging.along import CLOSER, FLOORS, Along
+from gearbench.diagnosis.judging.closing import Closing, energy_of
 from gearbench.diagnosis.selection.simulated import Simulated
-from gearbench.diagnosis.selection.weighing import Weighed, is_own
-from gearbench.diagnosis.simulation.passed_noise import noise_left
-from gearbench.diagnosis.simulation.simulator import Simulator
-from gearbench.diagnosis.simulation.target import FITTED, Target, target_of
+from gearbench.diagnosis.selection.weighing import Weighed
+from gearbench.diagnosis.simulation.target import FITTED, Target
 
 Array = NDArray[np.float64]
 Report = Callable[[str], None]
@@ -41,7 +29,8 @@ GREATER = 0.5
 class Judged:
     """A selection on the judged record `measured`: `found` with the effects that are kept, what each closes by its
     hypothesis' name, the signals (channel -> (N,)) of the nominal rig, of the one without any of them and with all of
-    them, what was entered but closes nothing, the lines of that record, and by channel the parts of its noise."""
+    them, what was entered but closes nothing, the lines of that record, by channel the parts of its noise, and the
+    signals with all effects `kept` on the record's way where the rig goes another by itself (None elsewhere)."""
 
     measured: Measurement
     found: Simulated
@@ -52,6 +41,7 @@ class Judged:
     dropped: tuple[Weighed, ...] = ()
     target: Target | None = None
     noise: Mapping[str, Array] = field(default_factory=dict)
+    kept: Mapping[str, Array] | None = None
 
     @cached_property
     def sizes(self) -> dict[str, Sizes]:
@@ -77,13 +67,41 @@ class Judged:
         return max((int(bins.max()) for _, _, bins in self.target.plan), default=None) if self.target else None
 
     @property
+    def answer(self) -> Mapping[str, Array]:
+        """The signals (channel -> (N,)) with all effects that say what is missing: those kept on the record's way where
+        the rig goes another."""
+        return self.signals if self.kept is None else self.kept
+
+    def strays_from(self, kept: Mapping[str, Array]) -> bool:
+        """Whether most of what the rig leaves of the transmission error is that it goes another way than the record:
+        `kept` on that it leaves far less."""
+        size = self.sizes.get("dte")
+        if size is None or size.final <= FLOORS * size.noise:
+            return False
+        return self.rms_left("dte", kept) <= CLOSER * size.final
+
+    @property
+    def along(self) -> Along | None:
+        """What the rig leaves by itself and kept on the record's way, where it goes another."""
+        if self.kept is None:
+            return None
+        return Along(self.measured.name, self.rms_left("dte", self.kept), self.sizes["dte"].final)
+
+    @cached_property
+    def _left(self) -> dict[str, float]:
+        """Rms by channel that `answer` leaves."""
+        if self.kept is None:
+            return {channel: one.final for channel, one in self.sizes.items()}
+        return {channel: self.rms_left(channel, self.kept) for channel in self.sizes}
+
+    @property
     def left(self) -> float:
         """Rms of what is left of the nominal gap, over it, all channels in units of their own fluctuation, beyond
         noise."""
         gap = left = 0.0
-        for one in self.sizes.values():
+        for channel, one in self.sizes.items():
             gap += max(one.nominal**2 - one.noise**2, 0.0) / one.fluctuation**2
-            left += max(one.final**2 - one.noise**2, 0.0) / one.fluctuation**2
+            left += max(self._left[channel] ** 2 - one.noise**2, 0.0) / one.fluctuation**2
         return float(np.sqrt(left / gap)) if gap > 0.0 else 0.0
 
     @property
@@ -95,7 +113,7 @@ class Judged:
     def _remaining(self) -> dict[str, float]:
         """By channel the part of its fluctuation that is left beyond noise."""
         return {
-            channel: float(np.sqrt(max(one.final**2 - one.noise**2, 0.0)) / one.fluctuation)
+            channel: float(np.sqrt(max(self._left[channel] ** 2 - one.noise**2, 0.0)) / one.fluctuation)
             for channel, one in self.sizes.items()
         }
 
@@ -128,7 +146,7 @@ class Judged:
         gap = back = 0.0
         for channel, one in self.sizes.items():
             gap += max(one.nominal**2 - one.noise**2, 0.0) / one.fluctuation**2
-            back += (self.rms_left(channel, without) ** 2 - one.final**2) / one.fluctuation**2
+            back += (self.rms_left(channel, without) ** 2 - self._left[channel] ** 2) / one.fluctuation**2
         return float(np.clip(back / gap, 0.0, 1.0)) if gap > 0.0 else 0.0
 
     def rms_left(self, channel: str, signals: Mapping[str, Array]) -> float:
@@ -150,122 +168,3 @@ class Sizes:
     plain: float
     final: float
     noise: float
-
-
-def judged_on(
-    problem: Problem,
-    found: Simulated,
-    measured: Measurement,
-    searched: Sequence[Measurement] = (),
-    report: Report = lambda step: None,
-) -> Judged | None:
-    """The selection with only those effects that close a part of the gap of `measured`, and those whose place others
-    had that do not; None where the rig found cannot answer that record. Those of the records `searched` whose flanks
-    part, which the fit leaves out or is nudged along, judge what `measured` does not feel, or feels too little of to
-    speak for or against it."""
-    band = problem.conditions[0].band
-    noise = noise_left(found.layout.nominal, measured, found.simulator.simulate)
-    condition = prepare(measured, problem.model, band)
-    target = target_of([measured], [condition], [noise])
-    if is_nudged(found, measured):
-        nudges = {**found.simulator.nudges, **nudges_of(problem.model, [condition])}
-        found = replace(found, simulator=replace(found.simulator, nudges=nudges))
-    fitted = found.simulator.target.measurements
-    rough = [one for one in searched if not any(one is own for own in found.simulator.held_by)]
-    parted = [target_of([one], [prepare(one, problem.model, band)]) for one in rough]
-    dropped: list[Weighed] = []
-    seen: set[frozenset[str]] = set()
-    # A record that had part in the search cannot make up for what it lacked.
-    apart = not any(measured is searched for searched in fitted)
-    while True:
-        seen.add(_names(found.selection.entered))
-        try:
-            judged = _closings(found, target, measured, parted, noise, apart=apart)
-        except ValueError:
-            return None
-        poor = [one for one in found.selection.entered if not _stays(judged, one)]
-        if poor:
-            worst = min(poor, key=lambda one: judged.closings[one.hypothesis.name].gain)
-            dropped.append(worst)
-            kept = [one for one in found.selection.entered if one is not worst]
-            selection = only(found.simulator, found.selection, kept)
-        else:
-            more = further(found.simulator, found.selection, (*found.out, *dropped), report, apart=apart)
-            # Effects may take turns, each needless beside the other: what was judged already is judged no more.
-            if more is None or _names(more.entered) in seen:
-                return replace(judged, dropped=tuple(dropped))
-            selection = more
-        found = found.with_selection(selection)
-
-
-def _names(entered: Sequence[Weighed]) -> frozenset[str]:
-    return frozenset(one.hypothesis.name for one in entered)
-
-
-def _stays(judged: Judged, one: Weighed) -> bool:
-    """Whether an effect is due; weak evidence is nothing to go by where the greater part is not explained. A number of
-    the nominal rig, which recalibration moves anyway, must make a difference to the whole: some part of it is closer by
-    what else it makes up for."""
-    closing, unknowns = judged.closings[one.hypothesis.name], judged.found.layout.unknowns
-    own = any(is_own(unknowns, wide) for wide in one.hypothesis.wide)
-    if not own and judged.grown(closing.without) < DUE:
-        return False
-    return closing.due and not (closing.lacking and judged.left > GREATER)
-
-
-def is_nudged(found: Simulated, measured: Measurement) -> bool:
-    """Whether the driver is nudged in a record that judges: where all records of the search are, or some, and its
-    flanks part as theirs."""
-    if found.simulator.anchored and found.simulator.nudges:
-        return parts(found.layout.nominal, measured, found.simulator.simulate)
-    return bool(found.simulator.nudges)
-
-
-def itself(problem: Problem, found: Simulated) -> Judged:
-    """The selection on the first record that it was found from, where no other can be answered."""
-    measured = found.simulator.held_by[0]
-    judged = judged_on(problem, found, measured)
-    assert judged is not None  # its optimum has been simulated there
-    return judged
-
-
-def _closings(
-    found: Simulated,
-    target: Target,
-    measured: Measurement,
-    parted: Sequence[Target],
-    noise: Mapping[str, Array],
-    *,
-    apart: bool,
-) -> Judged:
-    simulator, selection = found.simulator, found.selection
-    nudged = simulator.channels(selection.best.p, measured)
-    # Sizes are those of simulations that go their own way.
-    free = simulator.free
-    signals = nudged if free is simulator else free.channels(found.end_of(selection.best), measured)
-    closings = {}
-    for one in selection.entered:
-        optimum = taken_out(simulator, selection, one)
-        closing = closing_of(target, simulator.channels(optimum.p, measured), nudged)
-        silent = not feels(target, closing.without, nudged)
-        if not simulator.anchored or (simulator.nudges and measured.name in simulator.nudges):
-            # Alone, an effect must do better than the rig that was found without any, too.
-            others = [optimum, selection.bare] if len(selection.entered) == 1 else [optimum]
-            without = [free.channels(found.end_of(other), measured) for other in others]
-            closing = both(closing, *(free_closing(target, one, signals) for one in without))
-        lacking = inf if one.lacking and not apart else one.lacking
-        silent = silent or (not closing.due and closing.gain > -GAIN)
-        if parted and not one.lacking and silent:
-            told = [_closing_there(simulator, there, optimum.p, selection.best.p) for there in parted]
-            closing = replace(max(told, key=lambda there: there.gain), without=closing.without)
-        closings[one.hypothesis.name] = replace(closing, optimum=optimum, lacking=lacking)
-    nothing = np.zeros(simulator.layout.size)
-    nominal, plain = (free.channels(p, measured) for p in (nothing, found.end_of(selection.bare)))
-    return Judged(measured, found, closings, nominal, plain, signals, target=target, noise=noise)
-
-
-def _closing_there(simulator: Simulator, target: Target, without: Array, with_all: Array) -> Closing:
-    """What unknowns `with_all` (size,) close beside those `without` (size,) of the one record of a target."""
-    (measured,) = target.measurements
-    signals = [simulator.channels(p, measured) for p in (without, with_all)]
-    return replace(closing_of(target, *signals), record=measured.name)

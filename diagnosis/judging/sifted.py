@@ -11,7 +11,8 @@ from gearbench.diagnosis.evidence.problem import Problem
 from gearbench.diagnosis.evidence.search import Search
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.judging.decided import relative_size, size_needed
-from gearbench.diagnosis.judging.judged import Judged, itself, judged_on
+from gearbench.diagnosis.judging.held_against import itself, judged_on
+from gearbench.diagnosis.judging.judged import Judged
 from gearbench.diagnosis.selection.selection import only, with_entered
 from gearbench.diagnosis.selection.simulated import Simulated
 from gearbench.diagnosis.selection.weighing import WORTH, Weighed

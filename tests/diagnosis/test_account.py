@@ -101,6 +101,8 @@ def test_sentences_tell_sizes_band_place_and_noise() -> None:
     assert "does not close" in sentences_of_gap(worse, ())[0]
     words = sentence_of_effect("a cracked tooth", Closing(20.0, 2.53, ("y_driven", "other"), {}), 0.006)
     assert "displacement of the driven gear between the excited lines is 2.5 times as large" in words
+    kept = Closing(20.0, 2.53, ("dte", "other"), {}, own={})
+    assert "excited lines, kept on the record's way, is 2.5" in sentence_of_effect("a cracked tooth", kept, 0.006)
     assert "at 0–200 Hz" in sentence_of_effect("friction", Closing(20.0, 2.0, ("dte", "0–200"), {}), 0.5)
 
 

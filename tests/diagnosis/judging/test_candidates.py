@@ -13,6 +13,7 @@ from gearbench.diagnosis.effects.friction import FRICTION
 from gearbench.diagnosis.effects.pitch_error import PITCH_ERROR
 from gearbench.diagnosis.effects.torque_ripple import TORQUE_RIPPLE
 from gearbench.diagnosis.judging.candidates import candidates_of
+from gearbench.diagnosis.judging.closing import Closing
 from gearbench.diagnosis.judging.judged import Sizes
 from gearbench.diagnosis.selection.weighing import Weighed
 
@@ -30,6 +31,11 @@ def weighed(effect: Effect, nats: float, left: float, which: str = "") -> Weighe
     return Weighed(hypothesis, nats, optimum(nats, left))
 
 
+def closing(optimum: Any, left: float, own: float | None) -> Closing:
+    signals: Any = {"dte": left}
+    return Closing(9.0, 2.0, ("dte", "other"), signals, optimum=optimum, own=own and {"dte": own})  # type: ignore[arg-type]
+
+
 def listed(
     entered: Sequence[Weighed],
     others: Sequence[Weighed],
@@ -37,9 +43,10 @@ def listed(
     *,
     nudged: bool = False,
     measured: Any = HELD_OUT,
+    own: float | None = None,
 ) -> Listed:
-    """Evidence and gap by effects; `without`: by hypothesis' name evidence and gap without it. The plain rig leaves
-    0.9, that with all that entered 0.1, what is simulated its own unknown."""
+    """Evidence and gap by effects; `without`: by hypothesis' name evidence and gap without it, `own` if that is another
+    by its own motion. The plain rig leaves 0.9, that with all that entered 0.1, what is simulated its own unknown."""
 
     def channels(p: float, held: Any) -> dict[str, float]:
         if p < 0.0:
@@ -51,7 +58,7 @@ def listed(
         plain={"dte": 0.9},
         signals={"dte": 0.1} if entered else {"dte": 0.9},
         closings={
-            name: SimpleNamespace(optimum=optimum(evidence), without={"dte": left})
+            name: closing(optimum(evidence), left, own)
             for name, (evidence, left) in without.items()
         },
         sizes={"dte": Sizes(1.0, 1.0, 0.9, 0.1, 0.01)},
@@ -85,6 +92,12 @@ def test_of_two_that_entered_each_is_left_out_alone() -> None:
     assert found[("pitch-error", "torque-ripple")] == (120.0, 0.1)
     # Without the pitch errors the ripple is left, and the other way round.
     assert found[("torque-ripple",)] == (40.0, 0.5) and found[("pitch-error",)] == (60.0, 0.11)
+
+
+def test_a_gap_is_that_of_a_rig_by_its_own_motion() -> None:
+    """Of what was judged along the record's way too, as the gap of all that entered is."""
+    gaps = {"pitch-error": (-10.0, 0.5), "torque-ripple": (15.0, 0.11)}
+    assert listed([PITCH, RIPPLE], [], gaps, own=0.7)[("torque-ripple",)] == (40.0, 0.7)
 
 
 def test_of_three_the_pairs_that_stay_are_listed_with_their_evidence() -> None:

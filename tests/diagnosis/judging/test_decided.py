@@ -46,10 +46,12 @@ def decided(
     changing: float = 0.0,
     drift: Drift | None = None,
     late: float = 0.0,
+    kept: bool = False,
 ) -> Decided:
     """`worth` nats of friction (None: nothing was kept), which closes `share` of the gap; `left` of the nominal gap,
     `remains` of a channel's fluctuation in the end, `searched` (None: as much) on the records of the search,
-    whose noise may hide `hidden` of it; the drive acts `late` s, of sound rigs 1e-5."""
+    whose noise may hide `hidden` of it; the drive acts `late` s, of sound rigs 1e-5; the
+    rig is `kept` on the record's way."""
     entered: tuple[Any, ...] = ()
     if worth is not None:
         entered = (Weighed(FRICTION, worth, None),)
@@ -64,6 +66,7 @@ def decided(
         remains=remains,
         searched=remains if searched is None else searched,
         hidden=hidden,
+        kept={} if kept else None,
     )
     form = SimpleNamespace(hypothesis=Hypothesis("free drive", "drive", ()), log_bayes_factor=free)
     forces: Any = SimpleNamespace(best_free=form if free else None, tried=())
@@ -145,6 +148,12 @@ def test_the_sign_of_something_unknown_follows_the_remainder() -> None:
     signs = [decided(None, remains=1.2 * STRUCTURE, excess=one).sign for one in stands]
     assert signs == pytest.approx([1.2 / PLAIN, 1.1, 1.2 / VISIBLE])
     assert decided(None, remains=3.0 * STRUCTURE).sign == pytest.approx(3.0 / PLAIN)
+
+
+def test_none_says_where_its_remainder_was_seen() -> None:
+    assert "what remains, at most" in decided(None, remains=0.5 * STRUCTURE).because[0]
+    there = decided(None, remains=0.5 * STRUCTURE, kept=True)
+    assert there.verdict == "none" and "what remains, kept on the record's way, at most" in there.because[0]
 
 
 def test_far_more_than_any_sound_rig_leaves_is_unknown_whatever_part_of_the_gap_it_is() -> None:

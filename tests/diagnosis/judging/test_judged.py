@@ -14,9 +14,11 @@ from shared.fake_simulator import LINES, FakeSimulator, chosen, sensitivities, t
 from gearbench.diagnosis.account import sentence_of_effect
 from gearbench.diagnosis.effects.effect import Hypothesis, Wide
 from gearbench.diagnosis.judging import closing as closing_module
-from gearbench.diagnosis.judging import judged as module
+from gearbench.diagnosis.judging import held_against as module
+from gearbench.diagnosis.judging import judged as judged_module
 from gearbench.diagnosis.judging.closing import GAIN, closing_of, free_closing, rms_closed
-from gearbench.diagnosis.judging.judged import GREATER, Judged, Sizes, judged_on
+from gearbench.diagnosis.judging.held_against import judged_on
+from gearbench.diagnosis.judging.judged import GREATER, Judged, Sizes
 from gearbench.diagnosis.selection import selection as selecting
 from gearbench.diagnosis.selection.selection import Selection
 from gearbench.diagnosis.selection.simulated import Simulated
@@ -70,10 +72,12 @@ def judged(
     apart: bool = False,
     left: float = 0.05,
     free: Any = None,
+    way: Any = None,
     weighed: Sequence[Hypothesis] = (FRICTION, RIPPLE),
 ) -> Judged:
     """Effects of these sizes in the records of the search, and in the judged one, which is waited for (`apart`); so
-    much of the nominal gap is `left`; what simulates without what nudges, if it is nudged, is `free`."""
+    much of the nominal gap is `left`; what simulates without what nudges, if it is nudged, is `free`, what does on the
+    record's way, if it may matter, is `way`."""
     monkeypatch.setattr(Judged, "left", left)
     p, q = BACKGROUND.copy(), BACKGROUND.copy()
     for number, value in searched.items():
@@ -93,6 +97,7 @@ def judged(
     monkeypatch.setattr(module, "target_of", lambda measurements, conditions, residual=None: held)
     monkeypatch.setattr(module, "noise_left", lambda case, measured, simulate: {})
     monkeypatch.setattr(module, "prepare", lambda measured, model, band: None)
+    monkeypatch.setattr(module, "way_of", lambda *_: way)
     problem: Any = SimpleNamespace(model=None, conditions=[SimpleNamespace(band=1.0)])
     layout: Any = simulator.layout
     found = judged_on(problem, Simulated(layout, simulator, selection), None)  # type: ignore[arg-type]
@@ -143,17 +148,43 @@ def test_what_had_no_place_beside_what_closes_nothing_is_kept_instead(monkeypatc
     assert names(found.found.selection.entered) == ["torque-ripple"]
 
 
+class Alike(Answering):
+    """Whatever the unknowns, as simulations are that go their own way."""
+
+    def channels(self, p: np.ndarray, measured: Any) -> dict[str, np.ndarray]:
+        return super().channels(np.zeros(8), measured)
+
+
+def simulating(kind: type[Answering]) -> Answering:
+    return kind(lambda one: one @ MATRIX, target(np.zeros(LINES, complex)))
+
+
 def test_what_nudged_simulations_show_is_due_if_free_ones_show_it_too(monkeypatch: pytest.MonkeyPatch) -> None:
-    class Alike(Answering):
-        """Whatever the unknowns, as simulations are that go their own way."""
-
-        def channels(self, p: np.ndarray, measured: Any) -> dict[str, np.ndarray]:
-            return super().channels(np.zeros(8), measured)
-
-    same, alike = (kind(lambda one: one @ MATRIX, target(np.zeros(LINES, complex))) for kind in (Answering, Alike))
+    same, alike = simulating(Answering), simulating(Alike)
     assert names(judged({3: 0.4}, {3: 0.4}, monkeypatch, free=same).found.selection.entered) == ["friction"]
     found = judged({3: 0.4}, {3: 0.4}, monkeypatch, free=alike)
     assert names(found.dropped) == ["friction"]
+
+
+@pytest.mark.parametrize(("there", "named"), [(0.4, ["friction"]), (0.0, [])])
+def test_a_rig_that_only_goes_another_way_is_judged_along_the_record_s(
+    there: float, named: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[Any] = []
+    monkeypatch.setattr(Judged, "strays_from", lambda judged, kept: not asked.append(kept) and strays)
+    along, alike, strays = simulating(Answering), simulating(Alike), True
+    found = judged({3: 0.4}, {3: there}, monkeypatch, free=alike, way=along)
+    assert names(found.found.selection.entered) == named and asked
+    assert found.answer is found.kept and found.kept is not None
+    if named:
+        closing = found.closings["friction"]
+        assert closing.due and closing.own is not None
+        # The gap is told of its own motion, what the effect closes along the record's.
+        assert closing.own["lines"] == pytest.approx(0.0) and np.abs(closing.without["lines"]).max() > 0.01
+    # One that is as far off along the record's way is judged as it goes.
+    strays = False
+    found = judged({3: 0.4}, {3: there}, monkeypatch, free=alike, way=along)
+    assert names(found.dropped) == ["friction"] and found.kept is None and found.answer is found.signals
 
 
 def test_what_is_left_of_the_records_of_the_search_is_that_of_their_lines(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -225,7 +256,7 @@ def test_each_of_two_effects_is_taken_out_alone(monkeypatch: pytest.MonkeyPatch)
 def test_parts_of_the_gap_are_energies_beyond_noise_in_units_of_each_channel(monkeypatch: pytest.MonkeyPatch) -> None:
     rng = np.random.default_rng(2)
     measured = {name: size * rng.standard_normal((1, 4096)) for name, size in (("dte", 1.0), ("y_driver", 10.0))}
-    for where in (module, closing_module):
+    for where in (judged_module, closing_module):
         monkeypatch.setattr(where, "measured_channels", lambda one: measured)
     gap = {name: values[0] - values[0].std() * rng.standard_normal(4096) for name, values in measured.items()}
     nominal = {name: values[0] - 0.5 * gap[name] for name, values in measured.items()}
@@ -244,11 +275,30 @@ def test_parts_of_the_gap_are_energies_beyond_noise_in_units_of_each_channel(mon
     assert low < value < high < 1.1 * value and value == pytest.approx(np.sqrt(0.15) * gap["dte"].std(), rel=1e-6)
 
 
+def test_a_rig_strays_whose_gap_is_that_of_another_way(monkeypatch: pytest.MonkeyPatch) -> None:
+    wave = np.cos(2 * np.pi * np.arange(64)[:, None] * np.arange(4) / 64)
+    mean = 3.0 * wave[:, 1]
+    monkeypatch.setattr(judged_module, "measured_channels", lambda one: {"dte": mean[None]})
+    nominal, off, kept = ({"dte": mean - size * wave[:, 2]} for size in (2.0, 1.0, 0.2))
+    noise = {"dte": 0.1 * wave[:, 3]}
+    made = Judged(SimpleNamespace(name="heavy"), None, {}, nominal, nominal, off, noise=noise)  # type: ignore[arg-type]
+    assert made.along is None and made.left == pytest.approx(np.sqrt(0.99 / 3.99))
+    assert made.strays_from(kept) and not made.strays_from({"dte": mean - 0.3 * wave[:, 2]})
+    # Within twice the noise nothing does.
+    assert not replace(made, noise={"dte": 0.6 * wave[:, 3]}).strays_from(kept)
+    there = replace(made, kept=kept)
+    assert there.along is not None and there.along[1:] == pytest.approx((0.2 / np.sqrt(2), 1 / np.sqrt(2)))
+    # What is missing is missing along the record's way; the gap is that of the rig by itself.
+    assert there.left == pytest.approx(np.sqrt(0.03 / 3.99)) and there.sizes["dte"].final == pytest.approx(np.sqrt(0.5))
+    assert there.remains == pytest.approx(np.sqrt(0.03) / 3.0)
+    assert there.share(off) == pytest.approx((1.0 - 0.04) / 3.99) and made.share(off) == 0.0
+
+
 def test_beyond_the_lines_of_the_search_nothing_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
     """A resonance above the excitation is no part of the gap, nor of what a channel fluctuates by."""
     wave = np.exp(2j * np.pi * np.arange(64)[:, None] * np.arange(32) / 64).real
     mean = 3.0 + 2.0 * wave[:, 4] + wave[:, 20]
-    monkeypatch.setattr(module, "measured_channels", lambda one: {"dte": mean[None]})
+    monkeypatch.setattr(judged_module, "measured_channels", lambda one: {"dte": mean[None]})
     made = Judged(
         None,  # type: ignore[arg-type]
         None,  # type: ignore[arg-type]
@@ -299,6 +349,7 @@ def test_what_the_judged_record_does_not_feel_is_told_by_one_whose_flanks_part(
     monkeypatch.setattr(module, "target_of", of_record)
     monkeypatch.setattr(module, "noise_left", lambda case, measured, simulate: {})
     monkeypatch.setattr(module, "prepare", lambda measured, model, band: None)
+    monkeypatch.setattr(module, "way_of", lambda *_: None)
     problem: Any = SimpleNamespace(model=None, conditions=[SimpleNamespace(band=1.0)])
     layout: Any = simulator.layout
     whole: Any = Simulated(layout, simulator, selection)  # type: ignore[arg-type]

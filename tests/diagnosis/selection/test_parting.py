@@ -15,7 +15,7 @@ from gearbench.diagnosis.effects.library import hypotheses
 from gearbench.diagnosis.evidence.problem import Problem, problem_of
 from gearbench.diagnosis.fitting.fit import fit_afresh
 from gearbench.diagnosis.intake.measurements import Measurement, measurement
-from gearbench.diagnosis.judging.judged import judged_on
+from gearbench.diagnosis.judging.held_against import judged_on
 from gearbench.diagnosis.judging.only_there import with_backlash_there
 from gearbench.diagnosis.replay.replays import Replays
 from gearbench.diagnosis.selection import parting as module
