@@ -79,7 +79,7 @@ TORQUE_RIPPLE = Effect(
     noun="ripple of the driving torque",
     meaning="The motor's torque swings with its rotation beyond what was recorded: check its control, or measure the"
     " torque between motor and gear.",
-    parameters={"relative_amplitude": "amplitude over the mean torque"},
+    parameters={"relative_amplitude": "amplitude over the mean torque of the conditions"},
     fields=("rig.drive.ripple",),
     hypotheses_of=hypotheses,
     add=add,

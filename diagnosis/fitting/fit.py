@@ -19,7 +19,7 @@ from gearbench.diagnosis.effects.profile_error import FLANKS
 from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.simulation.quadratic import Quadratic, prior_cost, quadratic_of
 from gearbench.diagnosis.simulation.simulator import Simulator
-from gearbench.diagnosis.structure.structure import LEAST_STEP
+from gearbench.diagnosis.structure.structure import least_steps
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -171,7 +171,7 @@ def _standing(unknowns: Unknowns, p: Array) -> tuple[Array, Array]:
     """Bounds (size,) between which what a rig does not feel yet stands still: its derivative is that of a jump, and a
     step shorter than that promises what it does not keep."""
     low, high = unknowns.bounds()
-    for key, least in LEAST_STEP.items():
+    for key, least in least_steps(unknowns).items():
         at = unknowns.at(key)
         at = at[(p[at] >= 0.0) & (p[at] < least)]
         low[at] = high[at] = p[at]

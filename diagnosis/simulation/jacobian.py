@@ -31,7 +31,7 @@ from gearbench.diagnosis.simulation.runout import in_mesh_of_runout, lobes_of, o
 from gearbench.diagnosis.simulation.target import Target
 from gearbench.diagnosis.structure.contrast import CONTRAST, contrast_slope
 from gearbench.diagnosis.structure.layout import Layout
-from gearbench.diagnosis.structure.structure import GAIN, LATE, LEAST_STEP, PHASE, SEAT, STRUCTURE
+from gearbench.diagnosis.structure.structure import GAIN, LATE, PHASE, SEAT, STRUCTURE, least_steps
 from gearbench.diagnosis.structure.viscous import LOADED, damping_reference
 from gearbench.lumped.nonlinear.coordinates import IN_MESH, U1, Acting
 from gearbench.lumped.nonlinear.sensitive import LEAST_LEVEL
@@ -203,10 +203,10 @@ def others_of(layout: Layout, p: Array, sd: Array, chosen: Flags) -> list[Other]
 
     unknowns, here = layout.unknowns, model(p)
     low, high = unknowns.bounds()
-    out = []
+    out, leasts = [], least_steps(unknowns)
     for key in AROUND:
         for index in unknowns.at(key):
-            absent = 0.0 <= p[index] < LEAST_STEP.get(key, 0.0)
+            absent = 0.0 <= p[index] < leasts.get(key, 0.0)
             if absent or not chosen[index] or sd[index] <= 0.0:
                 continue
             step = APART * sd[index]

@@ -16,7 +16,7 @@ from gearbench.diagnosis.replay.replays import Replay, Replays, law_of
 from gearbench.diagnosis.simulation.jacobian import MOVED, SHORT_STEP, STEP, Other, forces_of, others_of, sensor_columns
 from gearbench.diagnosis.simulation.target import Target
 from gearbench.diagnosis.structure.layout import Layout
-from gearbench.diagnosis.structure.structure import LEAST_STEP
+from gearbench.diagnosis.structure.structure import least_steps
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -134,12 +134,12 @@ class Simulator:
         unknowns, here = self.layout.unknowns, self.lines(p)
         assert here is not None
         low, high = unknowns.bounds()
-        unmoved = self.layout.case(p)
+        unmoved, leasts = self.layout.case(p), least_steps(unknowns)
         for key in MOVED:
             for index in unknowns.at(key):
                 if not chosen[index] or sd[index] <= 0.0:
                     continue
-                least = LEAST_STEP.get(key, 0.0)
+                least = leasts.get(key, 0.0)
                 step = least if 0.0 <= p[index] < least else self.step * sd[index]
                 for signed in (step, -step):
                     moved = p.copy()

@@ -27,7 +27,7 @@ from gearbench.diagnosis.forces.condition import Condition
 from gearbench.diagnosis.forces.nominal import NominalModel
 from gearbench.diagnosis.forces.unknowns import Group, Unknowns, unknowns_of
 from gearbench.diagnosis.structure.contrast import contrast_groups, contrasted, tangents_of
-from gearbench.diagnosis.structure.structure import held, sensed, structure_groups
+from gearbench.diagnosis.structure.structure import held, least_steps, sensed, structure_groups
 from gearbench.diagnosis.structure.viscous import viscous, viscous_groups
 from gearbench.geometry import Pair, pair
 from gearbench.rig import Case, Rig
@@ -37,7 +37,6 @@ Array = NDArray[np.float64]
 
 # Of the background those that no field of a rig holds.
 FORCES_ONLY = ("compliance", "radial")
-NEARLY_RIGID = 1e-3  # compliance of a coupling below this part of its prior is left out of the rig
 LEAST_LOSS = 1e-6
 # Effects that are put into a rig whatever their size.
 PLAIN = ("friction", "eccentricity", "pitch-error", "profile-error", "backlash", "contact-nonlinearity",
@@ -144,8 +143,8 @@ def _supports(rig: Rig, layout: Layout, p: Array) -> Rig:
 
 
 def _coupled(rig: Rig, layout: Layout, fitted: Fitted) -> Rig:
-    least = NEARLY_RIGID * layout.unknowns.group(COMPLIANCE).wide[0]
-    if layout.model.rotor > 0.0 and layout.model.compliance + float(fitted.of(COMPLIANCE)[0]) > least:
+    least = least_steps(layout.unknowns)[COMPLIANCE]
+    if layout.model.rotor > 0.0 and layout.model.compliance + float(fitted.of(COMPLIANCE)[0]) >= least:
         rig = COUPLING.add(rig, _all_of("coupling"), fitted)[0]
     return rig
 

@@ -14,6 +14,7 @@ from math import cos, exp, pi, sin, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from gearbench.diagnosis.effects.coupling import KEY as COMPLIANCE
 from gearbench.diagnosis.effects.coupling import LOSS
 from gearbench.diagnosis.effects.effect import SIDES, changed
 from gearbench.diagnosis.forces.nominal import NominalModel
@@ -60,6 +61,9 @@ FELT, STIFFEST = 0.01, 0.03
 # Moved from nothing by the least that a rig feels: a smaller step would show no derivative, and a fit that begins
 # without it would never find it.
 LEAST_STEP: Mapping[str, float] = {ACROSS: STIFFEST, HOUSING: 0.05 * HOUSING_SD}
+# Part of the hypothesis' prior below which a coupling's compliance is left out of the rig, its resonance ten times the
+# mesh's: every step of a replay would have to follow what no line shows.
+NEARLY_RIGID = 4e-3
 NONE = 1e-4  # compliance of a housing below which there is none
 # What holds the gears beside the nominal rig's supports.
 STRUCTURE = (ACROSS, CROSS, DAMPED, HOUSING, MODE, SHAPE, OBLIQUE, LOSS)
@@ -132,6 +136,14 @@ def housings(unknowns: Unknowns, p: Array) -> list[Array]:
     for motion, kind in free_motions(unknowns, p):
         out += [with_motion(unknowns, p, motion, at, HOUSING_BEGIN, kind) for at in (-1.0, -0.5, 0.0, 0.5)]
     return out
+
+
+def least_steps(unknowns: Unknowns) -> Mapping[str, float]:
+    """Least that a rig feels of each group, by its key, that it need not have."""
+    least = dict(LEAST_STEP)
+    if COMPLIANCE in unknowns.slices:
+        least[COMPLIANCE] = NEARLY_RIGID * float(unknowns.group(COMPLIANCE).wide[0])
+    return least
 
 
 def free_motions(unknowns: Unknowns, p: Array) -> list[tuple[int, int]]:

@@ -84,7 +84,7 @@ def test_every_effect_place_and_channel_has_words() -> None:
     assert parameter_in_words("friction", "coefficient") == "coefficient of friction"
     assert parameter_in_words("sensor-delay", "angle_driver.delay") == "delay (angle of the driver)"
     ripple = parameter_in_words("torque-ripple", "order_6.relative_amplitude")
-    assert ripple == "amplitude over the mean torque (order 6)"
+    assert ripple == "amplitude over the mean torque of the conditions (order 6)"
     assert parameter_in_words("loose-foot", "driven.slope") == "slope (driven)"
 
 

@@ -90,7 +90,7 @@ ALIKE[3] = MATRIX[0] + 2.0 * MATRIX[1]  # what the first unknown does, once the 
 def test_what_is_not_felt_yet_does_not_stand_in_the_way(monkeypatch: pytest.MonkeyPatch) -> None:
     """A jump and the second unknown promise cheaply what the first one can do alone: with bounds that do not hold it
     the fit stays where it begins."""
-    monkeypatch.setattr("gearbench.diagnosis.fitting.fit.LEAST_STEP", {"friction": 0.2})
+    monkeypatch.setattr("gearbench.diagnosis.fitting.fit.least_steps", lambda unknowns: {"friction": 0.2})
     simulator = Jumping(lambda p: np.where(np.arange(8) == 3, p * (p >= 0.2), p) @ ALIKE, target(0.12 * MATRIX[0]))
     sd = np.array([0.02, *SD[1:]])
     first = sensitivity_of(simulator, np.zeros(8), sd)

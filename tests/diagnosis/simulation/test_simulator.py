@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from shared.simulated_lines import demonstration, jacobian_at, off
 
+from gearbench.diagnosis.effects.coupling import KEY as COMPLIANCE
 from gearbench.diagnosis.simulation.simulator import Simulator
 from gearbench.diagnosis.structure.contrast import CONTRAST
 from gearbench.diagnosis.structure.layout import Layout
-from gearbench.diagnosis.structure.structure import ACROSS, CROSS, GAIN, HOUSING, MODE, PHASE, housings
+from gearbench.diagnosis.structure.structure import ACROSS, CROSS, GAIN, HOUSING, MODE, PHASE, housings, least_steps
 
 
 @dataclass(frozen=True)
@@ -227,3 +228,18 @@ def test_a_mesh_that_changes_more_over_its_phase_is_moved_along_it(key: str, ent
         # Edges of contact zones jump between steps of the grid, which excites what lies beyond the band.
         edges = 0.25 if channel == "torque_driven" else 0.08
         assert 0.0 < error < (edges if key == PHASE else close) * size, channel
+
+
+def test_a_coupling_that_no_line_shows_is_left_out_of_the_rig(bench: Bench) -> None:
+    """Ten times above the mesh's resonance; every step would have to follow it."""
+    layout, unknowns = bench.layout, bench.layout.unknowns
+    at, least = unknowns[COMPLIANCE].start, least_steps(unknowns)[COMPLIANCE]
+    stiff, soft = (layout.case(np.where(np.arange(layout.size) == at, part * least, 0.0)).rig for part in (0.99, 1.0))
+    assert not stiff.drive.twists and soft.drive.twists
+    coupling = soft.drive.coupling
+    assert coupling is not None and coupling.stiffness is not None
+    reduced = 1.0 / (1.0 / coupling.inertia + 1.0 / layout.model.inertia[0])
+    ratio = np.sqrt(coupling.stiffness / reduced) / (2 * np.pi * layout.model.resonance)
+    assert ratio == pytest.approx(0.67 / np.sqrt(4e-3), rel=1e-6)
+    # It is looked for from none by as much: a smaller step would show no derivative.
+    assert np.abs(bench.jacobian[at]).max() > 0.0
