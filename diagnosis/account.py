@@ -141,6 +141,16 @@ def sentence_of_effect(noun: str, closing: Closing, share: float) -> str:
     )
 
 
+def sentence_of_shares(nouns: Sequence[str], plain: float, final: float) -> str:
+    """That a good rig's share of other effects closes as much of the transmission error: rms [m] that the rig leaves
+    without what is named, and with it."""
+    return (
+        f"Recalibrated without {' and '.join(nouns)}, with a good rig's share of other effects, the rig leaves hardly"
+        f" more of the whole transmission error here: {length(1e6 * plain)} um, for {length(1e6 * final)} um with it."
+        " All channels and records together speak for what is named"
+    )
+
+
 def sentence_of_only(noun: str, record: str) -> str:
     """That no record but the judged one shows an effect."""
     return (

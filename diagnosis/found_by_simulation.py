@@ -10,7 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.diagnosis.account import places_of, sentence_of_effect, sentence_of_only, sentence_of_rivals
+from gearbench.diagnosis.account import (
+    places_of,
+    sentence_of_effect,
+    sentence_of_only,
+    sentence_of_rivals,
+    sentence_of_shares,
+)
 from gearbench.diagnosis.effects.backlash import BACKLASH
 from gearbench.diagnosis.effects.temperature_drift import TEMPERATURE_DRIFT
 from gearbench.diagnosis.evidence.fit import Fit
@@ -103,7 +109,7 @@ def by_simulation(
         where=places_of(judged, kept, missing),
         recalibrated=found.recalibrated if kept else found.without_any,
         with_effect=found.with_effects if decided.named else None,
-        because=(*decided.because, *_why(judged, decided.named), *doubts, *flanks,
+        because=(*decided.because, *why(judged, decided.named), *doubts, *flanks,
                  *([way.sentence()] if way else []), *sentences_of_others(of.measurements, of.steady, band)),
         structure=structure_found(found.layout.unknowns, found.selection.best.p, found.std),
         missing=missing,
@@ -163,12 +169,16 @@ def changing_of(judged: Judged, parts: Mapping[str, float]) -> float:
     return max((rms / one.nominal for rms, one in sizes.values() if rms > seen * one.final), default=0.0)
 
 
-def _why(judged: Judged, named: Sequence[Weighed]) -> tuple[str, ...]:
+def why(judged: Judged, named: Sequence[Weighed]) -> tuple[str, ...]:
     """What each named effect closes, and what closes nothing."""
     said = []
     for one in named:
         closing = judged.closings[one.hypothesis.name]
         said.append(sentence_of_effect(one.effect.noun, closing, judged.share(closing.without)))
+    size = judged.sizes.get("dte")
+    # Along the record's way the sizes of both are not those that decide.
+    if named and judged.kept is None and size is not None and size.plain < DUE * size.final:
+        said.append(sentence_of_shares([one.effect.noun for one in named], size.plain, size.final))
     said += [sentence_of_only(one.effect.noun, one.only_in) for one in named if one.only_in]
     said += [sentence_of_rivals(one.causes) for one in named if one.rivals]
     for weighed in judged.dropped:

@@ -7,8 +7,12 @@ from typing import Any
 
 import pytest
 
-from gearbench.diagnosis.found_by_simulation import changing_of
+from gearbench.diagnosis.effects.eccentricity import ECCENTRICITY
+from gearbench.diagnosis.effects.effect import Hypothesis, Wide
+from gearbench.diagnosis.found_by_simulation import changing_of, why
+from gearbench.diagnosis.judging.closing import Closing
 from gearbench.diagnosis.judging.judged import Sizes
+from gearbench.diagnosis.selection.weighing import Weighed
 
 
 @pytest.mark.parametrize(("final", "found"), [(0.1, 0.06 / 0.7), (0.25, 0.0)])
@@ -18,3 +22,19 @@ def test_what_changes_counts_where_it_makes_what_is_left_a_tenth_larger(final: f
     judged: Any = SimpleNamespace(sizes=sizes)
     assert changing_of(judged, {"dte": 0.06, "y_driver": 0.05, "torque_driven": 1.0}) == pytest.approx(found)
     assert changing_of(judged, {}) == 0.0
+
+
+@pytest.mark.parametrize(("plain", "kept", "said"), [(1.05, None, True), (1.2, None, False), (1.05, {}, False)])
+def test_it_is_said_where_good_rigs_shares_of_other_effects_close_as_much(plain: float, kept: Any, said: bool) -> None:
+    one = Weighed(Hypothesis("run-out", "mesh", (Wide("none"),), effect=ECCENTRICITY), 60.0, None)
+    judged: Any = SimpleNamespace(
+        sizes={"dte": Sizes(9e-6, 2e-6, plain * 1e-6, 1e-6, 1e-7)},
+        closings={"run-out": Closing(60.0, 250.0, ("dte", "0–190"), {})},
+        share=lambda without: 0.99,
+        kept=kept,
+        dropped=(),
+    )
+    first, *more = why(judged, (one,))
+    assert first.startswith(f"Without {ECCENTRICITY.noun} the gap")
+    assert [f"{plain:.2f} um, for 1.00 um" in sentence for sentence in more] == [True] * said
+    assert not why(judged, ())
