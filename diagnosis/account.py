@@ -145,9 +145,9 @@ def sentence_of_shares(nouns: Sequence[str], plain: float, final: float) -> str:
     """That a good rig's share of other effects closes as much of the transmission error: rms [m] that the rig leaves
     without what is named, and with it."""
     return (
-        f"Recalibrated without {' and '.join(nouns)}, with a good rig's share of other effects, the rig leaves hardly"
-        f" more of the whole transmission error here: {length(1e6 * plain)} um, for {length(1e6 * final)} um with it."
-        " All channels and records together speak for what is named"
+        f"Recalibrated without {' and '.join(nouns)}, with a good rig's share of other effects, the rig leaves as"
+        f" little of the whole transmission error here ({length(1e6 * plain)} um, and {length(1e6 * final)} um with"
+        " what is named): all channels and records together speak for it"
     )
 
 

@@ -36,5 +36,5 @@ def test_it_is_said_where_good_rigs_shares_of_other_effects_close_as_much(plain:
     )
     first, *more = why(judged, (one,))
     assert first.startswith(f"Without {ECCENTRICITY.noun} the gap")
-    assert [f"{plain:.2f} um, for 1.00 um" in sentence for sentence in more] == [True] * said
+    assert [f"({plain:.2f} um, and 1.00 um" in sentence for sentence in more] == [True] * said
     assert not why(judged, ())
