@@ -127,9 +127,10 @@ def _closings(
     ends = (np.zeros(simulator.layout.size), found.end_of(selection.bare), found.end_of(selection.best))
     nominal, plain, signals = (simulator.free.channels(p, measured) for p in ends)
     judged = Judged(measured, found, {}, nominal, plain, signals, target=target, noise=noise)
-    kept = way.channels(selection.best.p, measured) if way is not None else None
+    kept = _kept(way, selection.best.p, measured)
     if kept is not None and judged.strays_from(kept):
         judged = replace(judged, kept=kept)
+    nudged = signals if simulator.free is simulator else simulator.channels(selection.best.p, measured)
     closings = {}
     for one in selection.entered:
         optimum = taken_out(simulator, selection, one)
@@ -137,7 +138,7 @@ def _closings(
             closing = _along_the_way(found, way, target, measured, optimum, judged.kept)
             silent = not feels(target, closing.without, judged.kept)
         else:
-            closing, silent = _by_itself(found, target, measured, optimum, signals)
+            closing, silent = _by_itself(found, target, measured, optimum, signals, nudged)
         lacking = inf if one.lacking and not apart else one.lacking
         silent = silent or (not closing.due and closing.gain > -GAIN)
         if parted and not one.lacking and silent:
@@ -147,14 +148,26 @@ def _closings(
     return replace(judged, closings=closings)
 
 
+def _kept(way: Simulator | None, p: Array, measured: Measurement) -> Mapping[str, Array] | None:
+    """Signals of the rig `p` (size,) on the record's way; None without one, or where it cannot be kept there."""
+    try:
+        return way.channels(p, measured) if way is not None else None
+    except ValueError:
+        return None
+
+
 def _by_itself(
-    found: Simulated, target: Target, measured: Measurement, optimum: Optimum, signals: Mapping[str, Array]
+    found: Simulated,
+    target: Target,
+    measured: Measurement,
+    optimum: Optimum,
+    signals: Mapping[str, Array],
+    nudged: Mapping[str, Array],
 ) -> tuple[Closing, bool]:
     """What the effect that is not in `optimum` closes, and whether the record does not feel it; `signals` are those of
-    the final rig as it goes its own way."""
+    the final rig as it goes its own way, `nudged` those of it as the search has it."""
     simulator, selection = found.simulator, found.selection
     free = simulator.free
-    nudged = signals if free is simulator else simulator.channels(selection.best.p, measured)
     closing = closing_of(target, simulator.channels(optimum.p, measured), nudged)
     silent = not feels(target, closing.without, nudged)
     if not simulator.anchored or (simulator.nudges and measured.name in simulator.nudges):

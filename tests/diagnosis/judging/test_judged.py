@@ -187,6 +187,17 @@ def test_a_rig_that_only_goes_another_way_is_judged_along_the_record_s(
     assert names(found.dropped) == ["friction"] and found.kept is None and found.answer is found.signals
 
 
+def test_a_rig_that_cannot_be_kept_on_the_record_s_way_is_judged_as_it_goes(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Nowhere(Answering):
+        """No rig can be kept there."""
+
+        def channels(self, p: np.ndarray, measured: Any) -> dict[str, np.ndarray]:
+            raise ValueError("no such motion")
+
+    found = judged({3: 0.4}, {3: 0.4}, monkeypatch, free=simulating(Answering), way=simulating(Nowhere))
+    assert names(found.found.selection.entered) == ["friction"] and found.kept is None
+
+
 def test_what_is_left_of_the_records_of_the_search_is_that_of_their_lines(monkeypatch: pytest.MonkeyPatch) -> None:
     found = judged({3: 0.4}, {3: 0.4}, monkeypatch)
     lines, best = found.found.simulator.target.lines, found.found.selection.best.lines
