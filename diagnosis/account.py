@@ -53,7 +53,7 @@ def places_of(judged: Judged, named: Sequence[Hypothesis], missing: Missing) -> 
     where its force is missing. Energies, all channels in units of their own fluctuation."""
     found = dict.fromkeys((*PLACES, "sensor"), 0.0)
     for one in named:
-        found[one.place] += judged.share(judged.closings[one.name].without)
+        found[one.place] += judged.share_of(one)
     for place, part in zip(PLACES, weights(missing), strict=True):
         found[place] += judged.left**2 * float(part)
     whole = sum(found.values())

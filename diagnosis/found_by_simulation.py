@@ -174,7 +174,7 @@ def why(judged: Judged, named: Sequence[Weighed]) -> tuple[str, ...]:
     said = []
     for one in named:
         closing = judged.closings[one.hypothesis.name]
-        said.append(sentence_of_effect(one.effect.noun, closing, judged.share(closing.without)))
+        said.append(sentence_of_effect(one.effect.noun, closing, judged.share_of(one.hypothesis)))
     size = judged.sizes.get("dte")
     # Along the record's way the sizes of both are not those that decide.
     if named and judged.kept is None and size is not None and size.plain < DUE * size.final:

@@ -33,7 +33,7 @@ def chances_of(
     left = max((value for name, value in evidence.items() if name not in dropped), default=0.0)
     named, all_signs = {}, [effect_signs(left, lines, False, 0.0)]
     for one in decided.named:
-        share = judged.share(judged.closings[one.hypothesis.name].without)
+        share = judged.share_of(one.hypothesis)
         all_signs.append(effect_signs(evidence[one.effect.name], lines, True, share))
         named[one.hypothesis.name] = known.effect.of(all_signs[-1]).value
     if decided.drift is not None:

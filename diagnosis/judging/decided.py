@@ -92,7 +92,7 @@ def _decided(
 ) -> Decided:  # fmt: skip
     """The decision without a drift."""
     named = judged.found.selection.entered
-    shares = [judged.share(judged.closings[one.hypothesis.name].without) for one in named]
+    shares = [judged.share_of(one.hypothesis) for one in named]
     share = max(shares, default=0.0)
     place, over = worst(unsteady, limits.unsteady)
     aside = (_changes(place, changing),) if over > 1.0 else ()

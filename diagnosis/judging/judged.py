@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from gearbench.diagnosis.effects.effect import Hypothesis
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.intake.signals import measured_channels
 from gearbench.diagnosis.judging.along import CLOSER, FLOORS, Along
@@ -148,6 +149,10 @@ class Judged:
             gap += max(one.nominal**2 - one.noise**2, 0.0) / one.fluctuation**2
             back += (self.rms_left(channel, without) ** 2 - self._left[channel] ** 2) / one.fluctuation**2
         return float(np.clip(back / gap, 0.0, 1.0)) if gap > 0.0 else 0.0
+
+    def share_of(self, effect: Hypothesis) -> float:
+        """The same without an effect that was held against the record."""
+        return self.share(self.closings[effect.name].without)
 
     def rms_left(self, channel: str, signals: Mapping[str, Array]) -> float:
         """Rms that a rig with those signals leaves of a measured channel."""

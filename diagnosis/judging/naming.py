@@ -43,7 +43,7 @@ def effects_of(judged: Judged, decided: Decided, chances: Chances) -> tuple[Effe
             probability=chances.named[one.hypothesis.name],
             due=closing.due,
             parameters={**before, **parameters_of(effect, estimates)},
-            share=judged.share(closing.without),
+            share=judged.share_of(one.hypothesis),
             closes=_closes(judged, closing),
         )
     return tuple(out.values())
