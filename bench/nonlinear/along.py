@@ -10,11 +10,12 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.fft import rfft
 
 from gearbench.bench.nonlinear.fine import averaged, integrated, interpolated, placed
 from gearbench.bench.nonlinear.pushing import Pushing, pushing, stepped
-from gearbench.bench.nonlinear.replay import Steady, resampled
-from gearbench.bench.record.sensors import shown_by
+from gearbench.bench.nonlinear.replay import Steady
+from gearbench.bench.record.sensors import resampled, shown_by
 from gearbench.lumped.nonlinear.coordinates import IN_MESH, LOAD, U1, U2, Acting, W
 from gearbench.lumped.nonlinear.law import MeshLaw
 from gearbench.lumped.nonlinear.model import NonLinear
@@ -194,7 +195,7 @@ class Along:
 
 def _spectrum(signal: NDArray[np.floating[Any]]) -> Lines:
     """Half-spectra (columns, K) of signals (columns, samples)."""
-    return np.asarray(np.fft.rfft(np.ascontiguousarray(signal, dtype=np.float32), axis=1))
+    return np.asarray(rfft(np.ascontiguousarray(signal, dtype=np.float32), axis=1))
 
 
 def along(steady: Steady) -> Along:

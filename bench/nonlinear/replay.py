@@ -21,7 +21,7 @@ from gearbench.bench.protocol import Channels, Drive
 from gearbench.bench.record.attributes import experiment_attributes, rig_attributes, shown_mean, turning_inertias
 from gearbench.bench.record.channels import mesh_phases, sensed, with_rotation
 from gearbench.bench.record.remarks import joined, lost_contact
-from gearbench.bench.record.sensors import check_delays, imposed, lag, repeated
+from gearbench.bench.record.sensors import check_delays, imposed, lag, repeated, resampled
 from gearbench.geometry import pair
 from gearbench.lumped.nonlinear.law import MeshLaw
 from gearbench.lumped.nonlinear.rest import mesh_direction
@@ -187,15 +187,6 @@ def _quiet(sensors: Sensors) -> Sensors:
     """The sensors without their noise and steps."""
     names = [name for name in Sensors.model_fields if name.startswith(("noise", "quantisation"))]
     return sensors.model_copy(update=dict.fromkeys(names, 0.0))
-
-
-def resampled(period: Array, points: int) -> Array:
-    """The trigonometric sum through the samples of one period, at `points` instants, a multiple of their number."""
-    samples = period.size
-    spectrum = np.fft.rfft(period)
-    if samples % 2 == 0 and points > samples:
-        spectrum[-1] *= 0.5  # the highest line and its mirror image share it
-    return np.asarray(np.fft.irfft(spectrum, n=points) * (points / samples))
 
 
 def seen_at(fine: NDArray[np.floating[Any]], samples: int, axis: int = -1) -> NDArray[np.floating[Any]]:

@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.fft import irfft, rfft
 
 from gearbench.bench.errors import BenchError
 from gearbench.records.antialias import about_filter, butterworth, butterworth_delay
@@ -175,6 +176,15 @@ def repeated(values: NDArray[Scalar], samples: int) -> NDArray[Scalar]:
     """What repeats (..., n) over `samples` samples; the same array where that is its length."""
     length = values.shape[-1]
     return values if length == samples else np.take(values, np.arange(samples) % length, axis=-1)
+
+
+def resampled(period: Array, points: int) -> Array:
+    """The trigonometric sums through the samples (..., n) of one period, at `points` instants, no fewer."""
+    samples = period.shape[-1]
+    spectrum = rfft(period, axis=-1)
+    if samples % 2 == 0 and points > samples:
+        spectrum[..., -1] *= 0.5  # the highest line and its mirror image share it
+    return np.asarray(irfft(spectrum, points, axis=-1) * (points / samples))
 
 
 class Noise:

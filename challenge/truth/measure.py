@@ -14,11 +14,10 @@ from scipy.fft import irfft, rfft, rfftfreq
 from scipy.interpolate import CubicSpline
 from scipy.signal import fftconvolve, firwin, kaiser_beta
 
-from gearbench.bench.nonlinear.replay import resampled
 from gearbench.bench.plan.excitation import torque_realisation
 from gearbench.bench.plan.schedule import Schedule, schedule
 from gearbench.bench.record.attributes import experiment_attributes, rig_attributes
-from gearbench.bench.record.sensors import repeated
+from gearbench.bench.record.sensors import repeated, resampled
 from gearbench.challenge.truth.levels import DELAYED, Foreign, Levels
 from gearbench.challenge.truth.motion import integrate
 from gearbench.challenge.truth.plant import (

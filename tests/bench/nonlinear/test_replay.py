@@ -11,7 +11,8 @@ from shared.small_case import small_case
 
 from gearbench.bench import BenchError, simulate
 from gearbench.bench.nonlinear.law_table import mesh_law
-from gearbench.bench.nonlinear.replay import replay, resampled, seen_at
+from gearbench.bench.nonlinear.replay import replay, seen_at
+from gearbench.bench.record.sensors import resampled
 from gearbench.records import make_record, validate_record
 from gearbench.rig import (
     Case,
