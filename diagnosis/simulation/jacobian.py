@@ -30,7 +30,7 @@ from gearbench.diagnosis.forces.basis import on_path, waves
 from gearbench.diagnosis.simulation.runout import in_mesh_of_runout, lobes_of, on_gears_of_runout, turn_of
 from gearbench.diagnosis.simulation.target import Target
 from gearbench.diagnosis.structure.contrast import CONTRAST, contrast_slope
-from gearbench.diagnosis.structure.layout import Layout
+from gearbench.diagnosis.structure.layout import Layout, around_mesh
 from gearbench.diagnosis.structure.structure import GAIN, LATE, PHASE, SEAT, STRUCTURE, least_steps
 from gearbench.diagnosis.structure.viscous import LOADED, damping_reference
 from gearbench.lumped.nonlinear.coordinates import IN_MESH, U1, Acting
@@ -199,7 +199,7 @@ def others_of(layout: Layout, p: Array, sd: Array, chosen: Flags) -> list[Other]
     from gearbench.lumped.nonlinear.model import nonlinear_model
 
     def model(values: Array) -> NonLinear:
-        return nonlinear_model(layout.case(values).rig, layout.meshing, layout.model.law)
+        return nonlinear_model(around_mesh(layout, values), layout.meshing, layout.model.law)
 
     unknowns, here = layout.unknowns, model(p)
     low, high = unknowns.bounds()

@@ -125,27 +125,16 @@ class MeshLaw:
         force, tangent = self._pressed(np.maximum(delta, 0.0), phase)
         return force, np.where(delta > 0, tangent, 0.0)
 
-    def of_pairs(self, delta: Array, phase: Array) -> tuple[Array, Array]:
-        """Force [N] and tangent stiffness [N/m] of every pair (..., n_o) at deflections (..., n_o) [m] of its own and
-        phases (...) [cycles]; none where its working flanks are apart."""
-        force, tangent = self._on(self.pair_secants.ravel(), np.maximum(delta, 0.0), phase[..., None], delta.shape[-1])
-        return force, np.where(delta > 0.0, np.maximum(tangent, 0.0), 0.0)
-
     def _pressed(self, depth: Array, phase: Array) -> tuple[Array, Array]:
         """Force and tangent at deflections >= 0."""
-        return self._on(self.secant.ravel(), depth, phase, 1)
-
-    def _on(self, table: Array, depth: Array, phase: Array, wide: int) -> tuple[Array, Array]:
-        """Force and tangent at deflections >= 0 of secants that lie in rows of `wide` columns."""
+        table = self.secant.ravel()
         row, weight = place_phase(phase, self.phases)
         last = len(self.approach) - 1
         root = last * np.sqrt(depth / self.approach[-1])
         node = np.minimum(root.astype(np.int64), last - 1)
-        at, next_row = (row * (last + 1) + node) * wide, (last + 1) * wide
-        if wide > 1:
-            at = at + np.arange(wide)
+        at, next_row = row * (last + 1) + node, last + 1
         low = table[at] + weight * (table[at + next_row] - table[at])
-        at = at + wide
+        at = at + 1
         high = table[at] + weight * (table[at + next_row] - table[at])
         rise = high - low
         stiffness = low + (root - node) * rise

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gearbench.lumped.errors import LumpedError
 from gearbench.lumped.nonlinear.law import MeshLaw
+from gearbench.lumped.nonlinear.reading import read_pairs
 
 Array = NDArray[np.float64]
 
@@ -57,7 +58,7 @@ def of_pairs(law: MeshLaw, at: Instants, travel: Array) -> Pressed:
     if at.differ:
         excess, gain = excess + at.pair_excess, gain * at.pair_gain
     delta = np.broadcast_to(travel[..., None] + excess, (*travel.shape, len(law.offsets)))
-    force, tangent = law.of_pairs(delta, at.phase)
+    force, tangent = read_pairs(law, delta, at.phase)
     return Pressed(gain * force, gain * tangent)
 
 

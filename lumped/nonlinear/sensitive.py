@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from gearbench.lumped.nonlinear.law import MeshLaw
 from gearbench.lumped.nonlinear.pressing import Instants, Pressed
+from gearbench.lumped.nonlinear.reading import read_pairs
 
 Array = NDArray[np.float64]
 
@@ -77,7 +78,7 @@ def _part(
 ) -> _Part:
     """That of one pair, or of all, where all are pressed by `depth` (n,) [m]."""
     n = exponent
-    force, tangent = law.of_pairs(np.broadcast_to(depth[:, None], (depth.size, len(law.offsets))), phase)
+    force, tangent = read_pairs(law, np.broadcast_to(depth[:, None], (depth.size, len(law.offsets))), phase)
     whole, stiff = force.sum(axis=1), tangent.sum(axis=1)
     loaded = whole > 0.0
     safe = np.where(loaded, whole, 1.0)
