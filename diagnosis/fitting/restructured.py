@@ -30,6 +30,8 @@ RENEWALS = 3
 CLOSE = 0.2
 # The same of a block that answers the excitation, above which it is nearly all unexplained.
 FAR = 5.0
+# Part of what one rig leaves of the excited lines above which another leaves nearly as much.
+ALIKE = 0.75
 # Cost of the nominal rig over that of a fit up to which another fit is begun there: mesh, offsets and flanks trade
 # along long valleys, and a rig without any of that can lie below their floors.
 NEAR = 1.5
@@ -66,9 +68,23 @@ def better(found: Optimum, other: Optimum | None) -> Optimum:
 def is_close(simulator: Simulator, found: Optimum) -> bool:
     """Whether the median block is left with little beside its noise, and no block that answers the excitation with
     much: a structure that is not there shows in the transmission error before it shows anywhere else."""
+    left = _left(simulator, found)
+    return bool(np.median(left) < CLOSE and not (simulator.target.excited & (left > FAR)).any())
+
+
+def answers_alike(simulator: Simulator, before: Optimum, after: Optimum) -> bool:
+    """Whether the lines that show structure are left with nearly as much by both rigs: what was not found beside the
+    one is not found beside the other."""
     target = simulator.target
-    left = target.nats(target.energies(target.lines - found.lines)) - target.nats(target.noise)
-    return bool(np.median(left) < CLOSE and not (target.excited & (left > FAR)).any())
+    counts = np.where(target.excited, target.counts, 0.0) if target.excited.any() else target.counts
+    one, other = (float((counts * _left(simulator, found)).sum()) for found in (before, after))
+    return other > ALIKE * one
+
+
+def _left(simulator: Simulator, found: Optimum) -> Array:
+    """Nats an independent line (blocks,) that the optimum leaves beside the noise."""
+    target = simulator.target
+    return np.asarray(target.nats(target.energies(target.lines - found.lines)) - target.nats(target.noise))
 
 
 def _from_around(simulator: Simulator, found: Optimum, shown: Shown | None, report: Report) -> Optimum | None:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from gearbench.diagnosis.effects.effect import BEYOND, Hypothesis
 from gearbench.diagnosis.fitting.fit import Optimum, fit, fit_afresh, gone_on, refreshed
 from gearbench.diagnosis.fitting.reshaped import has_shapes
-from gearbench.diagnosis.fitting.restructured import begun_at_nominal, is_close, restructured
+from gearbench.diagnosis.fitting.restructured import answers_alike, begun_at_nominal, is_close, restructured
 from gearbench.diagnosis.fitting.shown import Shown
 from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.selection.by_forces import Start
@@ -72,7 +72,9 @@ def select(
     best, entered, weighed = _forward(simulator, base, [], hypotheses, starts, report, apart=apart)
 
     def begun_elsewhere(best: Optimum, kept: Sequence[Weighed]) -> Optimum:
-        best = restructured(simulator, best, shown, report)
+        # Beside a base that is not close it was sought already.
+        if is_close(simulator, base) or not answers_alike(simulator, base, best):
+            best = restructured(simulator, best, shown, report)
         report("simulating: all together, from the nominal rig")
         return begun_at_nominal(simulator, best, _entries(unknowns, kept))
 

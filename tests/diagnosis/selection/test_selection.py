@@ -309,3 +309,15 @@ def test_what_further_records_call_for_enters_beside_what_is_there() -> None:
     other: Any = FakeSimulator(lambda q: q @ MATRIX, target(sound @ MATRIX + noise))
     found = carried_on(other, begun, LISTED)
     assert found is not None and names(found) == ["friction"]
+
+
+@pytest.mark.parametrize(("close", "alike", "times"), [(True, True, 1), (False, True, 0), (False, False, 1)])
+def test_structure_that_was_sought_beside_the_same_answer_is_sought_no_more(
+    close: bool, alike: bool, times: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where the base is close to the records none was sought beside it."""
+    sought = []
+    monkeypatch.setattr(module, "restructured", lambda here, best, *more: sought.append(best) or best)
+    monkeypatch.setattr(module, "is_close", lambda here, found: close)
+    monkeypatch.setattr(module, "answers_alike", lambda here, before, after: alike)
+    assert names(selected({3: 0.4})) == ["friction"] and len(sought) == times
