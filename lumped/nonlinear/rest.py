@@ -206,9 +206,6 @@ def springs_and_dampers(c: Constants, s: Structure | None, tangents: tuple[float
         (x1, s.stiffness1, s.damping1),
         (x2, s.stiffness2, s.damping2),
     )
-    for seen, k, d in pairs:
-        springs += k * np.outer(seen, seen)
-        dampers += d * np.outer(seen, seen)
-    for along, across, k in ((first, x1, s.coupling1), (second, x2, s.coupling2)):
-        springs += k * (np.outer(along, across) + np.outer(across, along))
-    return springs, dampers
+    seen, k, d = (np.array(part) for part in zip(*pairs, strict=True))
+    crossing = s.coupling1 * np.outer(first, x1) + s.coupling2 * np.outer(second, x2)
+    return springs + seen.T @ (k[:, None] * seen) + crossing + crossing.T, dampers + seen.T @ (d[:, None] * seen)
