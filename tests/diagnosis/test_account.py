@@ -67,7 +67,7 @@ def test_places_share_what_remains_by_how_far_they_stand_out() -> None:
     assert weights(replace(MISSING, silent=silent)) == pytest.approx(at("drive", 0.1 / 1.1) + at("mesh", 1 / 1.1))
     assert place_in(nothing_missing(), (0.0, 200.0)) == "none"
     judged: Any = type("J", (), {"closings": {"f": Closing(9.0, 2.0, ("dte", "excited"), {})}, "left": 0.5})()
-    judged.share = lambda without: 0.5
+    judged.share_of = lambda effect: 0.5
     friction = Hypothesis("f", "sensor", ())
     shares = {one.name: one.share for one in places_of(judged, (friction,), MISSING)}
     # Half of the gap is the sensor's; a quarter by energy remains, two thirds of it at the drive.

@@ -30,7 +30,7 @@ def test_it_is_said_where_good_rigs_shares_of_other_effects_close_as_much(plain:
     judged: Any = SimpleNamespace(
         sizes={"dte": Sizes(9e-6, 2e-6, plain * 1e-6, 1e-6, 1e-7)},
         closings={"run-out": Closing(60.0, 250.0, ("dte", "0–190"), {})},
-        share=lambda without: 0.99,
+        share_of=lambda effect: 0.99,
         kept=kept,
         dropped=(),
     )

@@ -38,7 +38,7 @@ def test_what_shows_only_beside_another_effect_is_as_likely_as_it_is_worth_there
     judged: Any = SimpleNamespace(
         found=SimpleNamespace(selection=selection),
         closings={"coupling": closing, "pitch-error": closing},
-        share=lambda without: 0.4,
+        share_of=lambda effect: 0.4,
     )
     decided: Any = SimpleNamespace(named=(first, second), drift=None)
     named = chances_of(judged, decided, POPULATION, LINES, ()).named

@@ -16,7 +16,7 @@ from gearbench.diagnosis.effects.effect import Hypothesis, Wide
 from gearbench.diagnosis.judging import closing as closing_module
 from gearbench.diagnosis.judging import held_against as module
 from gearbench.diagnosis.judging import judged as judged_module
-from gearbench.diagnosis.judging.closing import GAIN, closing_of, free_closing, rms_closed
+from gearbench.diagnosis.judging.closing import GAIN, Closing, closing_of, free_closing, rms_closed
 from gearbench.diagnosis.judging.held_against import judged_on
 from gearbench.diagnosis.judging.judged import GREATER, Judged, Sizes
 from gearbench.diagnosis.selection import selection as selecting
@@ -280,6 +280,8 @@ def test_parts_of_the_gap_are_energies_beyond_noise_in_units_of_each_channel(mon
     assert made.share(nominal) == pytest.approx(1 - 0.2**2)
     assert made.share(half) == pytest.approx(0.5 * (0.4**2 - 0.1**2) / 0.5**2, rel=0.05)
     assert made.share(final) == 0.0
+    closing = Closing(9.0, 2.0, ("dte", "excited"), half)
+    assert replace(made, closings={"friction": closing}).share_of(FRICTION) == made.share(half)
     assert made.grown(half) == pytest.approx(np.sqrt((0.4**2 + 0.1**2) / (2 * 0.1**2)), rel=0.05)
     assert made.grown(final) == 1.0
     value, low, high = rms_closed(None, "dte", half["dte"], final["dte"])  # type: ignore[arg-type]
