@@ -28,19 +28,30 @@ def effect(name: str, closes: float) -> Effect:
 def test_each_step_leaves_what_the_later_ones_take_off() -> None:
     # By energy 5^2 = 3^2 + 4^2: with coupling and friction 3 um are left, and friction alone takes 4 of the rest off.
     rows = steps_of(gap(3e-6), (effect("friction", 2.0), effect("coupling", 3.4641016)))
-    assert [words for words, _, _ in rows] == [
+    assert [one.words for one in rows] == [
         "nominal rig", "recalibrated", "+ an elastic coupling", "+ friction between the flanks", "noise floor",
     ]  # fmt: skip
-    assert [value for _, value, _ in rows] == pytest.approx([13.0, 5.0, 13**0.5, 3.0, 1.0])
-    assert [words for words, _, _ in steps_of(gap(None), ())] == ["nominal rig", "recalibrated", "noise floor"]
+    assert [one.left for one in rows] == pytest.approx([13.0, 5.0, 13**0.5, 3.0, 1.0])
+    assert [one.words for one in steps_of(gap(None), ())] == ["nominal rig", "recalibrated", "noise floor"]
 
 
 def test_no_step_is_drawn_above_the_one_before() -> None:
     rows = steps_of(gap(3e-6), (effect("friction", 9.0), effect("coupling", 8.0)))
-    assert [value for _, value, _ in rows] == pytest.approx([13.0, 5.0, 5.0, 3.0, 1.0])
+    assert [one.left for one in rows] == pytest.approx([13.0, 5.0, 5.0, 3.0, 1.0])
+
+
+def test_what_comes_back_without_an_effect_is_told_where_the_recalibrated_rig_hid_it() -> None:
+    """By energy 12^2 + 3^2 come back of a rig that is at 5 without any effect; 4^2 + 3^2 = 5^2 is that step itself."""
+    rows = steps_of(gap(3e-6), (effect("friction", 4.0),))
+    assert [one.without for one in rows] == [None] * 4
+    rows = steps_of(gap(3e-6), (effect("friction", 12.0),))
+    assert rows[2].without == pytest.approx(153**0.5) and rows[2].left == pytest.approx(3.0)
 
 
 def test_it_is_a_picture(tmp_path: Path) -> None:
     draw_waterfall(tmp_path / "w.svg", (gap(3e-6),), (effect("friction", 4.0),), "held-out")
     words = (tmp_path / "w.svg").read_text(encoding="utf-8")
     assert "+ friction between the flanks" in words and "record held-out [um]" in words
+    assert "without it" not in words
+    draw_waterfall(tmp_path / "x.svg", (gap(3e-6),), (effect("friction", 12.0),), "held-out")
+    assert "3.00; 12.4 without it" in (tmp_path / "x.svg").read_text(encoding="utf-8")

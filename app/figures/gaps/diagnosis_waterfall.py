@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import sqrt
+from math import hypot, sqrt
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from gearbench.figures.plotting import BLUE, GREEN, GREY, ORANGE, figure, save
 from gearbench.words.diagnosis import CHANNELS, SHOWN_UNITS, effects_in_words, length, whole_band
@@ -14,18 +14,30 @@ if TYPE_CHECKING:
     from gearbench.diagnosis.verdict import Effect, Gap
 
 PALE = 0.22  # opacity of what a step takes off
+MORE = 1.1  # times the gap before a step, that must come back without its effect to be drawn
+ROOM, MORE_ROOM = 1.14, 1.5  # of the axis over the largest bar, for what is told beside it
 
 
-def steps_of(gap: Gap, effects: Sequence[Effect]) -> list[tuple[str, float, str]]:
-    """Rows of a waterfall: words, rms gap after the step in the unit that is shown, colour.
+class Step(NamedTuple):
+    """A row of a waterfall: words, rms gap after the step in the unit that is shown, colour, and the gap that comes
+    back where this effect alone is taken out, if a good rig's share of others hid that from the step (else None)."""
+
+    words: str
+    left: float
+    colour: str
+    without: float | None = None
+
+
+def steps_of(gap: Gap, effects: Sequence[Effect]) -> list[Step]:
+    """Rows of a waterfall.
 
     With several effects those that close most come first, and each leaves what the later ones still take off by energy:
     the gap that comes back when they are taken out.
     """
     scale, _ = SHOWN_UNITS.get(gap.unit, (1.0, gap.unit))
     rows = [
-        ("nominal rig", scale * gap.nominal.value, ORANGE),
-        ("recalibrated", scale * gap.recalibrated.value, BLUE),
+        Step("nominal rig", scale * gap.nominal.value, ORANGE),
+        Step("recalibrated", scale * gap.recalibrated.value, BLUE),
     ]
     if gap.with_effect is not None:
         final = scale * gap.with_effect.value
@@ -33,31 +45,38 @@ def steps_of(gap: Gap, effects: Sequence[Effect]) -> list[tuple[str, float, str]
         ranked = sorted(effects, key=lambda one: -closed[one.name])
         for number, one in enumerate(ranked):
             later = sum(closed[other.name] ** 2 for other in ranked[number + 1 :])
-            left = min(sqrt(final**2 + later), max(rows[-1][1], final))
-            rows.append((f"+ {effects_in_words([one.name])}", left, GREEN))
+            before = rows[-1].left
+            left, without = min(sqrt(final**2 + later), max(before, final)), hypot(final, closed[one.name])
+            hidden = without if without > MORE * max(before, left) else None
+            rows.append(Step(f"+ {effects_in_words([one.name])}", left, GREEN, hidden))
     if gap.floor is not None:
-        rows.append(("noise floor", scale * gap.floor.value, GREY))
+        rows.append(Step("noise floor", scale * gap.floor.value, GREY))
     return rows
 
 
 def draw_waterfall(path: Path, gaps: Sequence[Gap], effects: Sequence[Effect], record: str) -> None:
-    """The rms gap of the first channel over the whole band, step by step; pale: what the step takes off."""
+    """The rms gap of the first channel over the whole band, step by step; pale: what the step takes off; dashed: what
+    comes back without that effect alone, where the recalibrated rig had shares of others in its place."""
     gap = whole_band(gaps)[0]
     rows = steps_of(gap, effects)
     unit = SHOWN_UNITS.get(gap.unit, (1.0, gap.unit))[1]
-    largest = max(value for _, value, _ in rows)
+    largest = max(max(one.left, one.without or 0.0) for one in rows)
     with figure(1, 1, (7.0, 1.0 + 0.46 * len(rows))) as (drawing, axes):
-        for number, (_, value, colour) in enumerate(rows):
-            y = len(rows) - 1 - number
-            axes.barh(y, value, height=0.6, color=colour)
-            before = rows[number - 1][1] if number else value
-            if colour != GREY and before > value:
-                axes.barh(y, before - value, left=value, height=0.6, color=colour, alpha=PALE)
-            axes.text(max(before, value) + 0.015 * largest, y, length(value), va="center", fontsize=10)
-            if number and rows[number][2] != GREY:
+        for number, one in enumerate(rows):
+            y, value = len(rows) - 1 - number, one.left
+            axes.barh(y, value, height=0.6, color=one.colour)
+            before = rows[number - 1].left if number else value
+            if one.colour != GREY and before > value:
+                axes.barh(y, before - value, left=value, height=0.6, color=one.colour, alpha=PALE)
+            told, end = length(value), max(before, value)
+            if one.without is not None:
+                axes.barh(y, one.without, height=0.6, fill=False, edgecolor=one.colour, linestyle="--")
+                told, end = f"{told}; {length(one.without)} without it", one.without
+            axes.text(end + 0.015 * largest, y, told, va="center", fontsize=10)
+            if number and one.colour != GREY:
                 axes.plot((before, before), (y + 0.3, y + 0.7), color=GREY, linewidth=0.8)
-        axes.set_yticks(range(len(rows)), [words for words, _, _ in reversed(rows)])
-        axes.set_xlim(0, 1.14 * largest)
+        axes.set_yticks(range(len(rows)), [one.words for one in reversed(rows)])
+        axes.set_xlim(0, (MORE_ROOM if any(one.without is not None for one in rows) else ROOM) * largest)
         axes.grid(visible=False, axis="y")
         axes.set_xlabel(f"rms gap of the {CHANNELS.get(gap.channel, gap.channel)} on record {record} [{unit}]")
         save(drawing, path)
