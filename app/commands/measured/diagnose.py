@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     from gearbench.rig import Case
 
 PICTURES = {
-    "waterfall": "What recalibration and each effect take off the gap, step by step.",
+    "waterfall": "What recalibration and each effect take off the gap, step by step; dashed: what comes back without an"
+    " effect alone, where its step does not show it.",
     "where": "Shares of the gap between the records and the nominal rig.",
     "gap": "Rms gap from the nominal rig to the noise floor, channel by channel.",
     "traces": "What remains between the record and its simulations: in time, and by frequency.",
