@@ -39,6 +39,18 @@ def shown_of(answer: Answer) -> frozenset[str]:
     return frozenset(name for name in answer.effects if sqrt(1.0 + answer.traces.get(name, inf) ** 2) >= DUE)
 
 
+def right_verdict(outcome: Outcome) -> str:
+    """Which of the verdicts effect, none and unknown a perfect program is sure of: none, too, of an effect that nobody
+    owes and nobody named, and of a foreign one that the record does not show; effect of a foreign one that the library
+    has after all, and that was named."""
+    answer = outcome.answer
+    if answer.kind == "foreign":
+        named = "effect" if outcome.result == "right" else "unknown"
+        return named if shown_of(answer) or named == "effect" else "none"
+    hit = any(outcome.at_work(name) for name in named_effects(outcome.verdict or {}))
+    return "effect" if hit or owed(outcome) else "none"
+
+
 def found_of_due(outcomes: Sequence[Outcome]) -> Rate:
     """How many of the effects that are due were named, or a class that holds them."""
     found = total = 0

@@ -22,8 +22,6 @@ from gearbench.challenge.answers import Answer
 VERDICTS = ("effect", "none", "unknown")
 # What version 2 of a verdict says for those of version 1.
 _NOW = {"effects": "effect"}
-# Which probability a perfect program gives 1, by the kind of the case.
-TRUE_VERDICT = {"effect": "effect", "none": "none", "foreign": "unknown"}
 
 Verdict = Mapping[str, Any]
 
@@ -41,11 +39,6 @@ class Outcome:
     def at_work(self, effect: str) -> bool:
         """Whether a named effect was at work: a foreign one, too, if the library has it after all."""
         return effect in self.answer.effects
-
-    @property
-    def true_verdict(self) -> str:
-        """The verdict that was right here: of a foreign effect unknown, or what it is."""
-        return "effect" if self.result == "right" and self.answer.kind == "foreign" else TRUE_VERDICT[self.answer.kind]
 
 
 def without(answer: Answer, effect: str | None) -> Answer:

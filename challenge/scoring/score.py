@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from gearbench.challenge.scoring.due import found_of_due, shown_of, true_of_named, within_intervals
+from gearbench.challenge.scoring.due import found_of_due, right_verdict, shown_of, true_of_named, within_intervals
 from gearbench.challenge.scoring.intervals import COVERAGE, Rate, brier, calibration_error, middle, reliability
 from gearbench.challenge.scoring.outcomes import VERDICTS, Outcome, named_effects, said
 from gearbench.challenge.scoring.reach import reach_table
@@ -131,7 +131,7 @@ def _calibration(outcomes: Sequence[Outcome]) -> Table:
     (whether it is the right one of the three) and of the named effect."""
     given = [o for o in outcomes if o.verdict is not None]
     stated = [[float(o.verdict["probability"][key]) for key in VERDICTS] for o in given if o.verdict is not None]
-    truth = [VERDICTS.index(o.true_verdict) for o in given]
+    truth = [VERDICTS.index(right_verdict(o)) for o in given]
     told = [VERDICTS.index(said(o.verdict)) for o in given if o.verdict is not None]
     named: list[tuple[float, bool]] = []
     for outcome in given:

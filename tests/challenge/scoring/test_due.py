@@ -9,7 +9,7 @@ import pytest
 from shared.fake_verdicts import verdict
 
 from gearbench.challenge.answers import Answer
-from gearbench.challenge.scoring.due import found_of_due, owed, true_of_named
+from gearbench.challenge.scoring.due import found_of_due, owed, right_verdict, true_of_named
 from gearbench.challenge.scoring.outcomes import Outcome, judge
 from gearbench.challenge.scoring.score import score
 from gearbench.challenge.scoring.text import score_text
@@ -97,6 +97,26 @@ def test_a_foreign_effect_that_the_library_has_after_all_is_named_rightly() -> N
     assert (known.result, blamed.result) == ("right", "blamed")
     assert (table["due"]["true"]["count"], table["due"]["true"]["total"]) == (1, 2)
     assert (table["foreign"]["refused_at_right_place"]["count"], table["foreign"]["blamed"]["count"]) == (1, 1)
-    assert [known.true_verdict, blamed.true_verdict] == ["effect", "unknown"]
+    assert [right_verdict(known), right_verdict(blamed)] == ["effect", "unknown"]
     assert table["calibration"]["effect"][0]["count"] == 1
     assert "    right                  1 of 2" in score_text(table)
+
+
+@pytest.mark.parametrize(
+    ("kind", "trace", "said", "right"),
+    [
+        ("effect", 0.1, "none", "none"),
+        ("effect", 0.1, "unknown", "none"),
+        ("effect", 0.1, "friction", "effect"),
+        ("effect", 9.0, "none", "effect"),
+        ("foreign", 0.1, "none", "none"),
+        ("foreign", 0.1, "backlash", "none"),
+        ("foreign", 9.0, "none", "unknown"),
+        ("none", 0.0, "unknown", "none"),
+    ],
+)
+def test_none_is_the_right_verdict_of_what_nobody_owes(kind: Any, trace: float, said: str, right: str) -> None:
+    names = () if kind == "none" else ("friction" if kind == "effect" else "torque-filter",)
+    answer = Answer(kind, names, "mesh", {}, traces=dict.fromkeys(names, trace))
+    given = verdict(said) if said in ("none", "unknown") else verdict("effect", said)
+    assert right_verdict(judge("x", answer, given | {"candidates": []})) == right
