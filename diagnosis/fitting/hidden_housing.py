@@ -46,6 +46,8 @@ STIFF_AT, STIFF = 1.8, 0.01
 RENEWALS = 3
 BEGUN = 1, 3  # frequencies at which a first and a second motion are begun: beside another it is seen less well
 SHOWS = 0.01  # compliance from which a second one does
+# Nats of the excited lines, to first order, by which a second one is plain to see beside a first that fell behind.
+PLAIN = 10.0
 # Shares of driver and driven along, then across: ten whose products with themselves tell those of any.
 TOLD_BY = np.array([
     (1, 0, 0, 0), (0, 1, 0, 0), (1, 1, 0, 0), (1, 0, 1, 0), (1, 0, -1, 0),
@@ -70,14 +72,15 @@ def on_a_housing(
         if number == 0 and first is not None:
             begun = [with_hidden(unknowns, p, number, first)]
         else:
-            begun = with_hidden_motions(simulator, p, found.sd, number)
+            begun, gain = with_hidden_motions(simulator, p, found.sd, number)
+            if best is not None and best.cost - best.left > found.cost:
+                # Beside one of two motions of equal size much is left of every line, and one more may catch up.
+                begun = begun[:1] if gain > PLAIN else []
         tried = [fit_afresh(simulator, one, found.sd, renewals=RENEWALS, chosen=free) for one in begun]
         again = max((one for one in tried if one is not None), key=lambda one: one.evidence, default=None)
         if again is None or (best is not None and again.evidence <= best.evidence):
             break
         p, best = again.p, again
-        if best.cost - best.left > found.cost:  # another motion would not catch up
-            break
     if best is None or best.evidence <= found.evidence:
         return best
     return gone_on(simulator, refreshed(simulator, best, unknowns.of((HOUSING,)) & (best.p <= NONE)), RENEWALS)
@@ -95,28 +98,29 @@ def without_housing(simulator: Simulator, p: Array) -> Array | None:
     return plain
 
 
-def with_hidden_motions(simulator: Simulator, p: Array, sd: Array, number: int) -> list[Array]:
+def with_hidden_motions(simulator: Simulator, p: Array, sd: Array, number: int) -> tuple[list[Array], float]:
     """`p` (size,) with that motion of a housing its sensors stand on, where its resonance explains the excited lines
-    best under the prior `sd` (size,), and, of a second one, without shares across there and where it does so next; none
-    where no line is excited, or no such rig can be."""
+    best under the prior `sd` (size,), and, of a second one, without shares across there and where it does so next; by
+    how many nats it explains them. None where no line is excited, or no such rig can be."""
     whole = simulator.target
     if not whole.excited.any():
-        return []
+        return [], 0.0
     excited = simulator.of_target(whole.of_lines(whole.excited[whole.of_line]))
     over = _over(excited)
     try:
         told = _told(excited, p, number, over)
         sensitivity = sensitivity_of(excited, p, sd)
     except ValueError:
-        return []
+        return [], 0.0
     if told is None or sensitivity is None:
-        return []
-    begun = _likeliest(excited, p, sd, told, sensitivity, over, most=BEGUN[number])
+        return [], 0.0
+    peaks = _likeliest(excited, p, sd, told, sensitivity, over, most=BEGUN[number])
+    begun = [motion for _, motion in peaks]
     if number > 0:
         # Beside another its shares across are told badly, and a fit lets stand what a rig hardly feels.
         plain = [Motion(one.resonance, one.shares * (1, 1, 0, 0), max(one.compliance, SHOWS)) for one in begun]
         begun = [*begun[:1], *plain]
-    return [with_hidden(simulator.layout.unknowns, p, number, one) for one in begun]
+    return [with_hidden(simulator.layout.unknowns, p, number, one) for one in begun], peaks[0][0] if peaks else 0.0
 
 
 def _told(excited: Simulator, p: Array, number: int, over: Array) -> Complex | None:
@@ -137,8 +141,9 @@ def _told(excited: Simulator, p: Array, number: int, over: Array) -> Complex | N
 
 def _likeliest(
     excited: Simulator, p: Array, sd: Array, told: Complex, sensitivity: Sensitivity, over: Array, most: int
-) -> list[Motion]:
-    """At most so many motions that explain most, with all other unknowns where they are best beside each."""
+) -> list[tuple[float, Motion]]:
+    """At most so many motions that explain most, with all other unknowns where they are best beside each, the best
+    first, and by how many nats."""
     target, unknowns, quadratic, here = excited.target, excited.layout.unknowns, sensitivity.quadratic, excited.lines(p)
     assert here is not None
     step, _, _ = quadratic.best(p, sd, unknowns.bounds())
@@ -153,7 +158,7 @@ def _likeliest(
     def made_of(found: Resonance) -> Array:
         return HOUSING_SD * real_parts(told * answer_of(over, found) * root)
 
-    return [motion for _, motion in likeliest(made_of, left, others, most)]
+    return likeliest(made_of, left, others, most)
 
 
 def _over(excited: Simulator) -> Array:
