@@ -10,7 +10,6 @@ from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import irfft, rfft
 
 from gearbench.bench.errors import BenchError
 from gearbench.records.antialias import about_filter, butterworth, butterworth_delay
@@ -181,10 +180,10 @@ def repeated(values: NDArray[Scalar], samples: int) -> NDArray[Scalar]:
 def resampled(period: Array, points: int) -> Array:
     """The trigonometric sums through the samples (..., n) of one period, at `points` instants, no fewer."""
     samples = period.shape[-1]
-    spectrum = rfft(period, axis=-1)
+    spectrum = np.fft.rfft(period, axis=-1)
     if samples % 2 == 0 and points > samples:
         spectrum[..., -1] *= 0.5  # the highest line and its mirror image share it
-    return np.asarray(irfft(spectrum, points, axis=-1) * (points / samples))
+    return np.asarray(np.fft.irfft(spectrum, points, axis=-1) * (points / samples))
 
 
 class Noise:

@@ -45,8 +45,9 @@ def right_verdict(outcome: Outcome) -> str:
     has after all, and that was named."""
     answer = outcome.answer
     if answer.kind == "foreign":
-        named = "effect" if outcome.result == "right" else "unknown"
-        return named if shown_of(answer) or named == "effect" else "none"
+        if outcome.result == "right":
+            return "effect"
+        return "unknown" if shown_of(answer) else "none"
     hit = any(outcome.at_work(name) for name in named_effects(outcome.verdict or {}))
     return "effect" if hit or owed(outcome) else "none"
 

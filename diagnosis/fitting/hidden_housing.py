@@ -72,10 +72,11 @@ def on_a_housing(
         if number == 0 and first is not None:
             begun = [with_hidden(unknowns, p, number, first)]
         else:
-            begun, gain = with_hidden_motions(simulator, p, found.sd, number)
+            seen = with_hidden_motions(simulator, p, found.sd, number)
             if best is not None and best.cost - best.left > found.cost:
                 # Beside one of two motions of equal size much is left of every line, and one more may catch up.
-                begun = begun[:1] if gain > PLAIN else []
+                seen = [one for one in seen[:1] if one[0] > PLAIN]
+            begun = [one for _, one in seen]
         tried = [fit_afresh(simulator, one, found.sd, renewals=RENEWALS, chosen=free) for one in begun]
         again = max((one for one in tried if one is not None), key=lambda one: one.evidence, default=None)
         if again is None or (best is not None and again.evidence <= best.evidence):
@@ -98,29 +99,30 @@ def without_housing(simulator: Simulator, p: Array) -> Array | None:
     return plain
 
 
-def with_hidden_motions(simulator: Simulator, p: Array, sd: Array, number: int) -> tuple[list[Array], float]:
-    """`p` (size,) with that motion of a housing its sensors stand on, where its resonance explains the excited lines
-    best under the prior `sd` (size,), and, of a second one, without shares across there and where it does so next; by
-    how many nats it explains them. None where no line is excited, or no such rig can be."""
+def with_hidden_motions(simulator: Simulator, p: Array, sd: Array, number: int) -> list[tuple[float, Array]]:
+    """By how many nats that motion of a housing its sensors stand on explains the excited lines, and `p` (size,) with
+    it, where its resonance does so best under the prior `sd` (size,), and, of a second one, without shares across there
+    and where it does so next; none where no line is excited, or no such rig can be."""
     whole = simulator.target
     if not whole.excited.any():
-        return [], 0.0
+        return []
     excited = simulator.of_target(whole.of_lines(whole.excited[whole.of_line]))
     over = _over(excited)
     try:
         told = _told(excited, p, number, over)
         sensitivity = sensitivity_of(excited, p, sd)
     except ValueError:
-        return [], 0.0
+        return []
     if told is None or sensitivity is None:
-        return [], 0.0
-    peaks = _likeliest(excited, p, sd, told, sensitivity, over, most=BEGUN[number])
-    begun = [motion for _, motion in peaks]
+        return []
+    begun = _likeliest(excited, p, sd, told, sensitivity, over, most=BEGUN[number])
     if number > 0:
         # Beside another its shares across are told badly, and a fit lets stand what a rig hardly feels.
-        plain = [Motion(one.resonance, one.shares * (1, 1, 0, 0), max(one.compliance, SHOWS)) for one in begun]
+        plain = [
+            (gain, Motion(one.resonance, one.shares * (1, 1, 0, 0), max(one.compliance, SHOWS))) for gain, one in begun
+        ]
         begun = [*begun[:1], *plain]
-    return [with_hidden(simulator.layout.unknowns, p, number, one) for one in begun], peaks[0][0] if peaks else 0.0
+    return [(gain, with_hidden(simulator.layout.unknowns, p, number, one)) for gain, one in begun]
 
 
 def _told(excited: Simulator, p: Array, number: int, over: Array) -> Complex | None:

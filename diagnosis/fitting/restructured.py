@@ -75,8 +75,7 @@ def is_close(simulator: Simulator, found: Optimum) -> bool:
 def answers_alike(simulator: Simulator, before: Optimum, after: Optimum) -> bool:
     """Whether the lines that show structure are left with nearly as much by both rigs: what was not found beside the
     one is not found beside the other."""
-    target = simulator.target
-    counts = np.where(target.excited, target.counts, 0.0) if target.excited.any() else target.counts
+    counts = simulator.target.excited_counts
     one, other = (float((counts * _left(simulator, found)).sum()) for found in (before, after))
     return other > ALIKE * one
 

@@ -143,6 +143,11 @@ class Target:
         return np.array([block.kind == "excited" for block in self.blocks])
 
     @property
+    def excited_counts(self) -> Array:
+        """Independent lines (blocks,) that answer the excitation; all where nothing is excited."""
+        return np.where(self.excited, self.counts, 0.0) if self.excited.any() else self.counts
+
+    @property
     def most_excited(self) -> int:
         """Number of the record with the most excited lines."""
         names = list(dict.fromkeys(block.record for block in self.blocks))
@@ -153,8 +158,7 @@ class Target:
 
     def excited_cost(self, residual: Complex) -> float:
         """Nats that a residual costs on the excited lines, or on all where nothing is excited."""
-        counts = np.where(self.excited, self.counts, 0.0) if self.excited.any() else self.counts
-        return float(np.sum(counts * self.nats(self.energies(residual))))
+        return float(np.sum(self.excited_counts * self.nats(self.energies(residual))))
 
 
 def target_of(

@@ -206,7 +206,6 @@ def springs_and_dampers(c: Constants, s: Structure | None, tangents: tuple[float
         (x1, s.stiffness1, s.damping1),
         (x2, s.stiffness2, s.damping2),
     )
-    seen = np.array([along for along, _, _ in pairs])
-    stiff, damped = (np.array(values)[:, None] for values in ([k for _, k, _ in pairs], [d for _, _, d in pairs]))
+    seen, stiff, damped = (np.array(part) for part in zip(*pairs, strict=True))
     crossing = s.coupling1 * np.outer(first, x1) + s.coupling2 * np.outer(second, x2)
-    return springs + seen.T @ (stiff * seen) + crossing + crossing.T, dampers + seen.T @ (damped * seen)
+    return springs + (seen.T * stiff) @ seen + crossing + crossing.T, dampers + (seen.T * damped) @ seen

@@ -44,7 +44,8 @@ def test_a_housing_under_the_sensors_is_told_by_the_transmission_error() -> None
     sd = keys.prior()
     plain = without_housing(moving, np.zeros(layout.size))
     assert plain is not None
-    (begin, *others), gain = with_hidden_motions(moving, plain, sd, 1)
+    (gain, begin), *further = with_hidden_motions(moving, plain, sd, 1)
+    others = [other for _, other in further]
     assert begin[keys[SEAT]] == 1.0 and others
     assert others[0][keys[MODE]] == pytest.approx(begin[keys[MODE]]) and not others[0][keys[OBLIQUE]].any()
     assert all(abs(begin[keys[MODE]] - other[keys[MODE]])[2] > APART for other in others[1:])
@@ -64,7 +65,7 @@ def test_a_soft_housing_far_below_the_supports_is_found() -> None:
     moving = recorded(simulator, p)
     plain = without_housing(moving, p)
     assert plain is not None
-    (found,), _ = with_hidden_motions(moving, plain, keys.prior(), 0)
+    ((_, found),) = with_hidden_motions(moving, plain, keys.prior(), 0)
     assert found[keys[MODE]][0] == pytest.approx(-2.2, abs=0.07)
     assert kind_of(keys, found, 0) == "rocking"
 
