@@ -20,6 +20,7 @@ from gearbench.diagnosis.errors import DiagnosisError
 from gearbench.diagnosis.finding import Finding
 from gearbench.diagnosis.forces.nominal import resonance_of
 from gearbench.diagnosis.intake.brisk import brisk
+from gearbench.diagnosis.intake.creeping import in_step
 from gearbench.diagnosis.intake.measurements import Measurement, held_out_of, intake
 from gearbench.diagnosis.intake.signals import simulated_channels
 from gearbench.diagnosis.odds import Calibration
@@ -128,7 +129,7 @@ def take_in(
     for name in without:
         if name not in names:
             raise DiagnosisError(f"without = {name} is no effect of the library: {', '.join(names)}")
-    rest, out = held_out_of([brisk(one) for one in intake(records, nominal)], held_out)
+    rest, out = held_out_of([brisk(in_step(one)) for one in intake(records, nominal)], held_out)
     left = tuple(dict.fromkeys(without))
     if nominal.simulation.model == "lumped":
         return Inputs(nominal, rest, out, left)

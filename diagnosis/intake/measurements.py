@@ -69,7 +69,8 @@ class Measurement:
     speed (each repetition adds `mesh_cycles`). `phase_known`: its origin is the geometry's; `zero_known`: the
     angles' zero is unloaded contact, so that the mean of the transmission error means something.
     `noise`: channel -> rms of one sample's departure between repetitions (empty with one); `drift`: the largest
-    change of a channel's level between repetitions beyond white noise, relative to its rms. `path`: its file.
+    change of a channel's level between repetitions beyond white noise, relative to its rms. `creep` (P,): mesh cycles
+    by which the rotation is ahead in each repetition, on the mean zero. `path`: its file.
     """
 
     name: str
@@ -85,6 +86,7 @@ class Measurement:
     zero_known: bool = True
     noise: dict[str, float] = field(default_factory=dict)
     drift: float = 0.0
+    creep: Array = field(default_factory=lambda: np.zeros(1))
     path: Path | None = None
 
     @property
@@ -166,6 +168,7 @@ def measurement(
         zero,
         {key: noise_of(values) for key, values in periods.items()} if repetitions > 1 else {},
         drift,
+        _creep(passed, facts),
     )
 
 
@@ -337,6 +340,12 @@ def _departures(
         for gear in GEARS:
             departures[f"angle_{gear}"] = departures[f"angle_{gear}"] - departures[f"angle_{gear}"].mean()
     return departures, zero
+
+
+def _creep(passed: dict[str, Array], facts: Facts) -> Array:
+    """Mesh cycles (P,) by which what passes away (P, N) in both angles turns the mesh on."""
+    turned = [passed[f"angle_{gear}"] * teeth for gear, teeth in zip(GEARS, facts.teeth, strict=True)]
+    return np.asarray(np.mean(turned, axis=(0, 2)) / (2 * pi))
 
 
 def _refuse_clipped(record: xr.Dataset, source: str) -> None:
