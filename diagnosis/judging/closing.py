@@ -23,6 +23,9 @@ GAIN = 3.0
 FELT = 0.1
 # Part of a channel's whole gap below which a part of it counts for nothing.
 SEEN = 0.05
+# By how much a part must grow where no channel's whole gap is smaller with the effect: what it makes worse elsewhere is
+# as large as a part of less.
+PLAIN = 2.0
 
 
 @dataclass(frozen=True)
@@ -77,7 +80,12 @@ def feels(target: Target, without: Mapping[str, Array], with_all: Mapping[str, A
 def closing_of(target: Target, without: Mapping[str, Array], with_all: Mapping[str, Array]) -> Closing:
     """What an effect closes of a record, from the signals (channel -> (N,)) of the rigs without and with it."""
     rest, final = (target.lines - target.gathered([signals]) for signals in (without, with_all))
-    growth, part = growth_of(target, target.energies(rest), target.energies(final))
+    lost, kept = target.energies(rest), target.energies(final)
+    growth, part = growth_of(target, lost, kept)
+    if growth < PLAIN:
+        before, after = (target.of_channels(one * target.sizes) for one in (lost, kept))
+        whole = float(np.sqrt((before / np.maximum(after, 1e-300)).max()))
+        growth = growth if whole > 1.0 else min(growth, whole)
     return Closing(target.cost(rest) - target.cost(final), growth, part, without)
 
 

@@ -1,0 +1,41 @@
+"""What closes a part of the gap, on lines made by hand whose residuals are written out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
+
+import numpy as np
+import pytest
+from shared.fake_simulator import LINES, target
+
+from gearbench.diagnosis.judging.closing import closing_of
+from gearbench.diagnosis.simulation.target import Target
+
+
+class OfLines(Target):
+    """A target whose signals are the lines themselves."""
+
+    def gathered(self, channels: Sequence[Mapping[str, np.ndarray]]) -> np.ndarray:
+        return channels[0]["lines"]
+
+
+@pytest.mark.parametrize(
+    ("without", "with_it", "due"),
+    [
+        ((1.3, 5.0), (1.0, 5.0), True),  # the whole is closer by what the part is
+        ((1.3, 5.0), (1.0, 5.2), False),  # worse elsewhere by more than that
+        ((2.5, 5.0), (1.0, 5.8), True),  # but a part of less than half speaks for itself
+        ((1.05, 5.0), (1.0, 5.0), False),
+    ],
+)
+def test_a_part_that_closes_at_the_cost_of_the_whole_must_close_by_half(
+    without: tuple[float, float], with_it: tuple[float, float], due: bool
+) -> None:
+    plain = target(np.zeros(LINES, dtype=complex))
+    held = OfLines(**{one.name: getattr(plain, one.name) for one in fields(plain)})
+    one, other = ({"lines": np.where(held.of_line == 0, *sizes)} for sizes in (without, with_it))
+    found = closing_of(held, one, other)
+    assert (found.growth > 1.1) is due
+    if due:
+        assert found.growth == pytest.approx(without[0] / with_it[0], rel=1e-6)
