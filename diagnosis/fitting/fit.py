@@ -209,8 +209,8 @@ def fit(
     chosen unknowns (None: all); None where `p` is no rig."""
     target, bounds = simulator.target, simulator.layout.unknowns.bounds()
     p = np.clip(p, *bounds)
-    # What these records do not show is left at nothing.
-    p[_unseen(simulator.layout.unknowns, sensitivity)] = 0.0
+    # What these records do not show is left at nothing, what is not chosen as it is.
+    p[_unseen(simulator.layout.unknowns, sensitivity) & (True if chosen is None else chosen)] = 0.0
     cost = cost_of(simulator, p, sd)
     if not np.isfinite(cost):
         return None

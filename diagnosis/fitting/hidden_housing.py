@@ -13,8 +13,10 @@ from math import log, pi, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.diagnosis.fitting.fit import Optimum, Sensitivity, fit_afresh, gone_on, refreshed, sensitivity_of
+from gearbench.diagnosis.fitting.beginning import linear_cost
+from gearbench.diagnosis.fitting.fit import Optimum, Sensitivity, fit_afresh, gone_on, sensitivity_of
 from gearbench.diagnosis.fitting.hidden_motion import Motion, Resonance, answer_of, likeliest, products_of
+from gearbench.diagnosis.fitting.rotation import ROTATION
 from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.intake.signals import frequencies
 from gearbench.diagnosis.simulation.quadratic import real_parts
@@ -59,13 +61,13 @@ def on_a_housing(
     simulator: Simulator, found: Optimum, first: Motion | None = None, tell: Callable[[], None] = lambda: None
 ) -> Optimum | None:
     """The fit with sensors on a housing, one motion of it after the other as long as it comes closer by each, which is
-    told; `first`: its first motion, if that is known. None where a rig has none."""
+    told; `first`: its first motion, if that is known. None where a rig has none, or the excited lines know of none."""
     unknowns = simulator.layout.unknowns
     p, best = without_housing(simulator, found.p), None
     if p is None:
         return None
     tell()
-    free = ~unknowns.of((HOUSING,))
+    free = ~unknowns.of((HOUSING,)) & ((found.sd > unknowns.prior()) | ~unknowns.of(ROTATION))
     for number in range(len(MOTIONS)):
         # One whose resonance is not looked for yet would grow at another's meanwhile.
         free[unknowns[HOUSING].start + number] = True
@@ -82,9 +84,11 @@ def on_a_housing(
         if again is None or (best is not None and again.evidence <= best.evidence):
             break
         p, best = again.p, again
-    if best is None or best.evidence <= found.evidence:
-        return best
-    return gone_on(simulator, refreshed(simulator, best, unknowns.of((HOUSING,)) & (best.p <= NONE)), RENEWALS)
+    # What waits is still as it is beside the former structure.
+    if best is None or linear_cost(simulator, best.p, found.sd) > linear_cost(simulator, found.p, found.sd):
+        return None
+    whole = fit_afresh(simulator, best.p, found.sd, renewals=RENEWALS)
+    return gone_on(simulator, whole, RENEWALS) if whole and whole.evidence > found.evidence else whole
 
 
 def without_housing(simulator: Simulator, p: Array) -> Array | None:

@@ -9,14 +9,10 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.diagnosis.effects.eccentricity import KEYS as RUNOUTS
-from gearbench.diagnosis.effects.encoder_runout import KEYS as ENCODERS
-from gearbench.diagnosis.effects.pitch_error import KEYS as PITCHES
-from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
-from gearbench.diagnosis.effects.torque_ripple import KEY as RIPPLE
 from gearbench.diagnosis.fitting.beginning import levelled, linear_cost, seen_by
 from gearbench.diagnosis.fitting.fit import Optimum, cost_of, fit, fit_afresh, gone_on
 from gearbench.diagnosis.fitting.hidden_housing import on_a_housing
+from gearbench.diagnosis.fitting.rotation import ROTATION
 from gearbench.diagnosis.fitting.shown import Shown
 from gearbench.diagnosis.simulation.simulator import Simulator
 from gearbench.diagnosis.structure.structure import SEAT, otherwise
@@ -35,8 +31,6 @@ ALIKE = 0.75
 # Cost of the nominal rig over that of a fit up to which another fit is begun there: mesh, offsets and flanks trade
 # along long valleys, and a rig without any of that can lie below their floors.
 NEAR = 1.5
-# What moves the rotation's lines alone: it waits until the structure is found.
-ROTATION = (*RUNOUTS.values(), *PITCHES.values(), CRACK, RIPPLE, *ENCODERS.values())
 
 
 def restructured(simulator: Simulator, found: Optimum, shown: Shown | None, report: Report) -> Optimum:

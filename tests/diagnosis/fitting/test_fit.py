@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from shared.fake_simulator import LINES, FakeSimulator, sensitivities, target, unknowns
 
-from gearbench.diagnosis.fitting.fit import Sensitivity, fit, refreshed, sensitivity_of
+from gearbench.diagnosis.fitting.fit import Sensitivity, fit, fit_afresh, refreshed, sensitivity_of
 from gearbench.diagnosis.simulation.quadratic import prior_cost, quadratic_of
 
 MATRIX = sensitivities()
@@ -40,6 +40,15 @@ def test_it_converges_to_the_rig_that_made_the_records() -> None:
     curvature = ((derivative.conj() * weights) @ derivative.T).real[:6, :6] + np.diag(SD[:6] ** -2)
     assert best.std[:6] == pytest.approx(np.sqrt(np.diag(np.linalg.inv(curvature))), rel=0.02)
     assert not best.std[6:].any()
+
+
+def test_what_is_not_chosen_stays_as_it_is() -> None:
+    simulator = FakeSimulator(lambda p: p @ MATRIX, target(TRUE @ MATRIX + noise(1e-3)))
+    begin, free = np.where(np.arange(8) == 3, 0.28, 0.0), np.arange(8) != 3
+    best = fit_afresh(simulator, begin, SD, renewals=1, chosen=free)
+    assert best is not None and best.p[3] == 0.28
+    whole = fit_afresh(simulator, best.p, SD, renewals=1)
+    assert whole is not None and whole.p == pytest.approx(TRUE, abs=2e-3)
 
 
 def test_a_step_to_where_no_rig_is_is_shortened() -> None:
