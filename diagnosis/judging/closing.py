@@ -50,6 +50,12 @@ class Closing:
         """Whether the effect closes a part of the gap that the record can see."""
         return self.gain > GAIN + self.lacking and self.growth > DUE
 
+    @property
+    def open(self) -> bool:
+        """Whether the record speaks neither for the effect nor against it: as it does where what is closer in some part
+        is worse on the whole."""
+        return not self.due and self.gain > -GAIN and (self.growth > 1.0 or self.gain < GAIN)
+
 
 def free_closing(target: Target, without: Mapping[str, Array], with_all: Mapping[str, Array]) -> Closing:
     """What an effect closes by simulations that go their own way: some part of the gap, and of the whole as much. Where

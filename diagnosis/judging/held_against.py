@@ -20,7 +20,7 @@ from gearbench.diagnosis.fitting.fit import Optimum
 from gearbench.diagnosis.forces.condition import prepare
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.judging.along import way_of
-from gearbench.diagnosis.judging.closing import DUE, GAIN, Closing, both, closing_of, feels, free_closing
+from gearbench.diagnosis.judging.closing import DUE, Closing, both, closing_of, feels, free_closing
 from gearbench.diagnosis.judging.judged import GREATER, Judged
 from gearbench.diagnosis.selection.followable import nudges_of, parts
 from gearbench.diagnosis.selection.selection import Selection, further, only, taken_out
@@ -140,8 +140,7 @@ def _closings(
         else:
             closing, silent = _by_itself(found, target, measured, optimum, signals, nudged)
         lacking = inf if one.lacking and not apart else one.lacking
-        silent = silent or (not closing.due and closing.gain > -GAIN)
-        if parted and not one.lacking and silent:
+        if parted and not one.lacking and (silent or closing.open):
             told = [_closing_there(simulator, there, optimum.p, selection.best.p) for there in parted]
             closing = replace(max(told, key=lambda there: there.gain), without=closing.without, own=closing.own)
         closings[one.hypothesis.name] = replace(closing, optimum=optimum, lacking=lacking)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from shared.fake_simulator import LINES, target
 
-from gearbench.diagnosis.judging.closing import closing_of
+from gearbench.diagnosis.judging.closing import GAIN, closing_of
 from gearbench.diagnosis.simulation.target import Target
 
 
@@ -39,3 +39,14 @@ def test_a_part_that_closes_at_the_cost_of_the_whole_must_close_by_half(
     assert (found.growth > 1.1) is due
     if due:
         assert found.growth == pytest.approx(without[0] / with_it[0], rel=1e-6)
+
+
+def test_what_makes_the_whole_worse_is_spoken_against() -> None:
+    """Though the record is likelier with it: no other is asked then."""
+    plain = target(np.zeros(LINES, dtype=complex))
+    held = OfLines(**{one.name: getattr(plain, one.name) for one in fields(plain)})
+    sizes = ((1.5, 5.0), (1.0, 5.1), (1.4, 5.0))
+    one, worse, little = ({"lines": np.where(held.of_line == 0, *pair)} for pair in sizes)
+    found = closing_of(held, one, worse)
+    assert found.gain > GAIN and not found.due and not found.open
+    assert closing_of(held, one, little).open
