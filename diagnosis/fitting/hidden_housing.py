@@ -13,10 +13,9 @@ from math import log, pi, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.diagnosis.fitting.beginning import linear_cost
 from gearbench.diagnosis.fitting.fit import Optimum, Sensitivity, fit_afresh, gone_on, sensitivity_of
 from gearbench.diagnosis.fitting.hidden_motion import Motion, Resonance, answer_of, likeliest, products_of
-from gearbench.diagnosis.fitting.rotation import ROTATION
+from gearbench.diagnosis.fitting.rotation import but_rotation, with_rotation
 from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.intake.signals import frequencies
 from gearbench.diagnosis.simulation.quadratic import real_parts
@@ -67,7 +66,7 @@ def on_a_housing(
     if p is None:
         return None
     tell()
-    free = ~unknowns.of((HOUSING,)) & ((found.sd > unknowns.prior()) | ~unknowns.of(ROTATION))
+    free = ~unknowns.of((HOUSING,)) & but_rotation(unknowns, found.sd)
     for number in range(len(MOTIONS)):
         # One whose resonance is not looked for yet would grow at another's meanwhile.
         free[unknowns[HOUSING].start + number] = True
@@ -84,10 +83,7 @@ def on_a_housing(
         if again is None or (best is not None and again.evidence <= best.evidence):
             break
         p, best = again.p, again
-    # What waits is still as it is beside the former structure.
-    if best is None or linear_cost(simulator, best.p, found.sd) > linear_cost(simulator, found.p, found.sd):
-        return None
-    whole = fit_afresh(simulator, best.p, found.sd, renewals=RENEWALS)
+    whole = with_rotation(simulator, found, best) if best else None
     return gone_on(simulator, whole, RENEWALS) if whole and whole.evidence > found.evidence else whole
 
 

@@ -9,10 +9,10 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.diagnosis.fitting.beginning import levelled, linear_cost, seen_by
+from gearbench.diagnosis.fitting.beginning import levelled, seen_by
 from gearbench.diagnosis.fitting.fit import Optimum, cost_of, fit, fit_afresh, gone_on
 from gearbench.diagnosis.fitting.hidden_housing import on_a_housing
-from gearbench.diagnosis.fitting.rotation import ROTATION
+from gearbench.diagnosis.fitting.rotation import but_rotation, with_rotation
 from gearbench.diagnosis.fitting.shown import Shown
 from gearbench.diagnosis.simulation.simulator import Simulator
 from gearbench.diagnosis.structure.structure import SEAT, otherwise
@@ -84,7 +84,6 @@ def _from_around(simulator: Simulator, found: Optimum, shown: Shown | None, repo
     """The fit begun with what the records show of the rig around its mesh, beside the effects that were widened."""
     unknowns = simulator.layout.unknowns
     widened = found.sd > unknowns.prior()
-    chosen = widened | ~unknowns.of(ROTATION)
     # Effects stay; what was fitted around the wrong structure goes.
     held = np.where(widened | unknowns.of((SEAT,)), found.p, 0.0)
     seen = seen_by(shown, unknowns, held)
@@ -92,11 +91,9 @@ def _from_around(simulator: Simulator, found: Optimum, shown: Shown | None, repo
         return None
     report("simulating: the rig around its mesh")
     begin = levelled(simulator, seen, held, found.sd)
+    chosen = but_rotation(unknowns, found.sd)
     best = fit_afresh(simulator, begin, found.sd, renewals=RENEWALS, chosen=chosen)
-    # What waits is missing in the other lines.
-    if best is None or linear_cost(simulator, best.p, found.sd) > linear_cost(simulator, found.p, found.sd):
-        return None
-    return fit_afresh(simulator, best.p, found.sd, renewals=RENEWALS)
+    return with_rotation(simulator, found, best) if best else None
 
 
 def _on_a_housing(simulator: Simulator, found: Optimum, shown: Shown | None, report: Report) -> Optimum:

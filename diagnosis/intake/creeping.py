@@ -9,10 +9,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
-from gearbench.diagnosis.intake.measurements import Measurement
+from gearbench.diagnosis.intake.measurements import Measurement, without
 from gearbench.diagnosis.intake.quality import noise_of
 from gearbench.diagnosis.intake.signals import excited
 
@@ -36,13 +35,14 @@ def in_step(measured: Measurement) -> Measurement:
     back = np.where(turning, np.exp(-2j * np.pi * order * creep[:, None]), 1.0)
     periods = {name: np.fft.irfft(back * np.fft.rfft(one, axis=-1), one.shape[-1], axis=-1)
                for name, one in measured.periods.items()}  # fmt: skip
-    moved = {name: (one - measured.periods[name]).ravel() for name, one in periods.items()}
+    record = without(measured.record, {name: measured.periods[name] - one for name, one in periods.items()})
     notes = measured.warnings
     if more > TOLD:
         notes = (*notes, f"the rotation creeps by {more:.2g} mesh cycles against the excitation over the record: the"
                          " lines of both shafts are turned back by it")  # fmt: skip
     noise = {name: noise_of(one) for name, one in periods.items()}
-    return replace(measured, record=_moved(measured.record, moved), periods=periods, noise=noise, warnings=notes)
+    still = np.zeros_like(creep)
+    return replace(measured, record=record, periods=periods, noise=noise, warnings=notes, creep=still)
 
 
 def _turning(measured: Measurement) -> Flags:
@@ -54,11 +54,3 @@ def _turning(measured: Measurement) -> Flags:
     out[0] = False
     out[excited(measured)] = False
     return out
-
-
-def _moved(record: xr.Dataset, moved: dict[str, Array]) -> xr.Dataset:
-    """The record with so much (P N,) added to channels of its first realisation."""
-    channels = {name: record[name].copy(data=record[name].values.copy()) for name in moved}
-    for name, more in moved.items():
-        channels[name].values[0] += more
-    return record.assign(channels)

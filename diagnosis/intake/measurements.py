@@ -148,7 +148,7 @@ def measurement(
     periods = {key: values.reshape(repetitions, samples) for key, values in whole.items()}
     drift = drift_of(periods, facts.base_radii, notes) if repetitions > 1 else 0.0
     passed = {key: passing(values) for key, values in periods.items()}
-    record = _settled(record, passed)
+    record = without(record, passed)
     periods = {key: values - passed[key] for key, values in periods.items()}
     if repetitions == 1:
         _one_repetition(record, notes)
@@ -298,9 +298,9 @@ def _completed(record: xr.Dataset, repetition: tuple[int, int], frequency: float
     return whole.assign_attrs(filled | {"samples_per_period": samples, "periods": repetitions})
 
 
-def _settled(record: xr.Dataset, passed: dict[str, Array]) -> xr.Dataset:
-    """The record without what passes away in the channels of its first realisation."""
-    moved = {key: values.ravel() for key, values in passed.items() if values.any()}
+def without(record: xr.Dataset, part: dict[str, Array]) -> xr.Dataset:
+    """The record without a part (P, N) of the channels of its first realisation."""
+    moved = {key: values.ravel() for key, values in part.items() if values.any()}
     if not moved:
         return record
     channels = {key: record[key].copy(data=record[key].values.copy()) for key in moved}

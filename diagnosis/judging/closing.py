@@ -52,8 +52,8 @@ class Closing:
 
     @property
     def open(self) -> bool:
-        """Whether the record speaks neither for the effect nor against it: as it does where what is closer in some part
-        is worse on the whole."""
+        """Whether the record speaks neither for the effect nor against it; where it is likelier with it and yet worse
+        on the whole, it speaks against it."""
         return not self.due and self.gain > -GAIN and (self.growth > 1.0 or self.gain < GAIN)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from types import SimpleNamespace
 from typing import Any
 
@@ -48,6 +48,19 @@ def target(lines: np.ndarray, floor: float = 1e-6) -> Target:
         counts=np.full(BLOCKS, 8.0),
         sizes=np.bincount(of_line).astype(float),
     )
+
+
+class OfLines(Target):
+    """A target whose signals are the lines themselves."""
+
+    def gathered(self, channels: Sequence[Mapping[str, Any]]) -> np.ndarray:
+        return channels[0]["lines"]
+
+
+def of_lines(lines: np.ndarray, **changes: Any) -> OfLines:
+    """The same blocks of ten such lines each."""
+    plain = target(lines)
+    return OfLines(**({one.name: getattr(plain, one.name) for one in fields(plain)} | changes))
 
 
 def chosen(

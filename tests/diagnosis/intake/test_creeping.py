@@ -42,6 +42,7 @@ def test_lines_that_turn_are_turned_back_and_excited_ones_stay(creep: float) -> 
     np.testing.assert_allclose(shift, expected.ravel(), atol=1e-13)
     assert made.noise["angle_driver"] < 0.05 * before.noise["angle_driver"]
     assert any("creeps by" in sentence for sentence in made.warnings)
+    assert in_step(made) is made
 
 
 def test_a_rotation_in_step_stays_as_it_is() -> None:

@@ -2,22 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import fields
-
 import numpy as np
 import pytest
-from shared.fake_simulator import LINES, target
+from shared.fake_simulator import LINES, of_lines
 
 from gearbench.diagnosis.judging.closing import GAIN, closing_of
-from gearbench.diagnosis.simulation.target import Target
 
-
-class OfLines(Target):
-    """A target whose signals are the lines themselves."""
-
-    def gathered(self, channels: Sequence[Mapping[str, np.ndarray]]) -> np.ndarray:
-        return channels[0]["lines"]
+NOTHING = np.zeros(LINES, dtype=complex)
 
 
 @pytest.mark.parametrize(
@@ -32,8 +23,7 @@ class OfLines(Target):
 def test_a_part_that_closes_at_the_cost_of_the_whole_must_close_by_half(
     without: tuple[float, float], with_it: tuple[float, float], due: bool
 ) -> None:
-    plain = target(np.zeros(LINES, dtype=complex))
-    held = OfLines(**{one.name: getattr(plain, one.name) for one in fields(plain)})
+    held = of_lines(NOTHING)
     one, other = ({"lines": np.where(held.of_line == 0, *sizes)} for sizes in (without, with_it))
     found = closing_of(held, one, other)
     assert (found.growth > 1.1) is due
@@ -43,8 +33,7 @@ def test_a_part_that_closes_at_the_cost_of_the_whole_must_close_by_half(
 
 def test_what_makes_the_whole_worse_is_spoken_against() -> None:
     """Though the record is likelier with it: no other is asked then."""
-    plain = target(np.zeros(LINES, dtype=complex))
-    held = OfLines(**{one.name: getattr(plain, one.name) for one in fields(plain)})
+    held = of_lines(NOTHING)
     sizes = ((1.5, 5.0), (1.0, 5.1), (1.4, 5.0))
     one, worse, little = ({"lines": np.where(held.of_line == 0, *pair)} for pair in sizes)
     found = closing_of(held, one, worse)

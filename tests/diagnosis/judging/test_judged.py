@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
-from shared.fake_simulator import LINES, FakeSimulator, chosen, sensitivities, target
+from shared.fake_simulator import LINES, FakeSimulator, OfLines, chosen, of_lines, sensitivities, target
 
 from gearbench.diagnosis.account import sentence_of_effect
 from gearbench.diagnosis.effects.effect import Hypothesis, Wide
@@ -23,19 +23,11 @@ from gearbench.diagnosis.selection import selection as selecting
 from gearbench.diagnosis.selection.selection import Selection
 from gearbench.diagnosis.selection.simulated import Simulated
 from gearbench.diagnosis.selection.weighing import LIMIT, PROVISIONAL
-from gearbench.diagnosis.simulation.target import Target
 
 MATRIX, OTHER = sensitivities(3), sensitivities(4)  # the records of the search, and the judged one
 FRICTION = Hypothesis("friction", "mesh", (Wide("friction"),))
 RIPPLE = Hypothesis("torque-ripple", "drive", (Wide("ripple"),))
 BACKGROUND = np.array([0.08, -0.1, 0.02, 0.004, -0.005, 0.006, 0.0, 0.0])
-
-
-class OfLines(Target):
-    """A target whose signals are the lines themselves."""
-
-    def gathered(self, channels: Sequence[Mapping[str, np.ndarray]]) -> np.ndarray:
-        return channels[0]["lines"]
 
 
 @dataclass
@@ -92,8 +84,7 @@ def judged(
     simulator.layout.size, simulator.layout.nominal = 8, None
     selection = chosen(simulator, weighed, [np.zeros(8)], {}, apart=apart)
     assert isinstance(selection, Selection)
-    plain = target(noisy(q @ OTHER, 12))
-    held = OfLines(**{one.name: getattr(plain, one.name) for one in fields(plain)})
+    held = of_lines(noisy(q @ OTHER, 12))
     monkeypatch.setattr(module, "target_of", lambda measurements, conditions, residual=None: held)
     monkeypatch.setattr(module, "noise_left", lambda case, measured, simulate: {})
     monkeypatch.setattr(module, "prepare", lambda measured, model, band: None)
@@ -355,9 +346,7 @@ def test_what_the_judged_record_does_not_feel_is_told_by_one_whose_flanks_part(
     assert selection is not None and names(selection.entered) == ["friction"]
 
     def of_record(measurements: Sequence[Any], conditions: Sequence[Any], residual: Any = None) -> OfLines:
-        plain = target(noisy(q @ SEEN_BY[measurements[0].name], 12))
-        given = {one.name: getattr(plain, one.name) for one in fields(plain)}
-        return OfLines(**(given | {"measurements": tuple(measurements)}))
+        return of_lines(noisy(q @ SEEN_BY[measurements[0].name], 12), measurements=tuple(measurements))
 
     monkeypatch.setattr(module, "target_of", of_record)
     monkeypatch.setattr(module, "noise_left", lambda case, measured, simulate: {})
@@ -378,8 +367,7 @@ def test_what_the_judged_record_does_not_feel_is_told_by_one_whose_flanks_part(
 
 def test_free_simulations_must_close_a_tenth_of_the_whole_gap() -> None:
     """A part is closer by chance: here that of ten lines of thirty, while the others are off as far as before."""
-    plain = target(noisy(BACKGROUND @ OTHER, 12))
-    held = OfLines(**{one.name: getattr(plain, one.name) for one in fields(plain)})
+    held = of_lines(noisy(BACKGROUND @ OTHER, 12))
     far = np.where(held.of_line == 0, 0.0, 5.0)
     one, other = held.lines + far + 1.0, held.lines + far + np.where(held.of_line == 0, 0.1, 1.0)
     part = closing_of(held, {"lines": one}, {"lines": other})
