@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from enum import Enum
 from math import inf
 
 import numpy as np
@@ -36,6 +37,12 @@ STEPS = 60
 REACH, SHRINK, GROW, SHORTEST = 0.3, 0.4, 2.0, 0.003
 NEARLY = 10.0  # nats promised up to which any gain will do
 SETTLED = 25.0  # nats that another step may promise: a fit that is close enough not to be gone on with
+
+
+class Known(Enum):
+    """Whose slopes are known where a fit is: none, those of what acts by forces, or also of what has to be moved."""
+
+    NOTHING, FORCES, ALL = range(3)
 
 
 @dataclass(frozen=True)
@@ -137,7 +144,7 @@ def _stepped(
 
 
 def _improved(
-    simulator: Simulator, p: Array, sd: Array, near: Quadratic, cost: float, reach: float
+    simulator: Simulator, p: Array, sd: Array, near: Quadratic, cost: float, reach: float, damped: bool
 ) -> tuple[Array, float, float, float]:
     """`p` (size,) after the longest step that lowers the cost, of no more than `reach` standard deviations; the cost
     there, the nats that the last step tried promised, and the reach of the next one."""
@@ -154,6 +161,8 @@ def _improved(
             if least < cost:
                 break
         if hoped <= GAIN:
+            return best, least, hoped, inf
+        if not damped:
             return best, least, hoped, inf
         reach = REACH
     while reach > SHORTEST:
@@ -193,7 +202,7 @@ def fit_afresh(
 ) -> Optimum | None:
     """As `fit`, with derivatives by the chosen unknowns (None: all) taken at `p` (size,)."""
     first = sensitivity_of(simulator, p, simulator.layout.unknowns.prior(), chosen)
-    return fit(simulator, p, sd, first, renewals=renewals, chosen=chosen) if first else None
+    return fit(simulator, p, sd, first, renewals=renewals, chosen=chosen, fresh=True) if first else None
 
 
 def fit(
@@ -204,37 +213,52 @@ def fit(
     *,
     renewals: int = 0,
     chosen: Flags | None = None,
+    fresh: bool = False,
 ) -> Optimum | None:
     """The optimum under the prior `sd` (size,) near `p` (size,), with at most so many renewals of the Jacobian of the
     chosen unknowns (None: all); None where `p` is no rig."""
-    target, bounds = simulator.target, simulator.layout.unknowns.bounds()
-    p = np.clip(p, *bounds)
+    p = np.clip(p, *simulator.layout.unknowns.bounds())
     # What these records do not show is left at nothing, what is not chosen as it is.
     p[_unseen(simulator.layout.unknowns, sensitivity) & (True if chosen is None else chosen)] = 0.0
     cost = cost_of(simulator, p, sd)
     if not np.isfinite(cost):
         return None
-    fresh, reach = False, inf
+    known, reach, renewed_at = Known.ALL if fresh else Known.NOTHING, inf, cost if fresh else inf
     for _ in range(STEPS):
-        lines = simulator.lines(p)
-        assert lines is not None
-        near, before = sensitivity.quadratic.moved(target.lines - lines), cost
-        p, cost, hoped, reach = _improved(simulator, p, sd, near, cost, reach)
+        near, before = _about_here(simulator, p, sensitivity), cost
+        damped = known is not Known.NOTHING or renewals == 0
+        p, cost, hoped, reach = _improved(simulator, p, sd, near, cost, reach, damped)
         gain = before - cost
-        if gain < max(GAIN, POOR * hoped):
-            # A rig that bends gives little of what is promised, but does so again from there.
-            if renewals == 0 or (fresh and gain < max(ANEW, LITTLE * hoped)):
-                break
-            renewed = sensitivity_of(simulator, p, np.where(sd > 0, sd, 1.0), chosen, sensitivity.jacobian)
-            if renewed is None:
-                break
-            sensitivity, renewals, fresh = renewed, renewals - 1, True
+        if gain >= max(GAIN, POOR * hoped):
+            known = Known.NOTHING
             continue
-        fresh = False
+        # A rig that bends gives little of what is promised, but does so again from there.
+        ended = gain < max(ANEW, LITTLE * hoped) and known is not Known.NOTHING
+        if renewals == 0 or (ended and known is Known.ALL) or (hoped <= GAIN and renewed_at - cost < ANEW):
+            break
+        if ended and _promised(simulator, p, sd, cost, sensitivity) < NEARLY:
+            break
+        # Where not even a short step keeps its promise, slopes that were not renewed lead astray.
+        left = None if ended else sensitivity.jacobian
+        renewed = sensitivity_of(simulator, p, np.where(sd > 0, sd, 1.0), chosen, left)
+        if renewed is None:
+            break
+        sensitivity, renewals, renewed_at = renewed, renewals - 1, cost
+        known, reach = (Known.ALL, inf) if ended else (Known.FORCES, reach)
+    return _optimum(simulator, p, sd, cost, Sensitivity(sensitivity.jacobian, _about_here(simulator, p, sensitivity)))
+
+
+def _about_here(simulator: Simulator, p: Array, sensitivity: Sensitivity) -> Quadratic:
+    """The quadratic about the residual of `p` (size,)."""
     lines = simulator.lines(p)
     assert lines is not None
-    near = sensitivity.quadratic.moved(target.lines - lines)
-    return _optimum(simulator, p, sd, cost, Sensitivity(sensitivity.jacobian, near))
+    return sensitivity.quadratic.moved(simulator.target.lines - lines)
+
+
+def _promised(simulator: Simulator, p: Array, sd: Array, cost: float, sensitivity: Sensitivity) -> float:
+    """Nats that a step of any length from `p` (size,) promises."""
+    near = _about_here(simulator, p, sensitivity)
+    return cost - near.best(p, sd, _standing(simulator.layout.unknowns, p))[1]
 
 
 def _optimum(simulator: Simulator, p: Array, sd: Array, cost: float, sensitivity: Sensitivity) -> Optimum:

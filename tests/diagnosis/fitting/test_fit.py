@@ -163,3 +163,28 @@ def test_derivatives_that_stayed_behind_are_taken_anew() -> None:
     assert (here.sensitivity.jacobian[:3] == stale[:3]).all()
     best = fit(simulator, here.p, SD, here.sensitivity, renewals=2)
     assert best is not None and best.p == pytest.approx(TRUE, abs=2e-3)
+
+
+class Keeping(FakeSimulator):
+    """What the fourth unknown does is only taken anew where nothing near is given."""
+
+    def jacobian(
+        self, p: np.ndarray, sd: np.ndarray, chosen: np.ndarray, near: np.ndarray | None = None
+    ) -> np.ndarray | None:
+        out = super().jacobian(p, sd, chosen)
+        if out is not None and near is not None:
+            out[3] = near[3]
+        return out
+
+
+def test_where_no_step_keeps_its_promise_slopes_that_stay_behind_are_renewed_too() -> None:
+    """One of the wrong sign: no step along it helps, however short."""
+    simulator = Keeping(curved, target(curved(TRUE) + noise(1e-3)))
+    fresh = sensitivity_of(simulator, np.zeros(8), SD)
+    assert fresh is not None
+    wrong = np.where(np.arange(8)[:, None] == 3, -0.5, 1.0) * fresh.jacobian
+    here = simulator.target.lines - curved(np.zeros(8))
+    near = quadratic_of(simulator.target, here, wrong, fresh.quadratic.active)
+    best = fit(simulator, np.zeros(8), SD, Sensitivity(wrong, near), renewals=6)
+    assert best is not None and best.left < 0.5
+    assert best.p == pytest.approx(TRUE, abs=2e-3)
