@@ -34,8 +34,8 @@ PLAIN = 1.5
 # Noise of the search's records, of a channel's fluctuation, from which they do not speak of what is left elsewhere.
 HIDING = 0.2
 # Part of the nominal gap that the named effects must close for content that changes, or a form without a name, not to
-# outbid them.
-CLOSES = 0.5
+# outbid them; the former does not either where they close so many times its energy.
+CLOSES, OUTWEIGHS = 0.5, 3.0
 # Of the place that stands out most, what the next one may reach for it to be told, and over what sound rigs leave, what
 # it must reach itself.
 TOLD, FAINT = 0.5, 0.2
@@ -96,7 +96,7 @@ def _decided(
     share = max(shares, default=0.0)
     place, over = worst(unsteady, limits.unsteady)
     aside = (_changes(place, changing),) if over > 1.0 else ()
-    if over > 1.0 and changing > known.changing and share < CLOSES:
+    if over > 1.0 and changing > known.changing and share < min(CLOSES, OUTWEIGHS * changing**2):
         because = f"the force missing {at_place(place)} changes from one repetition to the next"
         return Decided("unknown", place, (), changing / known.changing, (because,))
     left = _left_of(judged, missing, known)

@@ -197,6 +197,10 @@ def test_what_changes_counts_by_its_part_of_the_gap() -> None:
     assert "2.0 % of the gap" in quiet.because[-1] and len(decided(None).because) == 1
     assert decided(None, unsteady=out, changing=0.04).place == "driven-support"
     assert decided(900.0, unsteady=out, changing=0.3, share=0.8).verdict == "effects"
+    # A small part of a gap is no less explained for what changes being a smaller one still.
+    small = decided(900.0, unsteady=out, changing=0.04, share=0.006)
+    assert small.verdict == "effects" and "4.0 % of the gap" in small.because[-1]
+    assert decided(900.0, unsteady=out, changing=0.04, share=0.004).verdict == "unknown"
 
 
 def test_a_drift_that_explains_what_changes_is_named_and_speaks_against_nothing() -> None:
