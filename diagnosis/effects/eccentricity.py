@@ -20,7 +20,7 @@ from gearbench.diagnosis.effects.effect import (
     of_gears,
     twins_of,
 )
-from gearbench.diagnosis.effects.once_per_turn import once_of
+from gearbench.diagnosis.effects.once_per_turn import ENCODERS, once_of
 from gearbench.diagnosis.forces.condition import Condition
 from gearbench.diagnosis.forces.nominal import NominalModel
 from gearbench.diagnosis.forces.unknowns import Group, group
@@ -73,13 +73,16 @@ def hypotheses(model: NominalModel) -> tuple[Hypothesis, ...]:
 
 
 def add(rig: Rig, hypothesis: Hypothesis, fitted: Fitted) -> Added:
-    """Adds what was fitted to the run-out of both gears; estimates are given of the gear in question."""
+    """Adds what was fitted to the run-out of both gears; estimates are given of the gear in question, no better known
+    than what the same fit ascribes to its encoder."""
     out: list[Estimate] = []
     for side, key in KEYS.items():
         gear = getattr(rig, side)
         found = once_of(0.5 * gear.runout, gear.runout_phase, fitted.of(key), fitted.std_of(key))
         rig = changed(rig, side, runout=2 * found.size, runout_phase=found.angle)
         if side in hypothesis.on:
+            if ENCODERS[side] in fitted.unknowns.slices:
+                found = found.beside(fitted.of(ENCODERS[side]))
             out += found.estimates(f"{side}.runout", 2e6, "um")
     return rig, tuple(out)
 

@@ -20,14 +20,13 @@ from gearbench.diagnosis.effects.effect import (
     changed,
     twins_of,
 )
-from gearbench.diagnosis.effects.once_per_turn import once_of
+from gearbench.diagnosis.effects.once_per_turn import ENCODERS, once_of
 from gearbench.diagnosis.forces.condition import Condition
 from gearbench.diagnosis.forces.nominal import NominalModel
 from gearbench.diagnosis.forces.unknowns import Group, group
 from gearbench.rig import Rig
 
-# Groups by gear.
-KEYS = {side: f"encoder-{side}" for side in SIDES}
+KEYS = ENCODERS
 # Along the base circle over the deflection of the mesh: what grating and centring of a good encoder leave, and an
 # encoder set on its shaft like a gear of severity 1 on its own.
 SD, WIDE = 0.03, 0.5

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from cmath import phase, rect
-from math import pi
+from math import cos, hypot, pi, sin
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.diagnosis.effects.effect import Estimate
+from gearbench.diagnosis.effects.effect import SIDES, Estimate
 
 Array = NDArray[np.float64]
 NOTHING = 1e-15
+# Groups of the encoders' run-out, by gear.
+ENCODERS = {side: f"encoder-{side}" for side in SIDES}
 
 
 class Once(NamedTuple):
@@ -22,6 +24,12 @@ class Once(NamedTuple):
     size: float
     angle: float
     std: float
+
+    def beside(self, other: Array) -> Once:
+        """The same, known no better than by the part of what else comes once per revolution, with cosine and sine
+        `other` (2,) of the same fit, that lies in its direction: faint sidebands alone tell the two apart."""
+        along = float(other[0]) * cos(self.angle) + float(other[1]) * sin(self.angle)
+        return self._replace(std=hypot(self.std, along))
 
     def estimates(self, name: str, scale: float, unit: str) -> tuple[Estimate, Estimate]:
         """Size, times `scale` in `unit`, and angle as an effect's parameters."""

@@ -194,6 +194,11 @@ def test_fields_and_estimates_of_effects(base: Bench) -> None:
     assert found["driven.runout"].value == pytest.approx(10.0) and found["driven.runout"].unit == "um"
     assert found["driven.runout_phase"].value == pytest.approx(-53.13010235)
     assert "driver.runout" not in found
+    # What the encoder of the same gear reads ahead in that direction may be run-out, what lies across it not.
+    for other, more in (((0.6e-6, -0.8e-6), 2.0), ((0.8e-6, 0.6e-6), 0.0)):
+        _, beside = field("eccentricity driven", {"eccentricity-driven": (3e-6, -4e-6), "encoder-driven": other})
+        assert beside["driven.runout"].value == pytest.approx(10.0)
+        assert beside["driven.runout"].std == pytest.approx(np.hypot(found["driven.runout"].std, more))
 
     case, found = field("pitch-error driver", {"pitch-driver": 1e-6 * np.r_[2.0, -2.0, np.zeros(18)]})
     assert case.rig.driver.pitch_error[:3] == pytest.approx((2e-6, -2e-6, 0.0))
