@@ -216,7 +216,7 @@ def fit(
     fresh: bool = False,
 ) -> Optimum | None:
     """The optimum under the prior `sd` (size,) near `p` (size,), with at most so many renewals of the Jacobian of the
-    chosen unknowns (None: all); None where `p` is no rig."""
+    chosen unknowns (None: all); None where `p` is no rig. `fresh`: the sensitivities are those of `p`."""
     p = np.clip(p, *simulator.layout.unknowns.bounds())
     # What these records do not show is left at nothing, what is not chosen as it is.
     p[_unseen(simulator.layout.unknowns, sensitivity) & (True if chosen is None else chosen)] = 0.0
@@ -239,8 +239,10 @@ def fit(
         if ended and _promised(simulator, p, sd, cost, sensitivity) < NEARLY:
             break
         # Where not even a short step keeps its promise, slopes that were not renewed lead astray.
-        left = None if ended else sensitivity.jacobian
-        renewed = sensitivity_of(simulator, p, np.where(sd > 0, sd, 1.0), chosen, left)
+        if ended:
+            renewed = sensitivity_of(simulator, p, simulator.layout.unknowns.prior(), chosen)
+        else:
+            renewed = sensitivity_of(simulator, p, np.where(sd > 0, sd, 1.0), chosen, sensitivity.jacobian)
         if renewed is None:
             break
         sensitivity, renewals, renewed_at = renewed, renewals - 1, cost
