@@ -2,7 +2,8 @@
 
 Gauss-Newton on `quadratic`, whose steps are simulated: a step that does not lower the cost is halved, then tried
 without what the rig does not feel yet, then damped ever more; the Jacobian is renewed where the unknowns are by now
-when a step keeps little of what it promised. It is done when no step promises half a nat.
+when a step keeps little of what it promised, by all unknowns where forces alone do not mend that. It is done when no
+step promises half a nat.
 """
 
 from __future__ import annotations
@@ -147,7 +148,8 @@ def _improved(
     simulator: Simulator, p: Array, sd: Array, near: Quadratic, cost: float, reach: float, damped: bool
 ) -> tuple[Array, float, float, float]:
     """`p` (size,) after the longest step that lowers the cost, of no more than `reach` standard deviations; the cost
-    there, the nats that the last step tried promised, and the reach of the next one."""
+    there, the nats that the last step tried promised, and the reach of the next one. Without `damped` a reach that has
+    no end is not given one."""
     standing, hoped = _standing(simulator.layout.unknowns, p), 0.0
     best, least = p, cost
     if reach == inf:
@@ -160,9 +162,7 @@ def _improved(
                     return best, least, hoped, inf
             if least < cost:
                 break
-        if hoped <= GAIN:
-            return best, least, hoped, inf
-        if not damped:
+        if hoped <= GAIN or not damped:
             return best, least, hoped, inf
         reach = REACH
     while reach > SHORTEST:
@@ -236,7 +236,7 @@ def fit(
         ended = gain < max(ANEW, LITTLE * hoped) and known is not Known.NOTHING
         if renewals == 0 or (ended and known is Known.ALL) or (hoped <= GAIN and renewed_at - cost < ANEW):
             break
-        if ended and _promised(simulator, p, sd, cost, sensitivity) < NEARLY:
+        if ended and _promised(simulator, p, sd, cost, _about_here(simulator, p, sensitivity)) < NEARLY:
             break
         # Where not even a short step keeps its promise, slopes that were not renewed lead astray.
         if ended:
@@ -257,9 +257,8 @@ def _about_here(simulator: Simulator, p: Array, sensitivity: Sensitivity) -> Qua
     return sensitivity.quadratic.moved(simulator.target.lines - lines)
 
 
-def _promised(simulator: Simulator, p: Array, sd: Array, cost: float, sensitivity: Sensitivity) -> float:
+def _promised(simulator: Simulator, p: Array, sd: Array, cost: float, near: Quadratic) -> float:
     """Nats that a step of any length from `p` (size,) promises."""
-    near = _about_here(simulator, p, sensitivity)
     return cost - near.best(p, sd, _standing(simulator.layout.unknowns, p))[1]
 
 
@@ -267,7 +266,6 @@ def _optimum(simulator: Simulator, p: Array, sd: Array, cost: float, sensitivity
     """Unknowns of a rig that cost so many nats under a prior, with the sensitivities about their own residual."""
     lines, near = simulator.lines(p), sensitivity.quadratic
     assert lines is not None
-    _, promised, _ = near.best(p, sd, _standing(simulator.layout.unknowns, p))
     here = near.information(np.zeros(len(near.active)))
     return Optimum(
         p=p,
@@ -276,6 +274,6 @@ def _optimum(simulator: Simulator, p: Array, sd: Array, cost: float, sensitivity
         cost=cost,
         misfit=cost - prior_cost(p, sd),
         evidence=near.evidence(cost, here, sd),
-        left=cost - promised,
+        left=_promised(simulator, p, sd, cost, near),
         sensitivity=sensitivity,
     )
