@@ -18,7 +18,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from gearbench.diagnosis.errors import DiagnosisError
-from gearbench.diagnosis.intake.passing import passing
+from gearbench.diagnosis.intake.passing import passing_away
 from gearbench.diagnosis.intake.plausible import (
     GEARS,
     Facts,
@@ -147,7 +147,7 @@ def measurement(
     whole = _usable(whole, notes)
     periods = {key: values.reshape(repetitions, samples) for key, values in whole.items()}
     drift = drift_of(periods, facts.base_radii, notes) if repetitions > 1 else 0.0
-    passed = {key: passing(values) for key, values in periods.items()}
+    passed = passing_away(periods, facts.base_radii)
     record = without(record, passed)
     periods = {key: values - passed[key] for key, values in periods.items()}
     if repetitions == 1:

@@ -10,6 +10,8 @@ in the lowest lines alone.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.polynomial.legendre import legder, legval, legvander
 from numpy.typing import NDArray
@@ -19,6 +21,18 @@ Array = NDArray[np.float64]
 DEGREES = 12  # at most, of the polynomials that changes from repetition to repetition are
 # Nats that they must explain beside those of their coefficients' own choice (Schwarz, Ann. Stat. 6, 1978).
 WORTH = 10.0
+ANGLES = ("angle_driver", "angle_driven")
+
+
+def passing_away(channels: Mapping[str, Array], base_radii: tuple[float, float]) -> dict[str, Array]:
+    """What passes away (P, N) of each channel (P, N). Of the angles [rad] it is what does of the motion of both gears
+    together and of one against the other on their base circles [m]: polynomials that hold each angle by itself nearly
+    miss both by different parts, which is a transmission error that nothing has."""
+    out = {name: passing(values) for name, values in channels.items() if name not in ANGLES}
+    one, two = (radius * channels[name] for name, radius in zip(ANGLES, base_radii, strict=True))
+    together, against = passing((one + two) / 2), passing(one - two) / 2
+    moved = (together + against, together - against)
+    return out | {name: values / radius for name, values, radius in zip(ANGLES, moved, base_radii, strict=True)}
 
 
 def passing(repetitions: Array) -> Array:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from gearbench.diagnosis.intake.passing import passing
+from gearbench.diagnosis.intake.passing import passing, passing_away
 
 SAMPLES, NOISE = 2000, 1e-7
 TIME = np.arange(3 * SAMPLES) / SAMPLES  # in repetitions
@@ -47,3 +47,22 @@ def test_noise_stays_as_it_is(count: int) -> None:
 def test_a_tone_that_does_not_repeat_is_not_slow() -> None:
     tone = 1e-5 * np.sin(2 * np.pi * 100.3 * TIME[: 2 * SAMPLES]).reshape(2, SAMPLES)
     assert np.abs(passing(repeated(2) + tone)).max() < 0.05 * 1e-5
+
+
+@pytest.mark.parametrize("rate", [4.0, 40.0, 400.0])
+def test_gears_that_turn_on_together_make_no_transmission_error(rate: float) -> None:
+    """A motion of both that no polynomial of this degree is, above all where it decays fast."""
+    time, radii = TIME[: 2 * SAMPLES], (0.08, 0.32)
+    turned = 1e-3 * np.exp(-rate * time) * np.cos(20.0 * time)
+    error = 1e-6 * np.cos(2 * np.pi * time)
+    rng = np.random.default_rng(11)
+    channels = {
+        f"angle_{gear}": (moved / radius + NOISE / radius * rng.standard_normal(time.size)).reshape(2, SAMPLES)
+        for gear, radius, moved in zip(("driver", "driven"), radii, (turned + error, turned), strict=True)
+    }
+    passed = passing_away(channels, radii)
+    left = {name: values - passed[name] for name, values in channels.items()}
+    seen = radii[0] * left["angle_driver"] - radii[1] * left["angle_driven"]
+    lines = np.fft.rfft(seen.mean(axis=0) - error[:SAMPLES]) / SAMPLES
+    assert np.abs(lines[1:20]).max() < 5 * NOISE / np.sqrt(SAMPLES)
+    assert passed["angle_driver"].any()
