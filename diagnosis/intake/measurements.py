@@ -69,8 +69,8 @@ class Measurement:
     speed (each repetition adds `mesh_cycles`). `phase_known`: its origin is the geometry's; `zero_known`: the
     angles' zero is unloaded contact, so that the mean of the transmission error means something.
     `noise`: channel -> rms of one sample's departure between repetitions (empty with one); `drift`: the largest
-    change of a channel's level between repetitions beyond white noise, relative to its rms. `creep` (P,): mesh cycles
-    by which the rotation is ahead in each repetition, on the mean zero. `path`: its file.
+    change of a channel's level between repetitions beyond white noise, relative to its rms. `creep` (P, N): mesh
+    cycles by which the rotation is ahead, on the mean zero. `path`: its file.
     """
 
     name: str
@@ -86,7 +86,7 @@ class Measurement:
     zero_known: bool = True
     noise: dict[str, float] = field(default_factory=dict)
     drift: float = 0.0
-    creep: Array = field(default_factory=lambda: np.zeros(1))
+    creep: Array = field(default_factory=lambda: np.zeros((1, 1)))
     path: Path | None = None
 
     @property
@@ -343,9 +343,9 @@ def _departures(
 
 
 def _creep(passed: dict[str, Array], facts: Facts) -> Array:
-    """Mesh cycles (P,) by which what passes away (P, N) in both angles turns the mesh on."""
+    """Mesh cycles (P, N) by which what passes away in both angles turns the mesh on."""
     turned = [passed[f"angle_{gear}"] * teeth for gear, teeth in zip(GEARS, facts.teeth, strict=True)]
-    return np.asarray(np.mean(turned, axis=(0, 2)) / (2 * pi))
+    return np.asarray(np.mean(turned, axis=0) / (2 * pi))
 
 
 def _refuse_clipped(record: xr.Dataset, source: str) -> None:

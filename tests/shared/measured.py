@@ -27,9 +27,10 @@ def nominal() -> Case:
 
 def channels(
     *, torque: float = 100.0, mesh: float = MESH, samples: int = SAMPLES, periods: int = 2, noise: float = 1.0,
-    phase: float = 0.0, seed: int = 0,
+    phase: float = 0.0, seed: int = 0, ahead: np.ndarray | float = 0.0,
 ) -> dict[str, np.ndarray]:
-    """Quasi-static channels: both gears on springs of 1e8 N/m, the mesh too; white noise times `noise`."""
+    """Quasi-static channels: both gears on springs of 1e8 N/m, the mesh too; white noise times `noise`; the rotation is
+    `ahead` (samples * periods,) [cycles] of a steady one."""
     meshing = pair(nominal().rig)
     r1, r2 = meshing.driver.base_radius, meshing.driven.base_radius
     time = np.arange(samples * periods) / RATE
@@ -37,7 +38,7 @@ def channels(
     load = torque + 0.3 * torque * sum(np.cos(2 * pi * k * line * time + k * seed) for k in (31, 91, 151)) / 3
     force = load / r1
     along = force * cos(meshing.working_pressure_angle) / 1e8
-    cycles = phase + mesh * time
+    cycles = phase + mesh * time + ahead
     error = force / 1e8 + 2e-6 * np.cos(2 * pi * cycles)
     turn = np.random.default_rng(seed)
     clean = {
