@@ -49,11 +49,12 @@ def added(old: tuple[float, ...], new: Array) -> tuple[float, ...]:
 def _mesh(rig: Rig, model: NominalModel, fitted: Fitted) -> dict[str, object]:
     """Fields of the mesh correction: nominal plus what the fit adds."""
     shape, profile = fitted.of("shape"), fitted.of("profile")
+    offset = fitted.of("offset")[0] if "offset" in fitted.unknowns.slices else 0.0
     return {
         "stiffness_scale": float(model.scale * np.exp(fitted.of("scale")[0])),
         "stiffness_cos": added(rig.mesh.stiffness_cos, shape[0::2]),
         "stiffness_sin": added(rig.mesh.stiffness_sin, shape[1::2]),
-        "error_mean": float(rig.mesh.error_mean + fitted.of("offset")[0]),
+        "error_mean": float(rig.mesh.error_mean + offset),
         "error_cos": added(rig.mesh.error_cos, profile[0::2]),
         "error_sin": added(rig.mesh.error_sin, profile[1::2]),
     }

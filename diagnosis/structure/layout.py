@@ -35,8 +35,9 @@ from gearbench.rig.gear import Crack
 
 Array = NDArray[np.float64]
 
-# Of the background those that no field of a rig holds.
-FORCES_ONLY = ("compliance", "radial")
+# Of the background those that no field of a rig holds, and the zero of the angles, which force residuals need to know
+# the deflection: a simulated rig has its own, and material that all its working flanks lack would be backlash.
+FORCES_ONLY = ("compliance", "radial", "offset")
 LEAST_LOSS = 1e-6
 # Effects that are put into a rig whatever their size.
 PLAIN = ("friction", "eccentricity", "pitch-error", "profile-error", "backlash", "contact-nonlinearity",
