@@ -25,7 +25,7 @@ from gearbench.diagnosis.effects.profile_error import FLANKS
 from gearbench.diagnosis.effects.sensor_delay import KEYS as DELAYS
 from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
 from gearbench.diagnosis.effects.torque_ripple import KEY as RIPPLE
-from gearbench.diagnosis.effects.torque_ripple import ORDERS
+from gearbench.diagnosis.effects.torque_ripple import orders_in
 from gearbench.diagnosis.forces.basis import on_path, waves
 from gearbench.diagnosis.simulation.runout import in_mesh_of_runout, lobes_of, on_gears_of_runout, turn_of
 from gearbench.diagnosis.simulation.target import Target
@@ -119,7 +119,6 @@ def mesh_forces(layout: Layout, p: Array, along: Along, chosen: Flags) -> tuple[
     series = 1.0 + _series_at(mesh.stiffness_cos, mesh.stiffness_sin, phase)
     put(CONTRAST, stiffer * contrast_slope(layout.tangents, float(p[unknowns[CONTRAST]][0]), along.sharing)[:, None])
     put("shape", stiffer * (wave / series[:, None]))
-    put("offset", along.of_excess(np.ones((len(phase), 1))))
     put("profile", along.of_excess(wave))
     put(FLANKS, _of_flanks(along, numbers, layout.model.path))
     for side, key in enumerate(RUNOUTS.values()):
@@ -224,9 +223,9 @@ def drive_forces(layout: Layout, along: Along, condition: str) -> tuple[Array, I
     if condition not in names:
         return np.zeros((len(along.phase), 0)), np.zeros(0, dtype=int)
     turn = turn_of(along, 0)
-    columns = [part(order * turn) for order in ORDERS for part in (np.cos, np.sin)]
-    first = layout.unknowns[RIPPLE].start + names.index(condition) * 2 * len(ORDERS)
-    return np.stack(columns, axis=1) / layout.model.base_radius[0], first + np.arange(2 * len(ORDERS))
+    columns = [part(order * turn) for order in orders_in(layout.unknowns) for part in (np.cos, np.sin)]
+    first = layout.unknowns[RIPPLE].start + names.index(condition) * len(columns)
+    return np.stack(columns, axis=1) / layout.model.base_radius[0], first + np.arange(len(columns))
 
 
 def sensor_columns(
