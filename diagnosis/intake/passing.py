@@ -11,6 +11,7 @@ in the lowest lines alone.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import sqrt
 
 import numpy as np
 from numpy.polynomial.legendre import legder, legval, legvander
@@ -18,9 +19,11 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-DEGREES = 12  # at most, of the polynomials that changes from repetition to repetition are
-# Nats that they must explain beside those of their coefficients' own choice (Schwarz, Ann. Stat. 6, 1978).
-WORTH = 10.0
+# Of the polynomials that changes from repetition to repetition are made of; what goes up to the degrees of the last
+# ones is a tone or noise of some colour, and not slow.
+SLOW, DEGREES = 9, 24
+ABOVE = 50.0  # times the energy of the degrees beyond, from which a degree is slow motion
+CERTAIN = 3.0  # standard deviations from which a step at the ends is one
 ANGLES = ("angle_driver", "angle_driven")
 
 
@@ -37,46 +40,42 @@ def passing_away(channels: Mapping[str, Array], base_radii: tuple[float, float])
 
 def passing(repetitions: Array) -> Array:
     """What passes away (P, N) of repetitions (P, N), of mean zero; nothing where there is one repetition, or where
-    noise explains how they differ."""
+    noise or faster motion explains how they differ."""
     count, samples = repetitions.shape
     nothing = np.zeros_like(repetitions)
     if count < 2:
         return nothing
     place = 2.0 * np.arange(samples) / samples - 1.0
     changes = np.diff(repetitions, axis=0)
-    weights = _smooth(changes, place)
-    if weights is None:
-        return nothing
-    changed = np.concatenate([nothing[:1], np.cumsum(legval(place, weights), axis=0)])
-    return np.asarray(changed - changed.mean(axis=0) + _steps(weights, place))
-
-
-def _smooth(changes: Array, place: Array) -> Array | None:
-    """Legendre coefficients (degrees, P - 1) of changes (P - 1, N) from repetition to repetition; None where noise
-    explains them."""
     directions, triangle = np.linalg.qr(legvander(place, DEGREES))
     shares = directions.T @ changes.T
-    energy, size = float((changes**2).sum()), changes.size
-    if energy == 0.0:
-        return None
-    left = np.maximum(energy - np.cumsum((shares**2).sum(axis=1)), 1e-30 * energy)
-    chosen = len(changes) * np.arange(1, DEGREES + 2)
-    gain = 0.5 * size * np.log(energy / left) - 0.5 * chosen * np.log(size)
-    best = int(np.argmax(gain)) + 1
-    if gain[best - 1] < WORTH:
-        return None
-    return np.asarray(np.linalg.solve(triangle[:best, :best], shares[:best]))
+    energy = (shares**2).mean(axis=1)
+    rest = max(float(energy[SLOW + 1 : SLOW + 4].mean()), float(energy[SLOW + 4 :].mean()))
+    slow = np.flatnonzero(energy[: SLOW + 1] > ABOVE * rest)
+    if not slow.size:
+        return nothing
+    held = np.linalg.inv(triangle[: slow[-1] + 1, : slow[-1] + 1])
+    weights = held @ shares[: slow[-1] + 1]
+    changed = np.concatenate([nothing[:1], np.cumsum(legval(place, weights), axis=0)])
+    return np.asarray(changed - changed.mean(axis=0) + _steps(weights, held * sqrt(rest), place))
 
 
-def _steps(weights: Array, place: Array) -> Array:
+def _steps(weights: Array, spread: Array, place: Array) -> Array:
     """The steps (N,) of value, slope and curvature at the ends of the mean over repetitions, where their changes have
-    Legendre coefficients (degrees, P - 1)."""
+    Legendre coefficients (degrees, P - 1), each off by as much as columns of `spread` (degrees, degrees); those that
+    are too uncertain are left out."""
     along = 0.5 * (place + 1.0)
     bernoulli = (along - 0.5, along**2 - along + 1 / 6, along**3 - 1.5 * along**2 + 0.5 * along)
-    out, factorial = np.zeros_like(place), 1.0
+    out, factorial, count = np.zeros_like(place), 1.0, weights.shape[1]
     for order, polynomial in enumerate(bernoulli):
-        slope = 2.0**order * legder(weights, order) if order else weights
-        ends = legval(-1.0, slope).sum() + float(legval(1.0, slope[:, -1]))
+        # Of each degree at the beginning and at the end.
+        sides = [2.0**order * legval(end, legder(np.eye(len(weights)), order)) for end in (-1.0, 1.0)]
+        sums = [np.full(count, one) for one in (1.0, 0.0)]
+        sums[1][-1] = 1.0
+        ends = sum(float(side @ weights @ one) for side, one in zip(sides, sums, strict=True))
+        off = sum(np.outer(side @ spread, one) for side, one in zip(sides, sums, strict=True))
+        if abs(ends) < CERTAIN * float(np.linalg.norm(off)):
+            break
         factorial *= order + 1
-        out += ends / (weights.shape[1] + 1) / factorial * polynomial
+        out += ends / (count + 1) / factorial * polynomial
     return out
