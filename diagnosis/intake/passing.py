@@ -68,14 +68,13 @@ def _steps(weights: Array, spread: Array, place: Array) -> Array:
     bernoulli = (along - 0.5, along**2 - along + 1 / 6, along**3 - 1.5 * along**2 + 0.5 * along)
     out, factorial, count = np.zeros_like(place), 1.0, weights.shape[1]
     for order, polynomial in enumerate(bernoulli):
-        # Of each degree at the beginning and at the end.
-        sides = [2.0**order * legval(end, legder(np.eye(len(weights)), order)) for end in (-1.0, 1.0)]
-        sums = [np.full(count, one) for one in (1.0, 0.0)]
-        sums[1][-1] = 1.0
-        ends = sum(float(side @ weights @ one) for side, one in zip(sides, sums, strict=True))
-        off = sum(np.outer(side @ spread, one) for side, one in zip(sides, sums, strict=True))
-        if abs(ends) < CERTAIN * float(np.linalg.norm(off)):
+        begin, end = (2.0**order * legval(side, legder(np.eye(len(weights)), order)) for side in (-1.0, 1.0))
+        # Every change is met where it begins, the last one where it ends as well.
+        met = np.tile(begin, (count, 1))
+        met[-1] += end
+        step = float((met * weights.T).sum())
+        if abs(step) < CERTAIN * float(np.linalg.norm(met @ spread)):
             break
         factorial *= order + 1
-        out += ends / (count + 1) / factorial * polynomial
+        out += step / (count + 1) / factorial * polynomial
     return out
