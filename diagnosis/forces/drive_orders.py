@@ -32,13 +32,15 @@ def missing_orders(model: NominalModel, conditions: Sequence[Condition], least: 
         return np.zeros(0)
     # Beyond the mesh's frequency the drive's own resonances are as little known as its torque.
     order = np.arange(1, min(model.teeth[0], *((one.bins - 1) * one.teeth[0] // one.cycles + 1 for one in conditions)))
+    if not order.size:
+        return np.zeros(0)
     found = np.min([_missing(model, one, order) for one in conditions], axis=0)
     return np.where(found >= least, found, 0.0)
 
 
 def _missing(model: NominalModel, condition: Condition, order: Integers) -> Array:
-    """The same (orders,) in one condition; zero where it is uncertain."""
-    line = order * condition.cycles // condition.teeth[0]
+    """The same (orders,) in one condition; zero where it is uncertain, or no more than what other lines lack."""
+    line = np.arange(1, order[-1] * condition.cycles // condition.teeth[0] + 1)
     s, rb1 = 1j * condition.omega[line], model.base_radius[0]
     turned = {name: condition.spectra[f"angle_{name}"][line] for name in ("driver", "driven")}
     yields = model.compliance / (1 + s * model.coupling_damping * model.compliance)
@@ -49,7 +51,8 @@ def _missing(model: NominalModel, condition: Condition, order: Integers) -> Arra
     missing = np.abs(drive * force - torque + turning)
     noise = condition.noise["torque_driver"] + condition.noise["torque_driven"] * (rb1 / model.base_radius[1]) ** 2
     parts = (np.abs(force), np.abs(torque), np.abs(turning), np.abs(taken))
-    doubt = np.sqrt(KNOWN**2 * np.sum(np.square(parts), axis=0) + noise)
+    doubt = np.sqrt(KNOWN**2 * np.sum(np.square(parts), axis=0) + noise) + np.median(missing)
     # Where inertias carry most of it, so do errors of whatever moves them; and what is excited is no ripple.
     still = (np.maximum(parts[2], parts[3]) < np.abs(force)) & (np.abs(torque) < missing)
-    return np.asarray(2 * np.where((missing > CERTAIN * doubt) & still, missing, 0.0) / abs(condition.torque_mean))
+    lacking = 2 * np.where((missing > CERTAIN * doubt) & still, missing, 0.0) / abs(condition.torque_mean)
+    return np.asarray(lacking[order * condition.cycles // condition.teeth[0] - 1])

@@ -42,6 +42,14 @@ def test_what_a_drive_lacks_is_read_by_orders() -> None:
     assert orders_of(MODEL, conditions) == (2, 6, 7, 12, 18, 24)
 
 
+def test_balances_that_no_line_keeps_tell_no_order() -> None:
+    values = channels()
+    repeated = np.tile(np.random.default_rng(4).standard_normal(len(values["torque_driven"]) // 2), 2)
+    values["torque_driven"] = values["torque_driven"] + 100.0 * repeated
+    rough = prepare(measurement(record(values), "base", nominal()), MODEL, 300.0)
+    assert orders_of(MODEL, [rough]) == ORDERS
+
+
 def test_mesh_orders_and_records_without_a_reaction_tell_nothing() -> None:
     mesh = MODEL.teeth[0]
     assert not missing_orders(MODEL, [condition({mesh: 0.05, mesh + 3: 0.05})], LEAST).any()
