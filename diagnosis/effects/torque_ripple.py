@@ -77,7 +77,8 @@ def _average(values: Array, stds: Array, chosen: list[int]) -> float:
 def add(rig: Rig, hypothesis: Hypothesis, fitted: Fitted) -> Added:
     """Gives the drive one ripple for all conditions: the mean of theirs."""
     listed, values, stds = tuple(_listed(fitted.unknowns)), fitted.of(KEY), fitted.std_of(KEY)
-    amplitudes, phases, out, orders = [], [], [], orders_in(fitted.unknowns)
+    orders = orders_in(fitted.unknowns)
+    amplitudes, phases, out = [], [], []
     for order in orders:
         chosen = [i for i, (_, own, _) in enumerate(listed) if own == order]
         parts = [[i for i in chosen if listed[i][2] == part] for part in PARTS]

@@ -40,19 +40,18 @@ def missing_orders(model: NominalModel, conditions: Sequence[Condition], least: 
 
 def _missing(model: NominalModel, condition: Condition, order: Integers) -> Array:
     """The same (orders,) in one condition; zero where it is uncertain, or no more than what other lines lack."""
-    line = np.arange(1, order[-1] * condition.cycles // condition.teeth[0] + 1)
-    s, rb1 = 1j * condition.omega[line], model.base_radius[0]
-    turned = {name: condition.spectra[f"angle_{name}"][line] for name in ("driver", "driven")}
-    yields = model.compliance / (1 + s * model.coupling_damping * model.compliance)
-    drive = 1 + model.rotor * s**2 * yields
+    own = order * condition.cycles // condition.teeth[0]
+    line = np.arange(1, own[-1] + 1)
+    s, (rb1, rb2) = 1j * condition.omega[line], model.base_radius
+    drive = 1 + model.rotor * s**2 * model.coupling_compliance(condition.omega[line])
     torque, force = condition.spectra["torque_driver"][line], rb1 * condition.force_full[line]
-    turning = (model.rotor + drive * model.inertia[0]) * s**2 * turned["driver"] / rb1
-    taken = model.inertia[1] * s**2 * turned["driven"] * rb1 / model.base_radius[1] ** 2
+    turning = (model.rotor + drive * model.inertia[0]) * s**2 * condition.spectra["angle_driver"][line] / rb1
+    taken = model.inertia[1] * s**2 * condition.spectra["angle_driven"][line] * rb1 / rb2**2
     missing = np.abs(drive * force - torque + turning)
-    noise = condition.noise["torque_driver"] + condition.noise["torque_driven"] * (rb1 / model.base_radius[1]) ** 2
-    parts = (np.abs(force), np.abs(torque), np.abs(turning), np.abs(taken))
-    doubt = np.sqrt(KNOWN**2 * np.sum(np.square(parts), axis=0) + noise) + np.median(missing)
+    noise = condition.noise["torque_driver"] + condition.noise["torque_driven"] * (rb1 / rb2) ** 2
+    force, torque, turning, taken = (np.abs(part) for part in (force, torque, turning, taken))
+    doubt = np.sqrt(KNOWN**2 * (force**2 + torque**2 + turning**2 + taken**2) + noise) + np.median(missing)
     # Where inertias carry most of it, so do errors of whatever moves them; and what is excited is no ripple.
-    still = (np.maximum(parts[2], parts[3]) < np.abs(force)) & (np.abs(torque) < missing)
+    still = (np.maximum(turning, taken) < force) & (torque < missing)
     lacking = 2 * np.where((missing > CERTAIN * doubt) & still, missing, 0.0) / abs(condition.torque_mean)
-    return np.asarray(lacking[order * condition.cycles // condition.teeth[0] - 1])
+    return np.asarray(lacking[own - 1])

@@ -18,6 +18,7 @@ from gearbench.lumped.nonlinear.law import MeshLaw
 from gearbench.rig import Case, Rig, Support
 
 Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 
 # Relative standard deviations of what a case states without one.
 DEFAULT_SD = {
@@ -91,6 +92,10 @@ class NominalModel:
         law = self.hardened
         _, tangent = law.evaluate(law.approach[-1], np.arange(law.phases) / law.phases)
         return self.scale * float(tangent.mean())
+
+    def coupling_compliance(self, omega: Array) -> Complex:
+        """Compliance [rad/(N m)] of the drive's coupling by frequency [rad/s]; zero where it is rigid."""
+        return np.asarray(self.compliance / (1 + 1j * omega * self.coupling_damping * self.compliance))
 
     @property
     def deflection(self) -> float:

@@ -105,11 +105,9 @@ def carried_force(model: NominalModel, condition: Condition, departures: Departu
 
 def coupling_compliance(model: NominalModel, condition: Condition, departures: Departures) -> Complex:
     """H (K,) [rad/(N m)] of the drive's coupling."""
-    s = 1j * condition.omega[: condition.bins]
-    more = departures.coupling * (1.0 - 1j * LOSS_FACTOR * np.sign(s.imag))
-    if model.compliance == 0.0:
-        return np.asarray(more)
-    return np.asarray(model.compliance / (1 + s * model.coupling_damping * model.compliance) + more)
+    omega = condition.omega[: condition.bins]
+    more = departures.coupling * (1.0 - 1j * LOSS_FACTOR * np.sign(omega))
+    return np.asarray(model.coupling_compliance(omega) + more)
 
 
 def support_force(model: NominalModel, side: int, y: Array, departures: Departures) -> tuple[Array, Array]:

@@ -50,6 +50,7 @@ def passing(repetitions: Array) -> Array:
     directions, triangle = np.linalg.qr(legvander(place, DEGREES))
     shares = directions.T @ changes.T
     energy = (shares**2).mean(axis=1)
+    # A tone just too fast to be slow is in the next few degrees alone.
     rest = max(float(energy[SLOW + 1 : SLOW + 4].mean()), float(energy[SLOW + 4 :].mean()))
     slow = np.flatnonzero(energy[: SLOW + 1] > ABOVE * rest)
     if not slow.size:
