@@ -15,6 +15,7 @@ from gearbench.diagnosis.account import parts_of, sentences_of_gap
 from gearbench.diagnosis.advice import advice_of
 from gearbench.diagnosis.cause import find_cause
 from gearbench.diagnosis.confirmed import advice_on, confirmed_by_elements
+from gearbench.diagnosis.detection.detectable import detectable_of
 from gearbench.diagnosis.effects.library import CHANGING, LIBRARY
 from gearbench.diagnosis.errors import DiagnosisError
 from gearbench.diagnosis.finding import Finding
@@ -29,7 +30,7 @@ from gearbench.diagnosis.replay.adjustable import Simulate, uncertain, variants
 from gearbench.diagnosis.replay.budget import budget
 from gearbench.diagnosis.replay.gap import gaps
 from gearbench.diagnosis.replay.replays import replays_of
-from gearbench.diagnosis.verdict import Confirmed, Gap, Probabilities, Share, Verdict
+from gearbench.diagnosis.verdict import Confirmed, Detectable, Gap, Probabilities, Share, Verdict
 from gearbench.rig import Case, Damping
 from gearbench.rig.contract import rank_of
 
@@ -100,7 +101,8 @@ def diagnose(
     `records`: one of each condition, files or datasets. `held_out` names the record that the result is judged by and
     not found from (absent: the one named "held-out", or of four or more the last); `without` leaves effects out of the
     library; `progress` is told the name of every step as it begins. `quick` leaves out the division of the gap by
-    channel, band and so on. `confirm` asks the reduced finite-element model too, which takes one to some minutes.
+    channel, band and so on, and how small an effect would show. `confirm` asks the reduced finite-element model too,
+    which takes one to some minutes.
 
     Raises DiagnosisError or RecordError, one sentence each, for records that cannot be diagnosed.
 
@@ -171,12 +173,14 @@ def diagnosed(
     plain = inputs.damped(finding.recalibrated)
     improved = inputs.damped(finding.with_effect) if finding.with_effect is not None else None
     shrunk = gaps(inputs.nominal, plain, improved, inputs.judged, simulate=simulate)
-    where = finding.where
+    where, detectable = finding.where, tuple[Detectable, ...]()
     if not quick:
         said("where the gap is")
         where += _budget(inputs, simulate)
+        said("how small an effect would show")
+        detectable = _detectable(inputs, finding)
     confirmed = confirmed_by_elements(finding.judged, finding.effects, said) if confirm else None
-    return Diagnosis(inputs, _verdict(inputs, finding, where, shrunk, confirmed), plain, improved)
+    return Diagnosis(inputs, _verdict(inputs, finding, where, shrunk, confirmed, detectable), plain, improved)
 
 
 def _budget(inputs: Inputs, simulate: Simulate) -> tuple[Share, ...]:
@@ -186,8 +190,23 @@ def _budget(inputs: Inputs, simulate: Simulate) -> tuple[Share, ...]:
     return budget(measurements, simulated, nominal, moved)
 
 
+def _detectable(inputs: Inputs, finding: Finding) -> tuple[Detectable, ...]:
+    """How small an effect these records would have shown; nothing where simulation did not decide."""
+    if finding.judged is None or finding.problem is None:
+        return ()
+    try:
+        return detectable_of(finding.problem, finding.judged, inputs.measurements, inputs.without)
+    except ValueError:  # sizes that no rig may have cost what is said of them, not the verdict
+        return ()
+
+
 def _verdict(
-    inputs: Inputs, finding: Finding, where: tuple[Share, ...], shrunk: tuple[Gap, ...], confirmed: Confirmed | None
+    inputs: Inputs,
+    finding: Finding,
+    where: tuple[Share, ...],
+    shrunk: tuple[Gap, ...],
+    confirmed: Confirmed | None,
+    detectable: tuple[Detectable, ...],
 ) -> Verdict:
     advice = (*finding.advice, *advice_of(inputs.measurements, inputs.held_out), *advice_on(confirmed))
     explained, remaining = parts_of(shrunk, finding.missing, finding.places)
@@ -208,6 +227,7 @@ def _verdict(
         gap=shrunk,
         held_out=inputs.held_out.name if inputs.held_out else None,
         indistinguishable=finding.indistinguishable,
+        detectable=detectable,
         advice=tuple(dict.fromkeys(advice)),
         confirmed=confirmed,
     )

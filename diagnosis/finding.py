@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from gearbench.diagnosis.evidence.problem import Problem
 from gearbench.diagnosis.judging.judged import Judged
 from gearbench.diagnosis.judging.missing import Missing
 from gearbench.diagnosis.verdict import Candidate, Effect, Found, Outcome, Share
@@ -14,7 +15,7 @@ from gearbench.rig.contract import Place
 @dataclass(frozen=True)
 class Finding:
     """What was found: fields of the verdict, the nominal case recalibrated and with the effects added; `judged`: what
-    simulation makes of the judged record, None where records cannot be simulated."""
+    simulation makes of the judged record, None where records cannot be simulated; `problem`: what was searched."""
 
     verdict: Outcome
     probability: dict[str, float]
@@ -34,3 +35,4 @@ class Finding:
     evidence: dict[str, float] = field(default_factory=dict)
     audits: dict[str, tuple[float, ...]] = field(default_factory=dict)
     judged: Judged | None = None
+    problem: Problem | None = None

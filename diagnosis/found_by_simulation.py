@@ -122,6 +122,7 @@ def by_simulation(
             "left": (judged.left, judged.remains),
         },
         judged=judged,
+        problem=of.problem,
         **common,
     )
 

@@ -212,6 +212,26 @@ class Found(Value):
     unit: str
 
 
+class Smallest(Value):
+    """A parameter of an effect of the smallest size that records would have named (`value`; null: they would have named
+    none), its standard deviation `std` by these records alone, and what a `good` rig has."""
+
+    value: float | None
+    std: NotNegative
+    good: float
+    unit: str
+
+
+class Detectable(Value):
+    """How small an effect the records would have shown, by the parameters that tell its size, the foremost first; `on`:
+    the gears or channels that it is about."""
+
+    name: Name
+    place: Place
+    on: tuple[Name, ...] = ()
+    parameters: dict[Name, Smallest]
+
+
 class Confirmation(Value):
     """How a named effect stands by finite elements: whether it is due there by the same rule, the largest factor by
     which the gap of some part grows without it, nats that the judged record is more likely with it, and its parameters
@@ -259,6 +279,7 @@ class Verdict(Value):
     gap: tuple[Gap, ...] = ()
     held_out: Name | None = None
     indistinguishable: tuple[tuple[Name, ...], ...] = ()
+    detectable: tuple[Detectable, ...] = ()
     advice: tuple[str, ...] = ()
     signs: dict[Name, float] = {}
     calibrated_on: Annotated[int, Field(ge=0)] | None = None

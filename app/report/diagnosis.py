@@ -14,6 +14,7 @@ from gearbench.words.diagnosis import (
     SHOWN_UNITS,
     band_in_words,
     confidence,
+    detectable_in_words,
     effects_in_words,
     headline,
     interval,
@@ -224,9 +225,27 @@ def _limits(report: Report) -> list[str]:
             else "Each cause that was weighed would leave traces of its own."
         ),
         items(same),
+        *_smallest(verdict),
         text("What the records lack:") if losses else "",
         items(losses),
         *([text("What to measure next", "h2"), items(verdict.advice)] if verdict.advice else []),
+    ]
+
+
+def _smallest(verdict: Verdict) -> list[str]:
+    """From which size on the effects that are not named would have been."""
+    rows = [
+        (one.effect, one.told, "at no size" if one.found is None else number(one.found), number(one.good))
+        for one in detectable_in_words(verdict)
+    ]
+    if not rows:
+        return []
+    return [
+        text(
+            "An effect that is not named may still be at work, smaller than these records would have named it. As much"
+            " as a good rig has is not named, however well it shows. Sizes of each effect alone:"
+        ),
+        table(("effect", "size told by", "named from", "good rig"), rows, numbers=(2, 3)),
     ]
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import floor, isfinite, log10
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from gearbench.diagnosis.effects.library import CHANGING, LIBRARY
 from gearbench.diagnosis.words import CHANNELS, PLACES, SHOWN_UNITS, band_in_words, length, number, percent
@@ -19,6 +19,7 @@ __all__ = [
     "band_in_words",
     "basis",
     "confidence",
+    "detectable_in_words",
     "effects_in_words",
     "explained",
     "headline",
@@ -32,6 +33,7 @@ __all__ = [
     "places_in_words",
     "sentences",
     "shrinkage",
+    "size_in_words",
     "value_in_words",
     "whole_band",
     "with_std",
@@ -90,6 +92,42 @@ def parameters_in_words(verdict: Verdict) -> tuple[str, ...]:
             noun = effects_in_words([effect.name])
             out.append(f"{noun[:1].upper()}{noun[1:]}: {', '.join(parts)}.")
     return tuple(out)
+
+
+def size_in_words(effect: str, parameter: str, on: Sequence[str], unit: str) -> str:
+    """`run-out [um]`: the parameter that tells the size of an effect which is said to be about `on`."""
+    about, _, last = parameter.rpartition(".")
+    told = parameter_in_words(effect, last if about in on else parameter)
+    return f"{told} [{unit}]" if unit else told
+
+
+class Told(NamedTuple):
+    """An effect and the part that it is about, what tells its size, and the size from which on it would have been named
+    (None: at none) and of a good rig."""
+
+    effect: str
+    told: str
+    found: float | None
+    good: float
+
+
+def detectable_in_words(verdict: Verdict) -> list[Told]:
+    """From which size on each effect that is not named would have been; of several forms of one the least size."""
+    named = {effect.name for effect in verdict.effects}
+    out: dict[tuple[str, str], Told] = {}
+    for one in verdict.detectable:
+        if one.name in named:
+            continue
+        about = ", ".join(CHANNELS.get(each, each) for each in one.on)
+        words = effects_in_words([one.name]) + (f" ({about})" if about else "")
+        parameter, size = next(iter(one.parameters.items()))
+        scale, unit = SHOWN_UNITS.get(size.unit, (1.0, size.unit))
+        told = Told(words, size_in_words(one.name, parameter, one.on, unit),
+                    None if size.value is None else scale * size.value, scale * size.good)  # fmt: skip
+        held = out.get(told[:2])
+        if held is None or held.found is None or (told.found is not None and abs(told.found) < abs(held.found)):
+            out[told[:2]] = told
+    return list(out.values())
 
 
 def value_in_words(parameter: Parameter) -> tuple[str, str]:

@@ -7,7 +7,7 @@ from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 from gearbench.diagnosis.planning.worth import words_of
-from gearbench.words.diagnosis import SHOWN_UNITS, effects_in_words, number, parameter_in_words, percent
+from gearbench.words.diagnosis import SHOWN_UNITS, effects_in_words, number, percent, size_in_words
 
 if TYPE_CHECKING:
     from gearbench.diagnosis.planning.plan import Plan
@@ -40,9 +40,7 @@ def _line(cells: tuple[str, ...], width: list[int]) -> str:
 
 def _cells(row: Row) -> tuple[str, ...]:
     scale, unit = SHOWN_UNITS.get(row.unit, (1.0, row.unit))
-    about, _, last = row.parameter.rpartition(".")
-    told = parameter_in_words(row.effect, last if about in row.on else row.parameter)
-    named = f"{told} [{unit}]" if unit else told
+    named = size_in_words(row.effect, row.parameter, row.on, unit)
     found, std, beside = "-", "", "not found"
     if row.found is not None:
         found, std, beside = number(scale * row.found), number(scale * row.std, 2), _beside(row, scale)

@@ -13,6 +13,7 @@ from gearbench.challenge.scoring.due import found_of_due, right_verdict, shown_o
 from gearbench.challenge.scoring.intervals import COVERAGE, Rate, brier, calibration_error, middle, reliability
 from gearbench.challenge.scoring.outcomes import VERDICTS, Outcome, named_effects, said
 from gearbench.challenge.scoring.reach import reach_table
+from gearbench.challenge.scoring.smallest import smallest_table
 from gearbench.challenge.truth.effects import EFFECTS, SEVERITY
 from gearbench.rig.contract import rank_of
 
@@ -54,6 +55,7 @@ def score(outcomes: Sequence[Outcome]) -> Table:
         "true": true_of_named(outcomes).plain(),
         "within": within_intervals(table["parameters"]).plain(),
     }
+    table["smallest"] = smallest_table(outcomes)
     table["reach"] = reach_table(table)
     return table
 

@@ -30,7 +30,8 @@ RARE = ("class", "part", "failed")
 def score_text(score: Table) -> str:
     """All tables of a score, a line each row."""
     parts = [_kinds(score), _due(score["due"], score["several"]), _by_effect(score), _by_severity(score)]
-    parts += [_calibration(score), _parameters(score["parameters"]), _shrinkage(score["shrinkage"]), _reach(score)]
+    parts += [_calibration(score), _parameters(score["parameters"]), _shrinkage(score["shrinkage"])]
+    parts += [_smallest(score["smallest"]), _reach(score)]
     return "\n\n".join(part for part in parts if part)
 
 
@@ -146,6 +147,28 @@ def _shrinkage(shrinkage: Table) -> str:
         lines.append(f"  within 1.5 x of the oracle fit: {rate_text(shrinkage['oracle_within_1.5'])}")
     if shrinkage["oracle_not_listed"]:
         lines.append(f"  without the true effect among the candidates: {shrinkage['oracle_not_listed']} cases")
+    return "\n".join(lines) if len(lines) > 1 else ""
+
+
+def _smallest(table: Table) -> str:
+    lines = ["Missed effects beside the smallest that their records would have named, as the verdicts tell it"]
+    for row in table["missed"]:
+        words = f"  {row['case'][:8]} {row['effect']}{'' if row['due'] else ' (not due)'}"
+        if row["parameter"] is None:
+            lines.append(f"{words}: not told")
+            continue
+        limit = "at no size" if row["smallest"] is None else f"from {row['smallest']:.3g}"
+        lines.append(
+            f"{words}: {row['parameter']} {row['true']:.3g} {row['unit']}, named {limit}; good rig {row['good']:.2g},"
+            f" standard deviation at least {row['std']:.2g}"
+        )
+    if table["told"]:
+        lines.append(
+            f"  of {table['told']} missed {table['small']} are smaller, {table['hidden']} no larger than the records'"
+            " own uncertainty"
+        )
+    if table["named"]:
+        lines.append(f"  of {table['named']} named {table['named_small']} are smaller")
     return "\n".join(lines) if len(lines) > 1 else ""
 
 

@@ -15,19 +15,23 @@ from numpy.typing import NDArray
 
 from gearbench.bench.errors import BenchError
 from gearbench.diagnosis.advice import advice_of
+from gearbench.diagnosis.detection.information import Known, Without, floors_of
+from gearbench.diagnosis.detection.opened import MOST, Changed, smallest_backlash
+from gearbench.diagnosis.detection.smallest import View, apart_from, largest, rivals_at, smallest
+from gearbench.diagnosis.detection.stated import sizes_of, stated_at
 from gearbench.diagnosis.effects.backlash import BACKLASH, KEY
-from gearbench.diagnosis.effects.effect import Estimate, Hypothesis
+from gearbench.diagnosis.effects.effect import Hypothesis
 from gearbench.diagnosis.effects.library import hypotheses as library
 from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
 from gearbench.diagnosis.errors import DiagnosisError
 from gearbench.diagnosis.evidence.separable import groups_of
+from gearbench.diagnosis.forces.condition import Condition
+from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.judging.decided import VISIBLE
 from gearbench.diagnosis.planning.added import larger_plans
-from gearbench.diagnosis.planning.information import Known, Without, known_of
-from gearbench.diagnosis.planning.opened import MOST, smallest_backlash
+from gearbench.diagnosis.planning.known import known_of
 from gearbench.diagnosis.planning.planned import Planned, planned
 from gearbench.diagnosis.planning.row import BOTH, LONGER, Cost, Row
-from gearbench.diagnosis.planning.smallest import View, apart_from, direction, largest, rivals_at, smallest
 from gearbench.diagnosis.planning.worth import is_poor, said_of, sentence_of_more, words_of_effect
 from gearbench.diagnosis.population import POPULATION
 from gearbench.diagnosis.structure.layout import Layout
@@ -104,27 +108,16 @@ def _shown(plan: Planned, known: Known) -> tuple[Hypothesis, ...]:
     return tuple(one for one in listed if np.isin(one.entries(known.unknowns), known.active).any())
 
 
-def _estimate(layout: Layout, view: View, number: int, size: float) -> Estimate:
-    """The parameter that tells the size of an effect, as a verdict would state it."""
-    one = view.hypotheses[number]
-    assert one.effect is not None
-    fitted = layout.fitted(size * direction(view.known, one), view.std(number))
-    return next(found for found in one.effect.add(layout.nominal.rig, one, fitted)[1] if found.sized)
-
-
 def _row(layout: Layout, view: View, number: int) -> Row:
-    one, unknowns = view.hypotheses[number], view.known.unknowns
+    one, sizes = view.hypotheses[number], sizes_of(layout, view, number)
     assert one.effect is not None
-    found, most = smallest(view, number), largest(view.known, one)
-    at = one.entries(unknowns)
-    sound = float(np.sqrt(np.mean((unknowns.prior()[at] / direction(view.known, one)[at]) ** 2)))
+    found, most, stated = sizes.found, largest(view.known, one), sizes.stated[0]
     best = smallest(replace(view, sharper=SHARPER), number)
     apart = apart_from(view, number, found) if found is not None else None
-    stated = _estimate(layout, view, number, most if found is None else found)
     rivals = rivals_at(view, number, found) if found is not None else ()
 
     def told(size: float | None) -> float | None:
-        return None if size is None else _estimate(layout, view, number, size).value
+        return None if size is None else stated_at(layout, view, number, size)[0].value
 
     return Row(
         effect=one.effect.name,
@@ -133,13 +126,13 @@ def _row(layout: Layout, view: View, number: int) -> Row:
         on=one.on,
         parameter=stated.name,
         unit=stated.unit,
-        found=told(found),
+        found=None if found is None else stated.value,
         std=stated.std,
-        good=_estimate(layout, view, number, sound).value,
-        largest=_estimate(layout, view, number, most).value,
+        good=sizes.good[0].value,
+        largest=stated_at(layout, view, number, most)[0].value,
         apart=told(apart),
         best=told(best),
-        over_good=None if found is None else found / sound,
+        over_good=None if found is None else found / sizes.sound,
         over_best=None if found is None or best is None else found / best,
         rivals=_effects(view, rivals),
     )
@@ -227,7 +220,10 @@ def _groups(view: View) -> tuple[tuple[str, ...], ...]:
 def _backlash(plan: Planned) -> Row:
     """The row of the backlash, which is simulated."""
     (one,) = BACKLASH.hypotheses(plan.problem.model)
-    found = smallest_backlash(plan, LEFT)
+    found = None
+    if plan.rough:
+        rough = [(plan.inputs.measurements[number], plan.problem.conditions[number]) for number in plan.rough]
+        found = smallest_backlash(_changed(plan, rough), _changed(plan, [plan.judged]))
     group = plan.layout.unknowns.group(KEY)
     micro = 1e6
     return Row(
@@ -248,3 +244,9 @@ def _backlash(plan: Planned) -> Row:
         if found is not None and len(plan.rough) == 1
         else {},
     )
+
+
+def _changed(plan: Planned, of: Sequence[tuple[Measurement, Condition]]) -> Changed:
+    """How far some of the planned records change with the nominal rig's backlash."""
+    simulator = plan.simulator([one for one, _ in of], [condition for _, condition in of])
+    return Changed(simulator, np.zeros(plan.layout.size), floors_of(simulator.target, left=LEFT))

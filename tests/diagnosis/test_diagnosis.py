@@ -52,7 +52,7 @@ def test_datasets_and_files_are_diagnosed_alike(tmp_path: Path) -> None:
 def test_steps_are_told_and_quick_leaves_the_division_out() -> None:
     steps: list[str] = []
     whole = diagnose(sets(), nominal(), progress=steps.append)
-    assert steps == ["cause", "how far the gap shrinks", "where the gap is"]
+    assert steps == ["cause", "how far the gap shrinks", "where the gap is", "how small an effect would show"]
     quick = diagnose(sets(), nominal(), quick=True)
     assert {share.kind for share in quick.verdict.where} == {"place"}
     assert {share.kind for share in whole.verdict.where} > {"place", "channel", "tooth"}

@@ -7,7 +7,7 @@ import pytest
 
 from gearbench.diagnosis.effects.library import CHANGING, LIBRARY
 from gearbench.diagnosis.intake.signals import CHANNELS
-from gearbench.diagnosis.verdict import Effect, Gap, Parameter, Probabilities, Range, Verdict
+from gearbench.diagnosis.verdict import Detectable, Effect, Gap, Parameter, Probabilities, Range, Smallest, Verdict
 from gearbench.figures.gaps.diagnosis_gap import octave_bands
 from gearbench.rig.contract import PLACES
 from gearbench.words.diagnosis import CHANNELS as CHANNEL_WORDS
@@ -15,6 +15,7 @@ from gearbench.words.diagnosis import PLACES as PLACE_WORDS
 from gearbench.words.diagnosis import (
     SHORT_CHANNELS,
     confidence,
+    detectable_in_words,
     effects_in_words,
     headline,
     length,
@@ -164,3 +165,26 @@ def test_bands_of_a_sixth_of_an_octave_keep_the_energy() -> None:
     for frequency, energy in ((16.0, 3.0), (128.0, np.hypot(4.0, 12.0)), (1024.0, 1.0)):
         assert rms[np.argmin(np.abs(centre - frequency))] == pytest.approx(energy)
     assert (rms**2).sum() == pytest.approx((lines**2).sum())
+
+
+def test_of_what_is_not_named_it_is_said_from_which_size_on_it_would_have_been() -> None:
+    def one(name: str, value: float | None, good: float, unit: str, *on: str) -> Detectable:
+        parameter = {"eccentricity": "driver.runout", "coupling": "stiffness"}.get(name, "coefficient")
+        size = Smallest(value=value, std=0.1, good=good, unit=unit)
+        return Detectable(name=name, place="mesh", on=on, parameters={parameter: size})
+
+    limits = (
+        one("friction", 0.02, 0.004, "1"),
+        one("eccentricity", None, 0.8, "um", "driver"),
+        one("eccentricity", 3.5, 0.8, "um", "driver"),
+        one("eccentricity", 4.5, 0.8, "um", "driver"),
+        one("coupling", 8e4, 4e5, "N m/rad"),
+    )
+    rubs = Effect(name="friction", probability=0.9)
+    sure = Probabilities(effect=0.9, none=0.1, unknown=0.0)
+    verdict = Verdict(verdict="effects", probability=sure, place="mesh", effects=(rubs,), detectable=limits)
+    found = detectable_in_words(verdict)
+    assert [(row.effect, row.told, row.found, row.good) for row in found] == [
+        ("run-out of a gear (driver)", "run-out [um]", 3.5, 0.8),
+        ("an elastic coupling", "torsional stiffness [N m/rad]", 8e4, 4e5),
+    ]

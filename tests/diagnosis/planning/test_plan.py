@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from gearbench.cases import case_files
+from gearbench.diagnosis.detection.information import Known
+from gearbench.diagnosis.detection.smallest import View, direction, smallest, wide_prior
 from gearbench.diagnosis.effects.effect import Hypothesis
 from gearbench.diagnosis.effects.library import hypotheses
-from gearbench.diagnosis.planning.information import Known, known_of
+from gearbench.diagnosis.planning.known import known_of
 from gearbench.diagnosis.planning.planned import Planned, planned
-from gearbench.diagnosis.planning.smallest import View, direction, smallest, wide_prior
 from gearbench.diagnosis.selection.weighing import limit_of, relief
 from gearbench.diagnosis.simulation.quadratic import prior_cost
 from gearbench.rig import read_case

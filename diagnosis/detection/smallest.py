@@ -1,4 +1,4 @@
-"""The smallest size of an effect that planned records would name, and what else explains an effect of that size.
+"""The smallest size of an effect that records would name, and what else explains an effect of that size.
 
 With I the information, C the posterior covariance under a prior and d the effect's unknowns, each a standard deviation
 of its wide prior, an effect of size a raises the evidence of a hypothesis over the background by
@@ -17,11 +17,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from gearbench.diagnosis.detection.information import Known, Without
 from gearbench.diagnosis.effects.effect import Hypothesis
 from gearbench.diagnosis.evidence.calibration import LIMITS
 from gearbench.diagnosis.evidence.separable import APART
 from gearbench.diagnosis.judging.closing import DUE, GAIN, growth_of
-from gearbench.diagnosis.planning.information import Known, Without
 from gearbench.diagnosis.selection.rivals import NEARLY
 from gearbench.diagnosis.selection.selection import known_within
 from gearbench.diagnosis.selection.weighing import is_own, limit_of

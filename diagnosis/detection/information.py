@@ -1,22 +1,18 @@
-"""What planned records tell of the unknowns: Fisher's information at the nominal rig, block by block.
+"""What records tell of the unknowns: Fisher's information at a rig, block by block.
 
 A block is a record, a channel, a kind of line and a band (`output.target`). Leaving out a record or a channel leaves
-out its blocks, so that one Jacobian serves every question about the plan.
+out its blocks, so that one Jacobian serves every question about them.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.diagnosis.errors import DiagnosisError
-from gearbench.diagnosis.fitting.background import prior_of
-from gearbench.diagnosis.fitting.fit import sensitivity_of
 from gearbench.diagnosis.forces.unknowns import Unknowns
-from gearbench.diagnosis.planning.planned import Planned
-from gearbench.diagnosis.simulation.quadratic import Quadratic, quadratic_of
+from gearbench.diagnosis.simulation.quadratic import Quadratic
 from gearbench.diagnosis.simulation.target import Target
 
 Array = NDArray[np.float64]
@@ -24,7 +20,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Without:
-    """What is left out of a plan: a record of the search, channels of all records."""
+    """What is left out: a record of the search, channels of all records."""
 
     record: str = ""
     channels: tuple[str, ...] = ()
@@ -39,7 +35,7 @@ def floors_of(target: Target, quiet: float = 1.0, left: float = 0.0) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Blocks:
-    """Quadratic of some records about what they hold of the nominal rig itself: noise."""
+    """Quadratic of some records about what they hold beside the rig itself: noise, and what that rig leaves."""
 
     quadratic: Quadratic
 
@@ -79,24 +75,3 @@ class Known:
     narrow: Array
     search: Blocks
     judged: Blocks
-
-
-def known_of(plan: Planned) -> Known:
-    """Derivatives of all planned records at the nominal rig. Raises DiagnosisError where it cannot be simulated."""
-    simulator = plan.simulator(plan.fitted, plan.conditions)
-    unknowns = plan.layout.unknowns
-    nothing = np.zeros(unknowns.size)
-    found = sensitivity_of(simulator, nothing, unknowns.prior())
-    one, condition = plan.judged
-    # Ripple has unknowns for each condition of the search; the judged record's is like that of the first of them, whose
-    # name it takes.
-    alike = replace(one, name=plan.fitted[0].name)
-    other = plan.simulator([alike], [condition])
-    here, jacobian = other.lines(nothing), other.jacobian(nothing, unknowns.prior(), np.ones(unknowns.size, dtype=bool))
-    if found is None or here is None or jacobian is None:
-        raise DiagnosisError(
-            "the nominal rig does not settle under the planned conditions: nothing can be told of them"
-        )
-    active = found.quadratic.active
-    judged = quadratic_of(other.target, other.target.lines - here, jacobian, active)
-    return Known(unknowns, active, prior_of(simulator, unknowns.prior()), Blocks(found.quadratic), Blocks(judged))

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from shared.fake_simulator import LINES, sensitivities, target, unknowns
 
+from gearbench.diagnosis.detection.information import Blocks, Known, Without
+from gearbench.diagnosis.detection.smallest import View, apart_from, direction, largest, rivals_at, smallest, wide_prior
 from gearbench.diagnosis.effects.effect import Hypothesis, Wide
 from gearbench.diagnosis.effects.friction import FRICTION
 from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
 from gearbench.diagnosis.effects.tooth_crack import TOOTH_CRACK
 from gearbench.diagnosis.effects.torque_ripple import TORQUE_RIPPLE
-from gearbench.diagnosis.planning.information import Blocks, Known, Without
-from gearbench.diagnosis.planning.smallest import View, apart_from, direction, largest, rivals_at, smallest, wide_prior
 from gearbench.diagnosis.selection.weighing import LIMIT
 from gearbench.diagnosis.simulation.quadratic import quadratic_of
 

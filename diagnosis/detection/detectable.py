@@ -1,0 +1,136 @@
+"""The smallest size of every effect that the records at hand would have named: what a verdict without it says.
+
+The information is that of the last fit, about the rig that was found and with what that rig leaves of every block in
+its floor; the judged record's derivatives are made for it. No unbiased reading is surer than its inverse (Cramer 1946,
+Rao 1945), and an effect below these sizes is hidden by noise, by the rig's other unknowns, or by what a good rig has.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.diagnosis.detection.information import Blocks, Known
+from gearbench.diagnosis.detection.opened import Changed, smallest_backlash
+from gearbench.diagnosis.detection.smallest import View
+from gearbench.diagnosis.detection.stated import Sizes, sizes_of
+from gearbench.diagnosis.effects.backlash import BACKLASH, KEY
+from gearbench.diagnosis.effects.effect import Hypothesis
+from gearbench.diagnosis.effects.library import hypotheses as library
+from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
+from gearbench.diagnosis.evidence.problem import Problem
+from gearbench.diagnosis.forces.condition import prepare
+from gearbench.diagnosis.intake.measurements import Measurement
+from gearbench.diagnosis.judging.judged import Judged
+from gearbench.diagnosis.selection.followable import nudges_of, parts
+from gearbench.diagnosis.selection.simulated import Simulated
+from gearbench.diagnosis.simulation.quadratic import quadratic_of
+from gearbench.diagnosis.simulation.simulator import Simulator
+from gearbench.diagnosis.simulation.target import Target, target_of
+from gearbench.diagnosis.verdict import Detectable, Smallest
+
+Array = NDArray[np.float64]
+
+MICRO = 1e6
+
+
+def detectable_of(
+    problem: Problem, judged: Judged, searched: Sequence[Measurement], without: Sequence[str] = ()
+) -> tuple[Detectable, ...]:
+    """What the records `searched` and the judged one would have shown of every effect of the library but those left
+    out; nothing where the rig found does not answer the judged record."""
+    found = judged.found
+    simulator, target = _answering(problem, judged)
+    best = found.selection.best
+    lines = simulator.lines(best.p)
+    if lines is None:
+        return ()
+    left = target.floors + target.energies(target.lines - lines)
+    listed = [one for one in library(problem.model, without) if one.wide[0].key not in (CRACK, KEY)]
+    out = [*_by_information(found, simulator, [*listed, *_cracks(problem, found, without)], target.lines - lines, left)]
+    if BACKLASH.name not in without:
+        out.append(_backlash(problem, Changed(simulator, best.p, left), searched, found))
+    return tuple(out)
+
+
+def _answering(problem: Problem, judged: Judged) -> tuple[Simulator, Target]:
+    """What simulates the judged record as the search does its own, kept on its way where the rig goes another, and its
+    lines. It takes the name of the first record of the search, for whose condition the ripple has unknowns."""
+    found, measured = judged.found, judged.measured
+    assert judged.target is not None
+    alike = replace(measured, name=found.simulator.target.measurements[0].name)
+    nudges: Mapping[str, float] = {}
+    if judged.kept is not None:
+        nudges = nudges_of(problem.model, [prepare(alike, problem.model, problem.conditions[0].band)])
+    elif measured.name in found.simulator.nudges:
+        nudges = {alike.name: found.simulator.nudges[measured.name]}
+    target = replace(judged.target, measurements=(alike,))
+    return Simulator(found.layout, target, found.simulator.simulate, nudges), target
+
+
+def _cracks(problem: Problem, found: Simulated, without: Sequence[str]) -> list[Hypothesis]:
+    """One cracked tooth of each gear, of those that have unknowns."""
+    first: dict[str, Hypothesis] = {}
+    for one in library(problem.model, without):
+        if one.wide[0].key == CRACK and one.wide[0].at in found.layout.teeth:
+            first.setdefault(one.on[0], one)
+    return list(first.values())
+
+
+def _by_information(
+    found: Simulated, simulator: Simulator, hypotheses: Sequence[Hypothesis], residual: NDArray[np.complex128],
+    left: Array,
+) -> list[Detectable]:  # fmt: skip
+    """Of effects whose traces grow with them."""
+    unknowns, best, base = found.layout.unknowns, found.selection.best, found.selection.base
+    search = best.sensitivity.quadratic
+    chosen = np.isin(np.arange(unknowns.size), search.active)
+    jacobian = simulator.jacobian(best.p, unknowns.prior(), chosen)
+    if jacobian is None:
+        return []
+    judged = quadratic_of(replace(simulator.target, floors=left), residual, jacobian, search.active)
+    out = []
+    for one in hypotheses:
+        # Beside what is named, but not beside itself.
+        narrow, at = best.sd.copy(), one.entries(unknowns)
+        narrow[at] = base.sd[at]
+        view = View(Known(unknowns, search.active, narrow, Blocks(search), Blocks(judged)), (one,))
+        out.append(_told(one, sizes_of(found.layout, view, 0)))
+    return out
+
+
+def _told(one: Hypothesis, sizes: Sizes) -> Detectable:
+    assert one.effect is not None
+    parameters = {
+        told.name: Smallest(
+            value=None if sizes.found is None else told.value, std=told.std, good=good.value, unit=told.unit
+        )
+        for told, good in zip(sizes.stated, sizes.good, strict=True)
+    }
+    return Detectable(name=one.effect.name, place=one.place, on=one.on, parameters=parameters)
+
+
+def _backlash(problem: Problem, judged: Changed, searched: Sequence[Measurement], found: Simulated) -> Detectable:
+    """Of the backlash, which no record shows whose flanks stay together."""
+    simulator, group = found.simulator, found.layout.unknowns.group(KEY)
+    (one,) = BACKLASH.hypotheses(problem.model)
+    rig, band = found.layout.case(judged.p), problem.conditions[0].band
+    rough = [measured for measured in searched if parts(rig, measured, simulator.simulate)]
+    shown = None
+    if rough:
+        target = target_of(rough, [prepare(measured, problem.model, band) for measured in rough])
+        alone = Simulator(found.layout, target, simulator.simulate, simulator.nudges)
+        lines = alone.lines(judged.p)
+        if lines is not None:
+            left = target.floors + target.energies(target.lines - lines)
+            shown = smallest_backlash(Changed(alone, judged.p, left), judged)
+    more = Smallest(
+        value=None if shown is None else MICRO * shown[0],
+        std=MICRO * (float(group.wide[0]) if shown is None else shown[1]),
+        good=MICRO * float(group.sd[0]),
+        unit="um",
+    )
+    return Detectable(name=BACKLASH.name, place=one.place, on=one.on, parameters={"more": more})
