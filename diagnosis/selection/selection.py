@@ -21,7 +21,7 @@ from gearbench.diagnosis.fitting.restructured import answers_alike, begun_at_nom
 from gearbench.diagnosis.fitting.shown import Shown
 from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.selection.by_forces import Start
-from gearbench.diagnosis.selection.needed import beside, held_against_background, needed
+from gearbench.diagnosis.selection.needed import FAR, beside, held_against_background, needed
 from gearbench.diagnosis.selection.rivals import compared, is_like, rivals_of, usual_of
 from gearbench.diagnosis.selection.weighing import Weighed, entering, is_own, weigh
 from gearbench.diagnosis.simulation.jacobian import WEIGHED
@@ -79,7 +79,7 @@ def select(
         return begun_at_nominal(simulator, best, _entries(unknowns, kept))
 
     base, best, kept = _together(simulator, base, best, entered, report, begun_elsewhere, apart=apart)
-    return Selection(base, _without(simulator, base, kept), best, kept, tuple(weighed))
+    return Selection(base, _bare(simulator, base, kept), best, kept, tuple(weighed))
 
 
 def further(
@@ -106,7 +106,7 @@ def further(
     # Nothing would tell the next time that the same was tried.
     if {one.hypothesis.name for one in kept} <= {one.hypothesis.name for one in selection.entered}:
         return None
-    return replace(selection, base=base, bare=_without(simulator, base, kept), best=best, entered=kept)
+    return replace(selection, base=base, bare=_bare(simulator, base, kept), best=best, entered=kept)
 
 
 def carried_on(
@@ -133,7 +133,7 @@ def carried_on(
     base, best, kept = _together(simulator, base, best, entered, report, apart=apart)
     if selection.entered:
         weighed = list(selection.weighed)
-    return Selection(base, _without(simulator, base, kept), best, kept, tuple(weighed))
+    return Selection(base, _bare(simulator, base, kept), best, kept, tuple(weighed))
 
 
 def _together(
@@ -216,14 +216,14 @@ def _found(weighed: Sequence[Weighed]) -> dict[str, Start]:
 def with_entered(simulator: Simulator, selection: Selection, one: Weighed) -> Selection:
     """The selection with an effect entered that was weighed and simulated but did not clear the limit."""
     assert one.optimum is not None
-    bare = _without(simulator, selection.base, [one])
+    bare = _bare(simulator, selection.base, [one])
     return replace(selection, bare=bare, best=one.optimum, entered=(one,))
 
 
 def only(simulator: Simulator, selection: Selection, kept: Sequence[Weighed]) -> Selection:
     """The selection with only these of the effects that entered: the others go back to a background's size."""
     best = _with_only(simulator, selection.base, selection.best, kept)
-    bare = _without(simulator, selection.base, kept)
+    bare = _bare(simulator, selection.base, kept)
     return replace(selection, bare=bare, best=best, entered=tuple(kept))
 
 
@@ -241,6 +241,22 @@ def taken_out(simulator: Simulator, selection: Selection, effect: Weighed) -> Op
         held[one.hypothesis.entries(unknowns)] = False
     base = replace(selection.best, sd=np.where(held, 0.0, selection.best.sd))
     return _without(simulator, base, [effect])
+
+
+def _bare(simulator: Simulator, base: Optimum, effects: Sequence[Weighed]) -> Optimum:
+    """The background's optimum without any part of these effects. Of other effects it has no more in their place than a
+    good rig: an encoder's run-out of twenty of its deviations is no recalibration."""
+    found = _without(simulator, base, effects)
+    held = np.zeros(found.p.size, dtype=bool)
+    for group in simulator.layout.unknowns.groups:
+        at = simulator.layout.unknowns[group.key]
+        if not ((group.wide > group.sd).any() and (found.sd[at] > 0.0).all()):
+            continue
+        before, after = (float(np.sqrt(np.mean((p[at] / group.sd) ** 2))) for p in (base.p, found.p))
+        held[at] = after > max(FAR, before)
+    if not held.any():
+        return found
+    return _without(simulator, replace(base, sd=np.where(held, 0.0, base.sd)), effects)
 
 
 def _without(simulator: Simulator, base: Optimum, effects: Sequence[Weighed]) -> Optimum:

@@ -82,6 +82,18 @@ def test_what_explains_the_records_as_well_is_a_rival_and_leaves_with_the_one_th
         assert named is not None and names(named) == [f"tooth-crack {other}"]
 
 
+def test_no_other_effect_beyond_a_good_rigs_takes_the_place_of_what_is_left_out() -> None:
+    """Ripple that does almost what friction does: twelve of its deviations would explain most of the friction."""
+    alike = MATRIX.copy()
+    alike[4] = alike[3] + 0.05 * alike[4]
+    true = np.array([0.08, -0.1, 0.02, 0.12, 0.0, 0.0, 0.0, 0.0])
+    simulator = FakeSimulator(lambda q: q @ alike, target(true @ alike))
+    found = chosen(simulator, LISTED, [np.zeros(8)], {})
+    assert found is not None and names(found) == ["friction"]
+    assert found.bare.p[3] == 0.0 and abs(found.bare.p[4]) <= max(4.0 * 0.01, abs(found.base.p[4]))
+    assert found.bare.misfit > found.best.misfit + 400.0
+
+
 def test_of_gears_with_as_many_teeth_the_other_is_a_rival_unless_far_behind() -> None:
     optimum = selected({3: 0.4}).best
     winner = Weighed(replace(FRICTION, on=("driver",)), 100.0, optimum)
