@@ -12,7 +12,7 @@ from gearbench.diagnosis.evidence.problem import problem_of
 from gearbench.diagnosis.evidence.search import missing_by_equation, search
 from gearbench.diagnosis.evidence.separable import alike, representatives
 from gearbench.diagnosis.finding import Finding
-from gearbench.diagnosis.forces.steadiness import unsteadiness
+from gearbench.diagnosis.forces.steadiness import least_unsteadiness
 from gearbench.diagnosis.found_by_forces import by_forces_alone, fitted, left_of, places_by_forces
 from gearbench.diagnosis.found_by_simulation import Searched, by_simulation
 from gearbench.diagnosis.intake.measurements import Measurement
@@ -21,7 +21,7 @@ from gearbench.diagnosis.judging.repeating import repeating
 from gearbench.diagnosis.odds import Calibration
 from gearbench.diagnosis.population import POPULATION
 from gearbench.diagnosis.replay.replays import COARSER, Replays
-from gearbench.diagnosis.selection.simulated import simulated
+from gearbench.diagnosis.selection.simulated import carried_back, simulated
 from gearbench.rig import Case
 
 Report = Callable[[str], None]
@@ -49,7 +49,10 @@ def find_cause(
     found = simulated(problem, result, measurements, nominal, simulate, without, report, judged=judged)
     report("steadiness")
     band, steady = problem.conditions[0].band, repeating(measurements, found)
-    unsteady = unsteadiness(problem.model, steady, problem.unknowns, fit.p, band)
+    rigs = [fit.p]
+    if found is not None:
+        rigs.append(carried_back(found.layout, problem.unknowns, found.selection.best.p))
+    unsteady = least_unsteadiness(problem.model, steady, problem.unknowns, rigs, band)
     common: dict[str, Any] = {
         "indistinguishable": alike(fit, problem.unknowns, representatives(problem, without)),
         "evidence": {one.hypothesis.name: one.log_bayes_factor for one in result.tried},

@@ -33,19 +33,22 @@ ROUNDS = 60
 COLOURED = 12.0
 # Part of a channel's fluctuation that a sound rig's slow changes leave between repetitions.
 SLOW = 3e-3
+# Lines of all repetitions that an excess is told for: the more there are, the larger is the sum.
+PER_LINES = 20_000
 NEIGHBOURS = 41  # quiet lines that tell the noise of a line between them
 
 
 def unsteadiness(
     model: NominalModel, measurements: Sequence[Measurement], unknowns: Unknowns, p: Array, band: float
 ) -> Array:
-    """Excess scatter (equations + 1,) between repetitions: sum over blocks of bins of count log lambda, the mesh last.
+    """Excess scatter (equations + 1,) between repetitions: sum over blocks of bins of count log lambda, the mesh last,
+    for PER_LINES of them.
 
     Zero where there is one repetition only, and where no channel changes by more than a sound rig's slow changes make.
     What noise puts into an equation is read off its quiet lines, those that nothing excites, so that no stiffness or
     filter needs to be known for it.
     """
-    total = np.zeros(len(PLACES))
+    total, lines = np.zeros(len(PLACES)), 0
     if max(changing_parts(measurements, band).values(), default=0.0) < SLOW:
         return total
     for measured in measurements:
@@ -64,7 +67,20 @@ def unsteadiness(
         quiet = kinds_of(whole) == KINDS.index("other")
         variance[:MESH] = np.maximum(variance[:MESH], quiet_level(scatter, quiet))
         total += excess_of(scatter, last.mesh_factor, variance)
-    return total
+        lines += measured.repetitions * whole.bins
+    return total * (PER_LINES / max(lines, 1))
+
+
+def least_unsteadiness(
+    model: NominalModel,
+    measurements: Sequence[Measurement],
+    unknowns: Unknowns,
+    rigs: Sequence[Array],
+    band: float,
+) -> Array:
+    """The same for that of several `rigs` (size,) in which least changes in all: what changes is a force at one place,
+    and unknowns by which it is one at several are wrong."""
+    return min((unsteadiness(model, measurements, unknowns, p, band) for p in rigs), key=lambda one: float(one.sum()))
 
 
 def quiet_level(scatter: Complex, quiet: NDArray[np.bool_]) -> Array:

@@ -36,9 +36,6 @@ HIDING = 0.2
 # Part of the nominal gap that the named effects must close for content that changes, or a form without a name, not to
 # outbid them; the former does not either where they close so many times its energy.
 CLOSES, OUTWEIGHS = 0.5, 3.0
-# Nats of evidence from which a drift is one though the force that changes is small beside what sound rigs' forces do:
-# the sum of its excess grows with the number of lines, of which small rigs' records have few.
-SURE = 50.0
 # Of the place that stands out most, what the next one may reach for it to be told, and over what sound rigs leave, what
 # it must reach itself.
 TOLD, FAINT = 0.5, 0.2
@@ -74,7 +71,7 @@ def decide_simulated(
     (equations + 1,) the excess scatter between repetitions, by place, and `changing` the largest rms of what changes
     over that of the nominal gap, `drift` what explains most of it; `known`: what sound rigs leave."""
     _, over = worst(unsteady, limits.unsteady)
-    if drift is None or changing <= known.changing or (over <= 1.0 and drift.nats < SURE):
+    if drift is None or over <= 1.0 or changing <= known.changing:
         return _decided(judged, forces, missing, unsteady, changing, limits, known)
     # What a drift explains speaks neither for something unknown nor against an effect.
     rest = _decided(judged, forces, missing, np.zeros_like(unsteady), changing, limits, known)

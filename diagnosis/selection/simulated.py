@@ -192,6 +192,15 @@ def carried_over(layout: Layout, unknowns: Unknowns, p: Array) -> Array:
     return out
 
 
+def carried_back(layout: Layout, unknowns: Unknowns, p: Array) -> Array:
+    """Unknowns of a layout (size,) as those of the force residuals, which have filters in place of its structure."""
+    out = np.zeros(unknowns.size)
+    for one in unknowns.groups:
+        if one.key in layout.unknowns.slices:
+            out[unknowns[one.key]] = p[layout.unknowns[one.key]]
+    return out
+
+
 def _beginnings(layout: Layout, by_forces: Array) -> list[Array]:
     """Where to begin without an effect: the nominal rig, and the force residuals' one without and with structure."""
     return [np.zeros(layout.size), *beginnings(layout.unknowns, by_forces)]

@@ -18,7 +18,7 @@ from gearbench.diagnosis.forces.condition import prepare
 from gearbench.diagnosis.forces.covariance import BLOCK
 from gearbench.diagnosis.forces.equations import PLACES
 from gearbench.diagnosis.forces.nominal import NominalModel, nominal_model
-from gearbench.diagnosis.forces.steadiness import excess_of, quiet_level, unsteadiness
+from gearbench.diagnosis.forces.steadiness import excess_of, least_unsteadiness, quiet_level, unsteadiness
 from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.intake.measurements import Measurement, measurement
 from gearbench.rig import Case, Ripple, read_case
@@ -35,8 +35,18 @@ class Bench:
     model: NominalModel
     unknowns: Unknowns
 
+    @property
+    def p(self) -> np.ndarray:
+        p = np.zeros(self.unknowns.size)
+        p[self.unknowns["radial"]] = 30.0  # the lumped model has none
+        return p
+
     def unsteadiness(self, later: Case | None = None, *, noise: float = 1.0, periods: int = 2) -> np.ndarray:
-        """Of one period of the nominal rig and others of another one."""
+        seen = self.seen(later, noise=noise, periods=periods)
+        return unsteadiness(self.model, [seen], self.unknowns, self.p, BAND)
+
+    def seen(self, later: Case | None = None, *, noise: float = 1.0, periods: int = 2) -> Measurement:
+        """One period of the nominal rig and others of another one."""
         first = self.steady.periods
         second = first if later is None else measurement(replay(later, self.record), "x", self.nominal).periods
         turn = np.random.default_rng(6)
@@ -44,9 +54,7 @@ class Bench:
         for channel, values in first.items():
             both = np.stack([values[0], *(second[channel][0] for _ in range(periods - 1))])
             seen[channel] = both + noise * NOISE[channel.split("_")[0]] * turn.standard_normal(both.shape)
-        p = np.zeros(self.unknowns.size)
-        p[self.unknowns["radial"]] = 30.0  # the lumped model has none
-        return unsteadiness(self.model, [replace(self.steady, periods=seen)], self.unknowns, p, BAND)
+        return replace(self.steady, periods=seen)
 
     def changed(self, part: str, field: str, **update: object) -> Case:
         rig = self.nominal.rig
@@ -105,6 +113,25 @@ def test_a_rig_that_changes_shows_in_its_own_equation(bench: Bench, place: str) 
     found = dict(zip(PLACES, bench.unsteadiness(CHANGES[place](bench)), strict=True))
     own = found.pop(place)
     assert own > 100 and own > 10 * max(found.values())
+
+
+def test_the_place_is_told_by_the_rig_in_which_less_changes(bench: Bench) -> None:
+    """A mesh that is taken for three times as stiff as it is seems to change with all that shakes it."""
+    seen = [bench.seen(CHANGES["drive"](bench))]
+    stiff = bench.p
+    stiff[bench.unknowns["scale"]] = np.log(3.0)
+    astray = unsteadiness(bench.model, seen, bench.unknowns, stiff, BAND)
+    assert PLACES[int(np.argmax(astray))] == "mesh"
+    for rigs in ([stiff, bench.p], [bench.p, stiff]):
+        found = least_unsteadiness(bench.model, seen, bench.unknowns, rigs, BAND)
+        assert PLACES[int(np.argmax(found))] == "drive"
+
+
+def test_excess_is_told_for_so_many_lines(bench: Bench) -> None:
+    """Twice the records have twice the lines, and no more of anything."""
+    seen = bench.seen(CHANGES["mesh"](bench))
+    once, twice = (unsteadiness(bench.model, [seen] * n, bench.unknowns, bench.p, BAND) for n in (1, 2))
+    assert once.max() > 100 and twice == pytest.approx(once)
 
 
 def test_an_error_of_the_mesh_force_is_no_equations_own() -> None:
