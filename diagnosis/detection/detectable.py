@@ -49,7 +49,9 @@ def detectable_of(
     if lines is None:
         return ()
     left = target.floors + target.energies(target.lines - lines)
+    measured = ("driver", "driven", *judged.measured.periods)
     listed = [one for one in library(problem.model, without) if one.wide[0].key not in (CRACK, KEY)]
+    listed = [one for one in listed if all(name in measured for name in one.on)]
     out = [*_by_information(found, simulator, [*listed, *_cracks(problem, found, without)], target.lines - lines, left)]
     if BACKLASH.name not in without:
         out.append(_backlash(problem, Changed(simulator, best.p, left), searched, found))

@@ -37,7 +37,7 @@ EXCITED = 0.1
 
 def measured_channels(measurement: Measurement) -> dict[str, Array]:
     """Channel -> (P, N) in the units of this module."""
-    return _channels(measurement.periods, measurement.record.attrs, _has_both_y(measurement))
+    return _channels(measurement.periods, measurement.record.attrs, has_both_y(measurement))
 
 
 def simulated_channels(measurement: Measurement, replay: xr.Dataset) -> dict[str, Array]:
@@ -51,10 +51,11 @@ def simulated_channels(measurement: Measurement, replay: xr.Dataset) -> dict[str
     for gear in ("driver", "driven"):
         angle = values[f"angle_{gear}"] - 2 * pi * measurement.phase / int(measurement.record.attrs[f"teeth_{gear}"])
         values[f"angle_{gear}"] = angle if measurement.zero_known else angle - angle.mean()
-    return _channels(values, measurement.record.attrs, _has_both_y(measurement))
+    return _channels(values, measurement.record.attrs, has_both_y(measurement))
 
 
-def _has_both_y(measurement: Measurement) -> bool:
+def has_both_y(measurement: Measurement) -> bool:
+    """Whether both displacements are measured: without them the transmission error is that of the rotations alone."""
     return "y_driver" in measurement.periods and "y_driven" in measurement.periods
 
 

@@ -27,6 +27,7 @@ from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
 from gearbench.diagnosis.effects.torque_ripple import KEY as RIPPLE
 from gearbench.diagnosis.effects.torque_ripple import orders_in
 from gearbench.diagnosis.forces.basis import on_path, waves
+from gearbench.diagnosis.intake.signals import has_both_y
 from gearbench.diagnosis.simulation.runout import in_mesh_of_runout, lobes_of, on_gears_of_runout, turn_of
 from gearbench.diagnosis.simulation.target import Target
 from gearbench.diagnosis.structure.contrast import CONTRAST, contrast_slope
@@ -239,7 +240,7 @@ def sensor_columns(
     unknowns, one = layout.unknowns, target.measurements[number]
     samples = one.phase.size
     omega = 2 * np.pi * np.fft.rfftfreq(samples, 1 / one.sampling_rate)
-    g = layout.model.support_factor
+    g = layout.model.support_factor if has_both_y(one) else 0.0
     into = {"angle_driver": 1.0, "y_driver": g, "y_driven": -g}
     zero = np.zeros(omega.size, dtype=complex)
     found: dict[int, dict[str, Complex]] = {}

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gearbench.bench.plan.workers import side_by_side
 from gearbench.diagnosis.intake.measurements import Measurement
-from gearbench.diagnosis.intake.signals import simulated_channels
+from gearbench.diagnosis.intake.signals import has_both_y, simulated_channels
 from gearbench.diagnosis.replay.replays import Replay, Replays, law_of
 from gearbench.diagnosis.simulation.jacobian import MOVED, SHORT_STEP, STEP, Other, forces_of, others_of, sensor_columns
 from gearbench.diagnosis.simulation.target import Target
@@ -170,6 +170,8 @@ class Simulator:
             forces = forces_of(self.layout, p, tangent, measured.name, chosen, others)
             answers = tangent.answers(forces.acting)
             answers["torque_driven"] *= self.layout.model.base_radius[1]
+            if not has_both_y(measured):
+                answers["dte"] = answers["angle_driver"] - answers["angle_driven"]
             seen = simulated_channels(measured, seen_of(case, steady))
             sensed = sensor_columns(self.layout, self.target, number, seen)
             return forces.at, answers, sensed

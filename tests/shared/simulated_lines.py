@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from gearbench.bench import simulate
@@ -15,14 +17,14 @@ from gearbench.diagnosis.structure.layout import layout_of
 from gearbench.rig import Case, Load, read_case
 
 
-def demonstration(load: Load | None = None, faster: int = 1) -> Simulator:
-    """Replays of one record of `gap_demo`, or of it with this load or at so many times its speed, whose tooth 3 may be
-    cracked."""
+def demonstration(load: Load | None = None, faster: int = 1, without: Sequence[str] = ()) -> Simulator:
+    """Replays of one record of `gap_demo`, or of it with this load, at so many times its speed or without these
+    channels, whose tooth 3 may be cracked."""
     nominal = quicker(faster, 1)
     case = nominal.under(nominal.conditions[0])
     if load is not None:
         case = case.model_copy(update={"rig": case.rig.model_copy(update={"load": load})})
-    measured = measurement(simulate(case), nominal.conditions[0].name, nominal)
+    measured = measurement(simulate(case).drop_vars(without), nominal.conditions[0].name, nominal)
     problem = problem_of([measured], nominal)
     layout = layout_of(nominal, problem.model, problem.conditions, (3,))
     return Simulator(layout, target_of([measured], problem.conditions), Replays(problem.model.law))

@@ -66,6 +66,30 @@ def test_a_derivative_is_what_two_simulations_differ_by(bench: Bench, key: str, 
 
 
 @pytest.fixture(scope="module")
+def turning() -> Bench:
+    """A record without displacements, whose transmission error is that of the rotations."""
+    simulator = demonstration(faster=4, without=("y_driver", "y_driven"))
+    return Bench(simulator.layout, simulator, jacobian_at(simulator, np.zeros(simulator.layout.size)))
+
+
+@pytest.mark.parametrize(
+    ("key", "entry", "part"),
+    [("stiffness", 0, 0.02), ("mass", 0, 0.05), ("scale", 0, 0.02), ("shape", 1, 0.05), ("ripple", 3, 0.5)],
+)
+def test_so_it_is_where_rotations_alone_are_measured(turning: Bench, key: str, entry: int, part: float) -> None:
+    at = turning.layout.unknowns[key].start + entry
+    step = part * turning.layout.unknowns.prior()[at]
+    found = off(turning.simulator, turning.jacobian[at], np.zeros(turning.layout.size), at, step)
+    assert set(found) == {"dte", "torque_driven"}
+    assert all(error < CLOSE * size for error, size in found.values())
+
+
+def test_a_late_displacement_that_is_not_measured_is_not_seen(turning: Bench) -> None:
+    for channel in ("y_driver", "y_driven"):
+        assert not turning.jacobian[turning.layout.unknowns.at(f"delay-{channel}")].any()
+
+
+@pytest.fixture(scope="module")
 def uneven() -> tuple[Simulator, np.ndarray, np.ndarray]:
     """Simulator, unknowns and Jacobian of a rig whose teeth differ by as much as its mesh is pressed."""
     simulator = demonstration()
