@@ -20,6 +20,7 @@ from gearbench.diagnosis.fitting.fit import Optimum, fit, fit_afresh
 from gearbench.diagnosis.fitting.restructured import better
 from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.selection.weighing import Weighed, entering, is_own
+from gearbench.diagnosis.simulation.jacobian import FOLLOWED
 from gearbench.diagnosis.simulation.simulator import Simulator
 
 Array = NDArray[np.float64]
@@ -102,11 +103,14 @@ def _is_background(unknowns: Unknowns, one: Hypothesis, best: Optimum, without: 
 
 def size_of(unknowns: Unknowns, one: Hypothesis, p: Array, told: Array | None = None) -> float:
     """Rms of an effect's unknowns, of all (size,), in standard deviations of the background, each with the weight
-    `told` (entries,). Flanks that stand back everywhere have no error of form."""
+    `told` (entries,). Flanks that stand back everywhere have no error of form, and a driven angle that is early no
+    delay: simulations follow it, so that whatever is wrong behind the gear may seem to be."""
     at = one.entries(unknowns)
     values = p[at]
     if any(wide.key == FLANKS for wide in one.wide):
         values = values - np.average(values, weights=told)
+    if any(wide.key == FOLLOWED for wide in one.wide):
+        values = np.maximum(values, 0.0)
     return float(np.sqrt(np.average((values / unknowns.prior()[at]) ** 2, weights=told)))
 
 

@@ -15,6 +15,7 @@ from gearbench.diagnosis.fitting.fit import Optimum, fit_afresh
 from gearbench.diagnosis.forces.unknowns import group, unknowns_of
 from gearbench.diagnosis.selection.needed import CLEAR, held_against_background, size_of
 from gearbench.diagnosis.selection.weighing import LIMIT, PROVISIONAL, Weighed
+from gearbench.diagnosis.simulation.jacobian import FOLLOWED
 
 MATRIX = sensitivities(3)
 FRICTION = Hypothesis("friction", "mesh", (Wide("friction"),))
@@ -97,3 +98,10 @@ def test_flanks_that_stand_back_everywhere_have_no_error_of_form() -> None:
     assert size_of(here, flanks, form - 3.0) == pytest.approx(np.sqrt(0.8) * 2.0)
     told = np.array([1.0, 1.0, 0.0, 0.0, 0.0])
     assert size_of(here, flanks, form - 3.0, told) == pytest.approx(2.0)
+
+
+def test_a_driven_angle_that_is_early_is_no_delay() -> None:
+    here = unknowns_of([group(FOLLOWED, "s", ("delay",), 2e-6, slot="delay")], 2)
+    late = Hypothesis("sensor-delay angle_driven", "sensor", (Wide(FOLLOWED),))
+    assert size_of(here, late, np.array([8e-6])) == pytest.approx(4.0)
+    assert size_of(here, late, np.array([-8e-6])) == 0.0
