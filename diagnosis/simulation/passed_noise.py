@@ -21,6 +21,8 @@ from gearbench.rig import Case
 Array = NDArray[np.float64]
 
 GIVEN = ("torque_driver", "angle_driven")
+# Part of what noise does that may have the same sign as for the opposite noise, rms over rms.
+CURVED = 0.5
 MOST = 4  # groups that repetitions are taken in: one replay less
 
 
@@ -43,17 +45,23 @@ def noise_left(case: Case, measured: Measurement, simulate: Replay) -> dict[str,
 
 
 def _passed(case: Case, measured: Measurement, given: Mapping[str, Array], simulate: Replay) -> dict[str, Array]:
-    """Channel -> (parts, N): what the simulated channels become for the noise in what is given."""
+    """Channel -> (parts, N): what the simulated channels become for the noise in what is given. Raises ValueError
+    where that is no answer to it, as where flanks part and any little thing leads to another motion: the same noise
+    with the other sign must do the opposite."""
 
     def channels(record: xr.Dataset) -> dict[str, Array]:
         return simulated_channels(measured, simulate(case, record))
 
+    def shaken(part: int, sign: float = 1.0) -> dict[str, Array]:
+        noisy = channels(_shaken(measured.record, {name: sign * values[part] for name, values in given.items()}))
+        return {name: noisy[name] - quiet[name] for name in quiet}
+
     quiet = channels(measured.record)
     count = len(next(iter(given.values())))
-    rows = []
-    for part in range(count - 1):
-        noisy = channels(_shaken(measured.record, {name: values[part] for name, values in given.items()}))
-        rows.append({name: noisy[name] - quiet[name] for name in quiet})
+    rows = [shaken(part) for part in range(count - 1)]
+    there, back = rows[0]["dte"], shaken(0, -1.0)["dte"]
+    if float(np.mean((there + back) ** 2)) > CURVED**2 * float(np.mean((there - back) ** 2)):
+        raise ValueError(f"{measured.name}: no linear answer to noise")
     found = {name: np.array([row[name] for row in rows]) for name in quiet}
     # Parts add up to nothing, as departures from a mean do.
     return {name: np.concatenate([values, -values.sum(axis=0, keepdims=True)]) for name, values in found.items()}

@@ -115,6 +115,24 @@ def test_records_without_noise_or_without_a_simulation_have_that_of_their_channe
     np.testing.assert_array_equal(left["dte"], noise_of_mean(measured_channels(measured)["dte"]))
 
 
+def test_a_rig_that_goes_another_way_for_any_noise_says_nothing_of_it(
+    rig: Rig, noisy: tuple[Measurement, Replay]
+) -> None:
+    """A hundred times what the noise does, with the same sign for the opposite noise, as after an impact."""
+    measured, replayed = noisy
+
+    def rattling(case: Case, record: xr.Dataset) -> xr.Dataset:
+        out = replayed(case, record)
+        shaken = float(np.abs(record["angle_driven"] - measured.record["angle_driven"]).max()) > 0.0
+        way = 1e-4 * np.cos(np.arange(out.sizes["time"]))
+        return out.assign(angle_driver=out["angle_driver"] + way) if shaken else out
+
+    left = noise_left(rig.case, measured, rattling)
+    np.testing.assert_array_equal(left["dte"], noise_of_mean(measured_channels(measured)["dte"]))
+    linear = noise_left(rig.case, measured, replayed)
+    assert not np.array_equal(linear["dte"], left["dte"])
+
+
 def test_a_target_has_the_noise_that_it_is_given_and_counts_lines_of_shafts_by_teeth(
     rig: Rig, noisy: tuple[Measurement, Replay]
 ) -> None:
