@@ -13,6 +13,7 @@ from gearbench.diagnosis import verdict_file as module
 from gearbench.diagnosis.errors import DiagnosisError
 from gearbench.diagnosis.verdict import (
     Candidate,
+    Detectable,
     Effect,
     Found,
     Gap,
@@ -21,6 +22,7 @@ from gearbench.diagnosis.verdict import (
     Probabilities,
     Range,
     Share,
+    Smallest,
     Verdict,
 )
 from gearbench.diagnosis.verdict_file import parse_verdict, read_verdict, verdict_json, write_verdict
@@ -76,6 +78,14 @@ TREE: dict[str, Any] = {
     ],
     "held_out": "held-out",
     "indistinguishable": [["pitch-error", "eccentricity"]],
+    "detectable": [
+        {
+            "name": "eccentricity",
+            "place": "mesh",
+            "on": ["driver"],
+            "parameters": {"driver.runout": {"value": None, "std": 0.3, "good": 0.8, "unit": "um"}},
+        }
+    ],
     "advice": ["measure at 320 N m"],
 }
 
@@ -123,6 +133,14 @@ VERDICT = Verdict(
     ),
     held_out="held-out",
     indistinguishable=(("pitch-error", "eccentricity"),),
+    detectable=(
+        Detectable(
+            name="eccentricity",
+            place="mesh",
+            on=("driver",),
+            parameters={"driver.runout": Smallest(value=None, std=0.3, good=0.8, unit="um")},
+        ),
+    ),
     advice=("measure at 320 N m",),
 )
 TOLD = VERDICT.model_copy(update={"signs": {"lines": 400.0}, "calibrated_on": 12})
