@@ -29,7 +29,7 @@ from gearbench.diagnosis.selection.followable import nudges_of, parts
 from gearbench.diagnosis.selection.simulated import Simulated
 from gearbench.diagnosis.simulation.quadratic import quadratic_of
 from gearbench.diagnosis.simulation.simulator import Simulator
-from gearbench.diagnosis.simulation.target import Target, target_of
+from gearbench.diagnosis.simulation.target import target_of
 from gearbench.diagnosis.verdict import Detectable, Smallest
 
 Array = NDArray[np.float64]
@@ -43,7 +43,8 @@ def detectable_of(
     """What the records `searched` and the judged one would have shown of every effect of the library but those left
     out; nothing where the rig found does not answer the judged record."""
     found = judged.found
-    simulator, target = _answering(problem, judged)
+    simulator = _answering(problem, judged)
+    target = simulator.target
     best = found.selection.best
     lines = simulator.lines(best.p)
     if lines is None:
@@ -58,9 +59,9 @@ def detectable_of(
     return tuple(out)
 
 
-def _answering(problem: Problem, judged: Judged) -> tuple[Simulator, Target]:
-    """What simulates the judged record as the search does its own, kept on its way where the rig goes another, and its
-    lines. It takes the name of the first record of the search, for whose condition the ripple has unknowns."""
+def _answering(problem: Problem, judged: Judged) -> Simulator:
+    """What simulates the judged record's lines as the search does its own, kept on its way where the rig goes another.
+    It takes the name of the first record of the search, for whose condition the ripple has unknowns."""
     found, measured = judged.found, judged.measured
     assert judged.target is not None
     alike = replace(measured, name=found.simulator.target.measurements[0].name)
@@ -70,7 +71,7 @@ def _answering(problem: Problem, judged: Judged) -> tuple[Simulator, Target]:
     elif measured.name in found.simulator.nudges:
         nudges = {alike.name: found.simulator.nudges[measured.name]}
     target = replace(judged.target, measurements=(alike,))
-    return Simulator(found.layout, target, found.simulator.simulate, nudges), target
+    return Simulator(found.layout, target, found.simulator.simulate, nudges)
 
 
 def _cracks(problem: Problem, found: Simulated, without: Sequence[str]) -> list[Hypothesis]:
