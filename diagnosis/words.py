@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import floor, isfinite, log10
 
 PLACES = {
@@ -25,6 +26,12 @@ CHANNELS = {
 }
 # How a unit is shown: (factor, unit).
 SHOWN_UNITS = {"m": (1e6, "um"), "rad": (1e6, "urad"), "1": (1.0, "")}
+
+
+def with_parts(noun: str, on: Sequence[str], form: str = "") -> str:
+    """`run-out of a gear (driver)`: a noun and the parts that it is about, or its form where it is about none."""
+    about = ", ".join(CHANNELS.get(one, one) for one in on) or form
+    return f"{noun} ({about})" if about else noun
 
 
 def number(value: float, digits: int = 3) -> str:

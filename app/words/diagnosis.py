@@ -7,7 +7,7 @@ from math import floor, isfinite, log10
 from typing import TYPE_CHECKING, NamedTuple
 
 from gearbench.diagnosis.effects.library import CHANGING, LIBRARY
-from gearbench.diagnosis.words import CHANNELS, PLACES, SHOWN_UNITS, band_in_words, length, number, percent
+from gearbench.diagnosis.words import CHANNELS, PLACES, SHOWN_UNITS, band_in_words, length, number, percent, with_parts
 
 if TYPE_CHECKING:
     from gearbench.diagnosis.verdict import Gap, Parameter, Range, Verdict
@@ -118,8 +118,7 @@ def detectable_in_words(verdict: Verdict) -> list[Told]:
     for one in verdict.detectable:
         if one.name in named:
             continue
-        about = ", ".join(CHANNELS.get(each, each) for each in one.on)
-        words = effects_in_words([one.name]) + (f" ({about})" if about else "")
+        words = with_parts(effects_in_words([one.name]), one.on)
         parameter, size = next(iter(one.parameters.items()))
         scale, unit = SHOWN_UNITS.get(size.unit, (1.0, size.unit))
         told = Told(words, size_in_words(one.name, parameter, one.on, unit),

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.diagnosis.detection.information import Blocks, Known
-from gearbench.diagnosis.detection.opened import Changed, smallest_backlash
+from gearbench.diagnosis.detection.opened import Changed, backlashes, smallest_backlash
 from gearbench.diagnosis.detection.smallest import View
 from gearbench.diagnosis.detection.stated import Sizes, sizes_of
 from gearbench.diagnosis.effects.backlash import BACKLASH, KEY
@@ -33,8 +33,6 @@ from gearbench.diagnosis.simulation.target import target_of
 from gearbench.diagnosis.verdict import Detectable, Smallest
 
 Array = NDArray[np.float64]
-
-MICRO = 1e6
 
 
 def detectable_of(
@@ -130,10 +128,6 @@ def _backlash(problem: Problem, judged: Changed, searched: Sequence[Measurement]
         if lines is not None:
             left = target.floors + target.energies(target.lines - lines)
             shown = smallest_backlash(Changed(alone, judged.p, left), judged)
-    more = Smallest(
-        value=None if shown is None else MICRO * shown[0],
-        std=MICRO * (float(group.wide[0]) if shown is None else shown[1]),
-        good=MICRO * float(group.sd[0]),
-        unit="um",
-    )
+    sizes = backlashes(group, shown)
+    more = Smallest(value=sizes.found, std=sizes.std, good=sizes.good, unit="um")
     return Detectable(name=BACKLASH.name, place=one.place, on=one.on, parameters={"more": more})

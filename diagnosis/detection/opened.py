@@ -4,12 +4,14 @@ it is simulated and not read off a derivative."""
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.diagnosis.effects.backlash import BACKLASH, KEY
 from gearbench.diagnosis.evidence.calibration import LIMITS
+from gearbench.diagnosis.forces.unknowns import Group
 from gearbench.diagnosis.judging.closing import DUE, FELT, GAIN, growth_of
 from gearbench.diagnosis.selection.weighing import LIMIT
 from gearbench.diagnosis.simulation.simulator import Simulator
@@ -19,6 +21,7 @@ Array = NDArray[np.float64]
 LEAST, MOST = 0.02, 3.0  # wide standard deviations, between which it is looked for
 HALVINGS = 7
 SPACING = 0.15  # of a backlash, to which a verdict knows it
+MICRO = 1e6
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +53,25 @@ class Changed:
     def growth(self, more: float) -> float:
         """By how much the gap of some part grows without it."""
         return growth_of(self.simulator.target, self.floors + self.energies(more), self.floors)[0]
+
+
+class Backlashes(NamedTuple):
+    """Backlashes beyond the rig's own [um]: the smallest that is `found` (None: at no size), the deviation `std` that
+    is stated for it (of the prior where none is), a `good` rig's, and the `largest` that was looked for."""
+
+    found: float | None
+    std: float
+    good: float
+    largest: float
+
+
+def backlashes(group: Group, smallest: tuple[float, float] | None) -> Backlashes:
+    """The sizes that tell what `smallest_backlash` found with the unknown of the backlash."""
+    wide, good = MICRO * float(group.wide[0]), MICRO * float(group.sd[0])
+    if smallest is None:
+        return Backlashes(None, wide, good, MOST * wide)
+    found, std = smallest
+    return Backlashes(MICRO * found, MICRO * std, good, MOST * wide)
 
 
 def smallest_backlash(rough: Changed, judged: Changed) -> tuple[float, float] | None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 from gearbench.bench.errors import BenchError
 from gearbench.diagnosis.advice import advice_of
 from gearbench.diagnosis.detection.information import Known, Without, floors_of
-from gearbench.diagnosis.detection.opened import MOST, Changed, smallest_backlash
+from gearbench.diagnosis.detection.opened import Changed, backlashes, smallest_backlash
 from gearbench.diagnosis.detection.smallest import View, apart_from, largest, rivals_at, smallest
 from gearbench.diagnosis.detection.stated import sizes_of, stated_at
 from gearbench.diagnosis.effects.backlash import BACKLASH, KEY
@@ -220,12 +221,12 @@ def _groups(view: View) -> tuple[tuple[str, ...], ...]:
 def _backlash(plan: Planned) -> Row:
     """The row of the backlash, which is simulated."""
     (one,) = BACKLASH.hypotheses(plan.problem.model)
-    found = None
+    shown = None
     if plan.rough:
         rough = [(plan.inputs.measurements[number], plan.problem.conditions[number]) for number in plan.rough]
-        found = smallest_backlash(_changed(plan, rough), _changed(plan, [plan.judged]))
-    group = plan.layout.unknowns.group(KEY)
-    micro = 1e6
+        shown = smallest_backlash(_changed(plan, rough), _changed(plan, [plan.judged]))
+    sizes = backlashes(plan.layout.unknowns.group(KEY), shown)
+    one_alone = sizes.found is not None and len(plan.rough) == 1
     return Row(
         effect=BACKLASH.name,
         name=one.name,
@@ -233,16 +234,14 @@ def _backlash(plan: Planned) -> Row:
         on=one.on,
         parameter="more",
         unit="um",
-        found=None if found is None else micro * found[0],
-        std=micro * (float(group.wide[0]) if found is None else found[1]),
-        good=micro * float(group.sd[0]),
-        largest=micro * MOST * float(group.wide[0]),
-        apart=None if found is None else micro * found[0],
+        found=sizes.found,
+        std=sizes.std,
+        good=sizes.good,
+        largest=sizes.largest,
+        apart=sizes.found,
         best=None,
-        over_good=None if found is None else found[0] / float(group.sd[0]),
-        costs={f"record {plan.inputs.measurements[plan.rough[0]].name}": Cost(None, float("inf"))}
-        if found is not None and len(plan.rough) == 1
-        else {},
+        over_good=None if sizes.found is None else sizes.found / sizes.good,
+        costs={f"record {plan.inputs.measurements[plan.rough[0]].name}": Cost(None, inf)} if one_alone else {},
     )
 
 

@@ -7,7 +7,7 @@ from math import isinf
 
 from gearbench.diagnosis.effects.library import LIBRARY
 from gearbench.diagnosis.planning.row import BOTH, LONGER, Cost, Row
-from gearbench.diagnosis.words import CHANNELS, number
+from gearbench.diagnosis.words import CHANNELS, number, with_parts
 
 NOUNS = {effect.name: effect.noun for effect in LIBRARY}
 # A smallest size that grows, or a standard deviation that grows, by these factors counts as carried by what was left
@@ -79,8 +79,7 @@ def words_of(row: Row) -> str:
 def words_of_effect(effect: str, name: str, on: Sequence[str]) -> str:
     """The same of a hypothesis by its name; where it is about no part, the rest of its name tells it from another one
     of the same effect."""
-    about = ", ".join(CHANNELS.get(one, one) for one in on) or FORMS.get(name.removeprefix(effect).strip(), "")
-    return f"{NOUNS[effect]} ({about})" if about else NOUNS[effect]
+    return with_parts(NOUNS[effect], on, FORMS.get(name.removeprefix(effect).strip(), ""))
 
 
 def _of(name: str, rows: Sequence[Row]) -> str:
