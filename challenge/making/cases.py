@@ -34,6 +34,7 @@ from gearbench.challenge.truth.levels import background
 from gearbench.challenge.truth.measure import measure
 from gearbench.challenge.truth.rigs import Bench, check_nominal, conditions_of, make_bench
 from gearbench.challenge.truth.scale import Scale, scale_of
+from gearbench.challenge.truth.stated import stated
 from gearbench.challenge.truth.structure import FAMILIES, Structure, draw_structure, family_named, loosened
 from gearbench.geometry import pair
 from gearbench.records import write_record
@@ -84,6 +85,7 @@ def draw_truth(
     if scale is not None:
         structure, drawn = scale.structure(structure), replace(drawn, levels=scale.levels(drawn.levels))
         parameters = scale.parameters(parameters)
+    parameters = stated(parameters, structure, nominal)
     answer = Answer(
         plan.kind,
         plan.effects,

@@ -14,15 +14,21 @@ import numpy as np
 
 from gearbench.challenge.truth.levels import (
     BACKLASH,
+    CONTACT,
     CRACK,
+    DAMPING,
     DELAY,
     DELAYED,
+    DRIFT,
+    ENCODER,
     EXPONENT,
     FRICTION,
     PITCH,
+    PROFILE,
     RIPPLE,
     RIPPLE_ORDERS,
     RUNOUT,
+    SUPPORT,
     Foreign,
     Levels,
     one_tooth,
@@ -32,6 +38,7 @@ from gearbench.challenge.truth.levels import (
 SEVERITY = (0.35, 1.6)
 COUPLING = (900.0, 3000.0)  # [Hz] resonance of the rotor against the driver
 SIDES = ("driver", "driven")
+DRIFTING = ("mesh", "driver-support", "driven-support")
 
 Parameters = dict[str, dict[str, Any]]
 
@@ -119,6 +126,47 @@ def _backlash(levels: Levels, severity: float, rng: np.random.Generator) -> Draw
     return Drawn(replace(levels, backlash_more=size), "mesh", severity, {"more": _value(size * 1e6, "um")})
 
 
+def _contact(levels: Levels, severity: float, rng: np.random.Generator) -> Drawn:
+    size = CONTACT * severity
+    return Drawn(replace(levels, contact=size), "mesh", severity, {"exponent": _value(size, "1")})
+
+
+def _profile(levels: Levels, severity: float, rng: np.random.Generator) -> Drawn:
+    # From peak to valley a slope is twice its amplitude, a bow once.
+    size, kind = PROFILE * severity * float(rng.choice([-1.0, 1.0])), int(rng.integers(2))
+    profile = ((0.5 * size, 0.0), (0.0, size))[kind]
+    return Drawn(
+        replace(levels, profile=profile), "mesh", severity, {"peak_to_valley": _value(abs(size) * 1e6, "um")}
+    )
+
+
+def _encoder(levels: Levels, severity: float, rng: np.random.Generator) -> Drawn:
+    side, size = int(rng.integers(2)), ENCODER * severity
+    parameters = {f"{SIDES[side]}.encoder_runout": _value(size * 1e6, "um")}
+    return Drawn(replace(levels, encoder=_on(levels.encoder, side, size)), "sensor", severity, parameters)
+
+
+def _drift(levels: Levels, severity: float, rng: np.random.Generator) -> Drawn:
+    where, size = int(rng.integers(len(DRIFTING))), DRIFT * severity * float(rng.choice([-1.0, 1.0]))
+    a, b, c = (size if i == where else 0.0 for i in range(3))
+    of = "" if where == 0 else f"{SIDES[where - 1]}."
+    parameters = {f"{of}stiffness_drift": _value(size, "1")}
+    return Drawn(replace(levels, drift=(a, b, c)), DRIFTING[where], severity, parameters)
+
+
+def _support(levels: Levels, severity: float, rng: np.random.Generator) -> Drawn:
+    side, sense = int(rng.integers(2)), float(rng.choice([-1.0, 1.0]))
+    factor = float(np.exp(sense * (SUPPORT[0] + SUPPORT[1] * severity)))
+    levels = replace(levels, support=_on(levels.support, side, factor))
+    parameters = {f"{SIDES[side]}.stiffness": _value(factor, "1")}
+    return Drawn(levels, f"{SIDES[side]}-support", severity, parameters)
+
+
+def _damping(levels: Levels, severity: float, rng: np.random.Generator) -> Drawn:
+    factor = DAMPING[0] + DAMPING[1] * severity
+    return Drawn(replace(levels, damping=factor), "mesh", severity, {"ratio": _value(factor, "1")})
+
+
 # Draws of the effects by their names in the library.
 EFFECTS: dict[str, Draw] = {
     "backlash": _backlash,
@@ -130,19 +178,17 @@ EFFECTS: dict[str, Draw] = {
     "bearing-nonlinearity": _bearing,
     "sensor-delay": _delay,
     "torque-ripple": _ripple,
+    "contact-nonlinearity": _contact,
+    "profile-error": _profile,
+    "encoder-runout": _encoder,
+    "temperature-drift": _drift,
+    "support-stiffness": _support,
+    "mesh-damping": _damping,
 }
 
 
 def _foreign(levels: Levels, foreign: Foreign, place: str, parameters: Parameters) -> Drawn:
     return Drawn(replace(levels, foreign=foreign), place, 1.0, parameters)
-
-
-def _drift(levels: Levels, severity: float, rng: np.random.Generator) -> Drawn:
-    where = int(rng.integers(3))
-    size = float(rng.uniform(0.03, 0.10) * rng.choice([-1.0, 1.0]))
-    a, b, c = (size if i == where else 0.0 for i in range(3))
-    place = ("mesh", "driver-support", "driven-support")[where]
-    return _foreign(levels, Foreign(drift=(a, b, c)), place, {"relative_drift": _value(size, "1")})
 
 
 def _slip(levels: Levels, severity: float, rng: np.random.Generator) -> Drawn:
@@ -181,7 +227,6 @@ def _quadratic(levels: Levels, severity: float, rng: np.random.Generator) -> Dra
 
 # Draws of what no library holds; they have a range of their own and ignore the severity.
 FOREIGN: dict[str, Draw] = {
-    "temperature-drift": _drift,
     "slipping-coupling": _slip,
     "non-synchronous-torque": _tone,
     "torque-filter": _filter,

@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 # Those of EFFECTS that the reduced model has in motion; a crack is a shape there and not a loss of stiffness.
 REPRESENTED = (
     *("backlash", "friction", "eccentricity", "pitch-error", "coupling", "bearing-nonlinearity"),
-    *("sensor-delay", "torque-ripple"),
+    *("sensor-delay", "torque-ripple", "encoder-runout"),
 )
 COUPLING_DAMPING = 0.03  # ratio
 SIDES = ("driver", "driven")
@@ -77,7 +77,11 @@ def elastic_rig(nominal: Case, rig: Case, levels: Levels, condition: Condition, 
     update["drive"] = _drive(case.rig, levels, condition.experiment.torque_mean, soft)
     delays = {f"delay_{name}": late for name, late in zip(DELAYED, levels.delay, strict=True)}
     silent = {f"noise_{kind}": 0.0 for kind in ("angle", "displacement", "torque")}
-    update["sensors"] = case.rig.sensors.model_copy(update={**delays, **silent})
+    radii = (meshing.driver.base_radius, meshing.driven.base_radius)
+    ahead: dict[str, float] = {}
+    for side, radius, size, phase in zip(SIDES, radii, levels.encoder, levels.encoder_phase, strict=True):
+        ahead |= {f"encoder_runout_{side}": size / radius, f"encoder_runout_{side}_phase": phase}
+    update["sensors"] = case.rig.sensors.model_copy(update={**delays, **silent, **ahead})
     return case.model_copy(update={"rig": case.rig.model_copy(update=update), "uncertainty": {}})
 
 

@@ -20,6 +20,14 @@ EXPONENT = 0.35
 DELAY = 50e-6
 RIPPLE = 0.006  # of the mean torque, at each order
 BACKLASH = 80e-6  # transverse, at the reference circles
+CONTACT = 0.35  # exponent of the pairs' force law beyond the structure's
+PROFILE = 8e-6  # of the flanks over the path of contact, from peak to valley
+ENCODER = 5e-6  # amplitude along the base circle
+DRIFT = 0.06  # of a stiffness over a record
+# Logarithm of a support's stiffness over the nominal one, either way: part that all have, and part that grows.
+SUPPORT = (0.3, 0.4)
+# Damping ratio of the mesh over the nominal one, likewise.
+DAMPING = (3.0, 1.5)
 BACKGROUND = (0.05, 0.12)  # of severity 1
 RIGID_COUPLING = (7500.0, 11000.0)  # [Hz] background of the coupling's resonance
 
@@ -28,7 +36,6 @@ RIGID_COUPLING = (7500.0, 11000.0)  # [Hz] background of the coupling's resonanc
 class Foreign:
     """Effects that no library holds; the defaults are none."""
 
-    drift: tuple[float, float, float] = (0.0, 0.0, 0.0)  # mesh, driver support, driven support over a record
     slip_part: float = 0.0  # torque limit of the coupling is mean + part x peak of the first condition; 0: none
     tone: float = 0.0  # amplitude over the mean torque
     tone_frequency: float = 0.0  # [Hz]
@@ -55,6 +62,13 @@ class Levels:
     ripple: Array  # (orders,) over the mean torque
     ripple_phase: Array
     backlash_more: float  # [m] transverse, at the reference circles
+    encoder: tuple[float, float] = (0.0, 0.0)  # [m] along the base circles
+    encoder_phase: tuple[float, float] = (0.0, 0.0)
+    contact: float = 0.0  # exponent beyond the structure's
+    profile: tuple[float, float] = (0.0, 0.0)  # [m] slope and bow beyond the structure's
+    support: tuple[float, float] = (0.0, 0.0)  # stiffness over the nominal one; 0: as the structure has it
+    damping: float = 0.0  # ratio of the mesh likewise
+    drift: tuple[float, float, float] = (0.0, 0.0, 0.0)  # mesh, driver's support, driven support over a record
     foreign: Foreign = field(default_factory=Foreign)
 
 
@@ -79,6 +93,9 @@ def background(teeth: tuple[int, int], rng: np.random.Generator) -> Levels:
         ripple=np.array([level(RIPPLE) for _ in RIPPLE_ORDERS]),
         ripple_phase=rng.uniform(0, 2 * np.pi, len(RIPPLE_ORDERS)),
         backlash_more=sign() * level(BACKLASH),
+        # What came later draws last: a seed keeps its rigs.
+        encoder=(level(ENCODER), level(ENCODER)),
+        encoder_phase=(float(rng.uniform(0, 2 * np.pi)), float(rng.uniform(0, 2 * np.pi))),
     )
 
 

@@ -63,7 +63,8 @@ class Run:
 
 def fastest(plant: Plant) -> float:
     """An upper estimate of the fastest angular frequency [rad/s]."""
-    mesh = 2.0 * plant.teeth.stiffness.max()
+    exponent = plant.teeth.exponent
+    mesh = max(2.0, (1.0 + exponent) * IMPACT[1] ** exponent) * plant.teeth.stiffness.max()
     rows = [
         plant.coupling.stiffness / plant.inertia.rotor,
         (plant.coupling.stiffness + mesh * plant.base_driver**2) / plant.inertia.driver,
@@ -79,7 +80,8 @@ def fastest_decay(plant: Plant) -> float:
     damping = teeth.damping * max(1.0, 1.0 - teeth.damping_load + teeth.damping_load * IMPACT[1])
     damping += teeth.damping_quadratic * IMPACT[0]
     mobility = plant.base_driver**2 / plant.inertia.driver + plant.base_driven**2 / plant.inertia.driven
-    return float(damping * 2.0 * teeth.stiffness.max() * (mobility + (1.0 / np.array(plant.mass)).sum()))
+    stiffer = max(2.0, (1.0 + teeth.exponent) * IMPACT[1] ** teeth.exponent)
+    return float(damping * stiffer * teeth.stiffness.max() * (mobility + (1.0 / np.array(plant.mass)).sum()))
 
 
 def steps_per_sample(plant: Plant, rate: float) -> int:
@@ -163,7 +165,7 @@ def measure(
     challenge `name` and nothing else."""
     plan = schedule(condition.experiment, bench.nominal.rig)
     run = run_condition(bench, rig, levels, condition)
-    channels = _channels(run, plan, levels)
+    channels = _channels(run, plan, levels, (bench.meshing.driver.base_radius, bench.meshing.driven.base_radius))
     return make_record(noisy(channels, bench.nominal.rig.sensors, rng), attributes_of(bench, condition, plan, name))
 
 
@@ -176,7 +178,7 @@ def noisy(channels: Mapping[str, Array], sensors: Sensors, rng: np.random.Genera
     }
 
 
-def _channels(run: Run, plan: Schedule, levels: Levels) -> dict[str, Array]:
+def _channels(run: Run, plan: Schedule, levels: Levels, radii: tuple[float, float]) -> dict[str, Array]:
     samples = plan.record_samples
     time = np.arange(samples) / plan.sampling_rate
     delay = dict(zip(DELAYED, levels.delay, strict=True))
@@ -186,6 +188,8 @@ def _channels(run: Run, plan: Schedule, levels: Levels) -> dict[str, Array]:
         values, late = run.seen[:, OUTPUTS.index(name)], delay.get(name, 0.0)
         seen = CubicSpline(run.time, values)(run.time - late) if late else values
         channels[name] = sampled(seen) + speed.get(name, 0.0) * (time - late)
+    for name, radius, size, phase in zip(speed, radii, levels.encoder, levels.encoder_phase, strict=True):
+        channels[name] = channels[name] + size / radius * np.cos(channels[name] - phase)
     return channels
 
 

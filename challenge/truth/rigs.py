@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from gearbench.challenge.truth.scale import Scale
 from gearbench.challenge.truth.structure import Structure
 from gearbench.challenge.truth.teeth import pair_law, scaled
 from gearbench.geometry import Pair, pair
-from gearbench.rig import Case, Condition, Experiment, effects_in
+from gearbench.rig import Case, Condition, Experiment, Rig, effects_in
 
 Array = NDArray[np.float64]
 
@@ -92,6 +92,8 @@ def make_bench(
 
 def build_plant(bench: Bench, rig: Structure, levels: Levels, experiment: Experiment) -> Plant:
     """The plant under one experiment."""
+    modes = _modes(rig)  # a housing does not know what stands on it
+    rig = with_levels(rig, levels, bench.nominal.rig)
     meshing, plan = bench.meshing, schedule(experiment, bench.nominal.rig)
     first = conditions_of(bench.nominal)[0].experiment
     z1, z2 = meshing.driver.teeth, meshing.driven.teeth
@@ -108,7 +110,6 @@ def build_plant(bench: Bench, rig: Structure, levels: Levels, experiment: Experi
     if foreign.slip_part:
         assert first.multisine is not None
         limit = first.torque_mean + foreign.slip_part * (first.multisine.amplitude or 2 * (first.multisine.rms or 0.0))
-    modes = _modes(rig)
     return Plant(
         teeth=_teeth(bench, rig, levels),
         base_driver=rb1,
@@ -143,7 +144,22 @@ def build_plant(bench: Bench, rig: Structure, levels: Levels, experiment: Experi
         ripple=_ripple(levels, experiment),
         ripple_order=float(RIPPLE_ORDERS[0]),
         tone=_tone(levels, experiment, plan),
-        drift=Drift(*foreign.drift, experiment.periods * plan.samples_per_period / plan.sampling_rate),
+        drift=Drift(*levels.drift, experiment.periods * plan.samples_per_period / plan.sampling_rate),
+    )
+
+
+def with_levels(rig: Structure, levels: Levels, nominal: Rig) -> Structure:
+    """The structure with what effects make of its own numbers."""
+    slope, bow = levels.profile
+    support = rig.support.copy()
+    for along, side, factor in zip((1, 3), ("driver", "driven"), levels.support, strict=True):
+        if factor:
+            support[along] = getattr(nominal.support, side).stiffness * factor
+    return replace(
+        rig,
+        profile=rig.profile + np.array([slope, bow, 0.0, 0.0]),
+        damping_ratio=nominal.damping.mesh_ratio * levels.damping if levels.damping else rig.damping_ratio,
+        support=support,
     )
 
 
@@ -155,6 +171,8 @@ def _teeth(bench: Bench, rig: Structure, levels: Levels) -> Teeth:
     law = pair_law(nominal, meshing, rig.shape, rig.bow, DEEPEST * load / wanted)
     reference = REFERENCE * bench.scale.length
     law = scaled(law, rig.exponent, reference, load, wanted)
+    # What bends the law leaves force and deflection under the first condition's mean torque as they are.
+    stiffness = law.stiffness * (reference * wanted / ((1.0 + rig.exponent) * load)) ** levels.contact
     low, high = law.inside
     away = np.clip((law.place - 0.5 * (low + high)) / (0.5 * (high - low)), -1.0, 1.0)
     slope, bow, wave_cos, wave_sin = rig.profile
@@ -169,7 +187,7 @@ def _teeth(bench: Bench, rig: Structure, levels: Levels) -> Teeth:
     return Teeth(
         first=law.first,
         pitch=law.pitch,
-        stiffness=law.stiffness,
+        stiffness=stiffness,
         share_driver=np.ascontiguousarray(law.share_driver),
         share_driven=np.ascontiguousarray(law.share_driven),
         excess=excess - law.gap,
@@ -177,7 +195,7 @@ def _teeth(bench: Bench, rig: Structure, levels: Levels) -> Teeth:
         error_driven=np.ascontiguousarray(levels.pitch[1]),
         crack_driver=crack[0],
         crack_driven=crack[1],
-        exponent=rig.exponent,
+        exponent=rig.exponent + levels.contact,
         reference=reference,
         backlash=meshing.backlash_normal + more,
         damping=float(damping),

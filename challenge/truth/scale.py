@@ -53,6 +53,8 @@ class Scale:
             coupling_frequency=of.coupling_frequency * frequency,
             delay=(a, b, c, d),
             backlash_more=of.backlash_more * length,
+            encoder=(of.encoder[0] * length, of.encoder[1] * length),
+            profile=(of.profile[0] * length, of.profile[1] * length),
             foreign=replace(
                 foreign,
                 tone_frequency=foreign.tone_frequency * frequency,

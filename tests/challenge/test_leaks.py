@@ -122,7 +122,7 @@ def test_answers_hold_the_schema_and_alone_the_seed(challenge: tuple[Path, Path]
     tree = json.loads(challenge[1].read_text(encoding="utf-8"))
     assert len(tree) == MIX.cases
     kinds = [entry["kind"] for entry in tree.values()]
-    assert {kind: kinds.count(kind) for kind in kinds} == {"none": 2, "effect": 12, "foreign": 5}
+    assert {kind: kinds.count(kind) for kind in kinds} == {"none": 2, "effect": 18, "foreign": 4}
     for entry in tree.values():
         assert {"kind", "effects", "place", "parameters"} <= set(entry)
         assert entry["seed"] == SEED
@@ -143,7 +143,7 @@ def test_effects_change_the_record(challenge: tuple[Path, Path]) -> None:
 
 
 def test_made_again_it_is_the_same_and_goes_on(challenge: tuple[Path, Path], tmp_path: Path) -> None:
-    nominal, mix = short_case(), Mix(1, (0,) * 9, 1)
+    nominal, mix = short_case(), Mix(1, (0,) * len(EFFECTS), 1)
     out, answers = tmp_path / "cases", tmp_path / "answers.json"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(making, "nominal_stiffness", lambda nominal: STIFFNESS)
@@ -173,7 +173,7 @@ def test_answers_inside_the_folder_are_refused(inside: str, tmp_path: Path) -> N
 
 def test_no_cases_are_refused(tmp_path: Path) -> None:
     with pytest.raises(ChallengeError, match="at least 1"):
-        make_challenge(short_case(), Mix(0, (0,) * 9, 0), 1, tmp_path / "cases", tmp_path / "answers.json")
+        make_challenge(short_case(), Mix(0, (0,) * len(EFFECTS), 0), 1, tmp_path / "cases", tmp_path / "answers.json")
 
 
 def test_diagnosis_never_loads_the_truth() -> None:

@@ -141,6 +141,6 @@ def test_measured_torque_is_what_drives_the_truth_rigs() -> None:
 def test_a_calibration_holds_sound_foreign_and_withheld_rigs() -> None:
     mix = mix_of(12, 1)
     assert (mix.controls, mix.foreign, sum(mix.per_effect), mix.cases) == (4, 3, 5, 12)
-    assert mix_of(30, 1).cases == 30 and min(mix_of(30, 1).per_effect) >= 1
+    assert mix_of(36, 1).cases == 36 and min(mix_of(36, 1).per_effect) >= 1
     with pytest.raises(ChallengeError, match="at least 6"):
         mix_of(5, 1)

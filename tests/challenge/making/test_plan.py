@@ -18,18 +18,19 @@ from gearbench.challenge.truth.levels import Levels
 from gearbench.challenge.truth.rigs import check_nominal
 from gearbench.challenge.truth.scale import scale_of
 from gearbench.challenge.truth.structure import FAMILIES, draw_structure, family_named, loosened
+from gearbench.rig.contract import EFFECTS as NAMES
 
 
 def test_default_mix_is_that_of_the_reach() -> None:
-    assert default_mix(171) == Mix(60, (9, *(8,) * 8), 30, 6, 2)
+    assert default_mix(171) == Mix(60, (*(5,) * 13, 4, 4), 30, 6, 2)
     for cases in (1, 7, 60, 100):
         assert default_mix(cases).cases == cases
 
 
 def test_mix_is_parsed() -> None:
-    assert parse_mix("controls=12, per-effect=4,foreign=12") == Mix(12, (4,) * 9, 12)
+    assert parse_mix("controls=12, per-effect=4,foreign=12") == Mix(12, (4,) * 15, 12)
     assert parse_mix("pairs=3").cases == 3
-    assert parse_mix("triples=3,reduced=2") == Mix(0, (0,) * 9, 0, 0, 3, 2)
+    assert parse_mix("triples=3,reduced=2") == Mix(0, (0,) * 15, 0, 0, 3, 2)
 
 
 @pytest.mark.parametrize("text", ["controls", "effects=3", "controls=-1", "foreign=1e3", "controls=99999"])
@@ -39,11 +40,12 @@ def test_bad_mix_is_refused(text: str) -> None:
 
 
 def test_plan_holds_the_mix_with_log_uniform_severities() -> None:
-    plans = make_plan(Mix(5, (30,) * 9, 12, 4), np.random.default_rng(3))
+    plans = make_plan(Mix(5, (30,) * 15, 12, 4), np.random.default_rng(3))
     counts = Counter(plan.effects for plan in plans)
     assert counts[()] == 5
     assert all(counts[(name,)] == 30 for name in EFFECTS)
-    assert {counts[(name,)] for name in FOREIGN} == {2, 3}
+    assert {counts[(name,)] for name in FOREIGN} == {3}
+    assert set(EFFECTS) == set(NAMES)
     assert sum(len(plan.effects) == 2 for plan in plans) == 4
     for name in EFFECTS:
         logs = np.sort([np.log(plan.severity[0]) for plan in plans if plan.effects == (name,)])
@@ -54,8 +56,8 @@ def test_plan_holds_the_mix_with_log_uniform_severities() -> None:
 
 def test_triples_and_rigs_of_finite_elements_come_after_all_else() -> None:
     """A seed draws the same cases as before, whatever is asked for besides."""
-    before = make_plan(Mix(5, (3,) * 9, 12, 4), np.random.default_rng(3))
-    plans = make_plan(Mix(5, (3,) * 9, 12, 4, 5, 20), np.random.default_rng(3))
+    before = make_plan(Mix(5, (3,) * 15, 12, 4), np.random.default_rng(3))
+    plans = make_plan(Mix(5, (3,) * 15, 12, 4, 5, 20), np.random.default_rng(3))
     assert plans[: len(before)] == before and len(plans) == len(before) + 25
     for plan in plans[len(before) : -20]:
         assert plan.kind == "effect" and len(set(plan.effects)) == len(plan.severity) == 3
@@ -104,6 +106,13 @@ SIZES = {
     "bearing-nonlinearity": (lambda level: max(level.exponent), 0.35),
     "sensor-delay": (lambda level: max(np.abs(level.delay)), 50e-6),
     "torque-ripple": (lambda level: max(level.ripple), 0.006),
+    "encoder-runout": (lambda level: max(level.encoder), 5e-6),
+}
+# Of these a good rig has what its structure has of them.
+OWN = {
+    "contact-nonlinearity": (lambda level: level.contact, 0.35),
+    "profile-error": (lambda level: max(2 * abs(level.profile[0]), abs(level.profile[1])), 8e-6),
+    "temperature-drift": (lambda level: max(np.abs(level.drift)), 0.06),
 }
 
 
@@ -118,6 +127,35 @@ def test_effects_have_the_size_of_the_issue_times_their_severity(name: str) -> N
         assert others(drawn.levels, name) == others(before, name)
 
 
+@pytest.mark.parametrize("name", OWN)
+def test_a_good_rig_has_its_structure_alone_of_these(name: str) -> None:
+    size, unit = OWN[name]
+    before = drawn_levels(5)
+    assert size(before) == 0.0
+    for seed in range(6):
+        drawn = EFFECTS[name](before, 1.3, np.random.default_rng(seed))
+        assert size(drawn.levels) == pytest.approx(1.3 * unit)
+        assert others(drawn.levels, name) == others(before, name)
+
+
+@pytest.mark.parametrize("severity", SEVERITY)
+def test_known_numbers_leave_their_uncertainty_behind(severity: float) -> None:
+    """Another stiffness of a support, or damping of the mesh, is one beyond three standard deviations."""
+    nominal = short_case()
+    sides = set()
+    for number in range(20):
+        plan = Plan("effect", ("support-stiffness", "mesh-damping"), (severity, severity))
+        answer = draw_truth(nominal, "test", 7, number, plan)[0].answer
+        ((name, stiffness),) = answer.parameters["support-stiffness"].items()
+        side = name.removesuffix(".stiffness")
+        known = getattr(nominal.rig.support, side).stiffness, nominal.uncertainty[f"rig.support.{side}.stiffness"]
+        assert abs(stiffness["value"] - known[0]) > 3 * known[1] and stiffness["unit"] == "N/m"
+        sides.add((answer.places[0], stiffness["value"] > known[0]))
+        ratio = answer.parameters["mesh-damping"]["ratio"]["value"]
+        assert ratio > 0.05 + 3 * nominal.uncertainty["rig.damping.mesh_ratio"] and ratio < 0.3
+    assert sides == {(f"{side}-support", more) for side in ("driver", "driven") for more in (False, True)}
+
+
 def others(levels: Levels, name: str) -> str:
     """All levels but those of an effect, as text."""
     fields = {
@@ -129,6 +167,10 @@ def others(levels: Levels, name: str) -> str:
         "sensor-delay": "delay",
         "torque-ripple": "ripple",
         "coupling": "coupling_frequency",
+        "encoder-runout": "encoder",
+        "contact-nonlinearity": "contact",
+        "profile-error": "profile",
+        "temperature-drift": "drift",
     }
     skipped = fields.get(name, name)
     return str({key: value for key, value in vars(levels).items() if key != skipped})
@@ -150,6 +192,9 @@ def test_places_are_those_of_the_contract(name: str) -> None:
         "bearing-nonlinearity": {"driver-support", "driven-support"},
         "sensor-delay": {"sensor"},
         "temperature-drift": {"mesh", "driver-support", "driven-support"},
+        **{key: {"mesh"} for key in ("contact-nonlinearity", "profile-error", "mesh-damping")},
+        "encoder-runout": {"sensor"},
+        "support-stiffness": {"driver-support", "driven-support"},
         "quadratic-mesh-damping": {"mesh"},
     }
     draw = EFFECTS.get(name) or FOREIGN[name]
@@ -162,10 +207,10 @@ def test_bearing_and_drift_change_the_support_that_they_name() -> None:
         drawn = EFFECTS["bearing-nonlinearity"](drawn_levels(), 1.0, np.random.default_rng(seed))
         side = drawn.place.removesuffix("-support")
         assert drawn.levels.exponent[("driver", "driven").index(side)] == 0.35
-        warm = FOREIGN["temperature-drift"](drawn_levels(), 1.0, np.random.default_rng(seed))
+        warm = EFFECTS["temperature-drift"](drawn_levels(), 1.0, np.random.default_rng(seed))
         index = ("mesh", "driver-support", "driven-support").index(warm.place)
-        assert 0.03 <= abs(warm.levels.foreign.drift[index]) <= 0.10
-        assert sum(value != 0 for value in warm.levels.foreign.drift) == 1
+        assert abs(warm.levels.drift[index]) == pytest.approx(0.06)
+        assert sum(value != 0 for value in warm.levels.drift) == 1
 
 
 def test_families_share_no_choice_of_the_mesh() -> None:

@@ -19,13 +19,14 @@ from gearbench.rig import Case
 
 NOMINAL = short_case()
 CONDITION = conditions_of(NOMINAL)[0]
+DRIVEN_RADIUS = 0.5 * 30 * 3e-3 * np.cos(np.deg2rad(20.0))  # base radius of the driven gear [m]
 
 
 def quiet(levels: Levels) -> Levels:
     """Levels without any effect."""
     return replace(
         levels, friction=0.0, runout=(0.0, 0.0), pitch=tuple(0.0 * one for one in levels.pitch), exponent=(0.0, 0.0),
-        delay=(0.0, 0.0, 0.0, 0.0), ripple=0.0 * levels.ripple, backlash_more=0.0,
+        delay=(0.0, 0.0, 0.0, 0.0), ripple=0.0 * levels.ripple, backlash_more=0.0, encoder=(0.0, 0.0),
     )  # fmt: skip
 
 
@@ -52,6 +53,7 @@ def test_what_it_represents_the_reduced_model_does_not_refuse() -> None:
     assert (rig.driver.runout, rig.driven.runout) == levels.runout
     assert rig.driver.pitch_error == pytest.approx(levels.pitch[0]) and rig.friction.coefficient == levels.friction
     assert rig.driver.thinning + rig.driven.thinning == pytest.approx(60e-6 + levels.backlash_more)
+    assert rig.sensors.encoder_runout_driven * DRIVEN_RADIUS == pytest.approx(levels.encoder[1])
     assert rig.sensors.delay_y_driver == levels.delay[2] and rig.sensors.noise_angle == 0.0
     assert rig.drive.ripple is not None
     assert rig.drive.ripple.amplitude == pytest.approx(levels.ripple * CONDITION.experiment.torque_mean)

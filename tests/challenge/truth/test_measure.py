@@ -75,6 +75,23 @@ def test_forces_balance_in_the_mean() -> None:
     assert run.seen[:, Y_DRIVER].mean() < 0 < run.seen[:, Y_DRIVEN].mean()
 
 
+@pytest.mark.parametrize("side", [0, 1])
+def test_an_encoder_reads_ahead_once_a_turn_and_nothing_else_moves(side: int) -> None:
+    name, other = ("angle_driver", "angle_driven")[:: 1 - 2 * side]
+    radius = (BENCH.meshing.driver.base_radius, BENCH.meshing.driven.base_radius)[side]
+    size, phase = [0.0, 0.0], [0.0, 0.0]
+    size[side], phase[side] = 5e-6, 0.9
+    plain, shown = (
+        measure(SILENT, RIG, replace(LEVELS, encoder=(a, b), encoder_phase=(phase[0], phase[1])), CONDITION, "x",
+                np.random.default_rng(1))
+        for a, b in ((0.0, 0.0), size)
+    )  # fmt: skip
+    turned = channel(plain, name)
+    assert channel(shown, name) - turned == pytest.approx(5e-6 / radius * np.cos(turned - 0.9), abs=1e-12)
+    for rest in (other, "y_driver", "y_driven", "torque_driven"):
+        assert (channel(shown, rest) == channel(plain, rest)).all()
+
+
 @pytest.mark.parametrize("name", ["angle_driver", "angle_driven", "y_driver", "y_driven"])
 def test_a_delayed_channel_lags_and_no_other_does(name: str) -> None:
     names = ("angle_driver", "angle_driven", "y_driver", "y_driven")
@@ -132,7 +149,7 @@ def test_filter_is_on_the_recorded_or_on_the_acting_torque(acting: bool) -> None
 
 
 def test_drift_is_none_at_the_start_and_grows() -> None:
-    drifting = replace(LEVELS, foreign=Foreign(drift=(0.0, 0.1, 0.0)))
+    drifting = replace(LEVELS, drift=(0.0, 0.1, 0.0))
     plain, run = (run_condition(BENCH, RIG, levels, CONDITION) for levels in (LEVELS, drifting))
     change = np.abs(run.seen[:, Y_DRIVER] - plain.seen[:, Y_DRIVER])
     tenth = change.size // 10

@@ -10,14 +10,16 @@ from shared.truth_plants import drawn_levels, short_bench, undamped
 
 from gearbench.challenge.truth.levels import Levels
 from gearbench.challenge.truth.motion import derivative
-from gearbench.challenge.truth.plant import DEGREES, DRIVEN, DRIVER, ROTOR, STATES, Plant
+from gearbench.challenge.truth.plant import DEGREES, DRIVEN, DRIVER, ROTOR, STATES, Plant, Teeth
 from gearbench.challenge.truth.rigs import build_plant, conditions_of
 from gearbench.challenge.truth.structure import draw_structure
+from gearbench.challenge.truth.teeth import path_ends
 
 BENCH = short_bench()
 EXPERIMENT = conditions_of(BENCH.nominal)[0].experiment
 RIG = draw_structure(BENCH.nominal, "test", np.random.default_rng(2))
 LEVELS = drawn_levels(2)
+PATH = path_ends(BENCH.meshing)
 
 
 def plant_of(levels: Levels) -> Plant:
@@ -86,3 +88,46 @@ def test_tone_lies_off_the_lines() -> None:
     assert tone.amplitude == pytest.approx(2.0)
     assert line - np.floor(line) == pytest.approx(0.4)
     assert abs(line * spacing - 500.0) < spacing
+
+
+def test_a_bent_law_keeps_force_and_deflection_under_the_mean_torque() -> None:
+    """F (F/F0)^p of the force F of the same teeth without it: as large at F0, and stiffer there by 1 + p."""
+    plain, bent = (plant_of(replace(LEVELS, contact=contact)).teeth for contact in (0.0, 0.6))
+    load = 100.0 / BENCH.meshing.driver.base_radius
+    low, high = 0.0, 1e-3
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if mean_force(plain, middle) > load else (middle, high)
+    # Two pairs and one in turn share the load: single pairs are pressed a little more or less than the mean mesh.
+    assert mean_force(bent, high) == pytest.approx(load, rel=0.05)
+    rise = [mean_force(teeth, 1.01 * high) / mean_force(teeth, high) for teeth in (plain, bent)]
+    assert np.log(rise[1]) - np.log(rise[0]) == pytest.approx(0.6 * np.log(1.01), rel=0.05)
+
+
+def mean_force(teeth: Teeth, dte: float) -> float:
+    """Mean over a mesh cycle of the force [N] of pairs without gaps between their flanks at a deflection."""
+    place = teeth.first + teeth.pitch * np.arange(teeth.stiffness.size)
+    inside = (place > PATH[0]) & (place < PATH[1])
+    k = np.where(inside, teeth.stiffness, 0.0)
+    return float((k * dte * (dte / teeth.reference) ** teeth.exponent).sum() * teeth.pitch)
+
+
+def test_flanks_have_slope_and_bow_from_peak_to_valley() -> None:
+    for profile, ends in (((4e-6, 0.0), (-4e-6, 4e-6)), ((0.0, 6e-6), (-4e-6, -4e-6))):
+        plain, other = (plant_of(replace(LEVELS, profile=one)).teeth for one in ((0.0, 0.0), profile))
+        place = plain.first + plain.pitch * np.arange(plain.excess.size)
+        more = np.interp([PATH[0] + 1e-6, PATH[1] - 1e-6], place, other.excess - plain.excess)
+        assert more == pytest.approx(ends, abs=2e-8)
+        inside = (place > PATH[0]) & (place < PATH[1])
+        assert np.ptp((other.excess - plain.excess)[inside]) == pytest.approx(2 * profile[0] + profile[1], rel=5e-3)
+
+
+def test_supports_and_damping_are_multiples_of_the_nominal_ones() -> None:
+    plain, other = plant_of(LEVELS), plant_of(replace(LEVELS, support=(1.7, 0.0), damping=4.0))
+    assert other.support[1] == pytest.approx(1.7 * BENCH.nominal.rig.support.driver.stiffness)
+    assert (other.support[[0, 2, 3]] == plain.support[[0, 2, 3]]).all()
+    assert (other.mode_stiffness == plain.mode_stiffness).all()
+    # 2 zeta over the resonance of what turns on the mesh.
+    mass = (plain.inertia.rotor + plain.inertia.driver) / plain.base_driver**2
+    omega = np.sqrt(BENCH.stiffness * RIG.stiffness_factor / mass)
+    assert other.teeth.damping == pytest.approx(2 * 4.0 * 0.05 / omega)
