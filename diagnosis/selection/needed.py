@@ -75,6 +75,9 @@ def held_against_background(
         without = fit_afresh(simulator, without.p, without.sd, renewals=RENEWALS) if without else None
         if without is None:
             continue
+        if without.misfit < best.misfit:
+            # Fitted on, it came to a better rig: the effect is worth what it is beside that.
+            best = better(best, fit(simulator, without.p, best.sd, without.sensitivity, renewals=1))
         worth = best.evidence - without.evidence - float(np.log(one.hypothesis.choices))
         now = entering(unknowns, replace(one, log_bayes_factor=worth), apart)
         if now is None or _is_background(unknowns, one.hypothesis, best, without):

@@ -16,6 +16,7 @@ from gearbench.diagnosis.forces.unknowns import group, unknowns_of
 from gearbench.diagnosis.selection.needed import CLEAR, held_against_background, size_of
 from gearbench.diagnosis.selection.weighing import LIMIT, PROVISIONAL, Weighed
 from gearbench.diagnosis.simulation.jacobian import FOLLOWED
+from gearbench.diagnosis.simulation.quadratic import prior_cost
 
 MATRIX = sensitivities(3)
 FRICTION = Hypothesis("friction", "mesh", (Wide("friction"),))
@@ -43,6 +44,23 @@ def fitted(simulator: FakeSimulator, *wide: Hypothesis) -> Optimum:
 def held(simulator: FakeSimulator, base: Optimum, best: Optimum, *entered: Weighed) -> tuple[Optimum, list[str]]:
     _, found, stay = held_against_background(simulator, base, best, entered, apart=False)  # type: ignore[arg-type]
     return found, [one.hypothesis.name for one in stay]
+
+
+def test_a_rig_without_an_effect_that_is_fitted_further_is_not_better_for_it() -> None:
+    """The fit with friction stopped before the numbers around it had moved; that without any goes to its end."""
+    simulator = rig(0.06)
+    base, best = fitted(simulator), fitted(simulator, FRICTION)
+    p = np.where(np.arange(8) == 3, best.p, 0.0)
+    near = fit_afresh(simulator, p, best.sd, renewals=0)  # type: ignore[arg-type]
+    assert near is not None
+    lines = simulator.lines(p)
+    cost = simulator.target.cost(simulator.target.lines - lines) + prior_cost(p, best.sd)
+    stopped = replace(near, p=p, lines=lines, cost=cost, misfit=cost - prior_cost(p, best.sd),
+                      evidence=near.evidence - (cost - near.cost))  # fmt: skip
+    worth = best.evidence - base.evidence
+    assert worth > PROVISIONAL and stopped.misfit > base.misfit + worth
+    found, stay = held(simulator, base, stopped, Weighed(FRICTION, worth, best))
+    assert stay == ["friction"] and found.evidence == pytest.approx(best.evidence, abs=0.5)
 
 
 def test_what_entered_because_a_fit_was_on_its_way_leaves() -> None:
