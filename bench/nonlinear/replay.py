@@ -148,7 +148,8 @@ def seen_of(case: Case, steady: Steady) -> xr.Dataset:
         angle_driver=channels.angle_driver + turned / case.rig.driver.teeth,
         angle_driven=channels.angle_driven + turned / case.rig.driven.teeth,
     )
-    about = {"model": "lumped", "mesh": "non-linear", "substeps": setup.substeps}
+    about = {"model": "lumped", "mesh": "non-linear", "substeps": setup.substeps,
+             "unloaded_samples": int(setup.unloaded(outputs).sum())}  # fmt: skip
     lost = int(setup.apart(outputs).sum())
     return answer(steady.given, channels, steady.residual, lost, about)
 

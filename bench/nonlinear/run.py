@@ -266,6 +266,10 @@ class Setup:
     def apart(self, outputs: Array) -> NDArray[np.bool_]:
         return np.asarray(columns(outputs).mesh_force == 0)
 
+    def unloaded(self, outputs: Array) -> NDArray[np.bool_]:
+        """Samples at which the working flanks carry nothing: they are apart, or the back flanks touch."""
+        return np.asarray(columns(outputs).mesh_force <= 0)
+
     def strayed(self, outputs: Array) -> None:
         """Springs know no flanks to leave."""
 

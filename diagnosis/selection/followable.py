@@ -73,8 +73,9 @@ def parts(rig: Case, measured: Measurement, simulate: Replay) -> bool:
 
 
 def lost_contact(rig: Case, measurements: Sequence[Measurement], simulate: Replay) -> list[float]:
-    """Part of the time that the flanks of a rig are apart in each record; empty where it cannot be simulated in one of
-    them, or one does not tell the mesh phase."""
+    """Part of the time that the working flanks of a rig are apart in each record, whether the back flanks touch (as
+    they do at once without backlash) or not; empty where it cannot be simulated in one of them, or one does not tell
+    the mesh phase."""
     if not all(one.phase_known for one in measurements):
         return []
     lost = []
@@ -84,5 +85,6 @@ def lost_contact(rig: Case, measurements: Sequence[Measurement], simulate: Repla
         except ValueError:
             return []
         samples = max(int(np.prod(steady["time"].shape)), 1)
-        lost.append(float(steady.attrs.get("contact_lost_samples", 0)) / samples)
+        unloaded = steady.attrs.get("unloaded_samples", steady.attrs.get("contact_lost_samples", 0))
+        lost.append(float(unloaded) / samples)
     return lost

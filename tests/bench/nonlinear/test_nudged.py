@@ -103,6 +103,19 @@ def test_a_rattling_rig_that_is_a_little_off_stays_on_the_records_way() -> None:
     assert all(nudged < 0.25 * free for nudged, free in zip(left[True], left[False], strict=True)), left
 
 
+@pytest.mark.parametrize("thinning", [0.0, 60e-6])
+def test_working_flanks_part_whether_the_back_ones_touch_or_not(thinning: float) -> None:
+    """Without backlash, but for what run-out leaves, contact is never lost; with it impacts on back flanks are rare."""
+    case = make_case(150.0)
+    gears = {side: getattr(case.rig, side).model_copy(update={"thinning": thinning}) for side in ("driver", "driven")}
+    case = case.model_copy(update={"rig": case.rig.model_copy(update=gears)})
+    record = simulate(case)
+    found = replay(case, record)
+    unloaded, lost = (found.attrs[name] for name in ("unloaded_samples", "contact_lost_samples"))
+    assert unloaded > 0.1 * record.sizes["time"]
+    assert lost > 0.8 * unloaded if thinning else lost < 0.2 * unloaded
+
+
 def test_a_damper_without_limit_leads_the_driver() -> None:
     """On another rig: v1 goes to the recorded rate as one over the damper."""
     record = simulate(make_case(20.0))

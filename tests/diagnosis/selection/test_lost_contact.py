@@ -56,6 +56,17 @@ def test_another_rig_is_asked_where_flanks_part_in_all_records_of_the_first(
     assert smooth_records(rigs, records, of_rig) == smooth
 
 
+def test_back_flanks_that_touch_are_no_contact_of_the_working_ones() -> None:
+    """A pair without backlash never lets go, but its flanks part as those of any other."""
+
+    def without_backlash(rig: Any, record: Any) -> xr.Dataset:
+        return answer(rig, 0).assign_attrs(unloaded_samples=record)
+
+    records: Any = [SimpleNamespace(phase_known=True, record=one) for one in (0, 200)]
+    assert lost_contact(None, records, without_backlash) == [0.0, 0.2]  # type: ignore[arg-type]
+    assert smooth_records([None], records, without_backlash) == [0]  # type: ignore[list-item]
+
+
 def test_records_without_a_mesh_phase_are_not_simulated() -> None:
     records: Any = [SimpleNamespace(phase_known=False, record=None)]
     assert lost_contact(None, records, answer) == []  # type: ignore[arg-type]
