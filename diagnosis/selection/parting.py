@@ -32,7 +32,8 @@ Report = Callable[[str], None]
 # Part of any channel's fluctuation up to which a nudged simulation may be off a record for it to be taken in, as the
 # smooth records have led to it and after a fit; one that is not nudged needs no more where it is no further off.
 NEAR, FOLLOWED, EXPLAINED = 0.15, 0.05, 0.05
-# Part of the force residuals' backlash by which that of a simulation may differ where nothing else is followed.
+# Part of the force residuals' backlash by which that of a simulation may differ where nothing else is followed, unless
+# its own standard deviation is larger.
 AGREES = 0.35
 
 
@@ -65,7 +66,7 @@ def with_parting(
     if found is None or with_it.best is selection.best or (beside and off(alone, with_it.best.p) < FOLLOWED):
         return simulator, with_it
     forces = float(start.p[simulator.layout.unknowns[BACKLASH]][0]) if start is not None and forced else 0.0
-    return simulator, with_it if abs(found.value - forces) <= AGREES * abs(forces) else selection
+    return simulator, with_it if abs(found.value - forces) <= max(AGREES * abs(forces), found.std) else selection
 
 
 def _taken_in(

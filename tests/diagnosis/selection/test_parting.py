@@ -21,6 +21,7 @@ from gearbench.diagnosis.replay.replays import Replays
 from gearbench.diagnosis.selection import parting as module
 from gearbench.diagnosis.selection.by_forces import Start
 from gearbench.diagnosis.selection.followable import nudges_of
+from gearbench.diagnosis.selection.opened import Opened, opened
 from gearbench.diagnosis.selection.parting import EXPLAINED, FOLLOWED, NEAR, off, with_parting
 from gearbench.diagnosis.selection.selection import Selection
 from gearbench.diagnosis.selection.simulated import Simulated
@@ -111,11 +112,16 @@ def test_backlash_that_a_rough_record_shows_is_named_where_it_is_followed_with_i
 
 
 @pytest.mark.parametrize(
-    ("forces", "evidence", "named"), [(-40e-6, 9.0, True), (-20e-6, 9.0, False), (-45e-6, 0.0, False)]
+    ("forces", "evidence", "std", "named"),
+    [(-40e-6, 9.0, 1e-6, True), (-20e-6, 9.0, 1e-6, False), (-20e-6, 9.0, 30e-6, True), (-45e-6, 0.0, 30e-6, False)],
 )
 def test_where_nothing_follows_a_rough_record_the_force_residuals_must_have_as_much(
-    forces: float, evidence: float, named: bool
+    monkeypatch: pytest.MonkeyPatch, forces: float, evidence: float, std: float, named: bool
 ) -> None:
+    def known_to(std: float, found: Opened | None) -> Opened | None:
+        return found and found._replace(std=std)
+
+    monkeypatch.setattr(module, "opened", lambda alone, p: known_to(std, opened(alone, p)))
     of = searched(-45e-6, 6)
     listed = hypotheses(of.problem.model, ())
     (backlash,) = (one for one in listed if one.name == "backlash")
