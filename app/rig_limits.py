@@ -39,6 +39,7 @@ def limits_of(
     """
     from gearbench.challenge.making.around import mix_of, nominal_under
     from gearbench.challenge.making.cases import make_challenge
+    from gearbench.challenge.scoring.due import kind_shown
     from gearbench.challenge.scoring.judge import score_folder
     from gearbench.commands.measured.challenge import read
     from gearbench.diagnosis.odds import Known, calibrated
@@ -68,7 +69,7 @@ def limits_of(
     make_challenge(nominal, mix_of(rigs, SEED), SEED, cases, answers, FAMILY, making, torques=torques)
     outcomes, _ = score_folder(cases, answers, read, diagnose, resume=True, workers=workers, progress=diagnosing)
     known = [
-        Known(parse_verdict(json.dumps(one.verdict)), one.answer.kind, one.answer.effects)
+        Known(parse_verdict(json.dumps(one.verdict)), kind_shown(one.answer), one.answer.effects)
         for one in outcomes
         if one.verdict is not None
     ]

@@ -1,9 +1,9 @@
 """Fit the population's calibration of `diagnosis/population.py` to diagnosed challenges, and print it.
 
-    python -P benchmarks/diagnosis_population.py DIR ANSWERS [DIR ANSWERS ...]
+    python -P benchmarks/diagnosis_population.py [--onto] DIR ANSWERS [DIR ANSWERS ...]
 
-Folders whose cases have no verdict.json are read as far as they have. The limits of the present population stay: they
-were set on other rigs.
+Folders whose cases have no verdict.json are read as far as they have. With --onto the curves of the present population
+are what was known before. Its limits stay: they were set on other rigs.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from gearbench.challenge.answers import read_answers
+from gearbench.challenge.scoring.due import kind_shown
 from gearbench.diagnosis.odds import WIDTHS, Known, Odds, calibrated, nothing_known
 from gearbench.diagnosis.population import POPULATION
 from gearbench.diagnosis.verdict_file import read_verdict
@@ -24,7 +25,7 @@ def known_in(folder: Path, answers: Path) -> list[Known]:
     for name, answer in read_answers(answers).items():
         path = folder / name / "verdict.json"
         if path.is_file():
-            found.append(Known(read_verdict(path), answer.kind, answer.effects))
+            found.append(Known(read_verdict(path), kind_shown(answer), answer.effects))
     return found
 
 
@@ -37,12 +38,14 @@ def shown(name: str, odds: Odds) -> str:
 
 def main(arguments: list[str]) -> None:
     """Print both curves, and what the sound rigs left."""
-    pairs = zip(arguments[::2], arguments[1::2], strict=True)
+    onto = arguments[:1] == ["--onto"]
+    folders = arguments[onto:]
+    pairs = zip(folders[::2], folders[1::2], strict=True)
     known = [one for folder, answers in pairs for one in known_in(Path(folder), Path(answers))]
     blank = replace(
         POPULATION, effect=nothing_known(WIDTHS["effect"]), unknown=nothing_known(WIDTHS["unknown"])
     )
-    made = calibrated(blank, known, "population")
+    made = calibrated(POPULATION if onto else blank, known, "population")
     print(shown("EFFECT", made.effect))
     print(shown("UNKNOWN", made.unknown))
     print(f"{made.rigs} rigs; sound rigs times the margin: {made.structure:.3g} of a channel's fluctuation left,"

@@ -34,7 +34,7 @@ def by_forces_alone(
     updated = None
     lines = sum(float(blocks.count.sum()) for blocks in problem.blocks)
     ahead = max((one.log_bayes_factor for one in result.tried if one.hypothesis.effect), default=0.0)
-    best = effect_signs(ahead, lines, decision.winner is not None, 0.0)
+    best = effect_signs(ahead, lines, None if decision.winner is None else 1.0)
     probability = known.probabilities(best, decision.sign)
     effects: tuple[Effect, ...] = ()
     if decision.winner is not None and decision.winner.fit is not None:

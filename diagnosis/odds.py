@@ -1,7 +1,8 @@
 """What signs are worth: probabilities read off truth rigs whose answer was known, none of them a constant.
 
 Two logistic curves (Berkson 1944), each fitted to diagnoses of truth rigs. `effect`: is a candidate at work, given its
-log evidence over the number of independent lines, whether it was named, and the part of the gap that it closes? And
+log evidence over the number of independent lines, whether it was named, and by how much the gap of some part of the
+judged record grows without it? And
 `unknown`: where no effect of the library is at work, is something else, given the largest sign of it over its limit?
 Few rigs make flat curves: the weights have a Gaussian prior, and what they leave open is the interval of a probability.
 """
@@ -100,11 +101,12 @@ def fitted(prior: Odds, signs: Array, true: Sequence[bool]) -> Odds:
     )
 
 
-def effect_signs(evidence: float, lines: float, named: bool, share: float) -> tuple[float, ...]:
-    """Signs of a candidate: nats of evidence over the background, number of independent lines, whether it was named,
-    and the part of the nominal gap that comes back without it."""
+def effect_signs(evidence: float, lines: float, grows: float | None) -> tuple[float, ...]:
+    """Signs of a candidate: nats of evidence over the background, number of independent lines, and of one that was
+    named the factor by which the gap of some part grows without it (None: not named)."""
     scaled = PER_LINES * evidence / max(lines, 1.0)
-    return (1.0, log1p(scaled) if scaled > 0.0 else -log1p(-scaled), float(named), sqrt(share) if named else 0.0)
+    named = (0.0, 0.0) if grows is None else (1.0, log(max(grows, 1.0)))
+    return (1.0, log1p(scaled) if scaled > 0.0 else -log1p(-scaled), *named)
 
 
 def unknown_signs(sign: float) -> tuple[float, ...]:
@@ -186,12 +188,12 @@ def _limit(before: float, seen: Sequence[float]) -> float:
 
 def candidate_rows(one: Known) -> list[tuple[tuple[float, ...], bool]]:
     """Signs of every single candidate of a diagnosis, and whether it was at work."""
-    named = {effect.name: effect.share or 0.0 for effect in one.verdict.effects}
+    named = {effect.name: effect.grows or 1.0 for effect in one.verdict.effects}
     rows = []
     for candidate in one.verdict.candidates:
         if len(candidate.effects) != 1:
             continue
         (name,) = candidate.effects
-        signs = effect_signs(candidate.log_evidence, one.verdict.signs["lines"], name in named, named.get(name, 0.0))
+        signs = effect_signs(candidate.log_evidence, one.verdict.signs["lines"], named.get(name))
         rows.append((signs, name in one.effects))
     return rows

@@ -113,7 +113,8 @@ class Effect(Value):
 
     `share`: part of the nominal rig's gap that comes back when this effect alone is taken out and all else is fitted
     again (null: not computed), and by channel how much that is, `closes`: rms in um or N m. `due`: whether the gap then
-    grows by a tenth or more in some channel.
+    grows by a tenth or more in some channel, and `grows` the largest factor by which some part of one does (null: not
+    computed).
     """
 
     name: Name
@@ -122,6 +123,7 @@ class Effect(Value):
     parameters: dict[Name, Parameter] = {}
     share: Annotated[float, Field(ge=0.0, le=1.0 + ROUNDING)] | None = None
     closes: dict[Name, Range] = {}
+    grows: NotNegative | None = None
 
 
 class Candidate(Value):

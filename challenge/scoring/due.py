@@ -39,6 +39,12 @@ def shown_of(answer: Answer) -> frozenset[str]:
     return frozenset(name for name in answer.effects if sqrt(1.0 + answer.traces.get(name, inf) ** 2) >= DUE)
 
 
+def kind_shown(answer: Answer) -> str:
+    """What the held-out record shows of an answer's kind: nothing of a foreign effect that changes less than its
+    noise."""
+    return "none" if answer.kind == "foreign" and not shown_of(answer) else answer.kind
+
+
 def right_verdict(outcome: Outcome) -> str:
     """Which of the verdicts effect, none and unknown a perfect program is sure of: none, too, of an effect that nobody
     owes and nobody named, and of a foreign one that the record does not show; effect of a foreign one that the library
@@ -47,7 +53,7 @@ def right_verdict(outcome: Outcome) -> str:
     if answer.kind == "foreign":
         if outcome.result == "right":
             return "effect"
-        return "unknown" if shown_of(answer) else "none"
+        return "unknown" if kind_shown(answer) == "foreign" else "none"
     hit = any(outcome.at_work(name) for name in named_effects(outcome.verdict or {}))
     return "effect" if hit or owed(outcome) else "none"
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import log
 from typing import NamedTuple
 
 from gearbench.diagnosis.effects.temperature_drift import TEMPERATURE_DRIFT
 from gearbench.diagnosis.judging.decided import Decided
 from gearbench.diagnosis.judging.judged import Judged
 from gearbench.diagnosis.odds import Calibration, effect_signs
-from gearbench.diagnosis.selection.weighing import Weighed, best_evidence
+from gearbench.diagnosis.selection.weighing import Weighed, best_evidence, is_own
 from gearbench.diagnosis.words import percent
 
 LIKELY = 0.5  # an effect is named that is more likely at work than not
@@ -27,20 +28,32 @@ def chances_of(
 ) -> Chances:
     """The chances of what was named, and of the best candidate, named or not, that nothing spoke against: of what had
     `entered` and is not named, its size or the judged record did. Evidence is that of the candidates: over the
-    background alone, or, where that is more, beside the others that are named."""
+    background alone, or, where that is more, beside the others that are named; of a number of the nominal rig, over a
+    rig with it where its uncertainty ends."""
     evidence = best_evidence(judged.found.selection.weighed, decided.named)
+    for one in decided.named:
+        evidence[one.effect.name] = max(evidence[one.effect.name], _over_the_edge(judged, one))
     dropped = {one.effect.name for one in entered} - {one.effect.name for one in decided.named}
     left = max((value for name, value in evidence.items() if name not in dropped), default=0.0)
-    named, all_signs = {}, [effect_signs(left, lines, False, 0.0)]
+    named, all_signs = {}, [effect_signs(left, lines, None)]
     for one in decided.named:
-        share = judged.share_of(one.hypothesis)
-        all_signs.append(effect_signs(evidence[one.effect.name], lines, True, share))
+        grows = judged.closings[one.hypothesis.name].growth
+        all_signs.append(effect_signs(evidence[one.effect.name], lines, grows))
         named[one.hypothesis.name] = known.effect.of(all_signs[-1]).value
     if decided.drift is not None:
-        all_signs.append(effect_signs(decided.drift.nats, lines, True, decided.drift.share))
+        all_signs.append(effect_signs(decided.drift.nats, lines, decided.drift.grows))
         named[TEMPERATURE_DRIFT.name] = known.effect.of(all_signs[-1]).value
     best = max(all_signs[1:] or all_signs, key=lambda signs: known.effect.of(signs).value)
     return Chances(named, best)
+
+
+def _over_the_edge(judged: Judged, one: Weighed) -> float:
+    """Nats by which the records of the search call for a number of the nominal rig beyond its uncertainty, where
+    recalibration would move it at the price of its prior alone. None for other effects."""
+    without = judged.closings[one.hypothesis.name].optimum
+    if without is None or any(is_own(judged.found.layout.unknowns, wide) for wide in one.hypothesis.wide):
+        return 0.0
+    return float(judged.found.selection.best.evidence - without.evidence - log(one.hypothesis.choices))
 
 
 def unlikely(decided: Decided, chances: Chances) -> Weighed | None:

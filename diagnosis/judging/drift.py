@@ -8,6 +8,7 @@ The derivative is that of the rig found. One number explains all lines of all ch
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +41,11 @@ class Drift:
     std: float
     share: float
     nats: float
+
+    @property
+    def grows(self) -> float:
+        """Factor by which what changes and is not explained grows without it, rms over rms."""
+        return 1.0 / sqrt(max(1.0 - self.share, 1e-12))
 
 
 @dataclass(frozen=True)

@@ -36,15 +36,16 @@ def effects_of(judged: Judged, decided: Decided, chances: Chances) -> tuple[Effe
     for one in decided.named:
         effect = one.effect
         estimates = effect.add(found.layout.nominal.rig, one.hypothesis, values)[1]
-        before = out[effect.name].parameters if effect.name in out else {}
+        other = out.get(effect.name)
         closing = judged.closings[one.hypothesis.name]
         out[effect.name] = Effect(
             name=effect.name,
             probability=chances.named[one.hypothesis.name],
             due=closing.due,
-            parameters={**before, **parameters_of(effect, estimates)},
+            parameters={**(other.parameters if other else {}), **parameters_of(effect, estimates)},
             share=judged.share_of(one.hypothesis),
             closes=_closes(judged, closing),
+            grows=max(closing.growth, other.grows or 0.0 if other else 0.0),
         )
     return tuple(out.values())
 
@@ -63,6 +64,7 @@ def drifts_of(decided: Decided, changing: float, chances: Chances) -> tuple[Effe
             due=True,
             parameters=parameters_of(effect, (estimate,)),
             share=min(changing**2 * drift.share, 1.0),
+            grows=drift.grows,
         ),
     )
 

@@ -31,7 +31,7 @@ def known(kind: str, *, named: str = "", evidence: float = 1.0, effects: tuple[s
     verdict = Verdict(
         verdict="effects" if named else "none",
         probability=Probabilities(effect=0.2, none=0.7, unknown=0.1),
-        effects=(Effect(name=named, probability=0.9, share=0.5),) if named else (),
+        effects=(Effect(name=named, probability=0.9, grows=3.0),) if named else (),
         candidates=(Candidate(effects=(), log_evidence=0.0), Candidate(effects=("friction",), log_evidence=evidence)),
         place="mesh" if named else "none",
         signs=SIGNS | signs,
@@ -40,7 +40,7 @@ def known(kind: str, *, named: str = "", evidence: float = 1.0, effects: tuple[s
 
 
 def test_before_any_rig_everything_is_as_likely_as_not_and_nothing_is_sure() -> None:
-    chance = BLANK.effect.of(effect_signs(50.0, 400.0, True, 0.5))
+    chance = BLANK.effect.of(effect_signs(50.0, 400.0, 3.0))
     assert chance.value == 0.5 and chance.low < 0.01 and chance.high > 0.99
 
 
@@ -69,9 +69,15 @@ def test_the_mode_is_that_of_the_posterior_on_a_grid() -> None:
 
 
 def test_evidence_counts_by_the_number_of_lines() -> None:
-    assert effect_signs(20.0, 400.0, False, 0.0) == effect_signs(40.0, 800.0, False, 0.0)
-    assert effect_signs(-20.0, 400.0, False, 0.0)[1] == -effect_signs(20.0, 400.0, False, 0.0)[1]
+    assert effect_signs(20.0, 400.0, None) == effect_signs(40.0, 800.0, None)
+    assert effect_signs(-20.0, 400.0, None)[1] == -effect_signs(20.0, 400.0, None)[1]
     assert unknown_signs(0.0) == unknown_signs(1e-9)
+
+
+def test_what_is_named_counts_by_what_it_closes_and_nothing_less_than_nothing() -> None:
+    assert effect_signs(0.0, 400.0, np.e) == (1.0, 0.0, 1.0, pytest.approx(1.0))
+    assert effect_signs(0.0, 400.0, 0.2) == effect_signs(0.0, 400.0, 1.0) == (1.0, 0.0, 1.0, 0.0)
+    assert effect_signs(0.0, 400.0, None) == (1.0, 0.0, 0.0, 0.0)
 
 
 def test_probabilities_learn_from_truth_rigs_and_add_up() -> None:
@@ -79,9 +85,9 @@ def test_probabilities_learn_from_truth_rigs_and_add_up() -> None:
     cases += [known("none", evidence=-3.0) for _ in range(6)] + [known("foreign", unknown=3.0) for _ in range(6)]
     made = calibrated(BLANK, cases)
     assert (made.source, made.rigs) == ("this rig", 18)
-    strong = made.probabilities(effect_signs(60.0, 400.0, True, 0.5), 0.4)
-    sound = made.probabilities(effect_signs(-3.0, 400.0, False, 0.0), 0.4)
-    strange = made.probabilities(effect_signs(-3.0, 400.0, False, 0.0), 3.0)
+    strong = made.probabilities(effect_signs(60.0, 400.0, 3.0), 0.4)
+    sound = made.probabilities(effect_signs(-3.0, 400.0, None), 0.4)
+    strange = made.probabilities(effect_signs(-3.0, 400.0, None), 3.0)
     for one in (strong, sound, strange):
         assert sum(one.values()) == pytest.approx(1.0) and min(one.values()) > 0.0
     assert strong["effect"] > 0.85 and sound["none"] > 0.7 and strange["unknown"] > 0.7
@@ -106,7 +112,7 @@ def test_limits_of_a_rig_are_what_its_sound_rigs_leave() -> None:
 def test_what_was_named_wrongly_teaches_doubt() -> None:
     right = [known("effect", named="friction", evidence=60.0, effects=("friction",)) for _ in range(4)]
     wrong = [known("none", named="friction", evidence=60.0) for _ in range(4)]
-    signs = effect_signs(60.0, 400.0, True, 0.5)
+    signs = effect_signs(60.0, 400.0, 3.0)
 
     def after(cases: list[Known]) -> Calibration:
         return calibrated(BLANK, cases)

@@ -41,6 +41,7 @@ TREE: dict[str, Any] = {
             "parameters": {"coefficient": {"value": 0.05, "low": 0.04, "high": 0.07, "unit": ""}},
             "share": 0.75,
             "closes": {"dte": [1.5, 1.2, 1.9]},
+            "grows": 9.5,
         }
     ],
     "candidates": [
@@ -100,6 +101,7 @@ VERDICT = Verdict(
             parameters={"coefficient": Parameter(value=0.05, low=0.04, high=0.07, unit="")},
             share=0.75,
             closes={"dte": Range(value=1.5, low=1.2, high=1.9)},
+            grows=9.5,
         ),
     ),
     candidates=(

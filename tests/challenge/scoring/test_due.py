@@ -9,7 +9,7 @@ import pytest
 from shared.fake_verdicts import verdict
 
 from gearbench.challenge.answers import Answer
-from gearbench.challenge.scoring.due import found_of_due, owed, right_verdict, true_of_named
+from gearbench.challenge.scoring.due import found_of_due, kind_shown, owed, right_verdict, true_of_named
 from gearbench.challenge.scoring.outcomes import Outcome, judge
 from gearbench.challenge.scoring.score import score
 from gearbench.challenge.scoring.text import score_text
@@ -46,6 +46,15 @@ def test_the_place_of_a_foreign_effect_that_does_not_show_is_not_asked_for() -> 
                for size in (0.1, 9.0)]  # fmt: skip
     table = score([judge("x", one, verdict("unknown") | {"place": "mesh"}) for one in answers])
     assert table["foreign"]["refused_at_right_place"]["total"] == 1
+
+
+@pytest.mark.parametrize(
+    ("kind", "trace", "shown"),
+    [("foreign", 0.4, "none"), ("foreign", 4.0, "foreign"), ("effect", 0.4, "effect"), ("none", 0.0, "none")],
+)
+def test_a_foreign_effect_below_the_noise_teaches_as_a_sound_rig(kind: Any, trace: float, shown: str) -> None:
+    names = () if kind == "none" else ("slipping-coupling",)
+    assert kind_shown(Answer(kind, names, "drive", {}, traces=dict.fromkeys(names, trace))) == shown
 
 
 def test_of_two_effects_each_is_held_against_the_other_alone() -> None:

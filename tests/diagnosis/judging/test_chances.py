@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from math import log
 from types import SimpleNamespace
 from typing import Any
 
+import pytest
+
+from gearbench.diagnosis.effects.effect import Wide
+from gearbench.diagnosis.forces.unknowns import group, unknowns_of
 from gearbench.diagnosis.judging.chances import LIKELY, Chances, chances_of, sentence_of_doubt, unlikely
 from gearbench.diagnosis.odds import effect_signs
 from gearbench.diagnosis.population import POPULATION
@@ -27,23 +32,40 @@ def test_an_effect_that_entered_and_is_not_named_makes_none_likely() -> None:
         judged: Any = SimpleNamespace(found=SimpleNamespace(selection=selection), closings={})
         return chances_of(judged, decided, POPULATION, LINES, entered).best
 
-    assert best() == effect_signs(824.0, LINES, False, 0.0)
-    assert best(backlash) == effect_signs(1.0, LINES, False, 0.0)
+    assert best() == effect_signs(824.0, LINES, None)
+    assert best(backlash) == effect_signs(1.0, LINES, None)
 
 
 def test_what_shows_only_beside_another_effect_is_as_likely_as_it_is_worth_there() -> None:
     first, second = weighed("coupling", 300.0), weighed("pitch-error", 90.0)
     selection = SimpleNamespace(weighed=(first, weighed("pitch-error", -4.0)))
-    closing = SimpleNamespace(without=None)
+    closing = SimpleNamespace(growth=2.5, optimum=None)
     judged: Any = SimpleNamespace(
         found=SimpleNamespace(selection=selection),
         closings={"coupling": closing, "pitch-error": closing},
-        share_of=lambda effect: 0.4,
     )
     decided: Any = SimpleNamespace(named=(first, second), drift=None)
     named = chances_of(judged, decided, POPULATION, LINES, ()).named
-    assert named["pitch-error"] == POPULATION.effect.of(effect_signs(90.0, LINES, True, 0.4)).value
-    assert named["coupling"] == POPULATION.effect.of(effect_signs(300.0, LINES, True, 0.4)).value
+    assert named["pitch-error"] == POPULATION.effect.of(effect_signs(90.0, LINES, 2.5)).value
+    assert named["coupling"] == POPULATION.effect.of(effect_signs(300.0, LINES, 2.5)).value
+
+
+@pytest.mark.parametrize(("key", "worth"), [("mesh-ratio", 30.0 - log(2.0)), ("friction", 4.0)])
+def test_a_number_of_the_nominal_rig_counts_beyond_its_uncertainty(key: str, worth: float) -> None:
+    """Recalibration moves it anywhere at the price of its prior: what the records insist on is told by a rig with the
+    number where its uncertainty ends. Of an effect of its own a background's share is what it is held against."""
+    one = weighed("effect", 4.0)
+    one.hypothesis.wide, one.hypothesis.choices = (Wide(key),), 2
+    groups = [group("mesh-ratio", "1", 1, 0.4, slot="x"), group("friction", "1", 1, 0.01, 0.1, slot="y")]
+    unknowns = unknowns_of(groups, 50)
+    found = SimpleNamespace(
+        selection=SimpleNamespace(weighed=(one,), best=SimpleNamespace(evidence=-70.0)),
+        layout=SimpleNamespace(unknowns=unknowns),
+    )
+    closing = SimpleNamespace(growth=2.5, optimum=SimpleNamespace(evidence=-100.0))
+    judged: Any = SimpleNamespace(found=found, closings={"effect": closing})
+    decided: Any = SimpleNamespace(named=(one,), drift=None)
+    assert chances_of(judged, decided, POPULATION, LINES, ()).best == effect_signs(worth, LINES, 2.5)
 
 
 def test_what_is_less_likely_at_work_than_not_is_not_named() -> None:
