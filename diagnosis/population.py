@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from gearbench.diagnosis.odds import Calibration, Odds
 
-# Fitted by benchmarks/diagnosis_population.py to drawn rigs of the calibration family: 29 (seed 7304417), and onto these
-# 31 with every effect of the library (seed 8820417). Weights of 1, evidence, named, and the logarithm of the factor by
-# which some part of the gap grows, which the first rigs do not tell: nothing, give or take 1, before the others;
+# Fitted by benchmarks/diagnosis_population.py to drawn rigs of the calibration family: 29 (seed 7304417), and onto
+# these 31 with every effect of the library (seed 8820417). Weights of 1, evidence, named, and the logarithm of the
+# factor by which some part of the gap grows, which the first rigs do not tell: nothing, give or take 1, before the
+# others;
 EFFECT = Odds(
     weights=(-4.039, 1.98, 3.766, 0.4166),
     covariance=(

@@ -82,6 +82,13 @@ class Optimum:
         out[quadratic.active[free]] = scale * np.sqrt(np.diag(np.linalg.inv(matrix)))
         return out
 
+    def evidence_under(self, sd: Array) -> float:
+        """Log evidence of the same unknowns under other priors `sd` (size,): what was held counts as it does where it
+        is not."""
+        near = self.sensitivity.quadratic
+        information = near.information(np.zeros(len(near.active)))
+        return near.evidence(self.misfit + prior_cost(self.p, sd), information, sd)
+
 
 def sensitivity_of(
     simulator: Simulator, p: Array, sd: Array, chosen: Flags | None = None, near: Complex | None = None

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.judging.judged import Judged
+from gearbench.diagnosis.selection.selection import evidence_without
 from gearbench.diagnosis.selection.weighing import best_evidence
 from gearbench.diagnosis.verdict import Candidate
 
@@ -49,8 +50,13 @@ def _single(judged: Judged) -> dict[str, Effects]:
 
 def _without_each(judged: Judged) -> dict[Effects, float]:
     """Evidence of what entered without each one of it, by the effects that stay."""
-    optima = {effects: judged.closings[name].optimum for name, effects in _single(judged).items()}
-    return {effects: optimum.evidence for effects, optimum in optima.items() if effects and optimum is not None}
+    found, out = judged.found, {}
+    entered = {one.hypothesis.name: one for one in found.selection.entered}
+    for name, effects in _single(judged).items():
+        optimum = judged.closings[name].optimum
+        if effects and optimum is not None:
+            out[effects] = evidence_without(found.layout.unknowns, found.selection, entered[name], optimum)
+    return out
 
 
 def _left(judged: Judged, entered: Effects) -> dict[Effects, float]:

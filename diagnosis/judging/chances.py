@@ -10,6 +10,7 @@ from gearbench.diagnosis.effects.temperature_drift import TEMPERATURE_DRIFT
 from gearbench.diagnosis.judging.decided import Decided
 from gearbench.diagnosis.judging.judged import Judged
 from gearbench.diagnosis.odds import Calibration, effect_signs
+from gearbench.diagnosis.selection.selection import evidence_without
 from gearbench.diagnosis.selection.weighing import Weighed, best_evidence, is_own
 from gearbench.diagnosis.words import percent
 
@@ -51,9 +52,13 @@ def _over_the_edge(judged: Judged, one: Weighed) -> float:
     """Nats by which the records of the search call for a number of the nominal rig beyond its uncertainty, where
     recalibration would move it at the price of its prior alone. None for other effects."""
     without = judged.closings[one.hypothesis.name].optimum
-    if without is None or any(is_own(judged.found.layout.unknowns, wide) for wide in one.hypothesis.wide):
+    if without is None:
         return 0.0
-    return float(judged.found.selection.best.evidence - without.evidence - log(one.hypothesis.choices))
+    unknowns, selection = judged.found.layout.unknowns, judged.found.selection
+    if any(is_own(unknowns, wide) for wide in one.hypothesis.wide):
+        return 0.0
+    held = evidence_without(unknowns, selection, one, without)
+    return float(selection.best.evidence - held - log(one.hypothesis.choices))
 
 
 def unlikely(decided: Decided, chances: Chances) -> Weighed | None:

@@ -243,6 +243,15 @@ def taken_out(simulator: Simulator, selection: Selection, effect: Weighed) -> Op
     return _without(simulator, base, [effect])
 
 
+def evidence_without(unknowns: Unknowns, selection: Selection, effect: Weighed, optimum: Optimum) -> float:
+    """Log evidence of the `optimum` without one of the effects that entered, whose backgrounds were held for it, beside
+    that of the optimum with all."""
+    sd = selection.best.sd.copy()
+    for cause in effect.causes:
+        sd[cause.entries(unknowns)] = 0.0
+    return optimum.evidence_under(sd)
+
+
 def _bare(simulator: Simulator, base: Optimum, effects: Sequence[Weighed]) -> Optimum:
     """The background's optimum without any part of these effects. Of other effects it has no more in their place than a
     good rig: an encoder's run-out of twenty of its deviations is no recalibration."""

@@ -6,12 +6,14 @@ from collections.abc import Mapping, Sequence
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from gearbench.diagnosis.effects.effect import Effect, Hypothesis, Wide
 from gearbench.diagnosis.effects.friction import FRICTION
 from gearbench.diagnosis.effects.pitch_error import PITCH_ERROR
 from gearbench.diagnosis.effects.torque_ripple import TORQUE_RIPPLE
+from gearbench.diagnosis.forces.unknowns import group, unknowns_of
 from gearbench.diagnosis.judging.candidates import candidates_of
 from gearbench.diagnosis.judging.closing import Closing
 from gearbench.diagnosis.judging.judged import Sizes
@@ -23,7 +25,12 @@ Listed = dict[tuple[str, ...], tuple[float, float | None]]
 
 def optimum(evidence: float, left: float = 0.0) -> Any:
     """An optimum that leaves a part of the held-out record when it is simulated: its only unknown."""
-    return SimpleNamespace(evidence=evidence, p=left)
+    return SimpleNamespace(evidence=evidence, p=left, sd=np.array([2.0]))
+
+
+def held(evidence: float) -> Any:
+    """One that was found with backgrounds held, and has its evidence where that of the effect alone is."""
+    return SimpleNamespace(evidence=evidence + 165.0, evidence_under=lambda sd: evidence - 1e6 * float(sd.sum()))
 
 
 def weighed(effect: Effect, nats: float, left: float, which: str = "") -> Weighed:
@@ -58,12 +65,13 @@ def listed(
         plain={"dte": 0.9},
         signals={"dte": 0.1} if entered else {"dte": 0.9},
         closings={
-            name: closing(optimum(evidence), left, own)
+            name: closing(held(evidence), left, own)
             for name, (evidence, left) in without.items()
         },
         sizes={"dte": Sizes(1.0, 1.0, 0.9, 0.1, 0.01)},
         rms_left=lambda channel, signals: signals[channel],
         found=SimpleNamespace(
+            layout=SimpleNamespace(unknowns=unknowns_of([group("none", "1", 1, 0.4, slot="x")], 1)),
             simulator=SimpleNamespace(anchored=not nudged, free=SimpleNamespace(channels=channels)),
             selection=SimpleNamespace(
                 base=optimum(-50.0), best=optimum(70.0), entered=tuple(entered), weighed=(*entered, *others)

@@ -6,6 +6,7 @@ from math import log
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from gearbench.diagnosis.effects.effect import Wide
@@ -56,13 +57,16 @@ def test_a_number_of_the_nominal_rig_counts_beyond_its_uncertainty(key: str, wor
     number where its uncertainty ends. Of an effect of its own a background's share is what it is held against."""
     one = weighed("effect", 4.0)
     one.hypothesis.wide, one.hypothesis.choices = (Wide(key),), 2
+    one.hypothesis.entries = Wide(key).entries
     groups = [group("mesh-ratio", "1", 1, 0.4, slot="x"), group("friction", "1", 1, 0.01, 0.1, slot="y")]
     unknowns = unknowns_of(groups, 50)
     found = SimpleNamespace(
-        selection=SimpleNamespace(weighed=(one,), best=SimpleNamespace(evidence=-70.0)),
+        selection=SimpleNamespace(weighed=(one,), best=SimpleNamespace(evidence=-70.0, sd=np.array([0.4, 0.1]))),
         layout=SimpleNamespace(unknowns=unknowns),
     )
-    closing = SimpleNamespace(growth=2.5, optimum=SimpleNamespace(evidence=-100.0))
+    held = {(0.0, 0.1): -100.0, (0.4, 0.0): -90.0}
+    optimum = SimpleNamespace(evidence_under=lambda sd: held[tuple(sd)])
+    closing = SimpleNamespace(growth=2.5, optimum=optimum)
     judged: Any = SimpleNamespace(found=found, closings={"effect": closing})
     decided: Any = SimpleNamespace(named=(one,), drift=None)
     assert chances_of(judged, decided, POPULATION, LINES, ()).best == effect_signs(worth, LINES, 2.5)

@@ -123,3 +123,21 @@ def test_a_driven_angle_that_is_early_is_no_delay() -> None:
     late = Hypothesis("sensor-delay angle_driven", "sensor", (Wide(FOLLOWED),))
     assert size_of(here, late, np.array([8e-6])) == pytest.approx(4.0)
     assert size_of(here, late, np.array([-8e-6])) == 0.0
+
+
+def test_what_was_held_counts_in_the_evidence_as_where_it_is_not() -> None:
+    """Laplace by hand: half the logarithm of the determinant of the posterior's precision over the prior's."""
+    simulator = rig(0.06)
+    free = prior_of(simulator, unknowns().prior())  # type: ignore[arg-type]
+    held = np.where(np.arange(8) < 3, free, 0.0)
+    found = fit_afresh(simulator, np.zeros(8), held, renewals=4)  # type: ignore[arg-type]
+    assert found is not None and found.evidence_under(held) == pytest.approx(found.evidence)
+    near = found.sensitivity.quadratic
+    for prior in (free, 0.5 * held):
+        wide = prior[near.active] > 0.0
+        information = near.information(np.zeros(len(near.active)))[np.ix_(wide, wide)]
+        sd = prior[near.active][wide]
+        half = 0.5 * (np.linalg.slogdet(information + np.diag(sd**-2.0))[1] + 2 * np.log(sd).sum())
+        cost = found.misfit + 0.5 * float(((found.p[near.active][wide] / sd) ** 2).sum())
+        assert found.evidence_under(prior) == pytest.approx(-cost - half)
+    assert found.evidence_under(free) < found.evidence - 1.0
