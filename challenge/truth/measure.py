@@ -34,6 +34,7 @@ from gearbench.challenge.truth.plant import (
     Y_DRIVEN,
     Y_DRIVER,
     Plant,
+    Teeth,
 )
 from gearbench.challenge.truth.rigs import Bench, build_plant
 from gearbench.challenge.truth.structure import Structure
@@ -61,10 +62,14 @@ class Run:
     command: Array  # (samples a period,) [N m] recorded torque before noise
 
 
+def _stiffest(teeth: Teeth) -> float:
+    """Tangent stiffness [N/m] of the mesh at most, of two pairs or of one in an impact."""
+    return float(max(2.0, (1.0 + teeth.exponent) * IMPACT[1] ** teeth.exponent) * teeth.stiffness.max())
+
+
 def fastest(plant: Plant) -> float:
     """An upper estimate of the fastest angular frequency [rad/s]."""
-    exponent = plant.teeth.exponent
-    mesh = max(2.0, (1.0 + exponent) * IMPACT[1] ** exponent) * plant.teeth.stiffness.max()
+    mesh = _stiffest(plant.teeth)
     rows = [
         plant.coupling.stiffness / plant.inertia.rotor,
         (plant.coupling.stiffness + mesh * plant.base_driver**2) / plant.inertia.driver,
@@ -80,8 +85,7 @@ def fastest_decay(plant: Plant) -> float:
     damping = teeth.damping * max(1.0, 1.0 - teeth.damping_load + teeth.damping_load * IMPACT[1])
     damping += teeth.damping_quadratic * IMPACT[0]
     mobility = plant.base_driver**2 / plant.inertia.driver + plant.base_driven**2 / plant.inertia.driven
-    stiffer = max(2.0, (1.0 + teeth.exponent) * IMPACT[1] ** teeth.exponent)
-    return float(damping * stiffer * teeth.stiffness.max() * (mobility + (1.0 / np.array(plant.mass)).sum()))
+    return float(damping * _stiffest(teeth) * (mobility + (1.0 / np.array(plant.mass)).sum()))
 
 
 def steps_per_sample(plant: Plant, rate: float) -> int:
