@@ -11,7 +11,7 @@ from gearbench.diagnosis.judging.decided import Decided
 from gearbench.diagnosis.judging.judged import Judged
 from gearbench.diagnosis.odds import Calibration, effect_signs
 from gearbench.diagnosis.selection.selection import evidence_without
-from gearbench.diagnosis.selection.weighing import Weighed, best_evidence, is_own
+from gearbench.diagnosis.selection.weighing import Weighed, best_evidence, has_own
 from gearbench.diagnosis.words import percent
 
 LIKELY = 0.5  # an effect is named that is more likely at work than not
@@ -55,7 +55,7 @@ def _over_the_edge(judged: Judged, one: Weighed) -> float:
     if without is None:
         return 0.0
     unknowns, selection = judged.found.layout.unknowns, judged.found.selection
-    if any(is_own(unknowns, wide) for wide in one.hypothesis.wide):
+    if has_own(unknowns, one.hypothesis):
         return 0.0
     held = evidence_without(unknowns, selection, one, without)
     return float(selection.best.evidence - held - log(one.hypothesis.choices))

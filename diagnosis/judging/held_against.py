@@ -25,7 +25,7 @@ from gearbench.diagnosis.judging.judged import GREATER, Judged
 from gearbench.diagnosis.selection.followable import nudges_of, parts
 from gearbench.diagnosis.selection.selection import Selection, further, only, taken_out
 from gearbench.diagnosis.selection.simulated import Simulated
-from gearbench.diagnosis.selection.weighing import Weighed, is_own
+from gearbench.diagnosis.selection.weighing import Weighed, has_own
 from gearbench.diagnosis.simulation.passed_noise import noise_left
 from gearbench.diagnosis.simulation.simulator import Simulator
 from gearbench.diagnosis.simulation.target import Target, target_of
@@ -89,8 +89,7 @@ def _stays(judged: Judged, one: Weighed) -> bool:
     the nominal rig, which recalibration moves anyway, must make a difference to the whole: some part of it is closer by
     what else it makes up for."""
     closing, unknowns = judged.closings[one.hypothesis.name], judged.found.layout.unknowns
-    own = any(is_own(unknowns, wide) for wide in one.hypothesis.wide)
-    if not own and judged.grown(closing.without) < DUE:
+    if not has_own(unknowns, one.hypothesis) and judged.grown(closing.without) < DUE:
         return False
     return closing.due and not (closing.lacking and judged.left > GREATER)
 

@@ -45,7 +45,7 @@ def effects_of(judged: Judged, decided: Decided, chances: Chances) -> tuple[Effe
             parameters={**(other.parameters if other else {}), **parameters_of(effect, estimates)},
             share=judged.share_of(one.hypothesis),
             closes=_closes(judged, closing),
-            grows=max(closing.growth, other.grows or 0.0 if other else 0.0),
+            grows=max(closing.growth, (other.grows or 0.0) if other else 0.0),
         )
     return tuple(out.values())
 

@@ -19,7 +19,7 @@ from gearbench.diagnosis.fitting.background import prior_of
 from gearbench.diagnosis.fitting.fit import Optimum, fit, fit_afresh
 from gearbench.diagnosis.fitting.restructured import better
 from gearbench.diagnosis.forces.unknowns import Unknowns
-from gearbench.diagnosis.selection.weighing import Weighed, entering, is_own
+from gearbench.diagnosis.selection.weighing import Weighed, entering, has_own
 from gearbench.diagnosis.simulation.jacobian import FOLLOWED
 from gearbench.diagnosis.simulation.simulator import Simulator
 
@@ -100,8 +100,7 @@ def beside(simulator: Simulator, base: Optimum, best: Optimum, kept: Sequence[We
 
 def _is_background(unknowns: Unknowns, one: Hypothesis, best: Optimum, without: Optimum) -> bool:
     """Whether a good rig explains the records as well, by not much more than good rigs have."""
-    own = any(is_own(unknowns, wide) for wide in one.wide)
-    return own and without.misfit - best.misfit < SAME and size_of(unknowns, one, best.p) < FAR
+    return has_own(unknowns, one) and without.misfit - best.misfit < SAME and size_of(unknowns, one, best.p) < FAR
 
 
 def size_of(unknowns: Unknowns, one: Hypothesis, p: Array, told: Array | None = None) -> float:

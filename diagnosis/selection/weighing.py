@@ -198,7 +198,12 @@ def limit_of(unknowns: Unknowns, one: Hypothesis) -> float:
     """Nats from which a hypothesis enters where no other record speaks."""
     if any(wide.key == FOLLOWED for wide in one.wide):
         return LIMIT_GIVEN
-    return LIMIT if any(is_own(unknowns, wide) for wide in one.wide) else LIMIT_NUMBER
+    return LIMIT if has_own(unknowns, one) else LIMIT_NUMBER
+
+
+def has_own(unknowns: Unknowns, one: Hypothesis) -> bool:
+    """Whether a hypothesis has unknowns of its own, and is not about numbers of the nominal rig alone."""
+    return any(is_own(unknowns, wide) for wide in one.wide)
 
 
 def is_own(unknowns: Unknowns, wide: Wide) -> bool:
