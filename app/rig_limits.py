@@ -11,9 +11,11 @@ from typing import TYPE_CHECKING, Any
 from gearbench.files import fingerprint, write_text
 
 if TYPE_CHECKING:
+    from gearbench.challenge.answers import Answer
     from gearbench.challenge.making.around import Measured
     from gearbench.diagnosis.diagnosis import Inputs
-    from gearbench.diagnosis.odds import Calibration, Odds
+    from gearbench.diagnosis.odds import Calibration, Known, Odds
+    from gearbench.diagnosis.verdict import Verdict
 
 SEED = 1  # of the truth rigs: the same rig and experiment have the same limits
 FAMILY = "calibration"
@@ -39,10 +41,9 @@ def limits_of(
     """
     from gearbench.challenge.making.around import mix_of, nominal_under
     from gearbench.challenge.making.cases import make_challenge
-    from gearbench.challenge.scoring.due import kind_shown
     from gearbench.challenge.scoring.judge import score_folder
     from gearbench.commands.measured.challenge import read
-    from gearbench.diagnosis.odds import Known, calibrated
+    from gearbench.diagnosis.odds import calibrated
     from gearbench.diagnosis.population import POPULATION
     from gearbench.diagnosis.verdict_file import parse_verdict
     from gearbench.kernels.folders import cache_folder
@@ -69,13 +70,19 @@ def limits_of(
     make_challenge(nominal, mix_of(rigs, SEED), SEED, cases, answers, FAMILY, making, torques=torques)
     outcomes, _ = score_folder(cases, answers, read, diagnose, resume=True, workers=workers, progress=diagnosing)
     known = [
-        Known(parse_verdict(json.dumps(one.verdict)), kind_shown(one.answer), one.answer.effects)
-        for one in outcomes
-        if one.verdict is not None
+        known_of(parse_verdict(json.dumps(one.verdict)), one.answer) for one in outcomes if one.verdict is not None
     ]
     found = calibrated(POPULATION, known)
     write_text(kept, json.dumps(asdict(found), indent=1) + "\n")
     return found
+
+
+def known_of(verdict: Verdict, answer: Answer) -> Known:
+    """A diagnosed truth rig as a calibration learns from it: what its record does not show was not there."""
+    from gearbench.challenge.scoring.due import kind_shown
+    from gearbench.diagnosis.odds import Known
+
+    return Known(verdict, kind_shown(answer), answer.effects)
 
 
 def measured(inputs: Inputs) -> list[Measured]:

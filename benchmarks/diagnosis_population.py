@@ -13,10 +13,10 @@ from dataclasses import replace
 from pathlib import Path
 
 from gearbench.challenge.answers import read_answers
-from gearbench.challenge.scoring.due import kind_shown
 from gearbench.diagnosis.odds import WIDTHS, Known, Odds, calibrated, nothing_known
 from gearbench.diagnosis.population import POPULATION
 from gearbench.diagnosis.verdict_file import read_verdict
+from gearbench.rig_limits import known_of
 
 
 def known_in(folder: Path, answers: Path) -> list[Known]:
@@ -25,7 +25,7 @@ def known_in(folder: Path, answers: Path) -> list[Known]:
     for name, answer in read_answers(answers).items():
         path = folder / name / "verdict.json"
         if path.is_file():
-            found.append(Known(read_verdict(path), kind_shown(answer), answer.effects))
+            found.append(known_of(read_verdict(path), answer))
     return found
 
 

@@ -21,7 +21,7 @@ from gearbench.diagnosis.judging.repeating import repeating
 from gearbench.diagnosis.odds import Calibration
 from gearbench.diagnosis.population import POPULATION
 from gearbench.diagnosis.replay.replays import COARSER, Replays
-from gearbench.diagnosis.selection.simulated import carried_back, simulated
+from gearbench.diagnosis.selection.simulated import carried, simulated
 from gearbench.rig import Case
 
 Report = Callable[[str], None]
@@ -51,7 +51,7 @@ def find_cause(
     band, steady = problem.conditions[0].band, repeating(measurements, found)
     rigs = [fit.p]
     if found is not None:
-        rigs.append(carried_back(found.layout, problem.unknowns, found.selection.best.p))
+        rigs.append(carried(found.layout.unknowns, found.selection.best.p, problem.unknowns))
     unsteady = least_unsteadiness(problem.model, steady, problem.unknowns, rigs, band)
     common: dict[str, Any] = {
         "indistinguishable": alike(fit, problem.unknowns, representatives(problem, without)),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 
@@ -121,7 +121,7 @@ def simulated(
     do not tell the mesh phase, or flanks part in all of them, on the nominal rig and on that of the force residuals.
     `judged`: the record that judges what enters, None where none does."""
     apart, layout = judged is not None, layout_of(nominal, problem.model, problem.conditions, ())
-    by_forces = carried_over(layout, problem.unknowns, found.base.p)
+    by_forces = carried(problem.unknowns, found.base.p, layout.unknowns, ITS_OWN)
     smooth, nudges, restless = followable((nominal, layout.case(by_forces)), measurements, problem, simulate)
     if not smooth:
         return None
@@ -183,21 +183,13 @@ def _cracked_by_forces(problem: Problem, found: Search, cracks: Sequence[Hypothe
     return [at for at in (cracks[number].wide[0].at for number in ranked) if at is not None]
 
 
-def carried_over(layout: Layout, unknowns: Unknowns, p: Array) -> Array:
-    """Unknowns of the force residuals (size,) as those of a layout, but for those that a hypothesis carries alone."""
-    out = np.zeros(layout.size)
-    for one in layout.unknowns.groups:
-        if one.key in unknowns.slices and one.key not in ITS_OWN:
-            out[layout.unknowns[one.key]] = p[unknowns[one.key]]
-    return out
-
-
-def carried_back(layout: Layout, unknowns: Unknowns, p: Array) -> Array:
-    """Unknowns of a layout (size,) as those of the force residuals, which have filters in place of its structure."""
-    out = np.zeros(unknowns.size)
-    for one in unknowns.groups:
-        if one.key in layout.unknowns.slices:
-            out[unknowns[one.key]] = p[layout.unknowns[one.key]]
+def carried(unknowns: Unknowns, p: Array, into: Unknowns, but: Collection[str] = ()) -> Array:
+    """Unknowns (size,) as those of another list, such as the force residuals', which have filters in place of a
+    layout's structure; zero what either has not, and `but`."""
+    out = np.zeros(into.size)
+    for one in into.groups:
+        if one.key in unknowns.slices and one.key not in but:
+            out[into[one.key]] = p[unknowns[one.key]]
     return out
 
 
@@ -214,7 +206,7 @@ def _starts(
     for one in found.tried:
         if one.fit is None or one.hypothesis.name not in names:
             continue
-        p = carried_over(layout, unknowns, one.fit.p)
+        p = carried(unknowns, one.fit.p, layout.unknowns, ITS_OWN)
         if one.hypothesis.wide[0].key in ITS_OWN:
             here, there = (one.hypothesis.entries(of) for of in (layout.unknowns, unknowns))
             own = one.fit.p[there]
