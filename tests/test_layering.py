@@ -34,7 +34,7 @@ MAY_IMPORT: dict[str, set[str]] = {
 # that is not named here has no rooms.
 ROOMS: dict[str, tuple[str, ...]] = {
     "rig": ("casefile",),
-    "records": ("checks", "formats", "conversion"),
+    "records": ("seen", "clocks", "checks", "formats", "conversion"),
     "geometry": ("tooth", "pair", "mesh", "export"),
     "fem": ("gear", "contact", "motion", "full", "stress"),
     "lumped": ("stiffness", "linear", "nonlinear"),

@@ -6,9 +6,9 @@ from math import degrees, pi
 
 import numpy as np
 
-from gearbench.records.checks.finding import ANGLE_UNITS, Finding, unit_hint
-from gearbench.records.checks.look import GEARS, Look, mean_rate
 from gearbench.records.even_speed import departure
+from gearbench.records.seen.finding import ANGLE_UNITS, Finding, unit_hint
+from gearbench.records.seen.look import GEARS, Look, mean_rate
 
 # Speeds against teeth, base radii against teeth.
 RATIO = 1e-3

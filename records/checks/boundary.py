@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.records.checks.finding import Finding
-from gearbench.records.checks.look import GEARS, Complexes, Look
-from gearbench.records.checks.mesh_force import AGREE, EXPLAINED, NOTHING, Accounts, accounts_of
+from gearbench.records.seen.finding import Finding
+from gearbench.records.seen.look import GEARS, Complexes, Look
+from gearbench.records.seen.mesh_force import AGREE, EXPLAINED, NOTHING, Accounts, accounts_of
 
 Array = NDArray[np.float64]
 

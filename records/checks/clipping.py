@@ -8,8 +8,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from gearbench.records.checks.finding import Finding
-from gearbench.records.checks.look import Look
+from gearbench.records.seen.finding import Finding
+from gearbench.records.seen.look import Look
 
 Array = NDArray[np.float64]
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.records.checks.finding import Finding
-from gearbench.records.checks.look import GEARS, Look
-from gearbench.records.checks.mesh_force import AGREE, Accounts, accounts_of, explains
+from gearbench.records.seen.finding import Finding
+from gearbench.records.seen.look import GEARS, Look
+from gearbench.records.seen.mesh_force import AGREE, Accounts, accounts_of, explains
 
 Array = NDArray[np.float64]
 

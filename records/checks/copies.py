@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 
-from gearbench.records.checks.finding import Finding
-from gearbench.records.checks.look import Look
+from gearbench.records.seen.finding import Finding
+from gearbench.records.seen.look import Look
 
 Place = tuple[int, int]
 

@@ -35,21 +35,21 @@ from gearbench.records.checks.derived import (
     stored_as_channels_have_it,
     swings_fit_the_teeth,
 )
-from gearbench.records.checks.drift import clocks_keep_pace
-from gearbench.records.checks.dropouts import channels_do_not_stick
-from gearbench.records.checks.finding import Finding
-from gearbench.records.checks.lag import force_and_dte_in_step
-from gearbench.records.checks.late import clocks_agree
-from gearbench.records.checks.look import Look
-from gearbench.records.checks.lost import channels_keep_step, periods_keep_step
 from gearbench.records.checks.mesh_lines import mesh_lines_stand_out
 from gearbench.records.checks.passive import force_feeds_the_rig
 from gearbench.records.checks.periods import force_repeats_as_declared, periods_repeat
 from gearbench.records.checks.run_out import shafts_turn_true
-from gearbench.records.checks.sampled import sampled_fast_enough
-from gearbench.records.checks.slips import angles_do_not_slip, gears_pass_the_same_teeth, no_gap_in_all_channels
 from gearbench.records.checks.torques import load_balances, torque_as_declared
+from gearbench.records.clocks.drift import clocks_keep_pace
+from gearbench.records.clocks.dropouts import channels_do_not_stick
+from gearbench.records.clocks.lag import force_and_dte_in_step
+from gearbench.records.clocks.late import clocks_agree
+from gearbench.records.clocks.lost import channels_keep_step, periods_keep_step
+from gearbench.records.clocks.sampled import sampled_fast_enough
+from gearbench.records.clocks.slips import angles_do_not_slip, gears_pass_the_same_teeth, no_gap_in_all_channels
 from gearbench.records.errors import RecordError
+from gearbench.records.seen.finding import Finding
+from gearbench.records.seen.look import Look
 
 Check = Callable[[Look], list[Finding]]
 

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
-from gearbench.records.checks.finding import Finding
-from gearbench.records.checks.look import Look
+from gearbench.records.seen.finding import Finding
+from gearbench.records.seen.look import Look
 
 Array = NDArray[np.float64]
 

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.records.checks.contradictions import accounts_agree
-from gearbench.records.checks.finding import Finding
-from gearbench.records.checks.late import clocks_agree
-from gearbench.records.checks.look import GEARS, Look
+from gearbench.records.clocks.late import clocks_agree
+from gearbench.records.seen.finding import Finding
+from gearbench.records.seen.look import GEARS, Look
 
 # Cosine between force and rate of the transmission error over the excited lines. At the gears themselves a passive rig
 # has it at 0 or above; the gear centres, on which the force does not work, may bring dte a little below.

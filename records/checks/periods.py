@@ -5,13 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.records.checks.finding import Finding
-from gearbench.records.checks.look import Look
+from gearbench.records.seen.finding import Finding
+from gearbench.records.seen.look import Look
 
 # Part of the rms fluctuation that may differ from period to period.
 SCATTER = 0.1
-# Departure of a joint period from whole mesh periods [mesh periods] up to which both count as repeating.
-WHOLE = 1e-3
 # The same of the force beyond which the declared period is none of its: an average over noise of half its size would
 # say nothing either.
 OTHER = 0.5
@@ -26,7 +24,7 @@ COMPARED, PART = 0.25, 0.1
 def periods_repeat(look: Look) -> list[Finding]:
     """Periods are alike; what differs from one to the next is said as a share. It is noise to an identification, which
     finds it in its residual and counts it in its variance."""
-    joint = joint_samples(look)
+    joint = look.joint_samples
     if joint is None:
         return []
     found = []
@@ -55,7 +53,7 @@ def force_repeats_as_declared(look: Look) -> list[Finding]:
     force, declared = look.force, int(look.record.attrs["samples_per_period"])
     if force is None or not look.steady or not np.ptp(force) > 1e-9 * np.abs(force).max():
         return []
-    joint = joint_samples(look)
+    joint = look.joint_samples
     differs = differences(force - force.mean())
     own = float(differs[joint]) if joint is not None and joint < differs.size else None
     limit = REPEATS if own is not None and own > OTHER else ALONE
@@ -111,17 +109,3 @@ def _repeats(differs: NDArray[np.float64], limit: float) -> int | None:
 def _whole(times: float, period: int) -> bool:
     """Whether a declared period is that many whole ones, as far as a period that is known to half a sample can tell."""
     return abs(times - round(times)) < max(PART, 0.6 * times / period) and round(times) >= 1
-
-
-def joint_samples(look: Look) -> int | None:
-    """Samples of the shortest run of excitation periods that holds whole mesh periods, if there are two such runs and
-    the speed is constant."""
-    period, periods = int(look.record.attrs["samples_per_period"]), int(look.record.attrs["periods"])
-    if look.mesh_period is None or not look.steady:
-        return None
-    cycles = period / (look.rate * look.mesh_period)
-    for count in range(1, periods // 2 + 1):
-        whole = count * cycles
-        if periods % count == 0 and round(whole) >= 1 and abs(whole - round(whole)) < WHOLE:
-            return count * period
-    return None

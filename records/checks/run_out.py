@@ -7,8 +7,8 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.records.checks.finding import Finding
-from gearbench.records.checks.look import GEARS, Look
+from gearbench.records.seen.finding import Finding
+from gearbench.records.seen.look import GEARS, Look
 
 Array = NDArray[np.float64]
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from gearbench.records.checks.finding import TORQUE_UNITS, Finding, unit_hint
-from gearbench.records.checks.look import Look
+from gearbench.records.seen.finding import TORQUE_UNITS, Finding, unit_hint
+from gearbench.records.seen.look import Look
 
 # Mean against the declared mean; load torque against the mean torque times z2/z1 (friction and bearings take some).
 OWN_MEAN, LOAD = 0.02, 0.3

@@ -10,7 +10,7 @@ import pytest
 import gearbench as gb
 from gearbench.records import RecordError
 from gearbench.records.checks import check_record
-from gearbench.records.checks.mesh_force import Accounts
+from gearbench.records.seen.mesh_force import Accounts
 
 CASE = """
 [rig.driver]

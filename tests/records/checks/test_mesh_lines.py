@@ -12,8 +12,8 @@ from shared.reference_rig import ReferenceRig, reference_record
 from gearbench.records import RecordError, make_record
 from gearbench.records.checks import check_record
 from gearbench.records.checks.derived import swings_fit_the_teeth
-from gearbench.records.checks.look import Look
 from gearbench.records.checks.mesh_lines import mesh_lines_stand_out
+from gearbench.records.seen.look import Look
 
 # One revolution of 31 teeth in half a second: any number of teeth makes whole mesh periods.
 TEETH, DURATION = 31, 0.5

@@ -8,8 +8,8 @@ import xarray as xr
 
 import gearbench as gb
 from gearbench.records.checks import passive
-from gearbench.records.checks.look import Look
 from gearbench.records.checks.passive import force_feeds_the_rig
+from gearbench.records.seen.look import Look
 
 
 @pytest.fixture(scope="module")

@@ -10,8 +10,8 @@ from shared.spoilt import bare, simulated, with_values
 from gearbench.records import RecordError
 from gearbench.records.checks import check_record
 from gearbench.records.checks.clipping import clipped_ends
-from gearbench.records.checks.dropouts import stuck
 from gearbench.records.checks.periods import differences, force_repeats_as_declared
+from gearbench.records.clocks.dropouts import stuck
 from gearbench.records.record import make_record
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gearbench.records.checks.look import Look
 from gearbench.records.checks.run_out import shafts_turn_true
 from gearbench.records.record import make_record
+from gearbench.records.seen.look import Look
 
 RATE, SAMPLES, RADII = 4096.0, 8192, {"driver": 0.02, "driven": 0.05}
 SIZE = 2e-6  # m rms of what the excitation makes

@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 from gearbench.records.checks.angles import angles_follow_mesh_phase, angles_keep_mesh_period
 from gearbench.records.checks.boundary import inertias_as_declared
 from gearbench.records.checks.contradictions import gears_not_swapped
-from gearbench.records.checks.late import clocks_agree
-from gearbench.records.checks.look import GEARS, Look
-from gearbench.records.checks.mesh_force import accounts_of
 from gearbench.records.checks.periods import periods_repeat
+from gearbench.records.clocks.late import clocks_agree
 from gearbench.records.record import make_record
+from gearbench.records.seen.look import GEARS, Look
+from gearbench.records.seen.mesh_force import accounts_of
 
 Array = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ from shared.spoilt import Change, attribute, bare, simulated, times, under_stead
 from gearbench.records import RecordError
 from gearbench.records.checks import check_record
 from gearbench.records.checks.boundary import accelerations_as_torques
-from gearbench.records.checks.look import GEARS, Look
+from gearbench.records.seen.look import GEARS, Look
 
 
 @pytest.fixture(scope="module")

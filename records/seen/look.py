@@ -12,8 +12,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from gearbench.records.attributes import numeric_attribute
-from gearbench.records.checks.taper import SPREAD, transform
 from gearbench.records.even_speed import VARIES, departure, mesh_phase
+from gearbench.records.seen.taper import SPREAD, transform
 from gearbench.records.transmission_error import (
     AngleOnlyWarning,
     TransmissionError,
@@ -29,6 +29,8 @@ GEARS = ("driver", "driven")
 MOST_LINES = 800
 # Departure of the mesh phase from even rotation [cycles] from which on nothing need repeat.
 WANDERS = 0.5
+# Departure of excitation periods from whole mesh periods [mesh periods] up to which both count as repeating.
+WHOLE = 1e-3
 # A line is excited when its force exceeds this part of the strongest line's, the mean apart.
 EXCITED = 0.1
 
@@ -190,6 +192,20 @@ class Look:
         size = np.abs(self.transform(force - force.mean()))
         size[: self.lowest] = 0.0
         return np.asarray(size)
+
+    @cached_property
+    def joint_samples(self) -> int | None:
+        """Samples of the shortest run of excitation periods that holds whole mesh periods, if there are two such runs
+        and the speed is constant."""
+        period, periods = int(self.record.attrs["samples_per_period"]), int(self.record.attrs["periods"])
+        if self.mesh_period is None or not self.steady:
+            return None
+        cycles = period / (self.rate * self.mesh_period)
+        for count in range(1, periods // 2 + 1):
+            whole = count * cycles
+            if periods % count == 0 and round(whole) >= 1 and abs(whole - round(whole)) < WHOLE:
+                return count * period
+        return None
 
     def spectrum(self, values: Array, derivative: int = 0) -> Complexes:
         """DFT of values (samples,), or of a derivative in time, on `lines`, divided by the number of samples."""

@@ -8,8 +8,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.records.checks.look import Complexes, Look
-from gearbench.records.checks.mesh_force import Accounts
+from gearbench.records.seen.look import Complexes, Look
+from gearbench.records.seen.mesh_force import Accounts
 
 Array = NDArray[np.float64]
 

@@ -7,10 +7,10 @@ import pytest
 import xarray as xr
 from shared.spoilt import RIGS, bare, simulated, with_values
 
-from gearbench.records.checks.late import clocks_agree
-from gearbench.records.checks.look import Look
-from gearbench.records.checks.lost import channels_keep_step, periods_keep_step
-from gearbench.records.checks.slips import no_gap_in_all_channels
+from gearbench.records.clocks.late import clocks_agree
+from gearbench.records.clocks.lost import channels_keep_step, periods_keep_step
+from gearbench.records.clocks.slips import no_gap_in_all_channels
+from gearbench.records.seen.look import Look
 
 
 def lost(record: xr.Dataset, names: tuple[str, ...], count: int, at: float) -> xr.Dataset:

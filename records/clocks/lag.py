@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.records.checks.delays import delays_of
-from gearbench.records.checks.finding import Finding
-from gearbench.records.checks.look import EXCITED, Look
-from gearbench.records.checks.mesh_force import accounts_of
+from gearbench.records.clocks.delays import delays_of
+from gearbench.records.seen.finding import Finding
+from gearbench.records.seen.look import EXCITED, Look
+from gearbench.records.seen.mesh_force import accounts_of
 
 Array = NDArray[np.float64]
 

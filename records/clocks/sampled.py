@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from gearbench.records.checks.finding import Finding
-from gearbench.records.checks.look import GEARS, Look
+from gearbench.records.seen.finding import Finding
+from gearbench.records.seen.look import GEARS, Look
 
 # Part of the response beyond what a channel can tell that is said.
 SAYS = 0.01

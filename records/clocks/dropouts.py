@@ -7,8 +7,8 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.records.checks.finding import Finding
-from gearbench.records.checks.look import Look
+from gearbench.records.seen.finding import Finding
+from gearbench.records.seen.look import Look
 
 # Equal samples in a row, and how many times as many as the usual runs of a quantised signal (its 99th percentile).
 LONGEST, UNUSUAL = 32, 8.0

@@ -5,8 +5,8 @@ import pytest
 import xarray as xr
 from shared.reference_rig import ReferenceRig, reference_record
 
-from gearbench.records.checks.drift import clocks_keep_pace
-from gearbench.records.checks.look import Look
+from gearbench.records.clocks.drift import clocks_keep_pace
+from gearbench.records.seen.look import Look
 
 RIG = ReferenceRig(mesh_frequency=16.0, edge=0.1)
 

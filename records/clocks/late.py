@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from gearbench.records.checks.delays import Delays, delays_of
-from gearbench.records.checks.devices import error_of_lag, far_side, late_device
-from gearbench.records.checks.finding import Finding
-from gearbench.records.checks.look import Look
-from gearbench.records.checks.mesh_force import Accounts, accounts_of, explains
+from gearbench.records.clocks.delays import Delays, delays_of
+from gearbench.records.clocks.devices import error_of_lag, far_side, late_device
+from gearbench.records.seen.finding import Finding
+from gearbench.records.seen.look import Look
+from gearbench.records.seen.mesh_force import Accounts, accounts_of, explains
 
 # Error of the response that counts.
 MATTERS = 0.02

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from gearbench.records.checks.lag import force_and_dte_in_step
-from gearbench.records.checks.look import Look
+from gearbench.records.clocks.lag import force_and_dte_in_step
 from gearbench.records.record import make_record
+from gearbench.records.seen.look import Look
 
 RATE, SAMPLES = 8192.0, 8192
 FREQUENCY = np.arange(SAMPLES // 2 + 1) * RATE / SAMPLES

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.records.checks.delays import Delays, least
-from gearbench.records.checks.look import EXCITED, GEARS, Complexes, Look
-from gearbench.records.checks.mesh_force import Accounts
+from gearbench.records.clocks.delays import Delays, least
+from gearbench.records.seen.look import EXCITED, GEARS, Complexes, Look
+from gearbench.records.seen.mesh_force import Accounts
 
 Array = NDArray[np.float64]
 Lines = NDArray[np.int64]

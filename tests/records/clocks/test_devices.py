@@ -5,8 +5,8 @@ import pytest
 import xarray as xr
 
 import gearbench as gb
-from gearbench.records.checks.late import clocks_agree
-from gearbench.records.checks.look import Look
+from gearbench.records.clocks.late import clocks_agree
+from gearbench.records.seen.look import Look
 
 PAIR = [
     'rig.driver="gears/luo2019_z16.toml"',

@@ -11,8 +11,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.records.checks.finding import Finding
-from gearbench.records.checks.look import EXCITED, Look
+from gearbench.records.seen.finding import Finding
+from gearbench.records.seen.look import EXCITED, Look
 
 Array = NDArray[np.float64]
 

@@ -11,8 +11,8 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.records.checks.finding import Finding
-from gearbench.records.checks.look import GEARS, Look
+from gearbench.records.seen.finding import Finding
+from gearbench.records.seen.look import GEARS, Look
 
 # A step between two samples of so many times the 99th percentile of all of them (1.6 times is the most in 283 records
 # of sound rigs), which stays: of the samples around it at least this part of it is left.

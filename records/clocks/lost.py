@@ -7,14 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.records.checks.delays import Delays, delays_of
-from gearbench.records.checks.devices import groups_of
-from gearbench.records.checks.drift import delay_between
-from gearbench.records.checks.finding import Finding
-from gearbench.records.checks.late import SUSPICIOUS, lag_of
-from gearbench.records.checks.look import EXCITED, Look
-from gearbench.records.checks.mesh_force import AGREE, accounts_of
-from gearbench.records.checks.periods import joint_samples
+from gearbench.records.clocks.delays import Delays, delays_of
+from gearbench.records.clocks.devices import groups_of
+from gearbench.records.clocks.drift import delay_between
+from gearbench.records.clocks.late import SUSPICIOUS, lag_of
+from gearbench.records.seen.finding import Finding
+from gearbench.records.seen.look import EXCITED, Look
+from gearbench.records.seen.mesh_force import AGREE, accounts_of
 
 Array = NDArray[np.float64]
 
@@ -102,7 +101,7 @@ def _best(delays: Delays, names: frozenset[str]) -> tuple[float, float]:
 def periods_keep_step(look: Look) -> list[Finding]:
     """No period of excitation and mesh is the first one shifted in time. For force and dte each by itself, which is all
     that a record without channels of its gears can tell."""
-    joint, force, error = joint_samples(look), look.force, look.stored_or_own_dte
+    joint, force, error = look.joint_samples, look.force, look.stored_or_own_dte
     if joint is None or force is None or error is None or not np.ptp(force) > 0:
         return []
     driving = np.abs(np.fft.rfft(force.reshape(-1, joint)[0] - force.mean()))

@@ -10,7 +10,7 @@ from shared.spoilt import RIGS, bare, simulated, with_values
 from gearbench.records import RecordError
 from gearbench.records.checks import check_record
 from gearbench.records.checks.door import angles_do_not_slip, gears_pass_the_same_teeth
-from gearbench.records.checks.slips import gone, largest_step
+from gearbench.records.clocks.slips import gone, largest_step
 
 BOTH = [angles_do_not_slip, gears_pass_the_same_teeth]
 

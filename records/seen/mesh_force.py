@@ -16,7 +16,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.records.checks.look import GEARS, Complexes, Look
+from gearbench.records.seen.look import GEARS, Complexes, Look
 
 Array = NDArray[np.float64]
 
