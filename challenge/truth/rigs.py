@@ -180,7 +180,9 @@ def _teeth(bench: Bench, rig: Structure, levels: Levels) -> Teeth:
     excess = excess + wave_cos * np.cos(2 * np.pi * away) + wave_sin * np.sin(2 * np.pi * away)
     # As the nominal model counts it: the mass of the turning parts before the mesh, the load's speed being held.
     mesh_mass = (rig.inertia[0] + rig.inertia[1]) / meshing.driver.base_radius**2
-    damping = 2 * rig.damping_ratio * np.sqrt(mesh_mass / wanted)
+    # The ratio is that under the mean torque, as a verdict states it.
+    relative = load / wanted / reference
+    damping = 2 * rig.damping_ratio * np.sqrt(mesh_mass / wanted) / (1.0 + rig.damping_load * (relative - 1.0))
     crack = [loss / (1.0 - loss) for loss in levels.crack]
     more = levels.backlash_more * meshing.driver.base_radius / meshing.driver.reference_radius
     rate = RATE * bench.scale.length * bench.scale.frequency
