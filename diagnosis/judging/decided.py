@@ -71,7 +71,9 @@ def decide_simulated(
     (equations + 1,) the excess scatter between repetitions, by place, and `changing` the largest rms of what changes
     over that of the nominal gap, `drift` what explains most of it; `known`: what sound rigs leave."""
     _, over = worst(unsteady, limits.unsteady)
-    if drift is None or over <= 1.0 or changing <= known.changing:
+    # `changing` is more than nothing where what is left grows by it, whatever part of the nominal gap that is.
+    large = drift is not None and changing > (0.0 if drift.beyond_sound else known.changing)
+    if drift is None or over <= 1.0 or not large:
         return _decided(judged, forces, missing, unsteady, changing, limits, known)
     # What a drift explains speaks neither for something unknown nor against an effect.
     rest = _decided(judged, forces, missing, np.zeros_like(unsteady), changing, limits, known)

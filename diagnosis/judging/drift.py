@@ -29,6 +29,8 @@ Complex = NDArray[np.complex128]
 EXPLAINS = 0.5
 # Of the energy that the next best place leaves, the part that the best one may leave for the place to be told.
 TOLD = 0.5
+# Change of a stiffness over a record that sound rigs stay below, which settle by 0.4 % or so.
+SOUND = 0.01
 
 
 @dataclass(frozen=True)
@@ -41,6 +43,11 @@ class Drift:
     std: float
     share: float
     nats: float
+
+    @property
+    def beyond_sound(self) -> bool:
+        """Whether it is, within two deviations, more than sound rigs have."""
+        return abs(self.value) - 2.0 * self.std > SOUND
 
     @property
     def grows(self) -> float:
