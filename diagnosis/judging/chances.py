@@ -29,17 +29,18 @@ def chances_of(
 ) -> Chances:
     """The chances of what was named, and of the best candidate, named or not, that nothing spoke against: of what had
     `entered` and is not named, its size or the judged record did. Evidence is that of the candidates: over the
-    background alone, or, where that is more, beside the others that are named; of a number of the nominal rig, over a
-    rig with it where its uncertainty ends."""
+    background alone, or, where that is more, beside the others that are named, but no more than over the rig that was
+    fitted without it; of a number of the nominal rig, over a rig with it where its uncertainty ends."""
     evidence = best_evidence(judged.found.selection.weighed, decided.named)
-    for one in decided.named:
-        evidence[one.effect.name] = max(evidence[one.effect.name], _over_the_edge(judged, one))
+    nats = {one.hypothesis.name: _nats(judged, one, evidence[one.effect.name]) for one in decided.named}
+    for name in {one.effect.name for one in decided.named}:
+        evidence[name] = max(nats[one.hypothesis.name] for one in decided.named if one.effect.name == name)
     dropped = {one.effect.name for one in entered} - {one.effect.name for one in decided.named}
     left = max((value for name, value in evidence.items() if name not in dropped), default=0.0)
     named, all_signs = {}, [effect_signs(left, lines, None)]
     for one in decided.named:
         grows = judged.closings[one.hypothesis.name].growth
-        all_signs.append(effect_signs(evidence[one.effect.name], lines, grows))
+        all_signs.append(effect_signs(nats[one.hypothesis.name], lines, grows))
         named[one.hypothesis.name] = known.effect.of(all_signs[-1]).value
     if decided.drift is not None:
         all_signs.append(effect_signs(decided.drift.nats, lines, decided.drift.grows))
@@ -48,17 +49,18 @@ def chances_of(
     return Chances(named, best)
 
 
-def _over_the_edge(judged: Judged, one: Weighed) -> float:
-    """Nats by which the records of the search call for a number of the nominal rig beyond its uncertainty, where
-    recalibration would move it at the price of its prior alone. None for other effects."""
+def _nats(judged: Judged, one: Weighed, worth: float) -> float:
+    """Nats by which the records of the search call for a named effect: what it was `worth`, but no more than over the
+    rig that was fitted without any of it, beside held backgrounds of all others, as slopes may promise too much; a
+    number of the nominal rig over that with it where its uncertainty ends, whose prior recalibration would pay, if that
+    is more."""
     without = judged.closings[one.hypothesis.name].optimum
     if without is None:
-        return 0.0
+        return worth
     unknowns, selection = judged.found.layout.unknowns, judged.found.selection
-    if has_own(unknowns, one.hypothesis):
-        return 0.0
     held = evidence_without(unknowns, selection, one, without)
-    return float(selection.best.evidence - held - log(one.hypothesis.choices))
+    fitted = float(selection.best.evidence - held - log(one.hypothesis.choices))
+    return min(worth, fitted) if has_own(unknowns, one.hypothesis) else max(worth, fitted)
 
 
 def unlikely(decided: Decided, chances: Chances) -> Weighed | None:

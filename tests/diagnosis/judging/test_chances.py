@@ -51,11 +51,17 @@ def test_what_shows_only_beside_another_effect_is_as_likely_as_it_is_worth_there
     assert named["coupling"] == POPULATION.effect.of(effect_signs(300.0, LINES, 2.5)).value
 
 
-@pytest.mark.parametrize(("key", "worth"), [("mesh-ratio", 30.0 - log(2.0)), ("friction", 4.0)])
-def test_a_number_of_the_nominal_rig_counts_beyond_its_uncertainty(key: str, worth: float) -> None:
-    """Recalibration moves it anywhere at the price of its prior: what the records insist on is told by a rig with the
-    number where its uncertainty ends. Of an effect of its own a background's share is what it is held against."""
-    one = weighed("effect", 4.0)
+@pytest.mark.parametrize(
+    ("key", "told", "worth"),
+    [("mesh-ratio", 4.0, 30.0 - log(2.0)), ("friction", 4.0, 4.0), ("friction", 180.0, 20.0 - log(2.0))],
+)
+def test_what_is_named_counts_as_much_as_over_a_rig_that_was_fitted_without_it(
+    key: str, told: float, worth: float
+) -> None:
+    """Recalibration moves a number of the nominal rig anywhere at the price of its prior: what the records insist on is
+    told by a rig with it where its uncertainty ends. Of an effect of its own a background's share is what it is held
+    against, but slopes may promise more than a rig without it lacks."""
+    one = weighed("effect", told)
     one.hypothesis.wide, one.hypothesis.choices = (Wide(key),), 2
     one.hypothesis.entries = Wide(key).entries
     groups = [group("mesh-ratio", "1", 1, 0.4, slot="x"), group("friction", "1", 1, 0.01, 0.1, slot="y")]
