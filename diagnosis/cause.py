@@ -60,7 +60,7 @@ def find_cause(
     if found is None:
         silent = missing_by_equation(problem, fit)
         common["where"] = places_by_forces(problem, result.base)
-        common["audits"] = {"silent": tuple(silent), "unsteady": tuple(unsteady)}
+        common["audits"] = {"silent": tuple(silent), "unsteady": tuple(unsteady.excess)}
         decision, plain = decide(result, silent, unsteady), recalibrated(nominal, fitted(problem, result.base))
         if all(one.phase_known for one in measurements):
             common["advice"] = (PARTED,)

@@ -24,7 +24,7 @@ from gearbench.diagnosis.evidence.problem import Problem
 from gearbench.diagnosis.evidence.search import Search, missing_by_equation
 from gearbench.diagnosis.finding import Finding
 from gearbench.diagnosis.forces.equations import PLACES
-from gearbench.diagnosis.forces.steadiness import changing_parts
+from gearbench.diagnosis.forces.steadiness import Unsteady, changing_parts
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.judging.candidates import candidates_of
 from gearbench.diagnosis.judging.chances import chances_of, sentence_of_doubt, unlikely
@@ -51,8 +51,8 @@ Report = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Searched:
-    """What the search by forces had and found: `fit` is the best effect's, else the background's; `unsteady`
-    (equations + 1,) the excess scatter between repetitions of the records `steady`, `without` the effects left out."""
+    """What the search by forces had and found: `fit` is the best effect's, else the background's; `unsteady` the
+    excess scatter between repetitions of the records `steady`, `without` the effects left out."""
 
     problem: Problem
     nominal: Case
@@ -60,7 +60,7 @@ class Searched:
     result: Search
     fit: Fit
     steady: tuple[Measurement, ...]
-    unsteady: Array
+    unsteady: Unsteady
     without: tuple[str, ...] = ()
 
 
@@ -115,7 +115,7 @@ def by_simulation(
         missing=missing,
         places=tuple(one.place for one in kept),
         audits={
-            "unsteady": tuple(of.unsteady),
+            "unsteady": tuple(of.unsteady.excess),
             "missing": tuple(missing.excess),
             "silent": tuple(missing.silent),
             "changing": (changing,),

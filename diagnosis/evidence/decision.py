@@ -12,6 +12,7 @@ from gearbench.diagnosis.evidence.calibration import LIMITS, Limits
 from gearbench.diagnosis.evidence.fit import Fit
 from gearbench.diagnosis.evidence.search import Search, Tried
 from gearbench.diagnosis.forces.equations import PLACES
+from gearbench.diagnosis.forces.steadiness import Unsteady
 from gearbench.diagnosis.verdict import Outcome
 from gearbench.rig.contract import Place
 
@@ -30,11 +31,11 @@ class Decision:
     because: str
 
 
-def decide(search: Search, silent: Array, unsteady: Array, limits: Limits = LIMITS) -> Decision:
+def decide(search: Search, silent: Array, unsteady: Unsteady, limits: Limits = LIMITS) -> Decision:
     """The decision. `silent` (equations + 1,) is what the best effect's fit (else the background's) leaves unexplained
-    by equation, `unsteady` (equations + 1,) the excess scatter between repetitions."""
+    by equation, `unsteady` the excess scatter between repetitions."""
     best, free = named(search, limits), search.best_free
-    place, over = worst(unsteady, limits.unsteady)
+    place, over = unsteady.worst(limits.unsteady)
     if over > 1.0:
         because = f"the force missing {at_place(place)} changes from one repetition to the next"
         return Decision("unknown", place, None, over, because)

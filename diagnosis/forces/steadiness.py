@@ -8,8 +8,9 @@ force.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,7 @@ from gearbench.diagnosis.forces.residuals import residuals
 from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.intake.signals import measured_channels
+from gearbench.rig.contract import Place
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -38,17 +40,38 @@ PER_LINES = 20_000
 NEIGHBOURS = 41  # quiet lines that tell the noise of a line between them
 
 
+class Unsteady(NamedTuple):
+    """What scatters between repetitions beyond noise, by equation, the mesh last: `excess` (equations + 1,), the sum
+    over blocks of bins of count log lambda, for PER_LINES of them, and `force` (equations + 1,), its rms [N]."""
+
+    excess: Array
+    force: Array
+
+    @classmethod
+    def nothing(cls) -> Unsteady:
+        """Of what repeats."""
+        return cls(np.zeros(len(PLACES)), np.zeros(len(PLACES)))
+
+    def worst(self, limits: Mapping[str, float]) -> tuple[Place, float]:
+        """The place that something changes at, and the largest excess of any over its limit. Of the places beyond it
+        that of most force: what changes at one place makes an equation wrong at another by as much as its numbers are,
+        and a displacement tells little of that from noise."""
+        over = self.excess / np.array([limits[place] for place in PLACES])
+        beyond = over > 1.0
+        at = np.argmax(np.where(beyond, self.force, -1.0) if beyond.any() else over)
+        return PLACES[int(at)], float(over.max())
+
+
 def unsteadiness(
     model: NominalModel, measurements: Sequence[Measurement], unknowns: Unknowns, p: Array, band: float
-) -> Array:
-    """Excess scatter (equations + 1,) between repetitions: sum over blocks of bins of count log lambda, the mesh last,
-    for PER_LINES of them.
+) -> Unsteady:
+    """What the measurements scatter by between their repetitions.
 
     Zero where there is one repetition only, and where no channel changes by more than a sound rig's slow changes make.
     What noise puts into an equation is read off its quiet lines, those that nothing excites, so that no stiffness or
     filter needs to be known for it.
     """
-    total, lines = np.zeros(len(PLACES)), 0
+    total, lines = Unsteady.nothing(), 0
     if max(changing_parts(measurements, band).values(), default=0.0) < SLOW:
         return total
     for measured in measurements:
@@ -66,9 +89,10 @@ def unsteadiness(
         variance = noise_of_equations(model, whole) * measured.repetitions + (ALIASED * whole.force_level) ** 2
         quiet = kinds_of(whole) == KINDS.index("other")
         variance[:MESH] = np.maximum(variance[:MESH], quiet_level(scatter, quiet))
-        total += excess_of(scatter, last.mesh_factor, variance)
+        found = excess_of(scatter, last.mesh_factor, variance)
+        total = Unsteady(total.excess + found.excess, np.hypot(total.force, found.force))
         lines += measured.repetitions * whole.bins
-    return total * (PER_LINES / max(lines, 1))
+    return total._replace(excess=total.excess * (PER_LINES / max(lines, 1)))
 
 
 def least_unsteadiness(
@@ -77,10 +101,11 @@ def least_unsteadiness(
     unknowns: Unknowns,
     rigs: Sequence[Array],
     band: float,
-) -> Array:
+) -> Unsteady:
     """The same for that of several `rigs` (size,) in which least changes in all: what changes is a force at one place,
     and unknowns by which it is one at several are wrong."""
-    return min((unsteadiness(model, measurements, unknowns, p, band) for p in rigs), key=lambda one: float(one.sum()))
+    every = (unsteadiness(model, measurements, unknowns, p, band) for p in rigs)
+    return min(every, key=lambda one: float(one.excess.sum()))
 
 
 def quiet_level(scatter: Complex, quiet: NDArray[np.bool_]) -> Array:
@@ -126,9 +151,9 @@ def scatter_of(lines: Complex) -> tuple[Array, float]:
     return apart, float(np.median(apart)) / float(np.log(2.0))
 
 
-def excess_of(scatter: Complex, mesh_factor: Complex, variance: Array) -> Array:
-    """Count times log lambda (equations + 1,) of scatter (P, equations, K) against known variance (equations + 1, K);
-    `mesh_factor` (equations, K) is that by which an error of the mesh force enters each equation."""
+def excess_of(scatter: Complex, mesh_factor: Complex, variance: Array) -> Unsteady:
+    """What scatter (P, equations, K) holds beyond known variance (equations + 1, K), of all its bins; `mesh_factor`
+    (equations, K) is that by which an error of the mesh force enters each equation."""
     present = np.flatnonzero(np.isfinite(scatter).all(axis=(0, 2)))
     g = mesh_factor[present]
     r, floor = scatter[:, present], variance[[*present, MESH]]
@@ -142,6 +167,7 @@ def excess_of(scatter: Complex, mesh_factor: Complex, variance: Array) -> Array:
         factor = np.maximum(total / count, 1.0)
     # A few degrees of freedom always scatter above their variance: only what is clearly more counts.
     clear = np.where(factor > 3.0, factor, 1.0)
-    out = np.zeros(len(PLACES))
-    out[[*present, MESH]] = (count * np.log(clear)).sum(axis=1)
+    out = Unsteady.nothing()
+    out.excess[[*present, MESH]] = (count * np.log(clear)).sum(axis=1)
+    out.force[[*present, MESH]] = np.sqrt(2.0 * (floor * (clear[:, of_bin] - 1.0)).sum(axis=1))
     return out

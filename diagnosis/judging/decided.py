@@ -12,6 +12,7 @@ from gearbench.diagnosis.evidence.calibration import LIMITS, Limits
 from gearbench.diagnosis.evidence.decision import Decision, at_place, worst
 from gearbench.diagnosis.evidence.search import Search, told
 from gearbench.diagnosis.forces.equations import PLACES
+from gearbench.diagnosis.forces.steadiness import Unsteady
 from gearbench.diagnosis.judging.drift import Drift
 from gearbench.diagnosis.judging.judged import GREATER, Judged
 from gearbench.diagnosis.judging.missing import Missing
@@ -61,22 +62,22 @@ def decide_simulated(
     judged: Judged,
     forces: Search,
     missing: Missing,
-    unsteady: Array,
+    unsteady: Unsteady,
     changing: float,
     limits: Limits = LIMITS,
     known: Calibration = POPULATION,
     drift: Drift | None = None,
 ) -> Decided:
     """The decision on what was kept on the judged record. `missing` are the forces that the final rig lacks; `unsteady`
-    (equations + 1,) the excess scatter between repetitions, by place, and `changing` the largest rms of what changes
-    over that of the nominal gap, `drift` what explains most of it; `known`: what sound rigs leave."""
-    _, over = worst(unsteady, limits.unsteady)
+    the excess scatter between repetitions, by place, and `changing` the largest rms of what changes over that of the
+    nominal gap, `drift` what explains most of it; `known`: what sound rigs leave."""
+    _, over = unsteady.worst(limits.unsteady)
     # `changing` is more than nothing where what is left grows by it, whatever part of the nominal gap that is.
     large = drift is not None and changing > (0.0 if drift.beyond_sound else known.changing)
     if drift is None or over <= 1.0 or not large:
         return _decided(judged, forces, missing, unsteady, changing, limits, known)
     # What a drift explains speaks neither for something unknown nor against an effect.
-    rest = _decided(judged, forces, missing, np.zeros_like(unsteady), changing, limits, known)
+    rest = _decided(judged, forces, missing, Unsteady.nothing(), changing, limits, known)
     said = (
         f"{percent(drift.share)} of the energy of what changes from one repetition to the next is what a stiffness"
         f" {at_place(drift.place)} makes that changes by {percent(drift.value)} over a record"
@@ -89,14 +90,14 @@ def decide_simulated(
 
 
 def _decided(
-    judged: Judged, forces: Search, missing: Missing, unsteady: Array, changing: float, limits: Limits,
+    judged: Judged, forces: Search, missing: Missing, unsteady: Unsteady, changing: float, limits: Limits,
     known: Calibration,
 ) -> Decided:  # fmt: skip
     """The decision without a drift."""
     named = judged.found.selection.entered
     shares = [judged.share_of(one.hypothesis) for one in named]
     share = max(shares, default=0.0)
-    place, over = worst(unsteady, limits.unsteady)
+    place, over = unsteady.worst(limits.unsteady)
     aside = (_changes(place, changing),) if over > 1.0 else ()
     if over > 1.0 and changing > known.changing and share < min(CLOSES, OUTWEIGHS * changing**2):
         because = f"the force missing {at_place(place)} changes from one repetition to the next"

@@ -14,6 +14,7 @@ from gearbench.diagnosis.evidence.decision import Decision, decide
 from gearbench.diagnosis.evidence.fit import Fit
 from gearbench.diagnosis.evidence.search import Search, Tried
 from gearbench.diagnosis.forces.equations import PLACES
+from gearbench.diagnosis.forces.steadiness import Unsteady
 from gearbench.rig.contract import Place
 
 HAND = replace(
@@ -47,7 +48,7 @@ def decided(
     *tried: Tried, silent: np.ndarray = QUIET, unsteady: np.ndarray = QUIET, limits: Limits = HAND
 ) -> Decision:
     found = Search(FIT, tuple(sorted(tried, key=lambda one: -one.log_bayes_factor)))
-    decision = decide(found, silent, unsteady, limits)
+    decision = decide(found, silent, Unsteady(unsteady, unsteady), limits)
     assert decision.sign >= 0.0 and (decision.sign > 1.0) == (decision.verdict == "unknown")
     assert (decision.winner is not None) == (decision.verdict == "effects")
     return decision

@@ -14,6 +14,7 @@ from gearbench.diagnosis.effects.library import LIBRARY
 from gearbench.diagnosis.evidence.calibration import LIMITS
 from gearbench.diagnosis.evidence.decision import Decision
 from gearbench.diagnosis.forces.equations import PLACES
+from gearbench.diagnosis.forces.steadiness import Unsteady
 from gearbench.diagnosis.forces.unknowns import group, unknowns_of
 from gearbench.diagnosis.judging.decided import GREATER, HIDING, PLAIN, VISIBLE, Decided, decide_simulated, unexplained
 from gearbench.diagnosis.judging.drift import Drift
@@ -71,7 +72,7 @@ def decided(
     forces: Any = SimpleNamespace(best_free=form if free else None, tried=())
     missing = Missing(excess, ((0.0, 100.0),), np.ones((1, 5)))
     known = replace(POPULATION, changing=0.03)
-    return decide_simulated(judged, forces, missing, unsteady, changing, HAND, known, drift)
+    return decide_simulated(judged, forces, missing, Unsteady(unsteady, unsteady), changing, HAND, known, drift)
 
 
 def at(number: int, value: float) -> np.ndarray:
