@@ -19,6 +19,7 @@ from gearbench.diagnosis.account import (
 )
 from gearbench.diagnosis.effects.backlash import BACKLASH
 from gearbench.diagnosis.effects.temperature_drift import TEMPERATURE_DRIFT
+from gearbench.diagnosis.evidence.calibration import LIMITS
 from gearbench.diagnosis.evidence.fit import Fit
 from gearbench.diagnosis.evidence.problem import Problem
 from gearbench.diagnosis.evidence.search import Search, missing_by_equation
@@ -83,7 +84,7 @@ def by_simulation(
         missing = _missing(of, found)
         signs = {f"over {place}": float(over) for place, over in zip(PLACES, missing.over, strict=True)}
         missing = replace(missing, factors=np.array([known.outstanding.get(place, 1.0) for place in PLACES]))
-        drift = None if TEMPERATURE_DRIFT.name in of.without else drift_of(found)
+        drift = None if TEMPERATURE_DRIFT.name in of.without else drift_of(found, of.unsteady.worst(LIMITS.unsteady)[0])
         decided = decide_simulated(judged, of.result, missing, of.unsteady, changing, known=known, drift=drift)
         signs |= {"lines": float(found.simulator.target.counts.sum()), "unknown": decided.sign, "left": judged.left,
                   "remains": judged.remains, "searched": judged.searched, "hidden": judged.hidden,

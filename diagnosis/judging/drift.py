@@ -29,6 +29,9 @@ Complex = NDArray[np.complex128]
 EXPLAINS = 0.5
 # Of the energy that the next best place leaves, the part that the best one may leave for the place to be told.
 TOLD = 0.5
+# Part from which the place that the forces tell is it, though another explains a little more: at a resonance of both
+# all stiffnesses change alike, and a rig that is a few percent off there tells them apart no better.
+AS_WELL = 0.9
 # Change of a stiffness over a record that sound rigs stay below, which settle by 0.4 % or so.
 SOUND = 0.01
 
@@ -79,13 +82,17 @@ class _Part:
         return float((np.abs(self.departures - value * self.time * self.derivatives[place]) ** 2).sum())
 
 
-def drift_of(found: Simulated) -> Drift | None:
-    """The drift that explains most of what changes between repetitions of the records of the search; None where that
-    is less than half, where another place would explain nearly as much, or nothing changes beyond noise."""
+def drift_of(found: Simulated, by_forces: Place | None = None) -> Drift | None:
+    """The drift that explains most of what changes between repetitions of the records of the search, or nearly all of
+    it at the place where most force changes (`by_forces`); None where it explains less than half, where another place
+    would explain nearly as much, or nothing changes beyond noise."""
     parts = _parts(found)
     if not parts:
         return None
     drifts = sorted((_drift_at(parts, place) for place in parts[0].derivatives), key=lambda one: -one.share)
+    there = next((one for one in drifts if one.place == by_forces and one.share > AS_WELL), None)
+    if there is not None:
+        return there
     best, following = drifts[:2]
     told = 1.0 - best.share < TOLD * (1.0 - following.share)
     return best if best.share > EXPLAINS and told else None

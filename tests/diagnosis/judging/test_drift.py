@@ -11,6 +11,7 @@ import pytest
 from gearbench.diagnosis.forces.unknowns import group, unknowns_of
 from gearbench.diagnosis.judging import drift as module
 from gearbench.diagnosis.judging.drift import Drift, drift_of
+from gearbench.rig.contract import Place
 
 SAMPLES, REPETITIONS, NOISE = 4096, 4, 1e-3
 BINS = np.arange(1, 900)
@@ -33,7 +34,12 @@ def derivatives() -> np.ndarray:
     return lines.reshape(3, -1)
 
 
-def found(changes: np.ndarray, monkeypatch: pytest.MonkeyPatch, columns: np.ndarray | None = None) -> Drift | None:
+def found(
+    changes: np.ndarray,
+    monkeypatch: pytest.MonkeyPatch,
+    columns: np.ndarray | None = None,
+    by_forces: Place | None = None,
+) -> Drift | None:
     """`changes` (repetitions, lines of two channels): what each repetition has beside the others and noise; `columns`
     (3, lines): what the rig is said to do, if not what it does."""
     rng, channels = np.random.default_rng(7), {}
@@ -50,7 +56,7 @@ def found(changes: np.ndarray, monkeypatch: pytest.MonkeyPatch, columns: np.ndar
         selection=SimpleNamespace(best=optimum),
         layout=SimpleNamespace(unknowns=UNKNOWNS),
     )
-    return drift_of(simulated)
+    return drift_of(simulated, by_forces)
 
 
 def drifting(row: int, by: float) -> np.ndarray:
@@ -85,3 +91,17 @@ def test_a_place_that_another_explains_nearly_as_well_is_not_told(monkeypatch: p
     alike[MESH] = alike[DRIVER] + 0.05 * alike[MESH]
     changes = drifting(DRIVER, -0.07) + drifting(DRIVEN, 0.03)
     assert found(changes, monkeypatch) is not None and found(changes, monkeypatch, alike) is None
+
+
+def test_the_place_of_most_force_is_that_of_the_drift_where_it_explains_nearly_all(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The rig's derivative by the stiffness that drifts is off by more than that by another."""
+    off = derivatives()
+    off[DRIVER], off[MESH] = off[DRIVER] + 0.15 * off[DRIVEN], off[DRIVER] + 0.05 * off[MESH]
+    changes = drifting(DRIVER, -0.07)
+    told = {place: found(changes, monkeypatch, off, place) for place in (None, "driver-support", "driven-support")}
+    assert all(one is not None for one in told.values())
+    assert [one.place for one in told.values() if one] == ["mesh", "driver-support", "mesh"]
+    there = told["driver-support"]
+    assert there is not None and there.value == pytest.approx(-0.07, rel=0.05)
