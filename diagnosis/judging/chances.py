@@ -14,7 +14,7 @@ from gearbench.diagnosis.selection.selection import evidence_without
 from gearbench.diagnosis.selection.weighing import Weighed, best_evidence, has_own
 from gearbench.diagnosis.words import percent
 
-LIKELY = 0.5  # an effect is named that is more likely at work than not
+LIKELY = 2 / 3  # an effect is named that is twice as likely at work as not: to blame one costs more than to miss one
 
 
 class Chances(NamedTuple):
@@ -64,7 +64,7 @@ def _nats(judged: Judged, one: Weighed, worth: float) -> float:
 
 
 def unlikely(decided: Decided, chances: Chances) -> Weighed | None:
-    """The least likely of the named effects that are not more likely at work than not; None without any."""
+    """The least likely of the named effects that are not twice as likely at work as not; None without any."""
     doubtful = [one for one in decided.named if chances.named[one.hypothesis.name] < LIKELY]
     return min(doubtful, key=lambda one: chances.named[one.hypothesis.name], default=None)
 
@@ -74,5 +74,5 @@ def sentence_of_doubt(one: Weighed, chances: Chances) -> str:
     noun = one.effect.noun
     return (
         f"{noun[0].upper()}{noun[1:]} would close a part of the gap, but is"
-        f" less likely at work than not ({percent(chances.named[one.hypothesis.name])})"
+        f" not twice as likely at work as not ({percent(chances.named[one.hypothesis.name])})"
     )

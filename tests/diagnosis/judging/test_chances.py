@@ -78,12 +78,13 @@ def test_what_is_named_counts_as_much_as_over_a_rig_that_was_fitted_without_it(
     assert chances_of(judged, decided, POPULATION, LINES, ()).best == effect_signs(worth, LINES, 2.5)
 
 
-def test_what_is_less_likely_at_work_than_not_is_not_named() -> None:
+def test_what_is_not_twice_as_likely_at_work_as_not_is_not_named() -> None:
     """The least likely goes first: what it leaves may speak for the others."""
     one, other, sure = weighed("friction", 9.0), weighed("sensor-delay", 8.0), weighed("coupling", 99.0)
     decided: Any = SimpleNamespace(named=(one, other, sure))
-    chances = Chances({"friction": 0.45, "sensor-delay": 0.41, "coupling": 0.98}, ())
+    chances = Chances({"friction": 0.63, "sensor-delay": 0.41, "coupling": 0.98}, ())
     assert unlikely(decided, chances) is other
+    assert unlikely(SimpleNamespace(named=(sure, one)), chances) is one  # type: ignore[arg-type]
     assert unlikely(SimpleNamespace(named=(sure,)), chances) is None  # type: ignore[arg-type]
     assert unlikely(SimpleNamespace(named=(one,)), Chances({"friction": LIKELY}, ())) is None  # type: ignore[arg-type]
     other.hypothesis.effect.noun = "a delay of one sensor"
