@@ -54,7 +54,7 @@ def right_verdict(outcome: Outcome) -> str:
         if outcome.result == "right":
             return "effect"
         return "unknown" if kind_shown(answer) == "foreign" else "none"
-    hit = any(outcome.at_work(name) for name in named_effects(outcome.verdict or {}))
+    hit = any(outcome.told(name) for name in named_effects(outcome.verdict or {}))
     return "effect" if hit or owed(outcome) else "none"
 
 
@@ -62,10 +62,9 @@ def found_of_due(outcomes: Sequence[Outcome]) -> Rate:
     """How many of the effects that are due were named, or a class that holds them."""
     found = total = 0
     for outcome in outcomes:
-        names = set(named_effects(outcome.verdict)) if outcome.verdict else set()
         for name in owed(outcome):
             total += 1
-            found += name in names or outcome.result == "class"
+            found += outcome.found(name)
     return Rate(found, total)
 
 
@@ -75,7 +74,7 @@ def true_of_named(outcomes: Sequence[Outcome]) -> Rate:
     for outcome in outcomes:
         for name in named_effects(outcome.verdict) if outcome.verdict else ():
             total += 1
-            true += outcome.at_work(name) or outcome.result == "class"
+            true += outcome.told(name)
     return Rate(true, total)
 
 

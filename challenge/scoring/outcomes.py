@@ -40,6 +40,27 @@ class Outcome:
         """Whether a named effect was at work: a foreign one, too, if the library has it after all."""
         return effect in self.answer.effects
 
+    def told(self, effect: str) -> bool:
+        """Whether a named effect was at work, or one that was and is not named, which the verdict says that it cannot
+        tell from it."""
+        return self.at_work(effect) or bool(self._like(effect) & (set(self.answer.effects) - self._named))
+
+    def found(self, effect: str) -> bool:
+        """Whether an effect at work was named, or one that was not at work in its class."""
+        named = self._named
+        return effect in named or any(effect in self._like(other) for other in named - set(self.answer.effects))
+
+    @property
+    def _named(self) -> set[str]:
+        return set(named_effects(self.verdict or {}))
+
+    def _like(self, effect: str) -> set[str]:
+        """Effects of the library that the verdict cannot tell from one of it."""
+        if self.answer.kind != "effect":
+            return set()
+        classes = (self.verdict or {}).get("indistinguishable", ())
+        return {name for members in classes if effect in members for name in members}
+
 
 def without(answer: Answer, effect: str | None) -> Answer:
     """The answer when `effect` is not in the library: a case that it made counts as foreign."""

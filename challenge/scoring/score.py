@@ -71,12 +71,12 @@ def grouped(outcomes: Sequence[Outcome]) -> dict[str, list[Outcome]]:
 
 def _several(outcomes: Sequence[Outcome]) -> Table:
     """Of cases with several effects: how many of the effects were named, and how many of the names were true."""
-    true = [(set(o.answer.effects), set(named_effects(o.verdict)) if o.verdict else set()) for o in outcomes]
-    hits = sum(len(at_work & named) for at_work, named in true)
+    at_work = [outcome.found(effect) for outcome in outcomes for effect in outcome.answer.effects]
+    named = [outcome.told(name) for outcome in outcomes for name in named_effects(outcome.verdict or {})]
     return {
         "cases": len(outcomes),
-        "found": Rate(hits, sum(len(at_work) for at_work, _ in true)).plain(),
-        "true": Rate(hits, sum(len(named) for _, named in true)).plain(),
+        "found": Rate(sum(at_work), len(at_work)).plain(),
+        "true": Rate(sum(named), len(named)).plain(),
     }
 
 
@@ -139,7 +139,7 @@ def _calibration(outcomes: Sequence[Outcome]) -> Table:
     for outcome in given:
         assert outcome.verdict is not None
         for effect in outcome.verdict.get("effects", ()):
-            named.append((float(effect["probability"]), outcome.at_work(effect["name"])))
+            named.append((float(effect["probability"]), outcome.told(effect["name"])))
     chosen = [p[i] for p, i in zip(stated, told, strict=True)]
     verdict = reliability(chosen, [a == b for a, b in zip(told, truth, strict=True)])
     effect = reliability([p for p, _ in named], [hit for _, hit in named])

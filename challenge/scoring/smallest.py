@@ -69,7 +69,7 @@ def smallest_table(outcomes: Sequence[Outcome]) -> Table:
         due, names = owed(outcome), named_effects(outcome.verdict)
         for effect in outcome.answer.effects:
             one = beside(outcome, effect)
-            if effect not in names and outcome.result != "class":
+            if not outcome.found(effect):
                 rows.append({"case": outcome.name, "effect": effect, "due": effect in due, **_plain(one)})
             elif one is not None and effect in names:
                 named.append(one)

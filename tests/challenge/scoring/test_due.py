@@ -10,6 +10,7 @@ from shared.fake_verdicts import verdict
 
 from gearbench.challenge.answers import Answer
 from gearbench.challenge.scoring.due import found_of_due, kind_shown, owed, right_verdict, true_of_named
+from gearbench.challenge.scoring.intervals import Rate
 from gearbench.challenge.scoring.outcomes import Outcome, judge
 from gearbench.challenge.scoring.score import score
 from gearbench.challenge.scoring.text import score_text
@@ -129,3 +130,16 @@ def test_none_is_the_right_verdict_of_what_nobody_owes(kind: Any, trace: float, 
     answer = Answer(kind, names, "mesh", {}, traces=dict.fromkeys(names, trace))
     given = verdict(said) if said in ("none", "unknown") else verdict("effect", said)
     assert right_verdict(judge("x", answer, given | {"candidates": []})) == right
+
+
+def test_a_name_stands_for_what_the_verdict_cannot_tell_from_it() -> None:
+    """Of two effects one is named, and one of the class of the other: both are told. What is at work itself stands for
+    nothing else, nor does a class without an effect that is missed."""
+    given = verdict("effect", "friction", "pitch-error") | {"indistinguishable": [["coupling", "pitch-error"]]}
+    both = judge("x", TWO, given)
+    assert both.told("pitch-error") and both.found("coupling")
+    assert found_of_due([both]) == Rate(2, 2) and true_of_named([both]) == Rate(2, 2)
+    alone = judge("x", TWO, verdict("effect", "friction") | {"indistinguishable": [["coupling", "friction"]]})
+    assert not alone.found("coupling")
+    blamed = judge("x", FRICTION, given)
+    assert not blamed.told("pitch-error") and true_of_named([blamed]) == Rate(1, 2)
