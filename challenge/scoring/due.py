@@ -2,8 +2,8 @@
 
 The oracle is the same fit with the true effects: a verdict lists it among its candidates where it was simulated. An
 effect of which the candidates tell nothing counts as due, so that a search cannot excuse itself by not looking, unless
-the truth rig itself hardly shows it: no oracle's gap lies below the noise, and none grows by more than the record does
-when the effect is taken out of the rig.
+the truth rig itself hardly shows it, or the rig of the verdict, which lacks it, leaves hardly more than noise: no
+oracle's gap lies below the noise, and none grows by more than the record does when the effect is taken out of the rig.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from gearbench.challenge.scoring.intervals import Rate
 from gearbench.challenge.scoring.outcomes import Outcome, named_effects
 
 DUE = 1.1
+DRIFT = "temperature-drift"  # shows between repetitions, not in their mean
 
 
 def owed(outcome: Outcome) -> tuple[str, ...]:
@@ -28,10 +29,22 @@ def owed(outcome: Outcome) -> tuple[str, ...]:
     gaps = {frozenset(candidate["effects"]): candidate.get("held_out") for candidate in candidates}
     oracle = gaps.get(true)
     left = {name: gaps.get(true - {name}) for name in true}
+    closed = _at_the_noise(outcome)
     return tuple(
         name for name in sorted(shown)
-        if oracle is None or (gap := left[name]) is None or gap >= DUE * oracle
+        if (oracle is None or (gap := left[name]) is None or gap >= DUE * oracle)
+        and (outcome.found(name) or name == DRIFT or not closed)
     )  # fmt: skip
+
+
+def _at_the_noise(outcome: Outcome) -> bool:
+    """Whether the rig of a verdict, without what it missed, leaves hardly more of the held-out transmission error than
+    noise: no oracle leaves less."""
+    sizes = next((one for one in (outcome.verdict or {}).get("gap", ()) if one["channel"] == "dte"), None)
+    if sizes is None or not sizes.get("floor"):
+        return False
+    left = sizes.get("with_effect") or sizes["recalibrated"]
+    return float(left[0]) < DUE * float(sizes["floor"][0])
 
 
 def shown_of(answer: Answer) -> frozenset[str]:

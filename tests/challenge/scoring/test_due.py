@@ -42,6 +42,18 @@ def test_what_the_truth_hardly_shows_is_not_due_whatever_was_simulated(trace: fl
     assert owed(outcome) == (("friction",) if due else ())
 
 
+@pytest.mark.parametrize(("effect", "left", "due"), [
+    ("friction", 0.109, False), ("friction", 0.111, True), ("temperature-drift", 0.109, True),
+])  # fmt: skip
+def test_what_a_rig_without_it_leaves_at_the_noise_is_not_due(effect: str, left: float, due: bool) -> None:
+    answer = Answer("effect", (effect, "coupling"), "mesh", {})
+    gap = {"channel": "dte", "recalibrated": [3.0] * 3, "with_effect": [left] * 3, "floor": [0.1] * 3}
+    outcome = judge("x", answer, verdict("effect", "coupling") | {"gap": [gap]})
+    assert owed(outcome) == (("coupling", effect) if due else ("coupling",))
+    alone = judge("x", answer, verdict("none") | {"gap": [gap | {"recalibrated": [left] * 3, "with_effect": None}]})
+    assert (effect in owed(alone)) == due
+
+
 def test_the_place_of_a_foreign_effect_that_does_not_show_is_not_asked_for() -> None:
     answers = [Answer("foreign", ("temperature-drift",), "mesh", {}, traces={"temperature-drift": size})
                for size in (0.1, 9.0)]  # fmt: skip
