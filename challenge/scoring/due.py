@@ -16,7 +16,8 @@ from gearbench.challenge.scoring.intervals import Rate
 from gearbench.challenge.scoring.outcomes import Outcome, named_effects
 
 DUE = 1.1
-DRIFT = "temperature-drift"  # shows between repetitions, not in their mean
+# What shows between repetitions, not in their mean.
+PASSING = ("temperature-drift", "non-synchronous-torque")
 
 
 def owed(outcome: Outcome) -> tuple[str, ...]:
@@ -33,7 +34,7 @@ def owed(outcome: Outcome) -> tuple[str, ...]:
     return tuple(
         name for name in sorted(shown)
         if (oracle is None or (gap := left[name]) is None or gap >= DUE * oracle)
-        and (outcome.found(name) or name == DRIFT or not closed)
+        and (outcome.found(name) or name in PASSING or not closed)
     )  # fmt: skip
 
 
@@ -45,6 +46,14 @@ def _at_the_noise(outcome: Outcome) -> bool:
         return False
     left = sizes.get("with_effect") or sizes["recalibrated"]
     return float(left[0]) < DUE * float(sizes["floor"][0])
+
+
+def is_foreign_due(outcome: Outcome) -> bool:
+    """Whether a diagnosis owes that something foreign is at work: the record shows it, and it is not recalibrated away
+    to the noise."""
+    answer = outcome.answer
+    passing = any(name in PASSING for name in answer.effects)
+    return kind_shown(answer) == "foreign" and (passing or not _at_the_noise(outcome))
 
 
 def shown_of(answer: Answer) -> frozenset[str]:
@@ -66,7 +75,7 @@ def right_verdict(outcome: Outcome) -> str:
     if answer.kind == "foreign":
         if outcome.result == "right":
             return "effect"
-        return "unknown" if kind_shown(answer) == "foreign" else "none"
+        return "unknown" if is_foreign_due(outcome) else "none"
     hit = any(outcome.told(name) for name in named_effects(outcome.verdict or {}))
     return "effect" if hit or owed(outcome) else "none"
 

@@ -9,7 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from gearbench.challenge.scoring.due import found_of_due, right_verdict, shown_of, true_of_named, within_intervals
+from gearbench.challenge.scoring.due import (
+    found_of_due,
+    is_foreign_due,
+    right_verdict,
+    true_of_named,
+    within_intervals,
+)
 from gearbench.challenge.scoring.intervals import COVERAGE, Rate, brier, calibration_error, middle, reliability
 from gearbench.challenge.scoring.outcomes import VERDICTS, Outcome, named_effects, said
 from gearbench.challenge.scoring.reach import reach_table
@@ -39,7 +45,7 @@ def score(outcomes: Sequence[Outcome]) -> Table:
             **_rates(foreign, FOREIGN_RESULTS),
             "place_right": _place(foreign).plain(),
             "refused_at_right_place": _rate(
-                [o for o in foreign if shown_of(o.answer)], lambda o: o.result in ("refused", "right") and o.place_right
+                [o for o in foreign if is_foreign_due(o)], lambda o: o.result in ("refused", "right") and o.place_right
             ).plain(),
         },
         "by_effect": {name: _effect_rows(name, group) for name, group in grouped([*effects, *foreign]).items()},

@@ -61,6 +61,19 @@ def test_the_place_of_a_foreign_effect_that_does_not_show_is_not_asked_for() -> 
     assert table["foreign"]["refused_at_right_place"]["total"] == 1
 
 
+@pytest.mark.parametrize(("name", "left", "due"), [
+    ("torque-filter", 0.109, False), ("torque-filter", 0.111, True), ("non-synchronous-torque", 0.109, True),
+])  # fmt: skip
+def test_the_place_of_a_foreign_effect_that_recalibration_takes_up_is_not_asked_for(
+    name: str, left: float, due: bool
+) -> None:
+    answer = Answer("foreign", (name,), "drive", {}, traces={name: 9.0})
+    gap = {"channel": "dte", "recalibrated": [left] * 3, "with_effect": None, "floor": [0.1] * 3}
+    one = judge("x", answer, verdict("none") | {"gap": [gap]})
+    assert score([one])["foreign"]["refused_at_right_place"]["total"] == due
+    assert right_verdict(one) == ("unknown" if due else "none")
+
+
 @pytest.mark.parametrize(
     ("kind", "trace", "shown"),
     [("foreign", 0.4, "none"), ("foreign", 4.0, "foreign"), ("effect", 0.4, "effect"), ("none", 0.0, "none")],
