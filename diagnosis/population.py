@@ -1,4 +1,4 @@
-"""The calibration made beforehand, over a population of rigs (benchmarks/diagnosis.md tells which)."""
+"""The calibration made beforehand, over a population of rigs (benchmarks/diagnosis_log.md tells which)."""
 
 from __future__ import annotations
 

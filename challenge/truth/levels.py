@@ -11,7 +11,7 @@ Array = NDArray[np.float64]
 
 RIPPLE_ORDERS = (6, 12, 18, 24)
 DELAYED = ("angle_driver", "angle_driven", "y_driver", "y_driven")
-# What counts as severity 1 of each effect (benchmarks/diagnosis.md).
+# What counts as severity 1 of each effect (benchmarks/diagnosis_log.md).
 FRICTION = 0.06
 RUNOUT = 10e-6
 PITCH = 3e-6

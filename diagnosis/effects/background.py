@@ -1,7 +1,7 @@
 """The background of every rig: what the nominal case leaves open, with how well it is known.
 
 Its priors are the uncertainties that the case states, else the documented defaults of `forces.nominal`; those that no
-case can state are numbers of this file, set on the development family (benchmarks/diagnosis.md).
+case can state are numbers of this file, set on the development family (benchmarks/diagnosis_log.md).
 """
 
 from __future__ import annotations

@@ -57,5 +57,5 @@ BACKLASH = Effect(
     hypotheses_of=hypotheses,
     add=add,
     unknowns=unknowns,
-    model_error=0.06,  # rms on the calibration family (benchmarks/diagnosis.md)
+    model_error=0.06,  # rms on the calibration family (benchmarks/diagnosis_log.md)
 )

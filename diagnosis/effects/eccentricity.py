@@ -97,5 +97,5 @@ ECCENTRICITY = Effect(
     hypotheses_of=hypotheses,
     add=add,
     unknowns=unknowns,
-    model_error=0.04,  # rms on the calibration family (benchmarks/diagnosis.md)
+    model_error=0.04,  # rms on the calibration family (benchmarks/diagnosis_log.md)
 )

@@ -12,7 +12,7 @@ from gearbench.rig import Rig
 
 KEY = "friction"
 # Coefficient: 0.06 is a usual value of lubricated steel flanks, and severity 1 of the truth rigs of `challenge`. That
-# of sound rigs, 7 % of it, was set on the development family (benchmarks/diagnosis.md).
+# of sound rigs, 7 % of it, was set on the development family (benchmarks/diagnosis_log.md).
 SD, WIDE = 0.004, 0.06
 
 
@@ -44,5 +44,5 @@ FRICTION = Effect(
     add=add,
     unknowns=unknowns,
     always=True,  # it trades with the shape of the mesh stiffness, so that the background's quadratic misses it
-    model_error=0.17,  # rms on the calibration family (benchmarks/diagnosis.md)
+    model_error=0.17,  # rms on the calibration family (benchmarks/diagnosis_log.md)
 )

@@ -81,7 +81,7 @@ PITCH_ERROR = Effect(
     add=add,
     unknowns=unknowns,
     # Where flanks separate a rig's structure imitates them: up to 52 nats on controls of the calibration family, 84 and
-    # more on rigs that have them (benchmarks/diagnosis.md).
+    # more on rigs that have them (benchmarks/diagnosis_log.md).
     limit=60.0,
     model_error=0.23,  # rms on the calibration family
 )

@@ -31,5 +31,5 @@ TEMPERATURE_DRIFT = Effect(
     fields=(),
     hypotheses_of=hypotheses,
     add=add,
-    model_error=0.06,  # of -0.070 on a rig of the calibration family; benchmarks/diagnosis.md
+    model_error=0.06,  # of -0.070 on a rig of the calibration family; benchmarks/diagnosis_log.md
 )

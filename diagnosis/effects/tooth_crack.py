@@ -75,5 +75,5 @@ TOOTH_CRACK = Effect(
     unknowns=unknowns,
     least_size=LEAST,
     most_refits=2,  # the quadratic ranks teeth well: more would take the places of other effects
-    model_error=0.30,  # rms on the calibration family (benchmarks/diagnosis.md)
+    model_error=0.30,  # rms on the calibration family (benchmarks/diagnosis_log.md)
 )

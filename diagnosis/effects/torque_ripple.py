@@ -104,7 +104,7 @@ TORQUE_RIPPLE = Effect(
     hypotheses_of=hypotheses,
     add=add,
     unknowns=unknowns,
-    # rms on the calibration family (benchmarks/diagnosis.md)
+    # rms on the calibration family (benchmarks/diagnosis_log.md)
     model_error=0.03,
     force_error=0.13,
 )

@@ -1,7 +1,7 @@
 """Diagnosis: time and verdict of one diagnosis, and a small challenge.
 
 The challenge is a spot check of fixed seed on truth rigs of the development family: 15 cases give a point estimate. The
-full scoring on fresh seeds of the test family, with its intervals, is logged in benchmarks/diagnosis.md.
+full scoring on fresh seeds of the test family, with its intervals, is logged in benchmarks/diagnosis_log.md.
 """
 
 from __future__ import annotations
@@ -103,7 +103,7 @@ def withheld() -> Got:
     right = table["effect"]["right"]
     return Got(
         right["share"],
-        f"point estimate of {right['total']} cases, the full scoring is logged in benchmarks/diagnosis.md;"
+        f"point estimate of {right['total']} cases, the full scoring is logged in benchmarks/diagnosis_log.md;"
         f" effects: {told(table['effect'])}; controls: {told(table['none'])}; foreign: {told(table['foreign'])}",
     )
 
