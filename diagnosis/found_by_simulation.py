@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import sqrt
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ from gearbench.diagnosis.account import (
     sentence_of_rivals,
     sentence_of_shares,
 )
+from gearbench.diagnosis.detection.detectable import too_small
 from gearbench.diagnosis.effects.backlash import BACKLASH
 from gearbench.diagnosis.effects.temperature_drift import TEMPERATURE_DRIFT
 from gearbench.diagnosis.evidence.calibration import LIMITS
@@ -28,9 +29,9 @@ from gearbench.diagnosis.forces.equations import PLACES
 from gearbench.diagnosis.forces.steadiness import Unsteady, changing_parts
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.judging.candidates import candidates_of
-from gearbench.diagnosis.judging.chances import chances_of, sentence_of_doubt, unlikely
+from gearbench.diagnosis.judging.chances import Chances, chances_of, sentence_of_doubt, sentence_of_size, unlikely
 from gearbench.diagnosis.judging.closing import DUE
-from gearbench.diagnosis.judging.decided import decide_simulated
+from gearbench.diagnosis.judging.decided import Decided, decide_simulated
 from gearbench.diagnosis.judging.drift import drift_of
 from gearbench.diagnosis.judging.judged import Judged
 from gearbench.diagnosis.judging.missing import Missing, missing_forces, nothing_missing
@@ -74,27 +75,10 @@ def by_simulation(
     report: Report,
 ) -> Finding:
     """The finding that simulation justifies."""
-    entered = found.selection.entered
-    judged = judged_of_size(of.problem, _judgeable(of, found, held_out), held_out, of.measurements, report)
+    settled = _settled(of, found, held_out, known, report)
+    judged, decided, chances, missing = settled.judged, settled.decided, settled.chances, settled.missing
+    found, signs, changing = judged.found, settled.signs, settled.signs["changing"]
     band = of.problem.conditions[0].band
-    changing = changing_of(judged, changing_parts(of.steady, band))
-    doubts: tuple[str, ...] = ()
-    while True:
-        found = judged.found
-        missing = _missing(of, found)
-        signs = {f"over {place}": float(over) for place, over in zip(PLACES, missing.over, strict=True)}
-        missing = replace(missing, factors=np.array([known.outstanding.get(place, 1.0) for place in PLACES]))
-        drift = None if TEMPERATURE_DRIFT.name in of.without else drift_of(found, of.unsteady.worst(LIMITS.unsteady)[0])
-        decided = decide_simulated(judged, of.result, missing, of.unsteady, changing, known=known, drift=drift)
-        signs |= {"lines": float(found.simulator.target.counts.sum()), "unknown": decided.sign, "left": judged.left,
-                  "remains": judged.remains, "searched": judged.searched, "hidden": judged.hidden,
-                  "changing": changing}  # fmt: skip
-        chances = chances_of(judged, decided, known, signs["lines"], (*entered, *judged.dropped))
-        doubtful = unlikely(decided, chances)
-        if doubtful is None:
-            break
-        doubts = (*doubts, sentence_of_doubt(doubtful, chances))
-        judged = judged_of_size(of.problem, left_out(found, (doubtful,)), held_out, of.measurements, report)
     kept = [one.hypothesis for one in decided.named]
     flanks = other_flanks(found.layout.unknowns, found.selection.best.p)
     way = judged.along
@@ -110,7 +94,7 @@ def by_simulation(
         where=places_of(judged, kept, missing),
         recalibrated=found.recalibrated if kept else found.without_any,
         with_effect=found.with_effects if decided.named else None,
-        because=(*decided.because, *why(judged, decided.named), *doubts, *flanks,
+        because=(*decided.because, *why(judged, decided.named), *settled.doubts, *flanks,
                  *([way.sentence()] if way else []), *sentences_of_others(of.measurements, of.steady, band)),
         structure=structure_found(found.layout.unknowns, found.selection.best.p, found.std),
         missing=missing,
@@ -126,6 +110,59 @@ def by_simulation(
         problem=of.problem,
         **common,
     )
+
+
+class _Settled(NamedTuple):
+    """What was decided on the judged record, with its chances and signs, and what was not named for want of them."""
+
+    judged: Judged
+    decided: Decided
+    chances: Chances
+    missing: Missing
+    signs: dict[str, float]
+    doubts: tuple[str, ...]
+
+
+def _settled(
+    of: Searched, found: Simulated, held_out: Measurement | None, known: Calibration, report: Report
+) -> _Settled:
+    """The decision, made again without each effect that is named and is not likely, or smaller than the records
+    tell."""
+    entered, doubts = found.selection.entered, list[str]()
+    judged = judged_of_size(of.problem, _judgeable(of, found, held_out), held_out, of.measurements, report)
+    changing = changing_of(judged, changing_parts(of.steady, of.problem.conditions[0].band))
+    while True:
+        found = judged.found
+        missing = _missing(of, found)
+        signs = {f"over {place}": float(over) for place, over in zip(PLACES, missing.over, strict=True)}
+        missing = replace(missing, factors=np.array([known.outstanding.get(place, 1.0) for place in PLACES]))
+        place, _ = of.unsteady.worst(LIMITS.unsteady)
+        drift = None if TEMPERATURE_DRIFT.name in of.without else drift_of(found, place)
+        decided = decide_simulated(judged, of.result, missing, of.unsteady, changing, known=known, drift=drift)
+        signs |= {"lines": float(found.simulator.target.counts.sum()), "unknown": decided.sign, "left": judged.left,
+                  "remains": judged.remains, "searched": judged.searched, "hidden": judged.hidden,
+                  "changing": changing}  # fmt: skip
+        chances = chances_of(judged, decided, known, signs["lines"], (*entered, *judged.dropped))
+        doubtful = unlikely(decided, chances)
+        if doubtful is not None:
+            doubts.append(sentence_of_doubt(doubtful, chances))
+        else:
+            doubtful = _too_small(of, judged, decided.named)
+            if doubtful is None:
+                return _Settled(judged, decided, chances, missing, signs, tuple(doubts))
+            doubts.append(sentence_of_size(doubtful))
+        judged = judged_of_size(of.problem, left_out(found, (doubtful,)), held_out, of.measurements, report)
+
+
+def _too_small(of: Searched, judged: Judged, named: Sequence[Weighed]) -> Weighed | None:
+    """The named effect that is furthest below the size that the records would have named; None without any, or where
+    none has a size that a rig may have."""
+    if judged.target is None:
+        return None
+    try:
+        return too_small(of.problem, judged, named)
+    except ValueError:
+        return None
 
 
 def _judgeable(of: Searched, found: Simulated, held_out: Measurement | None) -> Simulated:

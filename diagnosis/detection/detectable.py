@@ -27,12 +27,17 @@ from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.judging.judged import Judged
 from gearbench.diagnosis.selection.followable import nudges_of, parts
 from gearbench.diagnosis.selection.simulated import Simulated
+from gearbench.diagnosis.selection.weighing import Weighed
 from gearbench.diagnosis.simulation.quadratic import quadratic_of
 from gearbench.diagnosis.simulation.simulator import Simulator
 from gearbench.diagnosis.simulation.target import target_of
 from gearbench.diagnosis.verdict import Detectable, Smallest
 
 Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+# Part of the nominal gap, by energy, from which an effect is plain to see whatever these records were expected to tell.
+PLAIN = 0.01
 
 
 def detectable_of(
@@ -40,21 +45,48 @@ def detectable_of(
 ) -> tuple[Detectable, ...]:
     """What the records `searched` and the judged one would have shown of every effect of the library but those left
     out; nothing where the rig found does not answer the judged record."""
-    found = judged.found
-    simulator = _answering(problem, judged)
-    target = simulator.target
-    best = found.selection.best
-    lines = simulator.lines(best.p)
-    if lines is None:
+    found, simulator = judged.found, _answering(problem, judged)
+    answer = _answer(found, simulator)
+    if answer is None:
         return ()
-    left = target.floors + target.energies(target.lines - lines)
     measured = ("driver", "driven", *judged.measured.periods)
     listed = [one for one in library(problem.model, without) if one.wide[0].key not in (CRACK, KEY)]
     listed = [one for one in listed if all(name in measured for name in one.on)]
-    out = [*_by_information(found, simulator, [*listed, *_cracks(problem, found, without)], target.lines - lines, left)]
+    told = _by_information(found, simulator, [*listed, *_cracks(problem, found, without)], *answer)
+    out = [_told(one, sizes) for one, sizes in told]
     if BACKLASH.name not in without:
-        out.append(_backlash(problem, Changed(simulator, best.p, left), searched, found))
+        out.append(_backlash(problem, Changed(simulator, found.selection.best.p, answer[1]), searched, found))
     return tuple(out)
+
+
+def too_small(problem: Problem, judged: Judged, named: Sequence[Weighed]) -> Weighed | None:
+    """Of the named effects that are no plain part of the gap, the one furthest below the size from which these records
+    would name it; None without any. What speaks for such an effect is something else that looks like it: of that size
+    it would not have been found."""
+    slight = [one for one in named if one.effect is not BACKLASH and judged.share_of(one.hypothesis) < PLAIN]
+    found, simulator = judged.found, _answering(problem, judged)
+    answer = _answer(found, simulator) if slight else None
+    if answer is None:
+        return None
+    unknowns, p = found.layout.unknowns, found.selection.best.p
+    parts = {}
+    for one, sizes in _by_information(found, simulator, [one.hypothesis for one in slight], *answer):
+        at = one.entries(unknowns)
+        size = float(np.sqrt(np.mean((p[at] / one.prior(unknowns)[at]) ** 2)))
+        parts[one.name] = size / (np.inf if sizes.found is None else sizes.found)
+    least = min(slight, key=lambda one: parts.get(one.hypothesis.name, 1.0))
+    return least if parts.get(least.hypothesis.name, 1.0) < 1.0 else None
+
+
+def _answer(found: Simulated, simulator: Simulator) -> tuple[Complex, Array] | None:
+    """What the rig found leaves of the judged record's lines (K,), and floors (blocks,) that hold it; None where it
+    does not answer."""
+    target = simulator.target
+    lines = simulator.lines(found.selection.best.p)
+    if lines is None:
+        return None
+    residual = target.lines - lines
+    return residual, target.floors + target.energies(residual)
 
 
 def _answering(problem: Problem, judged: Judged) -> Simulator:
@@ -82,9 +114,8 @@ def _cracks(problem: Problem, found: Simulated, without: Sequence[str]) -> list[
 
 
 def _by_information(
-    found: Simulated, simulator: Simulator, hypotheses: Sequence[Hypothesis], residual: NDArray[np.complex128],
-    left: Array,
-) -> list[Detectable]:  # fmt: skip
+    found: Simulated, simulator: Simulator, hypotheses: Sequence[Hypothesis], residual: Complex, left: Array
+) -> list[tuple[Hypothesis, Sizes]]:
     """Of effects whose traces grow with them."""
     unknowns, best, base = found.layout.unknowns, found.selection.best, found.selection.base
     search = best.sensitivity.quadratic
@@ -99,7 +130,7 @@ def _by_information(
         narrow, at = best.sd.copy(), one.entries(unknowns)
         narrow[at] = base.sd[at]
         view = View(Known(unknowns, search.active, narrow, Blocks(search), Blocks(judged)), (one,))
-        out.append(_told(one, sizes_of(found.layout, view, 0)))
+        out.append((one, sizes_of(found.layout, view, 0)))
     return out
 
 

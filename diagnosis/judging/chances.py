@@ -76,3 +76,12 @@ def sentence_of_doubt(one: Weighed, chances: Chances) -> str:
         f"{noun[0].upper()}{noun[1:]} would close a part of the gap, but is"
         f" not twice as likely at work as not ({percent(chances.named[one.hypothesis.name])})"
     )
+
+
+def sentence_of_size(one: Weighed) -> str:
+    """Why an effect that is smaller than the records tell is not named."""
+    noun = one.effect.noun
+    return (
+        f"{noun[0].upper()}{noun[1:]} would close a small part of the gap, but is smaller than these records would"
+        " tell, so that something like it may be at work"
+    )

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from shared.simulated_lines import quicker
 
-from gearbench.diagnosis.detection.detectable import detectable_of
+from gearbench.diagnosis.detection.detectable import _answering, detectable_of, too_small
 from gearbench.diagnosis.detection.smallest import View
 from gearbench.diagnosis.detection.stated import sizes_of
 from gearbench.diagnosis.effects.effect import Hypothesis
@@ -21,6 +21,7 @@ from gearbench.diagnosis.planning.plan import LEFT
 from gearbench.diagnosis.planning.planned import Planned, planned
 from gearbench.diagnosis.selection.selection import Selection
 from gearbench.diagnosis.selection.simulated import Simulated
+from gearbench.diagnosis.selection.weighing import Weighed
 from gearbench.diagnosis.verdict import Smallest
 
 FASTER = 4
@@ -101,3 +102,26 @@ def test_a_named_effect_is_told_beside_the_others_alone(made: Made) -> None:
     wide = replace(selection.best, sd=friction.widened(found.layout.unknowns, selection.best.sd))
     named = replace(made.judged, found=found.with_selection(replace(selection, best=wide)))
     assert friction_of(made, named) == friction_of(made, made.judged)
+
+
+@pytest.mark.parametrize(("part", "share", "small"), [(0.8, 1e-4, True), (1.2, 1e-4, False), (0.8, 0.02, False)])
+def test_a_named_effect_below_what_would_be_named_is_too_small(
+    made: Made, monkeypatch: pytest.MonkeyPatch, part: float, share: float, small: bool
+) -> None:
+    """But for one that is a plain part of the gap."""
+    monkeypatch.setattr(Judged, "share_of", lambda judged, effect: share)
+    found, selection = made.judged.found, made.judged.found.selection
+    unknowns, least = found.layout.unknowns, friction_of(made, made.judged).value
+    assert least is not None
+    (friction,) = (one for one in hypotheses(made.problem.model) if one.name == "friction")
+    p = selection.best.p.copy()
+    p[friction.entries(unknowns)] = part * least
+    named = Weighed(friction, 40.0, None)
+    best = replace(selection.best, p=p, sd=friction.widened(unknowns, selection.best.sd))
+    judged = replace(made.judged, found=found.with_selection(replace(selection, best=best)))
+    # The record is that of the rig with the effect, so that nothing is left of it.
+    simulator = _answering(made.problem, judged)
+    lines = simulator.lines(p)
+    assert judged.target is not None and lines is not None
+    there = replace(judged, target=replace(judged.target, lines=lines))
+    assert (too_small(made.problem, there, [named]) is named) == small
