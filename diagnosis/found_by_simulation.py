@@ -29,7 +29,14 @@ from gearbench.diagnosis.forces.equations import PLACES
 from gearbench.diagnosis.forces.steadiness import Unsteady, changing_parts
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.judging.candidates import candidates_of
-from gearbench.diagnosis.judging.chances import Chances, chances_of, sentence_of_doubt, sentence_of_size, unlikely
+from gearbench.diagnosis.judging.chances import (
+    Chances,
+    chances_of,
+    sentence_of_astray,
+    sentence_of_doubt,
+    sentence_of_size,
+    unlikely,
+)
 from gearbench.diagnosis.judging.closing import DUE
 from gearbench.diagnosis.judging.decided import Decided, decide_simulated
 from gearbench.diagnosis.judging.drift import drift_of
@@ -126,8 +133,8 @@ class _Settled(NamedTuple):
 def _settled(
     of: Searched, found: Simulated, held_out: Measurement | None, known: Calibration, report: Report
 ) -> _Settled:
-    """The decision, made again without each effect that is named and is not likely, or smaller than the records
-    tell."""
+    """The decision, made again without each effect that is named and is not likely, or smaller than the records tell,
+    and without all where the rig is closer to the judged record without any."""
     entered, doubts = found.selection.entered, list[str]()
     judged = judged_of_size(of.problem, _judgeable(of, found, held_out), held_out, of.measurements, report)
     changing = changing_of(judged, changing_parts(of.steady, of.problem.conditions[0].band))
@@ -143,15 +150,17 @@ def _settled(
                   "remains": judged.remains, "searched": judged.searched, "hidden": judged.hidden,
                   "changing": changing}  # fmt: skip
         chances = chances_of(judged, decided, known, signs["lines"], (*entered, *judged.dropped))
-        doubtful = unlikely(decided, chances)
-        if doubtful is not None:
+        if decided.named and judged.is_astray:
+            doubts += map(sentence_of_astray, out := decided.named)
+        elif doubtful := unlikely(decided, chances):
             doubts.append(sentence_of_doubt(doubtful, chances))
-        else:
-            doubtful = _too_small(of, judged, decided.named)
-            if doubtful is None:
-                return _Settled(judged, decided, chances, missing, signs, tuple(doubts))
+            out = (doubtful,)
+        elif doubtful := _too_small(of, judged, decided.named):
             doubts.append(sentence_of_size(doubtful))
-        judged = judged_of_size(of.problem, left_out(found, (doubtful,)), held_out, of.measurements, report)
+            out = (doubtful,)
+        else:
+            return _Settled(judged, decided, chances, missing, signs, tuple(doubts))
+        judged = judged_of_size(of.problem, left_out(found, out), held_out, of.measurements, report)
 
 
 def _too_small(of: Searched, judged: Judged, named: Sequence[Weighed]) -> Weighed | None:

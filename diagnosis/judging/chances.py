@@ -85,3 +85,9 @@ def sentence_of_size(one: Weighed) -> str:
         f"{noun[0].upper()}{noun[1:]} would close a small part of the gap, but is smaller than these records would"
         " tell, so that something like it may be at work"
     )
+
+
+def sentence_of_astray(one: Weighed) -> str:
+    """Why an effect is not named with which the rig is further from the judged record than without any."""
+    noun = one.effect.noun
+    return f"The records of the search speak for {noun}, but the rig without it is far closer to the judged record"

@@ -24,6 +24,8 @@ Report = Callable[[str], None]
 # Of the nominal gap, rms over rms and all channels in units of their own fluctuation: more than this part left is "the
 # greater part".
 GREATER = 0.5
+# Of what the rig without any effect leaves, from which one with effects goes another way.
+ASTRAY = 1.5
 
 
 @dataclass(frozen=True)
@@ -99,10 +101,20 @@ class Judged:
     def left(self) -> float:
         """Rms of what is left of the nominal gap, over it, all channels in units of their own fluctuation, beyond
         noise."""
+        return self._part(self._left)
+
+    @property
+    def is_astray(self) -> bool:
+        """Whether the rig without any effect is far closer to the record than that with what was named."""
+        plain = self._part({channel: one.plain for channel, one in self.sizes.items()})
+        return self.kept is None and self.left > ASTRAY * plain
+
+    def _part(self, rms: Mapping[str, float]) -> float:
+        """Rms by channel over the nominal gap, all in units of their own fluctuation, beyond noise."""
         gap = left = 0.0
         for channel, one in self.sizes.items():
             gap += max(one.nominal**2 - one.noise**2, 0.0) / one.fluctuation**2
-            left += max(self._left[channel] ** 2 - one.noise**2, 0.0) / one.fluctuation**2
+            left += max(rms[channel] ** 2 - one.noise**2, 0.0) / one.fluctuation**2
         return float(np.sqrt(left / gap)) if gap > 0.0 else 0.0
 
     @property

@@ -298,6 +298,17 @@ def test_a_rig_strays_whose_gap_is_that_of_another_way(monkeypatch: pytest.Monke
     assert there.share(off) == pytest.approx((1.0 - 0.04) / 3.99) and made.share(off) == 0.0
 
 
+def test_a_rig_is_astray_that_is_further_off_than_that_without_any_effect(monkeypatch: pytest.MonkeyPatch) -> None:
+    wave = np.cos(2 * np.pi * np.arange(64)[:, None] * np.arange(3) / 64)
+    mean = 3.0 * wave[:, 1]
+    monkeypatch.setattr(judged_module, "measured_channels", lambda one: {"dte": mean[None]})
+    nominal, plain, near, far = ({"dte": mean - size * wave[:, 2]} for size in (2.0, 0.4, 0.59, 0.61))
+    made = [Judged(None, None, {}, nominal, plain, final) for final in (plain, near, far)]  # type: ignore[arg-type]
+    assert [one.is_astray for one in made] == [False, False, True]
+    # A rig that goes another way than the record is judged along the record's.
+    assert not replace(made[2], kept=near).is_astray
+
+
 def test_beyond_the_lines_of_the_search_nothing_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
     """A resonance above the excitation is no part of the gap, nor of what a channel fluctuates by."""
     wave = np.exp(2j * np.pi * np.arange(64)[:, None] * np.arange(32) / 64).real
