@@ -18,11 +18,12 @@ from gearbench.diagnosis.detection.opened import Changed, backlashes, smallest_b
 from gearbench.diagnosis.detection.smallest import View
 from gearbench.diagnosis.detection.stated import Sizes, sizes_of
 from gearbench.diagnosis.effects.backlash import BACKLASH, KEY
-from gearbench.diagnosis.effects.effect import Hypothesis
+from gearbench.diagnosis.effects.effect import SIDES, Hypothesis
 from gearbench.diagnosis.effects.library import hypotheses as library
 from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
 from gearbench.diagnosis.evidence.problem import Problem
 from gearbench.diagnosis.forces.condition import prepare
+from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.judging.judged import Judged
 from gearbench.diagnosis.selection.followable import nudges_of, parts
@@ -71,11 +72,16 @@ def too_small(problem: Problem, judged: Judged, named: Sequence[Weighed]) -> Wei
     unknowns, p = found.layout.unknowns, found.selection.best.p
     parts = {}
     for one, sizes in _by_information(found, simulator, [one.hypothesis for one in slight], *answer):
-        at = one.entries(unknowns)
-        size = float(np.sqrt(np.mean((p[at] / one.prior(unknowns)[at]) ** 2)))
+        size = float(np.sqrt(np.mean(_without_mean(one, unknowns, p / np.maximum(one.prior(unknowns), 1e-300)) ** 2)))
         parts[one.name] = size / (np.inf if sizes.found is None else sizes.found)
     least = min(slight, key=lambda one: parts.get(one.hypothesis.name, 1.0))
     return least if parts.get(least.hypothesis.name, 1.0) < 1.0 else None
+
+
+def _without_mean(one: Hypothesis, unknowns: Unknowns, values: Array) -> Array:
+    """Those of its unknowns (entries,) out of `values` (size,); teeth or flanks that all stand out alike are even."""
+    groups = [values[wide.entries(unknowns)] for wide in one.wide]
+    return np.concatenate([group - group.mean() if len(group) > len(SIDES) else group for group in groups])
 
 
 def _answer(found: Simulated, simulator: Simulator) -> tuple[Complex, Array] | None:
