@@ -1,7 +1,8 @@
 """What comes back from a rig: the record, its channels, its file and its provenance.
 
-`checks`: what a record alone tells of its own faults. `formats`: files of measuring programs, one importer each.
-`conversion`: from their columns to a record. `pieces`: a record written piece by piece.
+`checks`: what a record alone tells of its own faults, `clocks`: those of time, `seen`: a record as both see it.
+`formats`: files of measuring programs, one importer each. `conversion`: from their columns to a record. `pieces`: a
+record written piece by piece.
 """
 
 from gearbench.records.channels import unit_of_channel

@@ -181,8 +181,8 @@ def _teeth(bench: Bench, rig: Structure, levels: Levels) -> Teeth:
     # As the nominal model counts it: the mass of the turning parts before the mesh, the load's speed being held.
     mesh_mass = (rig.inertia[0] + rig.inertia[1]) / meshing.driver.base_radius**2
     # The ratio is that under the mean torque, as a verdict states it.
-    relative = load / wanted / reference
-    damping = 2 * rig.damping_ratio * np.sqrt(mesh_mass / wanted) / (1.0 + rig.damping_load * (relative - 1.0))
+    damping = 2 * rig.damping_ratio * np.sqrt(mesh_mass / wanted)
+    loaded = 1.0 + rig.damping_load * (load / wanted / reference - 1.0)
     crack = [loss / (1.0 - loss) for loss in levels.crack]
     more = levels.backlash_more * meshing.driver.base_radius / meshing.driver.reference_radius
     rate = RATE * bench.scale.length * bench.scale.frequency
@@ -200,7 +200,7 @@ def _teeth(bench: Bench, rig: Structure, levels: Levels) -> Teeth:
         exponent=rig.exponent + levels.contact,
         reference=reference,
         backlash=meshing.backlash_normal + more,
-        damping=float(damping),
+        damping=float(damping / loaded),
         damping_load=rig.damping_load,
         damping_onset=rig.damping_onset,
         damping_quadratic=float(damping) * levels.foreign.damping_quadratic / rate,
