@@ -17,6 +17,7 @@ from gearbench.diagnosis.evidence.search import Search, Tried
 from gearbench.diagnosis.forces.condition import Condition, prepare
 from gearbench.diagnosis.forces.nominal import NominalModel, nominal_model
 from gearbench.diagnosis.forces.residuals import residuals
+from gearbench.diagnosis.forces.steadiness import Unsteady
 from gearbench.diagnosis.forces.unknowns import Unknowns
 
 Prepared = tuple[NominalModel, Condition, Unknowns]
@@ -65,4 +66,4 @@ def test_it_is_named_beyond_three_standard_deviations(prepared: Prepared, size: 
     ones = np.ones(1)
     fit = Fit(ones, ones, np.eye(1), np.eye(1), ones, (), 0.0, 0.0, 1)
     tried = Tried(MESH_DAMPING.hypotheses(prepared[0])[0], 40.0, fit, size)
-    assert decide(Search(fit, (tried,)), np.zeros(5), np.zeros(5)).verdict == verdict
+    assert decide(Search(fit, (tried,)), np.zeros(5), Unsteady.nothing()).verdict == verdict
