@@ -138,29 +138,36 @@ def _settled(
     entered, doubts = found.selection.entered, list[str]()
     judged = judged_of_size(of.problem, _judgeable(of, found, held_out), held_out, of.measurements, report)
     changing = changing_of(judged, changing_parts(of.steady, of.problem.conditions[0].band))
+    place, _ = of.unsteady.worst(LIMITS.unsteady)
     while True:
         found = judged.found
         missing = _missing(of, found)
         signs = {f"over {place}": float(over) for place, over in zip(PLACES, missing.over, strict=True)}
         missing = replace(missing, factors=np.array([known.outstanding.get(place, 1.0) for place in PLACES]))
-        place, _ = of.unsteady.worst(LIMITS.unsteady)
         drift = None if TEMPERATURE_DRIFT.name in of.without else drift_of(found, place)
         decided = decide_simulated(judged, of.result, missing, of.unsteady, changing, known=known, drift=drift)
         signs |= {"lines": float(found.simulator.target.counts.sum()), "unknown": decided.sign, "left": judged.left,
                   "remains": judged.remains, "searched": judged.searched, "hidden": judged.hidden,
                   "changing": changing}  # fmt: skip
         chances = chances_of(judged, decided, known, signs["lines"], (*entered, *judged.dropped))
-        if decided.named and judged.is_astray:
-            doubts += map(sentence_of_astray, out := decided.named)
-        elif doubtful := unlikely(decided, chances):
-            doubts.append(sentence_of_doubt(doubtful, chances))
-            out = (doubtful,)
-        elif doubtful := _too_small(of, judged, decided.named):
-            doubts.append(sentence_of_size(doubtful))
-            out = (doubtful,)
-        else:
+        out, said = _doubted(of, judged, decided, chances)
+        doubts += said
+        if not out:
             return _Settled(judged, decided, chances, missing, signs, tuple(doubts))
         judged = judged_of_size(of.problem, left_out(found, out), held_out, of.measurements, report)
+
+
+def _doubted(
+    of: Searched, judged: Judged, decided: Decided, chances: Chances
+) -> tuple[tuple[Weighed, ...], list[str]]:
+    """Of the named effects those that are to be left out next, and why."""
+    if decided.named and judged.is_astray:
+        return decided.named, [sentence_of_astray(one) for one in decided.named]
+    if one := unlikely(decided, chances):
+        return (one,), [sentence_of_doubt(one, chances)]
+    if one := _too_small(of, judged, decided.named):
+        return (one,), [sentence_of_size(one)]
+    return (), []
 
 
 def _too_small(of: Searched, judged: Judged, named: Sequence[Weighed]) -> Weighed | None:

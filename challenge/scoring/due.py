@@ -13,7 +13,7 @@ from math import inf, sqrt
 
 from gearbench.challenge.answers import Answer
 from gearbench.challenge.scoring.intervals import Rate
-from gearbench.challenge.scoring.outcomes import Outcome, named_effects
+from gearbench.challenge.scoring.outcomes import Outcome
 
 DUE = 1.1
 # What shows between repetitions, not in their mean.
@@ -76,7 +76,7 @@ def right_verdict(outcome: Outcome) -> str:
         if outcome.result == "right":
             return "effect"
         return "unknown" if is_foreign_due(outcome) else "none"
-    hit = any(outcome.told(name) for name in named_effects(outcome.verdict or {}))
+    hit = any(outcome.told(name) for name in outcome.named)
     return "effect" if hit or owed(outcome) else "none"
 
 
@@ -94,7 +94,7 @@ def true_of_named(outcomes: Sequence[Outcome]) -> Rate:
     """How many of the effects named in any case were at work there; one of a class with the true one counts."""
     true = total = 0
     for outcome in outcomes:
-        for name in named_effects(outcome.verdict) if outcome.verdict else ():
+        for name in outcome.named:
             total += 1
             true += outcome.told(name)
     return Rate(true, total)

@@ -36,6 +36,11 @@ class Outcome:
     result: str
     place_right: bool
 
+    @property
+    def named(self) -> tuple[str, ...]:
+        """Names of the effects that the verdict gives; none where it failed."""
+        return named_effects(self.verdict or {})
+
     def at_work(self, effect: str) -> bool:
         """Whether a named effect was at work: a foreign one, too, if the library has it after all."""
         return effect in self.answer.effects
@@ -43,16 +48,13 @@ class Outcome:
     def told(self, effect: str) -> bool:
         """Whether a named effect was at work, or one that was and is not named, which the verdict says that it cannot
         tell from it."""
-        return self.at_work(effect) or bool(self._like(effect) & (set(self.answer.effects) - self._named))
+        return self.at_work(effect) or bool(self._like(effect) & set(self.answer.effects).difference(self.named))
 
     def found(self, effect: str) -> bool:
         """Whether an effect at work was named, or one that was not at work in its class."""
-        named = self._named
-        return effect in named or any(effect in self._like(other) for other in named - set(self.answer.effects))
-
-    @property
-    def _named(self) -> set[str]:
-        return set(named_effects(self.verdict or {}))
+        return effect in self.named or any(
+            effect in self._like(other) for other in self.named if not self.at_work(other)
+        )
 
     def _like(self, effect: str) -> set[str]:
         """Effects of the library that the verdict cannot tell from one of it."""

@@ -17,7 +17,7 @@ from gearbench.challenge.scoring.due import (
     within_intervals,
 )
 from gearbench.challenge.scoring.intervals import COVERAGE, Rate, brier, calibration_error, middle, reliability
-from gearbench.challenge.scoring.outcomes import VERDICTS, Outcome, named_effects, said
+from gearbench.challenge.scoring.outcomes import VERDICTS, Outcome, said
 from gearbench.challenge.scoring.reach import reach_table
 from gearbench.challenge.scoring.smallest import smallest_table
 from gearbench.challenge.truth.effects import EFFECTS, SEVERITY
@@ -78,7 +78,7 @@ def grouped(outcomes: Sequence[Outcome]) -> dict[str, list[Outcome]]:
 def _several(outcomes: Sequence[Outcome]) -> Table:
     """Of cases with several effects: how many of the effects were named, and how many of the names were true."""
     at_work = [outcome.found(effect) for outcome in outcomes for effect in outcome.answer.effects]
-    named = [outcome.told(name) for outcome in outcomes for name in named_effects(outcome.verdict or {})]
+    named = [outcome.told(name) for outcome in outcomes for name in outcome.named]
     return {
         "cases": len(outcomes),
         "found": Rate(sum(at_work), len(at_work)).plain(),
@@ -128,7 +128,7 @@ def _confusion(outcomes: Sequence[Outcome]) -> Table:
         true = "+".join(outcome.answer.effects) or "none"
         name = "failed"
         if outcome.verdict is not None:
-            name = "+".join(sorted(named_effects(outcome.verdict))) or said(outcome.verdict)
+            name = "+".join(sorted(outcome.named)) or said(outcome.verdict)
         row = table.setdefault(true, {})
         row[name] = row.get(name, 0) + 1
     return table
@@ -230,7 +230,7 @@ def _oracle_ratio(outcome: Outcome) -> float | None:
     candidates = outcome.verdict.get("candidates", ())
     listed = {frozenset(candidate["effects"]): candidate.get("held_out") for candidate in candidates}
     oracle = listed.get(frozenset(outcome.answer.effects))
-    chosen = listed.get(frozenset(named_effects(outcome.verdict)))
+    chosen = listed.get(frozenset(outcome.named))
     return float(chosen) / float(oracle) if chosen is not None and oracle else None
 
 

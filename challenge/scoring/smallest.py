@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from gearbench.challenge.scoring.due import owed
-from gearbench.challenge.scoring.outcomes import Outcome, named_effects
+from gearbench.challenge.scoring.outcomes import Outcome
 
 HIDDEN = 3.0  # standard deviations that the records alone do not tell from nothing
 
@@ -66,7 +66,7 @@ def smallest_table(outcomes: Sequence[Outcome]) -> Table:
     for outcome in outcomes:
         if outcome.answer.kind != "effect" or outcome.verdict is None:
             continue
-        due, names = owed(outcome), named_effects(outcome.verdict)
+        due, names = owed(outcome), outcome.named
         for effect in outcome.answer.effects:
             one = beside(outcome, effect)
             if not outcome.found(effect):

@@ -65,23 +65,26 @@ def too_small(problem: Problem, judged: Judged, named: Sequence[Weighed]) -> Wei
     would name it; None without any. What speaks for such an effect is something else that looks like it: of that size
     it would not have been found."""
     slight = [one for one in named if one.effect is not BACKLASH and judged.share_of(one.hypothesis) < PLAIN]
+    if not slight:
+        return None
     found, simulator = judged.found, _answering(problem, judged)
-    answer = _answer(found, simulator) if slight else None
+    answer = _answer(found, simulator)
     if answer is None:
         return None
-    unknowns, p = found.layout.unknowns, found.selection.best.p
-    parts = {}
+    unknowns, p, parts = found.layout.unknowns, found.selection.best.p, dict[str, float]()
     for one, sizes in _by_information(found, simulator, [one.hypothesis for one in slight], *answer):
-        size = float(np.sqrt(np.mean(_without_mean(one, unknowns, p / np.maximum(one.prior(unknowns), 1e-300)) ** 2)))
-        parts[one.name] = size / (np.inf if sizes.found is None else sizes.found)
-    least = min(slight, key=lambda one: parts.get(one.hypothesis.name, 1.0))
-    return least if parts.get(least.hypothesis.name, 1.0) < 1.0 else None
+        parts[one.name] = _size_of(one, unknowns, p) / (np.inf if sizes.found is None else sizes.found)
+    small = [one for one in slight if parts.get(one.hypothesis.name, 1.0) < 1.0]
+    return min(small, key=lambda one: parts[one.hypothesis.name], default=None)
 
 
-def _without_mean(one: Hypothesis, unknowns: Unknowns, values: Array) -> Array:
-    """Those of its unknowns (entries,) out of `values` (size,); teeth or flanks that all stand out alike are even."""
-    groups = [values[wide.entries(unknowns)] for wide in one.wide]
-    return np.concatenate([group - group.mean() if len(group) > len(SIDES) else group for group in groups])
+def _size_of(one: Hypothesis, unknowns: Unknowns, p: Array) -> float:
+    """Rms of its unknowns, of all (size,), in standard deviations of the wide prior; teeth or flanks that all stand out
+    alike are even."""
+    wide = one.prior(unknowns)
+    groups = [p[part.entries(unknowns)] / wide[part.entries(unknowns)] for part in one.wide]
+    even = [group - group.mean() if len(group) > len(SIDES) else group for group in groups]
+    return float(np.sqrt(np.mean(np.concatenate(even) ** 2)))
 
 
 def _answer(found: Simulated, simulator: Simulator) -> tuple[Complex, Array] | None:
