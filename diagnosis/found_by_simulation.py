@@ -40,6 +40,7 @@ from gearbench.diagnosis.judging.chances import (
 from gearbench.diagnosis.judging.closing import DUE
 from gearbench.diagnosis.judging.decided import Decided, decide_simulated
 from gearbench.diagnosis.judging.drift import drift_of
+from gearbench.diagnosis.judging.free_forces import FreeForce, free_forces
 from gearbench.diagnosis.judging.judged import Judged
 from gearbench.diagnosis.judging.missing import Missing, missing_forces, nothing_missing
 from gearbench.diagnosis.judging.naming import drifts_of, effects_of
@@ -139,13 +140,18 @@ def _settled(
     judged = judged_of_size(of.problem, _judgeable(of, found, held_out), held_out, of.measurements, report)
     changing = changing_of(judged, changing_parts(of.steady, of.problem.conditions[0].band))
     place, _ = of.unsteady.worst(LIMITS.unsteady)
+    free = _free(found)
     while True:
         found = judged.found
         missing = _missing(of, found)
         signs = {f"over {place}": float(over) for place, over in zip(PLACES, missing.over, strict=True)}
         missing = replace(missing, factors=np.array([known.outstanding.get(place, 1.0) for place in PLACES]))
         drift = None if TEMPERATURE_DRIFT.name in of.without else drift_of(found, place)
-        decided = decide_simulated(judged, of.result, missing, of.unsteady, changing, known=known, drift=drift)
+        decided = decide_simulated(
+            judged, of.result, missing, of.unsteady, changing, known=known, drift=drift, free=free
+        )
+        signs |= {f"free {one.form.name}": one.worth for one in free}
+        signs |= {f"size {one.form.name}": one.size for one in free}
         signs |= {"lines": float(found.simulator.target.counts.sum()), "unknown": decided.sign, "left": judged.left,
                   "remains": judged.remains, "searched": judged.searched, "hidden": judged.hidden,
                   "changing": changing}  # fmt: skip
@@ -188,6 +194,14 @@ def _judgeable(of: Searched, found: Simulated, held_out: Measurement | None) -> 
     if held_out is None or not held_out.phase_known or BACKLASH.name in of.without:
         return found
     return with_backlash_there(of.problem, found, held_out)
+
+
+def _free(found: Simulated) -> tuple[FreeForce, ...]:
+    """What forces without a name are worth beside the rig without any effect."""
+    try:
+        return free_forces(found.simulator, found.selection.base)
+    except ValueError:  # an audit that cannot be made costs what it would have seen, not the verdict
+        return ()
 
 
 def _missing(of: Searched, found: Simulated) -> Missing:

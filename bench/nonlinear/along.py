@@ -158,7 +158,7 @@ class Along:
                 for number in np.flatnonzero([any(parts) for parts in zip(one.along, two.along, strict=True)]):
                     change = two.along[number] * after - one.along[number] * before
                     moved[int(number)] = moved.get(int(number), np.zeros(len(change))) + change
-        forces = {number: resampled(-force, len(self.phase)) for number, force in moved.items()}
+        forces = {number: self.resampled(-force) for number, force in moved.items()}
         factor, changed = (one.constants().damping_factor for one in (self.model, other))
         if factor != changed:
             forces[IN_MESH] = (changed / factor - 1.0) * self.tangent.damping * self.rate
@@ -166,7 +166,11 @@ class Along:
 
     def fine(self, coordinate: int) -> Array:
         """A coordinate [m] on the half-step grid (entries,)."""
-        return resampled(self.places[:, coordinate], len(self.phase))
+        return self.resampled(self.places[:, coordinate])
+
+    def resampled(self, values: Array) -> Array:
+        """What is known at the samples (samples,), on the half-step grid (entries,)."""
+        return resampled(values, len(self.phase))
 
     def rate_of(self, excess: Array) -> Array:
         """Time derivative (entries, columns) of periodic signals on the grid."""

@@ -72,14 +72,8 @@ class Optimum:
     @property
     def std(self) -> Array:
         """Posterior standard deviations (size,); of what these records do not show, those of the prior."""
-        quadratic = self.sensitivity.quadratic
-        width = self.sd[quadratic.active]
-        free = width > 0.0
-        scale = width[free]
-        information = quadratic.information(np.zeros(len(quadratic.active)))
-        matrix = information[np.ix_(free, free)] * scale[:, None] * scale[None, :] + np.eye(len(scale))
-        out = self.sd.copy()
-        out[quadratic.active[free]] = scale * np.sqrt(np.diag(np.linalg.inv(matrix)))
+        near, out = self.sensitivity.quadratic, self.sd.copy()
+        out[near.active] = near.std(near.information(np.zeros(len(near.active))), self.sd)
         return out
 
     def evidence_under(self, sd: Array) -> float:

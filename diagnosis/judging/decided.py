@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -14,6 +15,7 @@ from gearbench.diagnosis.evidence.search import Search, told
 from gearbench.diagnosis.forces.equations import PLACES
 from gearbench.diagnosis.forces.steadiness import Unsteady
 from gearbench.diagnosis.judging.drift import Drift
+from gearbench.diagnosis.judging.free_forces import FreeForce
 from gearbench.diagnosis.judging.judged import GREATER, Judged
 from gearbench.diagnosis.judging.missing import Missing
 from gearbench.diagnosis.odds import Calibration
@@ -40,6 +42,9 @@ CLOSES, OUTWEIGHS = 0.5, 3.0
 # Of the place that stands out most, what the next one may reach for it to be told, and over what sound rigs leave, what
 # it must reach itself.
 TOLD, FAINT = 0.5, 0.2
+# Nats that a force without a name is worth beside a rig without any effect from which it is one, and its least and
+# largest rms over the linear force at its place: beyond that its lines are not those of a small force.
+FREE, FREE_SIZES = 15.0, (0.05, 1.0)
 # Over what sound rigs have: a lag of the drive's torque from which something is between its sensor and the rotor.
 LATE_LIMIT = 3.0
 
@@ -67,17 +72,20 @@ def decide_simulated(
     limits: Limits = LIMITS,
     known: Calibration = POPULATION,
     drift: Drift | None = None,
+    free: Sequence[FreeForce] = (),
 ) -> Decided:
     """The decision on what was kept on the judged record. `missing` are the forces that the final rig lacks; `unsteady`
     the excess scatter between repetitions, by place, and `changing` the largest rms of what changes over that of the
-    nominal gap, `drift` what explains most of it; `known`: what sound rigs leave."""
+    nominal gap, `drift` what explains most of it; `known`: what sound rigs leave; `free`: what forces without a name
+    are worth beside the rig without any effect."""
+    told = _Told(judged, forces, missing, limits, known, tuple(free))
     _, over = unsteady.worst(limits.unsteady)
     # `changing` is more than nothing where what is left grows by it, whatever part of the nominal gap that is.
     large = drift is not None and changing > (0.0 if drift.beyond_sound else known.changing)
     if drift is None or over <= 1.0 or not large:
-        return _decided(judged, forces, missing, unsteady, changing, limits, known)
+        return _decided(told, unsteady, changing)
     # What a drift explains speaks neither for something unknown nor against an effect.
-    rest = _decided(judged, forces, missing, Unsteady.nothing(), changing, limits, known)
+    rest = _decided(told, Unsteady.nothing(), changing)
     said = (
         f"{percent(drift.share)} of the energy of what changes from one repetition to the next is what a stiffness"
         f" {at_place(drift.place)} makes that changes by {percent(drift.value)} over a record"
@@ -89,11 +97,27 @@ def decide_simulated(
     return replace(rest, verdict="effects", place=place, because=because, drift=drift)
 
 
-def _decided(
-    judged: Judged, forces: Search, missing: Missing, unsteady: Unsteady, changing: float, limits: Limits,
-    known: Calibration,
-) -> Decided:  # fmt: skip
+class _Told(NamedTuple):
+    """What a decision rests on, without what changes between repetitions."""
+
+    judged: Judged
+    forces: Search
+    missing: Missing
+    limits: Limits
+    known: Calibration
+    free: tuple[FreeForce, ...]
+
+    @property
+    def unnamed(self) -> FreeForce | None:
+        """The force without a name that is worth most, of those larger than a sound rig's."""
+        least, most = FREE_SIZES
+        fitting = (one for one in self.free if least < abs(one.size) <= most)
+        return max(fitting, key=lambda one: one.worth, default=None)
+
+
+def _decided(of: _Told, unsteady: Unsteady, changing: float) -> Decided:
     """The decision without a drift."""
+    judged, missing, limits, known = of.judged, of.missing, of.limits, of.known
     named = judged.found.selection.entered
     shares = [judged.share_of(one.hypothesis) for one in named]
     share = max(shares, default=0.0)
@@ -104,9 +128,9 @@ def _decided(
         return Decided("unknown", place, (), changing / known.changing, (because,))
     left = _left_of(judged, missing, known)
     if not named:
-        made = _without(judged, missing, left, known)
+        made = _without(of, left)
         return replace(made, because=(*made.because, *aside)) if made.verdict == "none" else made
-    doubt = _outbid(forces, named, limits) if share < CLOSES and left.size > 1.0 else None
+    doubt = _outbid(of, named) if share < CLOSES and left.size > 1.0 else None
     if doubt is not None:
         return doubt
     if judged.left > 1.0 and left.size > 1.0:
@@ -138,31 +162,46 @@ def _left_of(judged: Judged, missing: Missing, known: Calibration) -> _Left:
     return _Left(size, shown, seen, max(min(judged.left / GREATER, size), seen, shown / PLAIN))
 
 
-def _outbid(forces: Search, named: tuple[Weighed, ...], limits: Limits) -> Decided | None:
+def _outbid(of: _Told, named: tuple[Weighed, ...]) -> Decided | None:
     """What a form without a name that explains the records clearly better than what is named says."""
-    free = forces.best_free
-    if not free:
-        return None
     worth = max(one.log_bayes_factor for one in named)
-    needed = limits.competitor_factor * max(worth, _by_force(forces, named)) + limits.competitor_offset
-    if free.log_bayes_factor <= needed:
+    unnamed, free, limits = of.unnamed, of.forces.best_free, of.limits
+    needed = limits.competitor_factor * worth + limits.competitor_offset
+    if unnamed is not None and unnamed.worth > needed:
+        return _explained(unnamed, unnamed.worth / needed)
+    needed = limits.competitor_factor * max(worth, _by_force(of.forces, named)) + limits.competitor_offset
+    if not free or free.log_bayes_factor <= needed:
         return None
     place = free.hypothesis.place
     because = f"a force {at_place(place)} without any given form explains the records clearly better"
     return Decided("unknown", place, (), free.log_bayes_factor / needed, (because,))
 
 
-def _without(judged: Judged, missing: Missing, left: _Left, known: Calibration) -> Decided:
+def _explained(by: FreeForce, sign: float) -> Decided:
+    """The decision for a force without a name."""
+    because = (
+        f"{by.form.words} explains the records clearly better ({by.worth:.3g} nats, {percent(abs(by.size))} of the"
+        " linear force there), and no effect of the library is such"
+    )
+    return Decided("unknown", by.form.place, (), sign, (because,))
+
+
+def _without(of: _Told, left: _Left) -> Decided:
     """The decision where no effect is named."""
+    judged, missing, known, unnamed = of.judged, of.missing, of.known, of.unnamed
+    alone = unnamed.worth / FREE if unnamed is not None else 0.0
+    leading = _leading(missing)
+    if leading == "none" and unnamed is not None and alone > 1.0:
+        leading = unnamed.form.place
     if left.size > 1.0 and judged.left > GREATER:
         because = "no effect of the library closes the gap, and the greater part of it stays"
-        return Decided("unknown", _leading(missing), (), left.sign, (because,))
+        return Decided("unknown", leading, (), left.sign, (because,))
     if left.shown > PLAIN:
         because = (
             f"{percent(left.shown * known.structure)} of a channel's fluctuation stays, where sound rigs leave"
             f" {percent(known.structure)} at most, and no effect of the library explains it"
         )
-        return Decided("unknown", _leading(missing), (), left.sign, (because,))
+        return Decided("unknown", leading, (), left.sign, (because,))
     if left.seen > 1.0:
         place, _ = outstanding(missing)
         because = f"a force {at_place(place)} remains that no effect of the library explains"
@@ -170,7 +209,9 @@ def _without(judged: Judged, missing: Missing, left: _Left, known: Calibration) 
     late, sound = lag_of_drive(judged.found.layout.unknowns, judged.found.selection.best.p)
     if abs(late) > LATE_LIMIT * sound:
         return Decided("unknown", "drive", (), max(left.sign, abs(late) / (LATE_LIMIT * sound)), (_late(late),))
-    return Decided("none", "none", (), left.sign, (_nothing(judged, known),))
+    if unnamed is not None and alone > 1.0:
+        return _explained(unnamed, max(left.sign, alone))
+    return Decided("none", "none", (), max(left.sign, alone), (_nothing(judged, known),))
 
 
 def _nothing(judged: Judged, known: Calibration) -> str:

@@ -120,11 +120,22 @@ class Quadratic:
 
     def evidence(self, cost: float, information: Array, sd: Array) -> float:
         """Laplace's log evidence of a cost with its prior, and the information there."""
+        _, matrix = self._scaled(information, sd)
+        return -cost - 0.5 * float(np.linalg.slogdet(matrix)[1])
+
+    def std(self, information: Array, sd: Array) -> Array:
+        """Posterior standard deviations (q,) under the prior `sd` (size,); nothing of what that holds."""
+        free, matrix = self._scaled(information, sd)
+        out = sd[self.active]
+        out[free] *= np.sqrt(np.diag(np.linalg.inv(matrix)))
+        return out
+
+    def _scaled(self, information: Array, sd: Array) -> tuple[Flags, Array]:
+        """Which unknowns (q,) are free, and data and prior's information about these in standard deviations."""
         width = sd[self.active]
         free = width > 0.0
         scale = width[free]
-        matrix = information[np.ix_(free, free)] * scale[:, None] * scale[None, :] + np.eye(int(free.sum()))
-        return -cost - 0.5 * float(np.linalg.slogdet(matrix)[1])
+        return free, information[np.ix_(free, free)] * scale[:, None] * scale[None, :] + np.eye(len(scale))
 
 
 def _solution(matrix: Array, pull: Array) -> Array:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,12 @@ from gearbench.diagnosis.simulation.jacobian import MOVED, SHORT_STEP, STEP, Oth
 from gearbench.diagnosis.simulation.target import Target
 from gearbench.diagnosis.structure.layout import Layout
 from gearbench.diagnosis.structure.structure import least_steps
+from gearbench.lumped.nonlinear.coordinates import Acting
+from gearbench.rig import Case
+
+if TYPE_CHECKING:
+    from gearbench.bench.nonlinear.along import Along
+    from gearbench.bench.nonlinear.replay import Steady
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -153,37 +159,48 @@ class Simulator:
                         out[index] = (answer - here) / signed
                         break
 
+    def motion(self, p: Array, measured: Measurement) -> tuple[Case, Steady]:
+        """The rig of unknowns (size,) as it is in one record, and its steady motion there."""
+        # Its time loop is compiled on import, which not every user of this module wants.
+        from gearbench.bench.nonlinear.replay import steady_motion
+
+        coarser = self.simulate.coarser if isinstance(self.simulate, Replays) else 1.0
+        case = self.layout.case(p, measured.name)
+        law, nudge = law_of(self.layout.model.sound, case), self.nudges.get(measured.name, 0.0)
+        return case, steady_motion(case, measured.record, law, nudge=nudge, coarser=coarser)
+
+    def answers(self, measured: Measurement, tangent: Along, acting: Acting) -> Spectra:
+        """Half-spectra (departures, K) of what the channels of a record change by under small forces."""
+        answers = tangent.answers(acting)
+        answers["torque_driven"] *= self.layout.model.base_radius[1]
+        if not has_both_y(measured):
+            answers["dte"] = answers["angle_driver"] - answers["angle_driven"]
+        return answers
+
     def _by_forces(self, out: Complex, p: Array, chosen: Flags, others: Sequence[Other]) -> None:
         """Fill in what forces in the mesh and on the coordinates, and sensors, do."""
         # Its time loop is compiled on import, which not every user of this module wants.
         from gearbench.bench.nonlinear.along import along
-        from gearbench.bench.nonlinear.replay import seen_of, steady_motion
-
-        coarser = self.simulate.coarser if isinstance(self.simulate, Replays) else 1.0
+        from gearbench.bench.nonlinear.replay import seen_of
 
         def one(item: tuple[int, Measurement]) -> tuple[Integers, Spectra, dict[int, dict[str, Complex]]]:
             number, measured = item
-            case = self.layout.case(p, measured.name)
-            law, nudge = law_of(self.layout.model.sound, case), self.nudges.get(measured.name, 0.0)
-            steady = steady_motion(case, measured.record, law, nudge=nudge, coarser=coarser)
+            case, steady = self.motion(p, measured)
             tangent = along(steady)
             forces = forces_of(self.layout, p, tangent, measured.name, chosen, others)
-            answers = tangent.answers(forces.acting)
-            answers["torque_driven"] *= self.layout.model.base_radius[1]
-            if not has_both_y(measured):
-                answers["dte"] = answers["angle_driver"] - answers["angle_driven"]
+            answers = self.answers(measured, tangent, forces.acting)
             seen = simulated_channels(measured, seen_of(case, steady))
             sensed = sensor_columns(self.layout, self.target, number, seen)
             return forces.at, answers, sensed
 
         for number, (at, answers, sensed) in enumerate(side_by_side(one, list(enumerate(self.target.measurements)))):
-            self._put(out, number, at, answers)
+            self.put(out, number, at, answers)
             for index, parts in sensed.items():
                 if chosen[index]:
-                    self._put(out, number, np.array([index]), {name: values[None] for name, values in parts.items()})
+                    self.put(out, number, np.array([index]), {name: values[None] for name, values in parts.items()})
 
-    def _put(self, out: Complex, number: int, at: Integers, spectra: Spectra) -> None:
-        """Add the lines of half-spectra (n, K) of what a record answers to unknowns `at` (n,), one of which may have
+    def put(self, out: Complex, number: int, at: Integers, spectra: Spectra) -> None:
+        """Add to rows `at` (n,) of `out` the lines of half-spectra (n, K) that a record answers; one row may have
         several answers."""
         samples, start = self.target.measurements[number].phase.size, 0
         for record, channel, bins in self.target.plan:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -16,8 +17,19 @@ from gearbench.diagnosis.evidence.decision import Decision
 from gearbench.diagnosis.forces.equations import PLACES
 from gearbench.diagnosis.forces.steadiness import Unsteady
 from gearbench.diagnosis.forces.unknowns import group, unknowns_of
-from gearbench.diagnosis.judging.decided import GREATER, HIDING, PLAIN, VISIBLE, Decided, decide_simulated, unexplained
+from gearbench.diagnosis.judging.decided import (
+    FREE,
+    FREE_SIZES,
+    GREATER,
+    HIDING,
+    PLAIN,
+    VISIBLE,
+    Decided,
+    decide_simulated,
+    unexplained,
+)
 from gearbench.diagnosis.judging.drift import Drift
+from gearbench.diagnosis.judging.free_forces import Form, FreeForce
 from gearbench.diagnosis.judging.missing import OUTSTANDING, Missing
 from gearbench.diagnosis.population import POPULATION
 from gearbench.diagnosis.selection.weighing import Weighed
@@ -48,10 +60,11 @@ def decided(
     drift: Drift | None = None,
     late: float = 0.0,
     kept: bool = False,
+    forces: Sequence[FreeForce] = (),
 ) -> Decided:
     """`worth` nats of friction (None: nothing was kept), which closes `share` of the gap; `left` of the nominal gap,
     `remains` of a channel's fluctuation in the end, `searched` (None: as much) on the records of the search,
-    whose noise may hide `hidden` of it; the drive acts `late` s, of sound rigs 1e-5; the
+    whose noise may hide `hidden` of it; `forces` without a name; the drive acts `late` s, of sound rigs 1e-5; the
     rig is `kept` on the record's way."""
     entered: tuple[Any, ...] = ()
     if worth is not None:
@@ -69,10 +82,11 @@ def decided(
         kept={} if kept else None,
     )
     form = SimpleNamespace(hypothesis=Hypothesis("free drive", "drive", ()), log_bayes_factor=free)
-    forces: Any = SimpleNamespace(best_free=form if free else None, tried=())
+    search: Any = SimpleNamespace(best_free=form if free else None, tried=())
     missing = Missing(excess, ((0.0, 100.0),), np.ones((1, 5)))
     known = replace(POPULATION, changing=0.03)
-    return decide_simulated(judged, forces, missing, Unsteady(unsteady, unsteady), changing, HAND, known, drift)
+    unsettled = Unsteady(unsteady, unsteady)
+    return decide_simulated(judged, search, missing, unsettled, changing, HAND, known, drift, forces)
 
 
 def at(number: int, value: float) -> np.ndarray:
@@ -93,6 +107,35 @@ def test_the_greater_part_unexplained_is_unknown_unless_any_rig_leaves_as_much()
     assert decided(None, **much, excess=at(3, 2 * OUTSTANDING["driven-support"])).place == "driven-support"
     assert decided(None, **(much | {"left": 0.9 * GREATER})).verdict == "none"
     assert decided(None, **(much | {"remains": 0.9 * STRUCTURE})).verdict == "none"
+
+
+def damper(worth: float, size: float = 0.2) -> FreeForce:
+    return FreeForce(Form("damper", "driven-support", "damping there"), worth, size, 0.01)
+
+
+def test_a_force_without_a_name_is_unknown_where_nothing_else_is_and_its_size_is_one() -> None:
+    made = decided(None, forces=[damper(1.2 * FREE)])
+    assert (made.verdict, made.place) == ("unknown", "driven-support") and made.sign == pytest.approx(1.2)
+    assert made.because[0].startswith("damping there explains the records clearly better (18 nats, 20 %")
+    made = decided(None, forces=[damper(0.8 * FREE)])
+    assert made.verdict == "none" and made.sign == pytest.approx(0.8)
+    least, most = FREE_SIZES
+    for size in (-0.9 * least, 1.1 * most):
+        assert decided(None, forces=[damper(3 * FREE, size)]).verdict == "none"
+    assert decided(None, forces=[damper(2 * FREE, size=-0.3), damper(1.2 * FREE)]).sign == pytest.approx(2.0)
+
+
+def test_what_stands_out_has_a_place_before_a_force_without_a_name() -> None:
+    much: dict[str, Any] = {"left": 1.1 * GREATER, "remains": 1.1 * STRUCTURE, "forces": [damper(3 * FREE)]}
+    assert decided(None, **much).place == "driven-support"
+    assert decided(None, **much, excess=at(0, 2 * OUTSTANDING["drive"])).place == "drive"
+
+
+def test_a_force_without_a_name_outbids_what_closes_little_beside_a_remainder() -> None:
+    much: dict[str, Any] = {"remains": 1.1 * STRUCTURE, "forces": [damper(1.1 * (1.5 * 40.0 + 20.0))]}
+    assert decided(40.0, **much).place == "driven-support"
+    assert decided(50.0, **much).verdict == "effects"
+    assert decided(40.0, **much, share=0.6).verdict == "effects"
 
 
 def test_a_rig_further_from_the_judged_record_than_the_nominal_one_names_nothing() -> None:

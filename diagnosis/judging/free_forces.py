@@ -1,0 +1,152 @@
+"""Forces without a name: what no number of a rig makes, each a small force along a rig's motion, and what it is worth.
+
+A joint between two parts passes a force that depends on how far they are apart and how fast they move (Masri and
+Caughey 1979); a rig has what is linear in both, and the laws of the library. What a joint may have besides is tried
+here in its simplest forms: a damper that grows or falls with the rate, and a spring that is stiffer one way. Their
+lines are first-order answers of the rig's tangent, so that nothing is simulated for them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.diagnosis.fitting.fit import Optimum
+from gearbench.diagnosis.forces.equations import SUPPORTS
+from gearbench.diagnosis.intake.measurements import Measurement
+from gearbench.diagnosis.simulation.quadratic import quadratic_of
+from gearbench.diagnosis.simulation.simulator import Simulator, Spectra
+from gearbench.lumped.nonlinear.coordinates import IN_MESH, U1, Acting, W
+from gearbench.rig.contract import Place
+
+if TYPE_CHECKING:
+    from gearbench.bench.nonlinear.along import Along
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+# Rms of such a force over that of the linear one at its place, one standard deviation before any record.
+WIDE = 1.0
+TINY = 1e-300
+SIDES = ("driver", "driven gear")
+
+
+@dataclass(frozen=True)
+class Form:
+    """A form of force at a `place`: what is in that joint, and how a sentence begins with it."""
+
+    kind: Literal["damper", "spring"]
+    place: Place
+    words: str
+
+    @property
+    def name(self) -> str:
+        """Kind and place."""
+        return f"{self.kind} {self.place}"
+
+
+@dataclass(frozen=True)
+class FreeForce:
+    """A form's log Bayes factor `worth` over no such force [nats], and its `size`, rms over that of the linear force at
+    its place, with standard deviation `std`."""
+
+    form: Form
+    worth: float
+    size: float
+    std: float
+
+
+@dataclass(frozen=True)
+class _Course:
+    """A form along a motion: a force (entries,), `on` coordinates with such factors, and the linear force (entries,)
+    [N] at its place. Of the force only the course counts, that of all records in one unit."""
+
+    form: Form
+    on: tuple[tuple[int, float], ...]
+    force: Array
+    linear: Array
+
+
+def free_forces(simulator: Simulator, found: Optimum) -> tuple[FreeForce, ...]:
+    """What forces without a name are worth beside all that `found` holds, the most first. Raises what a simulation of
+    that rig raises."""
+    columns = lines_of_forms(simulator, found.p)
+    target, inner, size = simulator.target, found.sensitivity, found.p.size
+    active, bounds = inner.quadratic.active, simulator.layout.unknowns.bounds()
+    _, cost, information = inner.quadratic.best(found.p, found.sd, bounds)
+    plain = inner.quadratic.evidence(cost, information, found.sd)
+    p, sd = np.append(found.p, 0.0), np.append(found.sd, WIDE)
+    limits = np.append(bounds[0], -np.inf), np.append(bounds[1], np.inf)
+    out = []
+    for form, column in columns:
+        jacobian = np.concatenate([inner.jacobian, column[None]])
+        near = quadratic_of(target, target.lines - found.lines, jacobian, np.append(active, size))
+        step, cost, information = near.best(p, sd, limits)
+        worth = near.evidence(cost, information, sd) - plain
+        std = near.std(information, sd)[-1]
+        out.append(FreeForce(form, worth, float(step[-1]), float(std)))
+    return tuple(sorted(out, key=lambda one: -one.worth))
+
+
+def lines_of_forms(simulator: Simulator, p: Array) -> list[tuple[Form, Complex]]:
+    """The forms, each with what the lines (K,) change by where it is as large as its linear force, over all records."""
+    found = [_answered(simulator, p, one) for one in simulator.target.measurements]
+    out = []
+    for number, same in enumerate(zip(*(courses for courses, _ in found), strict=True)):
+        size = np.sqrt(sum(_power(one.linear) for one in same) / max(sum(_power(one.force) for one in same), TINY))
+        lines = np.zeros((1, simulator.target.lines.size), dtype=complex)
+        for record, (_, spectra) in enumerate(found):
+            only = {channel: rows[[number]] for channel, rows in spectra.items()}
+            simulator.put(lines, record, np.array([0]), only)
+        if np.abs(lines).max() > 0.0:
+            out.append((same[0].form, lines[0] * size))
+    return out
+
+
+def _answered(simulator: Simulator, p: Array, measured: Measurement) -> tuple[list[_Course], Spectra]:
+    """The forms along the rig's motion in a record, and what its channels change by under each."""
+    # Its time loop is compiled on import, which not every user of this module wants.
+    from gearbench.bench.nonlinear.along import along
+
+    _, steady = simulator.motion(p, measured)
+    found = along(steady)
+    courses = list(_courses(found))
+    values = [factor * one.force for one in courses for _, factor in one.on]
+    on = [coordinate for one in courses for coordinate, _ in one.on]
+    of = [number for number, one in enumerate(courses) for _ in one.on]
+    acting = Acting(np.stack(values, axis=1).astype(np.float32), np.array(on), np.array(of))
+    return courses, simulator.answers(measured, found, acting)
+
+
+def _courses(along: Along) -> Iterator[_Course]:
+    """The forms along a motion."""
+    model, rate = along.model, along.rate
+    yield _damped("in the mesh", "mesh", ((IN_MESH, 1.0),), rate, along.tangent.damping * rate)
+    dampers = model.constants().damping1, model.constants().damping2
+    for support, spring, damper in zip(SUPPORTS, model.support_springs, dampers, strict=True):
+        moved = along.resampled(spring.deflection(along.places))
+        moved = moved - moved.mean()
+        on = tuple((number, -part) for number, part in enumerate(spring.along) if part)
+        where, place = f"at the {SIDES[support.side]}'s support", support.equation.place
+        stiffer = Form("spring", place, f"a stiffness {where} that differs between both senses")
+        yield _Course(stiffer, on, moved**2, spring.stiffness * moved)
+        closing = along.rate_of(moved)
+        yield _damped(where, place, on, closing, damper * closing)
+    if model.elastic_shaft:
+        twisting = along.rate_of(along.fine(W) - along.fine(U1))
+        yield _damped("in the coupling", "drive", ((W, -1.0), (U1, 1.0)), twisting, model.shaft[1] * twisting)
+
+
+def _damped(where: str, place: Place, on: tuple[tuple[int, float], ...], rate: Array, linear: Array) -> _Course:
+    """Damping with the square of a rate (entries,) [m/s]."""
+    form = Form("damper", place, f"damping {where} that is not in proportion to the rate")
+    return _Course(form, on, rate * np.abs(rate), linear)
+
+
+def _power(values: Array) -> float:
+    """Mean square."""
+    return float(np.mean(values**2))
