@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from math import inf
+from math import inf, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,7 +49,9 @@ def judged_on(
     noise = noise_left(found.layout.nominal, measured, found.simulator.simulate)
     condition = prepare(measured, problem.model, band)
     target, way = target_of([measured], [condition], [noise]), way_of(found, problem.model, condition, measured)
+    scatter: Mapping[str, Array] = noise
     if is_nudged(found, measured):
+        scatter = scattered(noise)
         nudges = {**found.simulator.nudges, **nudges_of(problem.model, [condition])}
         found = replace(found, simulator=replace(found.simulator, nudges=nudges))
     fitted = found.simulator.target.measurements
@@ -62,7 +64,7 @@ def judged_on(
     while True:
         seen.add(_names(found.selection.entered))
         try:
-            judged = _closings(found, target, measured, parted, noise, way, apart=apart)
+            judged = _closings(found, target, measured, parted, scatter, way, apart=apart)
         except ValueError:
             return None
         poor = [one for one in found.selection.entered if not _stays(judged, one)]
@@ -78,6 +80,12 @@ def judged_on(
                 return replace(judged, dropped=tuple(dropped))
             selection = more
         found = found.with_selection(selection)
+
+
+def scattered(noise: Mapping[str, Array]) -> dict[str, Array]:
+    """The parts (parts, N) of noise of each channel where motions need not repeat: the simulated one departs from the
+    mean of all, too, as far as one repetition of the record does."""
+    return {channel: sqrt(1.0 + len(parts)) * parts for channel, parts in noise.items()}
 
 
 def _names(entered: Sequence[Weighed]) -> frozenset[str]:
