@@ -14,6 +14,9 @@ KEY = "curvature"
 # Exponent of the mesh force over its own: teeth stiffen a little as their contacts widen, and far more where flanks
 # bear on a part of their width: a point contact has one half.
 SD, WIDE, LEAST, LARGEST = 0.08, 0.25, -0.4, 0.8
+# The same where it is simulated: force residuals have other errors in its place. Of 53 drawn rigs without the effect,
+# whose pairs have an exponent of another law than the nominal teeth's, 50 have 0.068 at most, 0.03 rms.
+SD_SIMULATED = 0.04
 
 
 def unknowns(model: NominalModel, conditions: Sequence[Condition]) -> tuple[Group, ...]:

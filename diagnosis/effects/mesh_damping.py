@@ -16,6 +16,12 @@ KEY = "mesh-ratio"  # of the background: logarithm of the factor on the damping 
 WIDE, WIDER = log(2.0), 5.0
 
 
+def deviation(model: NominalModel) -> float:
+    """Standard deviation of the logarithm where it is simulated. What is known so badly has no three deviations of the
+    logarithm where it has three of its own."""
+    return log(1.0 + BEYOND * model.sd_mesh_ratio) / BEYOND
+
+
 def hypotheses(model: NominalModel) -> tuple[Hypothesis, ...]:
     """The one mesh."""
     return (Hypothesis("mesh-damping", "mesh", (Wide(KEY, 0, max(WIDE, WIDER * model.sd_mesh_ratio)),)),)

@@ -14,10 +14,14 @@ from numpy.typing import NDArray
 
 from gearbench.diagnosis.effects.background import background
 from gearbench.diagnosis.effects.bearing_nonlinearity import KEYS as BEARINGS
+from gearbench.diagnosis.effects.contact_nonlinearity import KEY as CONTACT
+from gearbench.diagnosis.effects.contact_nonlinearity import SD_SIMULATED
 from gearbench.diagnosis.effects.coupling import COUPLING
 from gearbench.diagnosis.effects.coupling import KEY as COMPLIANCE
 from gearbench.diagnosis.effects.effect import SIDES, Fitted, Hypothesis, changed, with_rig
 from gearbench.diagnosis.effects.library import LIBRARY
+from gearbench.diagnosis.effects.mesh_damping import KEY as RATIO
+from gearbench.diagnosis.effects.mesh_damping import deviation
 from gearbench.diagnosis.effects.recalibrated import recalibrated
 from gearbench.diagnosis.effects.sensor_delay import KEYS as DELAYS
 from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
@@ -114,10 +118,21 @@ def layout_of(
         groups += effect.unknowns(model, conditions)
     groups += structure_groups(nominal.rig, model)
     groups += [*contrast_groups(), *viscous_groups(nominal, model)]
-    # Bases belong to force residuals: here unknowns are moved one by one.
-    plain = [replace(one, basis=None) for one in groups]
+    # What force residuals take for these has other errors of theirs in it.
+    known = {CONTACT: SD_SIMULATED, RATIO: deviation(model)}
+    plain = [_as_simulated(one, known.get(one.key)) for one in groups]
     means = {condition.name: condition.torque_mean for condition in conditions}
     return Layout(nominal, model, unknowns_of(plain, sum(model.teeth)), tuple(teeth), means)
+
+
+def _as_simulated(one: Group, sd: float | None) -> Group:
+    """A group of the force residuals as output error moves it, with another prior where one is given."""
+    # Bases belong to force residuals: here unknowns are moved one by one.
+    plain = replace(one, basis=None)
+    if sd is None:
+        return plain
+    own = one.wide > one.sd  # else it is a number of the nominal rig, which has no wider prior
+    return replace(plain, sd=np.full_like(one.sd, sd), wide=np.where(own, one.wide, sd))
 
 
 def _cracked(rig: Rig, layout: Layout, p: Array) -> Rig:
