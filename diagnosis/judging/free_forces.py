@@ -8,7 +8,7 @@ lines are first-order answers of the rig's tangent, so that nothing is simulated
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
@@ -31,6 +31,8 @@ Complex = NDArray[np.complex128]
 
 # Rms of such a force over that of the linear one at its place, one standard deviation before any record.
 WIDE = 1.0
+# Part of the time without contact up to which flanks stay together.
+PARTED = 1e-3
 TINY = 1e-300
 SIDES = ("driver", "driven gear")
 
@@ -72,29 +74,47 @@ class _Course:
 
 
 def free_forces(simulator: Simulator, found: Optimum) -> tuple[FreeForce, ...]:
-    """What forces without a name are worth beside all that `found` holds, the most first. Raises what a simulation of
-    that rig raises."""
-    columns = lines_of_forms(simulator, found.p)
-    target, inner, size = simulator.target, found.sensitivity, found.p.size
-    active, bounds = inner.quadratic.active, simulator.layout.unknowns.bounds()
-    _, cost, information = inner.quadratic.best(found.p, found.sd, bounds)
-    plain = inner.quadratic.evidence(cost, information, found.sd)
+    """What forces without a name are worth beside all that `found` holds, the most first, by the records in which its
+    flanks stay together: impacts, met a little otherwise, look like any of them. Raises what a simulation of that rig
+    raises."""
+    motions = list(enumerate(_motion(simulator, found.p, one) for one in simulator.target.measurements))
+    kept = {number: one for number, one in motions if float((one.elastic <= 0.0).mean()) <= PARTED}
+    if not kept:
+        return ()
+    inside, target = simulator.target.in_records(list(kept)), simulator.target.of_records(list(kept))
+    inner, active, size = found.sensitivity.jacobian[:, inside], found.sensitivity.quadratic.active, found.p.size
+    residual, bounds = target.lines - found.lines[inside], simulator.layout.unknowns.bounds()
+    alone = quadratic_of(target, residual, inner, active)
+    _, cost, information = alone.best(found.p, found.sd, bounds)
+    plain = alone.evidence(cost, information, found.sd)
     p, sd = np.append(found.p, 0.0), np.append(found.sd, WIDE)
     limits = np.append(bounds[0], -np.inf), np.append(bounds[1], np.inf)
     out = []
-    for form, column in columns:
-        jacobian = np.concatenate([inner.jacobian, column[None]])
-        near = quadratic_of(target, target.lines - found.lines, jacobian, np.append(active, size))
+    for form, column in _columns(simulator.of_target(target), list(kept.values())):
+        near = quadratic_of(target, residual, np.concatenate([inner, column[None]]), np.append(active, size))
         step, cost, information = near.best(p, sd, limits)
         worth = near.evidence(cost, information, sd) - plain
-        std = near.std(information, sd)[-1]
-        out.append(FreeForce(form, worth, float(step[-1]), float(std)))
+        out.append(FreeForce(form, worth, float(step[-1]), float(near.std(information, sd)[-1])))
     return tuple(sorted(out, key=lambda one: -one.worth))
 
 
 def lines_of_forms(simulator: Simulator, p: Array) -> list[tuple[Form, Complex]]:
     """The forms, each with what the lines (K,) change by where it is as large as its linear force, over all records."""
-    found = [_answered(simulator, p, one) for one in simulator.target.measurements]
+    return _columns(simulator, [_motion(simulator, p, one) for one in simulator.target.measurements])
+
+
+def _motion(simulator: Simulator, p: Array, measured: Measurement) -> Along:
+    """The rig's motion in a record."""
+    # Its time loop is compiled on import, which not every user of this module wants.
+    from gearbench.bench.nonlinear.along import along
+
+    return along(simulator.motion(p, measured)[1])
+
+
+def _columns(simulator: Simulator, motions: Sequence[Along]) -> list[tuple[Form, Complex]]:
+    """The same along the motions in all records."""
+    pairs = zip(simulator.target.measurements, motions, strict=True)
+    found = [_answered(simulator, one, motion) for one, motion in pairs]
     out = []
     for number, same in enumerate(zip(*(courses for courses, _ in found), strict=True)):
         size = np.sqrt(sum(_power(one.linear) for one in same) / max(sum(_power(one.force) for one in same), TINY))
@@ -107,19 +127,14 @@ def lines_of_forms(simulator: Simulator, p: Array) -> list[tuple[Form, Complex]]
     return out
 
 
-def _answered(simulator: Simulator, p: Array, measured: Measurement) -> tuple[list[_Course], Spectra]:
-    """The forms along the rig's motion in a record, and what its channels change by under each."""
-    # Its time loop is compiled on import, which not every user of this module wants.
-    from gearbench.bench.nonlinear.along import along
-
-    _, steady = simulator.motion(p, measured)
-    found = along(steady)
-    courses = list(_courses(found))
+def _answered(simulator: Simulator, measured: Measurement, motion: Along) -> tuple[list[_Course], Spectra]:
+    """The forms along the motion in a record, and what its channels change by under each."""
+    courses = list(_courses(motion))
     values = [factor * one.force for one in courses for _, factor in one.on]
     on = [coordinate for one in courses for coordinate, _ in one.on]
     of = [number for number, one in enumerate(courses) for _ in one.on]
     acting = Acting(np.stack(values, axis=1).astype(np.float32), np.array(on), np.array(of))
-    return courses, simulator.answers(measured, found, acting)
+    return courses, simulator.answers(measured, motion, acting)
 
 
 def _courses(along: Along) -> Iterator[_Course]:

@@ -77,15 +77,19 @@ class Bench:
         return Joints(**{joint: size / getattr(self.moved(Joints()).sizes, joint)})
 
 
-@pytest.fixture(scope="module")
-def bench() -> Bench:
-    nominal = read_case(CASES / "gap_demo.toml", EVEN).model_copy(update={"conditions": ()})
+def bench_of(*more: str) -> Bench:
+    nominal = read_case(CASES / "gap_demo.toml", (*EVEN, *more)).model_copy(update={"conditions": ()})
     # The plain rig says nothing of the load's torque.
     record = simulate(nominal).drop_vars("torque_driven")
     problem = problem_of([measurement(record, "one", nominal)], nominal)
     layout = layout_of(nominal, problem.model, problem.conditions, ())
     model = nonlinear_model(nominal.rig, layout.meshing, problem.model.law)
     return Bench(nominal, record, model.constants(), layout.model.base_radius[0])
+
+
+@pytest.fixture(scope="module")
+def bench() -> Bench:
+    return bench_of()
 
 
 def test_a_rig_of_linear_joints_has_none(bench: Bench) -> None:
@@ -124,3 +128,7 @@ def test_a_joint_is_found_with_its_size_and_sign(bench: Bench, name: str, joint:
     assert first.form.name == name
     assert first.worth > FREE
     assert first.size == pytest.approx(size, rel=0.3)
+
+
+def test_a_record_whose_flanks_part_says_nothing() -> None:
+    assert not bench_of("experiment.multisine.amplitude_nm=250").found(Joints())
