@@ -140,9 +140,9 @@ def _settled(
     judged = judged_of_size(of.problem, _judgeable(of, found, held_out), held_out, of.measurements, report)
     changing = changing_of(judged, changing_parts(of.steady, of.problem.conditions[0].band))
     place, _ = of.unsteady.worst(LIMITS.unsteady)
-    free = _free(found)
     while True:
         found = judged.found
+        free = _free(found)
         missing = _missing(of, found)
         signs = {f"over {place}": float(over) for place, over in zip(PLACES, missing.over, strict=True)}
         missing = replace(missing, factors=np.array([known.outstanding.get(place, 1.0) for place in PLACES]))
@@ -197,9 +197,9 @@ def _judgeable(of: Searched, found: Simulated, held_out: Measurement | None) -> 
 
 
 def _free(found: Simulated) -> tuple[FreeForce, ...]:
-    """What forces without a name are worth beside the rig without any effect."""
+    """What forces without a name are worth beside the rig found."""
     try:
-        return free_forces(found.simulator, found.selection.base)
+        return free_forces(found.simulator, found.selection.best)
     except ValueError:  # an audit that cannot be made costs what it would have seen, not the verdict
         return ()
 

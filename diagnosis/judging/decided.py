@@ -42,7 +42,7 @@ CLOSES, OUTWEIGHS = 0.5, 3.0
 # Of the place that stands out most, what the next one may reach for it to be told, and over what sound rigs leave, what
 # it must reach itself.
 TOLD, FAINT = 0.5, 0.2
-# Nats that a force without a name is worth beside a rig without any effect from which it is one, and its least and
+# Nats that a force without a name is worth beside the final rig from which it is one, and its least and
 # largest rms over the linear force at its place: beyond that its lines are not those of a small force.
 FREE, FREE_SIZES = 15.0, (0.05, 1.0)
 # Over what sound rigs have: a lag of the drive's torque from which something is between its sensor and the rotor.
@@ -77,7 +77,7 @@ def decide_simulated(
     """The decision on what was kept on the judged record. `missing` are the forces that the final rig lacks; `unsteady`
     the excess scatter between repetitions, by place, and `changing` the largest rms of what changes over that of the
     nominal gap, `drift` what explains most of it; `known`: what sound rigs leave; `free`: what forces without a name
-    are worth beside the rig without any effect."""
+    are worth beside the final rig."""
     told = _Told(judged, forces, missing, limits, known, tuple(free))
     _, over = unsteady.worst(limits.unsteady)
     # `changing` is more than nothing where what is left grows by it, whatever part of the nominal gap that is.
@@ -130,7 +130,7 @@ def _decided(of: _Told, unsteady: Unsteady, changing: float) -> Decided:
     if not named:
         made = _without(of, left)
         return replace(made, because=(*made.because, *aside)) if made.verdict == "none" else made
-    doubt = _outbid(of, named) if share < CLOSES and left.size > 1.0 else None
+    doubt = _outbid(of, named, left) if share < CLOSES else None
     if doubt is not None:
         return doubt
     if judged.left > 1.0 and left.size > 1.0:
@@ -138,7 +138,9 @@ def _decided(of: _Told, unsteady: Unsteady, changing: float) -> Decided:
     if left.shown > PLAIN and left.seen > 1.0 and sum(shares) < judged.left**2:
         return Decided("unknown", _leading(missing), (), left.sign, (_made_up(missing, named),))
     because = "simulated with it, the rig comes closer to the records than any rig without an effect"
-    return Decided("effects", named[0].hypothesis.place, named, left.sign, (because, *aside))
+    more = of.unnamed
+    beside = (_beside(more),) if more is not None and more.worth > FREE else ()
+    return Decided("effects", named[0].hypothesis.place, named, left.sign, (because, *beside, *aside))
 
 
 class _Left(NamedTuple):
@@ -162,15 +164,16 @@ def _left_of(judged: Judged, missing: Missing, known: Calibration) -> _Left:
     return _Left(size, shown, seen, max(min(judged.left / GREATER, size), seen, shown / PLAIN))
 
 
-def _outbid(of: _Told, named: tuple[Weighed, ...]) -> Decided | None:
-    """What a form without a name that explains the records clearly better than what is named says."""
+def _outbid(of: _Told, named: tuple[Weighed, ...], left: _Left) -> Decided | None:
+    """What a form without a name that explains the records clearly better than what is named says: beside that, or by
+    the force residuals where more is left than sound rigs leave."""
     worth = max(one.log_bayes_factor for one in named)
     unnamed, free, limits = of.unnamed, of.forces.best_free, of.limits
     needed = limits.competitor_factor * worth + limits.competitor_offset
     if unnamed is not None and unnamed.worth > needed:
         return _explained(unnamed, unnamed.worth / needed)
     needed = limits.competitor_factor * max(worth, _by_force(of.forces, named)) + limits.competitor_offset
-    if not free or free.log_bayes_factor <= needed:
+    if left.size <= 1.0 or not free or free.log_bayes_factor <= needed:
         return None
     place = free.hypothesis.place
     because = f"a force {at_place(place)} without any given form explains the records clearly better"
@@ -184,6 +187,14 @@ def _explained(by: FreeForce, sign: float) -> Decided:
         " linear force there), and no effect of the library is such"
     )
     return Decided("unknown", by.form.place, (), sign, (because,))
+
+
+def _beside(more: FreeForce) -> str:
+    """That something without a name is at work besides."""
+    return (
+        f"{more.form.words} explains what is left clearly better ({more.worth:.3g} nats, {percent(abs(more.size))} of"
+        " the linear force there): something else may be at work besides"
+    )
 
 
 def _without(of: _Told, left: _Left) -> Decided:

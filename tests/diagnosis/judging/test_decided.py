@@ -131,11 +131,13 @@ def test_what_stands_out_has_a_place_before_a_force_without_a_name() -> None:
     assert decided(None, **much, excess=at(0, 2 * OUTSTANDING["drive"])).place == "drive"
 
 
-def test_a_force_without_a_name_outbids_what_closes_little_beside_a_remainder() -> None:
-    much: dict[str, Any] = {"remains": 1.1 * STRUCTURE, "forces": [damper(1.1 * (1.5 * 40.0 + 20.0))]}
+def test_a_force_without_a_name_outbids_what_closes_little_whatever_is_left() -> None:
+    much: dict[str, Any] = {"remains": 0.1 * STRUCTURE, "forces": [damper(1.1 * (1.5 * 40.0 + 20.0))]}
     assert decided(40.0, **much).place == "driven-support"
     assert decided(50.0, **much).verdict == "effects"
-    assert decided(40.0, **much, share=0.6).verdict == "effects"
+    made = decided(40.0, **much, share=0.6)
+    assert made.verdict == "effects" and made.because[1].startswith("damping there explains what is left")
+    assert len(decided(40.0, forces=[damper(0.9 * FREE)]).because) == 1
 
 
 def test_a_rig_further_from_the_judged_record_than_the_nominal_one_names_nothing() -> None:
