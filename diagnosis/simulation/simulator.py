@@ -152,8 +152,11 @@ class Simulator:
                     moved[index] += signed
                     if not low[index] <= moved[index] <= high[index]:
                         continue
-                    if self.layout.case(moved) == unmoved:
-                        break  # frequency of a housing that is not there
+                    try:
+                        if self.layout.case(moved) == unmoved:
+                            break  # frequency of a housing that is not there
+                    except ValueError:  # of this sense there is no rig
+                        continue
                     answer = self._lines(moved)
                     if answer is not None:
                         out[index] = (answer - here) / signed

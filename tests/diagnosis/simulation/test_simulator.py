@@ -13,6 +13,7 @@ from gearbench.diagnosis.simulation.simulator import Simulator
 from gearbench.diagnosis.structure.contrast import CONTRAST
 from gearbench.diagnosis.structure.layout import Layout
 from gearbench.diagnosis.structure.structure import ACROSS, CROSS, GAIN, HOUSING, MODE, PHASE, housings, least_steps
+from gearbench.rig import Case
 
 
 @dataclass(frozen=True)
@@ -267,3 +268,23 @@ def test_a_coupling_that_no_line_shows_is_left_out_of_the_rig(bench: Bench) -> N
     assert ratio == pytest.approx(0.67 / np.sqrt(4e-3), rel=1e-6)
     # It is looked for from none by as much: a smaller step would show no derivative.
     assert np.abs(bench.jacobian[at]).max() > 0.0
+
+
+def test_of_an_unknown_that_no_rig_may_have_more_of_the_other_sense_tells(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    at, size = bench.layout.unknowns[COMPLIANCE].start, bench.layout.size
+    p, chosen = np.zeros(size), np.arange(size) == at
+    p[at] = 5.0 * least_steps(bench.layout.unknowns)[COMPLIANCE]
+    plain = bench.simulator.moved(p, bench.layout.unknowns.prior(), chosen)
+    made = Layout.case
+
+    def case(layout: Layout, values: np.ndarray, condition: str | None = None) -> Case:
+        if values[at] > p[at]:
+            raise ValueError("no rig may have as much")
+        return made(layout, values, condition)
+
+    monkeypatch.setattr(Layout, "case", case)
+    found = bench.simulator.moved(p, bench.layout.unknowns.prior(), chosen)
+    assert plain is not None and found is not None
+    assert np.linalg.norm(found[at] - plain[at]) < 0.3 * np.linalg.norm(plain[at])
