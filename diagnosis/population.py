@@ -31,8 +31,8 @@ UNKNOWN = Odds(
 )
 
 # Limits: a drift of 0.4 % changes 0.0014 of the nominal gap, sound and slipping rigs of the development family up to
-# 0.006, none of 53 drawn sound rigs anything that counts; drifts and tones of three seeds 0.02 and more. Of a channel's fluctuation sound rigs leave up to 0.18 and not much
-# at one place.
+# 0.006, none of 53 drawn sound rigs anything that counts; drifts and tones of three seeds 0.02 and more. Of a channel's
+# fluctuation sound rigs leave up to 0.18 and not much at one place.
 POPULATION = Calibration(
     source="population", effect=EFFECT, unknown=UNKNOWN, rigs=60, structure=0.08, changing=0.012
 )
