@@ -168,16 +168,19 @@ def _outbid(of: _Told, named: tuple[Weighed, ...], left: _Left) -> Decided | Non
     """What a form without a name that explains the records clearly better than what is named says: beside that, or by
     the force residuals where more is left than sound rigs leave."""
     worth = max(one.log_bayes_factor for one in named)
-    unnamed, free, limits = of.unnamed, of.forces.best_free, of.limits
-    needed = limits.competitor_factor * worth + limits.competitor_offset
-    if unnamed is not None and unnamed.worth > needed:
-        return _explained(unnamed, unnamed.worth / needed)
-    needed = limits.competitor_factor * max(worth, _by_force(of.forces, named)) + limits.competitor_offset
-    if left.size <= 1.0 or not free or free.log_bayes_factor <= needed:
+    unnamed, free = of.unnamed, of.forces.best_free
+
+    def needed(by: float) -> float:
+        return of.limits.competitor_factor * by + of.limits.competitor_offset
+
+    if unnamed is not None and unnamed.worth > needed(worth):
+        return _explained(unnamed, unnamed.worth / needed(worth))
+    by_force = needed(max(worth, _by_force(of.forces, named)))
+    if left.size <= 1.0 or not free or free.log_bayes_factor <= by_force:
         return None
     place = free.hypothesis.place
     because = f"a force {at_place(place)} without any given form explains the records clearly better"
-    return Decided("unknown", place, (), free.log_bayes_factor / needed, (because,))
+    return Decided("unknown", place, (), free.log_bayes_factor / by_force, (because,))
 
 
 def _explained(by: FreeForce, sign: float) -> Decided:

@@ -77,7 +77,7 @@ def free_forces(simulator: Simulator, found: Optimum) -> tuple[FreeForce, ...]:
     """What forces without a name are worth beside all that `found` holds, the most first, by the records in which its
     flanks stay together: impacts, met a little otherwise, look like any of them. Raises what a simulation of that rig
     raises."""
-    motions = list(enumerate(_motion(simulator, found.p, one) for one in simulator.target.measurements))
+    motions = list(enumerate(motion_of(simulator, found.p, one) for one in simulator.target.measurements))
     kept = {number: one for number, one in motions if float((one.elastic <= 0.0).mean()) <= PARTED}
     if not kept:
         return ()
@@ -90,7 +90,7 @@ def free_forces(simulator: Simulator, found: Optimum) -> tuple[FreeForce, ...]:
     p, sd = np.append(found.p, 0.0), np.append(found.sd, WIDE)
     limits = np.append(bounds[0], -np.inf), np.append(bounds[1], np.inf)
     out = []
-    for form, column in _columns(simulator.of_target(target), list(kept.values())):
+    for form, column in lines_of_forms(simulator.of_target(target), list(kept.values())):
         near = quadratic_of(target, residual, np.concatenate([inner, column[None]]), np.append(active, size))
         step, cost, information = near.best(p, sd, limits)
         worth = near.evidence(cost, information, sd) - plain
@@ -98,21 +98,17 @@ def free_forces(simulator: Simulator, found: Optimum) -> tuple[FreeForce, ...]:
     return tuple(sorted(out, key=lambda one: -one.worth))
 
 
-def lines_of_forms(simulator: Simulator, p: Array) -> list[tuple[Form, Complex]]:
-    """The forms, each with what the lines (K,) change by where it is as large as its linear force, over all records."""
-    return _columns(simulator, [_motion(simulator, p, one) for one in simulator.target.measurements])
-
-
-def _motion(simulator: Simulator, p: Array, measured: Measurement) -> Along:
-    """The rig's motion in a record."""
+def motion_of(simulator: Simulator, p: Array, measured: Measurement) -> Along:
+    """The motion of the rig of unknowns (size,) in a record."""
     # Its time loop is compiled on import, which not every user of this module wants.
     from gearbench.bench.nonlinear.along import along
 
     return along(simulator.motion(p, measured)[1])
 
 
-def _columns(simulator: Simulator, motions: Sequence[Along]) -> list[tuple[Form, Complex]]:
-    """The same along the motions in all records."""
+def lines_of_forms(simulator: Simulator, motions: Sequence[Along]) -> list[tuple[Form, Complex]]:
+    """The forms along the motions in all records, each with what the lines (K,) change by where it is as large as its
+    linear force, over all of them."""
     pairs = zip(simulator.target.measurements, motions, strict=True)
     found = [_answered(simulator, one, motion) for one, motion in pairs]
     out = []

@@ -15,7 +15,7 @@ from gearbench.diagnosis.evidence.problem import problem_of
 from gearbench.diagnosis.fitting.fit import fit_afresh
 from gearbench.diagnosis.intake.measurements import measurement
 from gearbench.diagnosis.judging.decided import FREE
-from gearbench.diagnosis.judging.free_forces import FreeForce, free_forces, lines_of_forms
+from gearbench.diagnosis.judging.free_forces import FreeForce, free_forces, lines_of_forms, motion_of
 from gearbench.diagnosis.replay.replays import Replays
 from gearbench.diagnosis.simulation.simulator import Simulator
 from gearbench.diagnosis.simulation.target import target_of
@@ -103,7 +103,8 @@ def test_a_rig_of_linear_joints_has_none(bench: Bench) -> None:
 def test_lines_are_those_of_the_plain_rig(bench: Bench, name: str, joint: str) -> None:
     """Its motions with a little more and a little less of the force differ by as much."""
     simulator, small = bench.simulator({}), 0.02
-    forms = lines_of_forms(simulator, np.zeros(simulator.layout.size))
+    motions = [motion_of(simulator, np.zeros(simulator.layout.size), one) for one in simulator.target.measurements]
+    forms = lines_of_forms(simulator, motions)
     column = next(lines for form, lines in forms if form.name == name)
     wanted = bench.difference(bench.factor(joint, -small), bench.factor(joint, small))
     g = bench.constants.factor
