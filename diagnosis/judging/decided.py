@@ -42,9 +42,9 @@ CLOSES, OUTWEIGHS = 0.5, 3.0
 # Of the place that stands out most, what the next one may reach for it to be told, and over what sound rigs leave, what
 # it must reach itself.
 TOLD, FAINT = 0.5, 0.2
-# Nats that a force without a name is worth beside the final rig from which it is one, and its least and
-# largest rms over the linear force at its place: beyond that its lines are not those of a small force.
-FREE, FREE_SIZES = 15.0, (0.05, 1.0)
+# Nats that a force without a name is worth beside the final rig from which it is one, its least rms over the linear
+# force at its place, and how far it may go against that: no damper drives.
+FREE, LEAST_FREE, AGAINST = 15.0, 0.05, -1.0
 # Over what sound rigs have: a lag of the drive's torque from which something is between its sensor and the rotor.
 LATE_LIMIT = 3.0
 
@@ -109,10 +109,10 @@ class _Told(NamedTuple):
 
     @property
     def unnamed(self) -> FreeForce | None:
-        """The force without a name that is worth most, of those larger than a sound rig's."""
-        least, most = FREE_SIZES
-        fitting = (one for one in self.free if least < abs(one.size) <= most)
-        return max(fitting, key=lambda one: one.worth, default=None)
+        """The force without a name that is worth most, if it is larger than a sound rig's: what is worth less stands in
+        for that, at another place."""
+        most = max(self.free, key=lambda one: one.worth, default=None)
+        return most if most is not None and abs(most.size) > LEAST_FREE and most.size >= AGAINST else None
 
 
 def _decided(of: _Told, unsteady: Unsteady, changing: float) -> Decided:

@@ -18,10 +18,11 @@ from gearbench.diagnosis.forces.equations import PLACES
 from gearbench.diagnosis.forces.steadiness import Unsteady
 from gearbench.diagnosis.forces.unknowns import group, unknowns_of
 from gearbench.diagnosis.judging.decided import (
+    AGAINST,
     FREE,
-    FREE_SIZES,
     GREATER,
     HIDING,
+    LEAST_FREE,
     PLAIN,
     VISIBLE,
     Decided,
@@ -119,9 +120,9 @@ def test_a_force_without_a_name_is_unknown_where_nothing_else_is_and_its_size_is
     assert made.because[0].startswith("damping there explains the records clearly better (18 nats, 20 %")
     made = decided(None, forces=[damper(0.8 * FREE)])
     assert made.verdict == "none" and made.sign == pytest.approx(0.8)
-    least, most = FREE_SIZES
-    for size in (-0.9 * least, 1.1 * most):
-        assert decided(None, forces=[damper(3 * FREE, size)]).verdict == "none"
+    for size in (-0.9 * LEAST_FREE, 1.1 * AGAINST):
+        assert decided(None, forces=[damper(3 * FREE, size), damper(2 * FREE)]).verdict == "none"
+    assert decided(None, forces=[damper(3 * FREE, size=1.5), damper(2 * FREE)]).sign == pytest.approx(3.0)
     assert decided(None, forces=[damper(2 * FREE, size=-0.3), damper(1.2 * FREE)]).sign == pytest.approx(2.0)
 
 
