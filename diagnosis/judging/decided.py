@@ -78,14 +78,14 @@ def decide_simulated(
     the excess scatter between repetitions, by place, and `changing` the largest rms of what changes over that of the
     nominal gap, `drift` what explains most of it; `known`: what sound rigs leave; `free`: what forces without a name
     are worth beside the final rig."""
-    told = _Told(judged, forces, missing, limits, known, tuple(free))
+    all_told = _Told(judged, forces, missing, limits, known, tuple(free))
     _, over = unsteady.worst(limits.unsteady)
     # `changing` is more than nothing where what is left grows by it, whatever part of the nominal gap that is.
     large = drift is not None and changing > (0.0 if drift.beyond_sound else known.changing)
     if drift is None or over <= 1.0 or not large:
-        return _decided(told, unsteady, changing)
+        return _decided(all_told, unsteady, changing)
     # What a drift explains speaks neither for something unknown nor against an effect.
-    rest = _decided(told, Unsteady.nothing(), changing)
+    rest = _decided(all_told, Unsteady.nothing(), changing)
     said = (
         f"{percent(drift.share)} of the energy of what changes from one repetition to the next is what a stiffness"
         f" {at_place(drift.place)} makes that changes by {percent(drift.value)} over a record"
@@ -114,6 +114,16 @@ class _Told(NamedTuple):
         most = max(self.free, key=lambda one: one.worth, default=None)
         return most if most is not None and abs(most.size) > LEAST_FREE and most.size >= AGAINST else None
 
+    @property
+    def clear(self) -> FreeForce | None:
+        """The same, if it is one that no sound rig has."""
+        return self.unnamed if self.alone > 1.0 else None
+
+    @property
+    def alone(self) -> float:
+        """What it is worth, over what those of sound rigs are."""
+        return self.unnamed.worth / FREE if self.unnamed is not None else 0.0
+
 
 def _decided(of: _Told, unsteady: Unsteady, changing: float) -> Decided:
     """The decision without a drift."""
@@ -138,8 +148,7 @@ def _decided(of: _Told, unsteady: Unsteady, changing: float) -> Decided:
     if left.shown > PLAIN and left.seen > 1.0 and sum(shares) < judged.left**2:
         return Decided("unknown", _leading(missing), (), left.sign, (_made_up(missing, named),))
     because = "simulated with it, the rig comes closer to the records than any rig without an effect"
-    more = of.unnamed
-    beside = (_beside(more),) if more is not None and more.worth > FREE else ()
+    beside = (_beside(of.clear),) if of.clear else ()
     return Decided("effects", named[0].hypothesis.place, named, left.sign, (because, *beside, *aside))
 
 
@@ -185,28 +194,28 @@ def _outbid(of: _Told, named: tuple[Weighed, ...], left: _Left) -> Decided | Non
 
 def _explained(by: FreeForce, sign: float) -> Decided:
     """The decision for a force without a name."""
-    because = (
-        f"{by.form.words} explains the records clearly better ({by.worth:.3g} nats, {percent(abs(by.size))} of the"
-        " linear force there), and no effect of the library is such"
-    )
+    better = f"{by.form.words} explains the records clearly better ({_worth_of(by)})"
+    because = f"{better}, and no effect of the library is such"
     return Decided("unknown", by.form.place, (), sign, (because,))
 
 
 def _beside(more: FreeForce) -> str:
     """That something without a name is at work besides."""
-    return (
-        f"{more.form.words} explains what is left clearly better ({more.worth:.3g} nats, {percent(abs(more.size))} of"
-        " the linear force there): something else may be at work besides"
-    )
+    better = f"{more.form.words} explains what is left clearly better ({_worth_of(more)})"
+    return f"{better}: something else may be at work besides"
+
+
+def _worth_of(one: FreeForce) -> str:
+    """What it is worth and how large it is."""
+    return f"{one.worth:.3g} nats, {percent(abs(one.size))} of the linear force there"
 
 
 def _without(of: _Told, left: _Left) -> Decided:
     """The decision where no effect is named."""
-    judged, missing, known, unnamed = of.judged, of.missing, of.known, of.unnamed
-    alone = unnamed.worth / FREE if unnamed is not None else 0.0
+    judged, missing, known, clear = of.judged, of.missing, of.known, of.clear
     leading = _leading(missing)
-    if leading == "none" and unnamed is not None and alone > 1.0:
-        leading = unnamed.form.place
+    if leading == "none" and clear:
+        leading = clear.form.place
     if left.size > 1.0 and judged.left > GREATER:
         because = "no effect of the library closes the gap, and the greater part of it stays"
         return Decided("unknown", leading, (), left.sign, (because,))
@@ -223,9 +232,10 @@ def _without(of: _Told, left: _Left) -> Decided:
     late, sound = lag_of_drive(judged.found.layout.unknowns, judged.found.selection.best.p)
     if abs(late) > LATE_LIMIT * sound:
         return Decided("unknown", "drive", (), max(left.sign, abs(late) / (LATE_LIMIT * sound)), (_late(late),))
-    if unnamed is not None and alone > 1.0:
-        return _explained(unnamed, max(left.sign, alone))
-    return Decided("none", "none", (), max(left.sign, alone), (_nothing(judged, known),))
+    sign = max(left.sign, of.alone)
+    if clear:
+        return _explained(clear, sign)
+    return Decided("none", "none", (), sign, (_nothing(judged, known),))
 
 
 def _nothing(judged: Judged, known: Calibration) -> str:

@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from gearbench.bench.plan.workers import side_by_side
+from gearbench.diagnosis.evidence.decision import at_place
 from gearbench.diagnosis.fitting.fit import Optimum
 from gearbench.diagnosis.forces.equations import SUPPORTS
 from gearbench.diagnosis.intake.measurements import Measurement
@@ -34,32 +36,36 @@ WIDE = 1.0
 # Part of the time without contact up to which flanks stay together.
 PARTED = 1e-3
 TINY = 1e-300
-SIDES = ("driver", "driven gear")
 
 
 @dataclass(frozen=True)
 class Form:
-    """A form of force at a `place`: what is in that joint, and how a sentence begins with it."""
+    """What is in the joint at a `place`."""
 
     kind: Literal["damper", "spring"]
     place: Place
-    words: str
 
     @property
     def name(self) -> str:
         """Kind and place."""
         return f"{self.kind} {self.place}"
 
+    @property
+    def words(self) -> str:
+        """How a sentence begins with it."""
+        if self.kind == "damper":
+            return f"damping {at_place(self.place)} that is not in proportion to the rate"
+        return f"a stiffness {at_place(self.place)} that differs between both senses"
+
 
 @dataclass(frozen=True)
 class FreeForce:
     """A form's log Bayes factor `worth` over no such force [nats], and its `size`, rms over that of the linear force at
-    its place, with standard deviation `std`."""
+    its place."""
 
     form: Form
     worth: float
     size: float
-    std: float
 
 
 @dataclass(frozen=True)
@@ -74,28 +80,36 @@ class _Course:
 
 
 def free_forces(simulator: Simulator, found: Optimum) -> tuple[FreeForce, ...]:
-    """What forces without a name are worth beside all that `found` holds, the most first, by the records in which its
-    flanks stay together: impacts, met a little otherwise, look like any of them. Raises what a simulation of that rig
-    raises."""
-    motions = list(enumerate(motion_of(simulator, found.p, one) for one in simulator.target.measurements))
-    kept = {number: one for number, one in motions if float((one.elastic <= 0.0).mean()) <= PARTED}
+    """What forces without a name are worth beside all that `found` holds, by the records in which its flanks stay
+    together: impacts, met a little otherwise, look like any of them. Raises what a simulation of that rig raises."""
+    motions = side_by_side(lambda one: motion_of(simulator, found.p, one), simulator.target.measurements)
+    kept = {n: one for n, one in enumerate(motions) if float((one.elastic <= 0.0).mean()) <= PARTED}
     if not kept:
         return ()
     inside, target = simulator.target.in_records(list(kept)), simulator.target.of_records(list(kept))
-    inner, active, size = found.sensitivity.jacobian[:, inside], found.sensitivity.quadratic.active, found.p.size
-    residual, bounds = target.lines - found.lines[inside], simulator.layout.unknowns.bounds()
-    alone = quadratic_of(target, residual, inner, active)
-    _, cost, information = alone.best(found.p, found.sd, bounds)
-    plain = alone.evidence(cost, information, found.sd)
-    p, sd = np.append(found.p, 0.0), np.append(found.sd, WIDE)
-    limits = np.append(bounds[0], -np.inf), np.append(bounds[1], np.inf)
+    forms = lines_of_forms(simulator.of_target(target), list(kept.values()))
+    nothing, (low, high) = np.zeros(len(forms)), simulator.layout.unknowns.bounds()
+    near = quadratic_of(
+        target,
+        target.lines - found.lines[inside],
+        np.concatenate([found.sensitivity.jacobian[:, inside], *(column[None] for _, column in forms)]),
+        np.append(found.sensitivity.quadratic.active, found.p.size + np.arange(len(forms))),
+    )
+    p = np.append(found.p, nothing)
+    bounds = np.append(low, nothing - np.inf), np.append(high, nothing + np.inf)
+
+    def weighed(widths: Array) -> tuple[float, Array]:
+        """Log evidence with forces of these prior widths (forms,), none of width 0, and their sizes (forms,)."""
+        sd = np.append(found.sd, widths)
+        step, cost, information = near.best(p, sd, bounds)
+        return near.evidence(cost, information, sd), step[len(step) - len(forms) :]
+
+    plain, _ = weighed(nothing)
     out = []
-    for form, column in lines_of_forms(simulator.of_target(target), list(kept.values())):
-        near = quadratic_of(target, residual, np.concatenate([inner, column[None]]), np.append(active, size))
-        step, cost, information = near.best(p, sd, limits)
-        worth = near.evidence(cost, information, sd) - plain
-        out.append(FreeForce(form, worth, float(step[-1]), float(near.std(information, sd)[-1])))
-    return tuple(sorted(out, key=lambda one: -one.worth))
+    for (form, _), widths in zip(forms, WIDE * np.eye(len(forms)), strict=True):
+        evidence, sizes = weighed(widths)
+        out.append(FreeForce(form, evidence - plain, float(sizes[widths > 0.0][0])))
+    return tuple(out)
 
 
 def motion_of(simulator: Simulator, p: Array, measured: Measurement) -> Along:
@@ -109,8 +123,8 @@ def motion_of(simulator: Simulator, p: Array, measured: Measurement) -> Along:
 def lines_of_forms(simulator: Simulator, motions: Sequence[Along]) -> list[tuple[Form, Complex]]:
     """The forms along the motions in all records, each with what the lines (K,) change by where it is as large as its
     linear force, over all of them."""
-    pairs = zip(simulator.target.measurements, motions, strict=True)
-    found = [_answered(simulator, one, motion) for one, motion in pairs]
+    pairs = list(zip(simulator.target.measurements, motions, strict=True))
+    found = side_by_side(lambda pair: _answered(simulator, *pair), pairs)
     out = []
     for number, same in enumerate(zip(*(courses for courses, _ in found), strict=True)):
         size = np.sqrt(sum(_power(one.linear) for one in same) / max(sum(_power(one.force) for one in same), TINY))
@@ -136,26 +150,23 @@ def _answered(simulator: Simulator, measured: Measurement, motion: Along) -> tup
 def _courses(along: Along) -> Iterator[_Course]:
     """The forms along a motion."""
     model, rate = along.model, along.rate
-    yield _damped("in the mesh", "mesh", ((IN_MESH, 1.0),), rate, along.tangent.damping * rate)
+    yield _damped("mesh", ((IN_MESH, 1.0),), rate, along.tangent.damping * rate)
     dampers = model.constants().damping1, model.constants().damping2
     for support, spring, damper in zip(SUPPORTS, model.support_springs, dampers, strict=True):
         moved = along.resampled(spring.deflection(along.places))
         moved = moved - moved.mean()
-        on = tuple((number, -part) for number, part in enumerate(spring.along) if part)
-        where, place = f"at the {SIDES[support.side]}'s support", support.equation.place
-        stiffer = Form("spring", place, f"a stiffness {where} that differs between both senses")
-        yield _Course(stiffer, on, moved**2, spring.stiffness * moved)
+        on, place = tuple((number, -part) for number, part in enumerate(spring.along) if part), support.equation.place
+        yield _Course(Form("spring", place), on, moved**2, spring.stiffness * moved)
         closing = along.rate_of(moved)
-        yield _damped(where, place, on, closing, damper * closing)
+        yield _damped(place, on, closing, damper * closing)
     if model.elastic_shaft:
         twisting = along.rate_of(along.fine(W) - along.fine(U1))
-        yield _damped("in the coupling", "drive", ((W, -1.0), (U1, 1.0)), twisting, model.shaft[1] * twisting)
+        yield _damped("drive", ((W, -1.0), (U1, 1.0)), twisting, model.shaft[1] * twisting)
 
 
-def _damped(where: str, place: Place, on: tuple[tuple[int, float], ...], rate: Array, linear: Array) -> _Course:
+def _damped(place: Place, on: tuple[tuple[int, float], ...], rate: Array, linear: Array) -> _Course:
     """Damping with the square of a rate (entries,) [m/s]."""
-    form = Form("damper", place, f"damping {where} that is not in proportion to the rate")
-    return _Course(form, on, rate * np.abs(rate), linear)
+    return _Course(Form("damper", place), on, rate * np.abs(rate), linear)
 
 
 def _power(values: Array) -> float:

@@ -110,14 +110,17 @@ def test_the_greater_part_unexplained_is_unknown_unless_any_rig_leaves_as_much()
     assert decided(None, **(much | {"remains": 0.9 * STRUCTURE})).verdict == "none"
 
 
+DAMPER = "damping at the driven support that is not in proportion to the rate"
+
+
 def damper(worth: float, size: float = 0.2) -> FreeForce:
-    return FreeForce(Form("damper", "driven-support", "damping there"), worth, size, 0.01)
+    return FreeForce(Form("damper", "driven-support"), worth, size)
 
 
 def test_a_force_without_a_name_is_unknown_where_nothing_else_is_and_its_size_is_one() -> None:
     made = decided(None, forces=[damper(1.2 * FREE)])
     assert (made.verdict, made.place) == ("unknown", "driven-support") and made.sign == pytest.approx(1.2)
-    assert made.because[0].startswith("damping there explains the records clearly better (18 nats, 20 %")
+    assert made.because[0].startswith(f"{DAMPER} explains the records clearly better (18 nats, 20 %")
     made = decided(None, forces=[damper(0.8 * FREE)])
     assert made.verdict == "none" and made.sign == pytest.approx(0.8)
     for size in (-0.9 * LEAST_FREE, 1.1 * AGAINST):
@@ -137,7 +140,7 @@ def test_a_force_without_a_name_outbids_what_closes_little_whatever_is_left() ->
     assert decided(40.0, **much).place == "driven-support"
     assert decided(50.0, **much).verdict == "effects"
     made = decided(40.0, **much, share=0.6)
-    assert made.verdict == "effects" and made.because[1].startswith("damping there explains what is left")
+    assert made.verdict == "effects" and made.because[1].startswith(f"{DAMPER} explains what is left")
     assert len(decided(40.0, forces=[damper(0.9 * FREE)]).because) == 1
 
 
