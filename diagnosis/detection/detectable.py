@@ -20,6 +20,7 @@ from gearbench.diagnosis.detection.stated import Sizes, sizes_of
 from gearbench.diagnosis.effects.backlash import BACKLASH, KEY
 from gearbench.diagnosis.effects.effect import SIDES, Hypothesis
 from gearbench.diagnosis.effects.library import hypotheses as library
+from gearbench.diagnosis.effects.profile_error import FLANKS, uneven
 from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
 from gearbench.diagnosis.evidence.problem import Problem
 from gearbench.diagnosis.forces.condition import prepare
@@ -81,10 +82,13 @@ def too_small(problem: Problem, judged: Judged, named: Sequence[Weighed]) -> Wei
 def _size_of(one: Hypothesis, unknowns: Unknowns, p: Array) -> float:
     """Rms of its unknowns, of all (size,), in standard deviations of the wide prior; teeth or flanks that all stand out
     alike are even."""
-    wide = one.prior(unknowns)
-    groups = [p[part.entries(unknowns)] / wide[part.entries(unknowns)] for part in one.wide]
-    even = [group - group.mean() if len(group) > len(SIDES) else group for group in groups]
-    return float(np.sqrt(np.mean(np.concatenate(even) ** 2)))
+    values_of, wide, out = uneven(unknowns, p), one.prior(unknowns), []
+    for part in one.wide:
+        at = part.entries(unknowns)
+        values = values_of[at] / wide[at]
+        alike = len(values) > len(SIDES) and part.key != FLANKS
+        out.append(values - values.mean() if alike else values)
+    return float(np.sqrt(np.mean(np.concatenate(out) ** 2)))
 
 
 def _answer(found: Simulated, simulator: Simulator) -> tuple[Complex, Array] | None:

@@ -1,7 +1,8 @@
 """Flanks that depart from the nominal ones, all teeth alike: an error that every pair repeats along its path.
 
-Of two kinds: what all pairs in contact have at once, a wave over the mesh phase, and the form of the flanks themselves,
-which moves the load from one pair in contact to the next, as reliefs do.
+Of three kinds: what all pairs in contact have at once, a wave over the mesh phase; the form of the flanks themselves,
+which moves the load from one pair in contact to the next, as reliefs do; and of all forms slope and barrelling, which
+grinding leaves, by two numbers.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from gearbench.diagnosis.effects.recalibrated import added
 from gearbench.diagnosis.forces.basis import PLACES_ON_PATH, SHAPE_ORDERS, waves
 from gearbench.diagnosis.forces.condition import Condition
 from gearbench.diagnosis.forces.nominal import NominalModel
-from gearbench.diagnosis.forces.unknowns import Group, group
+from gearbench.diagnosis.forces.unknowns import Group, Unknowns, group
 from gearbench.rig import Gear, Rig
 
 Array = NDArray[np.float64]
@@ -26,8 +27,12 @@ KEY, FLANKS = "profile", "flanks"
 # At each mesh order, over the deflection of the mesh: of good flanks, and of those whose relief is that of another
 # load, which is as large as the deflection.
 SD, WIDE = 0.08, 0.4
-# Likewise at each place along the path of contact, where other teeth than the nominal ones differ in stiffness too.
-SD_FORM, WIDE_FORM = 0.2, 1.2
+# Of the form of the flanks along the path of contact, by its parts: teeth of another stiffness than the nominal ones
+# have a zigzag of their own, and far less of a slope or a barrelling, which are ground. What is even is no form.
+EVEN, NAMES = 0, ("even", "slope", "barrelling", "cubic", "quartic", "quintic", "sextic")
+GROUND = ("slope", "barrelling")
+SD_FORM = (0.08, 0.1, 0.13, 0.2, 0.2, 0.2, 0.2)
+WIDE_FORM = (0.5, 0.6, 1.2, 1.2, 1.2, 1.2, 1.2)
 PHASES = 128
 # Of reliefs to begin from: depths over the deflection of the mesh, and parts of the path of contact that they take.
 DEPTHS, LENGTHS = (1.0, 2.0, 3.0, 4.5), (0.25, 0.5)
@@ -35,9 +40,20 @@ MIDDLE = PLACES_ON_PATH.index(0.5)
 LEAST_ROLL = 1e-6  # rad; a table of a flank's form begins beyond the base circle
 
 
+def _parts() -> Array:
+    """Excess at the places (parts, places) per unit of every part of a form: even, a slope towards where teeth leave
+    the mesh, a barrelling without a mean over the path, and orthonormal polynomials of the degrees beyond."""
+    away = 2.0 * np.array(PLACES_ON_PATH) - 1.0
+    beyond = np.linalg.qr(np.polynomial.legendre.legvander(away, len(away) - 1))[0][:, 3:]
+    return np.vstack([np.ones_like(away), away, 1 / 3 - away**2, beyond.T])
+
+
+PARTS = _parts()
+
+
 def _flanks(condition: Condition) -> Array:
-    """What the mesh has of the form at each place (places, N)."""
-    return condition.flanks
+    """What the mesh has of each part of the form (parts, N)."""
+    return np.asarray(PARTS @ condition.flanks)
 
 
 def unknowns(model: NominalModel, conditions: Sequence[Condition]) -> tuple[Group, ...]:
@@ -45,16 +61,25 @@ def unknowns(model: NominalModel, conditions: Sequence[Condition]) -> tuple[Grou
     one = model.deflection
     return (
         group(KEY, "m", 2 * SHAPE_ORDERS, SD * one, WIDE * one, slot="profile"),
-        group(FLANKS, "m", len(PLACES_ON_PATH), SD_FORM * one, WIDE_FORM * one, slot="excess", basis=_flanks),
+        group(FLANKS, "m", NAMES, one * np.array(SD_FORM), one * np.array(WIDE_FORM), slot="excess", basis=_flanks),
     )
 
 
 def hypotheses(model: NominalModel) -> tuple[Hypothesis, ...]:
     """The one mesh: what one gear's flanks lack, its mate's may have."""
+    ground = tuple(Wide(FLANKS, NAMES.index(one)) for one in GROUND)
     return (
-        Hypothesis("profile-error", "mesh", (Wide(KEY),), choices=2),
-        Hypothesis("profile-error flanks", "mesh", (Wide(FLANKS),), choices=2),
+        Hypothesis("profile-error", "mesh", (Wide(KEY),), choices=3),
+        Hypothesis("profile-error flanks", "mesh", (Wide(FLANKS),), choices=3),
+        Hypothesis("profile-error slope", "mesh", ground, choices=3),
     )
+
+
+def uneven(unknowns: Unknowns, p: Array) -> Array:
+    """Unknowns (size,) without what a form has of the even part, which is no error of form."""
+    out = p.copy()
+    out[unknowns.at(FLANKS)[EVEN : EVEN + 1]] = 0.0
+    return out
 
 
 def shapes(model: NominalModel) -> Array:
@@ -67,13 +92,14 @@ def shapes(model: NominalModel) -> Array:
         for form in (entry, leaving, entry + leaving):
             out += [-depth * form for depth in DEPTHS]
         out.append(entry + leaving)
-    return model.deflection * np.array(out)
+    return np.asarray(model.deflection * np.linalg.solve(PARTS.T, np.array(out).T).T)
 
 
 def add(rig: Rig, hypothesis: Hypothesis, fitted: Fitted) -> Added:
     """Gives the mesh the error over its phase that was fitted, and each gear the form from the pitch point to its tip,
     which its mate's root may have as well; sizes are told from peak to valley."""
-    model, values, form = fitted.model, fitted.of(KEY), fitted.of(FLANKS)
+    model, values = fitted.model, fitted.of(KEY)
+    form = fitted.of(FLANKS) @ PARTS
     cosine, sine = added(model.error_cos, values[0::2]), added(model.error_sin, values[1::2])
     rig = changed(rig, "mesh", error_cos=cosine, error_sin=sine)
     if form.any():
@@ -82,8 +108,13 @@ def add(rig: Rig, hypothesis: Hypothesis, fitted: Fitted) -> Added:
         of_driver = np.where(middle, form[MIDDLE], form)
         rig = changed(rig, "driver", **_formed(rig.driver, model, 0, travel, of_driver))
         rig = changed(rig, "driven", **_formed(rig.driven, model, 1, -travel[::-1], (form - of_driver)[::-1]))
-    if any(wide.key == FLANKS for wide in hypothesis.wide):
-        return rig, _along_path(form, fitted.std_of(FLANKS))
+    chosen = [wide for wide in hypothesis.wide if wide.key == FLANKS]
+    if chosen:
+        at = np.concatenate([wide.entries(fitted.unknowns) for wide in chosen])
+        own = PARTS[at - fitted.unknowns[FLANKS].start]
+        # What sound flanks have of a form, teeth of another stiffness make: of that nothing is an error of theirs.
+        std = np.hypot(fitted.std[at], fitted.unknowns.prior()[at])
+        return rig, _along_path(fitted.p[at] @ own, std[:, None] * own)
     size, std = _peak_to_valley(values, fitted.std_of(KEY))
     return rig, (Estimate("peak_to_valley", 1e6 * size, 1e6 * std, "um"),)
 
@@ -112,17 +143,15 @@ def _rolls(gear: Gear, radius: float) -> Array:
     return np.array([sqrt(max((0.5 * one / radius) ** 2 - 1.0, 0.0)) for one in gear.profile_form_diameter])
 
 
-def _along_path(form: Array, std: Array) -> tuple[Estimate, ...]:
-    """Size of a form (places,) from peak to valley, and how far both ends of the path stand out over its middle."""
+def _along_path(form: Array, parts: Array) -> tuple[Estimate, ...]:
+    """Size of a form (places,) from peak to valley, and how far both ends of the path stand out over its middle;
+    `parts` (n, places) what independent standard deviations of its n numbers make of it."""
     high, low = int(form.argmax()), int(form.argmin())
-    out = [Estimate("peak_to_valley", 1e6 * float(form[high] - form[low]), 1e6 * _both(std, high, low), "um")]
-    for name, end in (("driven_tip", 0), ("driver_tip", -1)):
-        out.append(Estimate(name, 1e6 * float(form[end] - form[MIDDLE]), 1e6 * _both(std, end, MIDDLE), "um"))
+    out = []
+    for name, one, other in (("peak_to_valley", high, low), ("driven_tip", 0, MIDDLE), ("driver_tip", -1, MIDDLE)):
+        value, std = form[one] - form[other], np.linalg.norm(parts[:, one] - parts[:, other])
+        out.append(Estimate(name, 1e6 * float(value), 1e6 * float(std), "um"))
     return tuple(out)
-
-
-def _both(std: Array, one: int, other: int) -> float:
-    return float(np.hypot(std[one], std[other]))
 
 
 def _peak_to_valley(values: Array, std: Array) -> tuple[float, float]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gearbench.diagnosis.effects.effect import Hypothesis
+from gearbench.diagnosis.effects.effect import Hypothesis, Wide
 from gearbench.diagnosis.fitting.fit import Optimum, cost_of, fit_afresh
 from gearbench.diagnosis.simulation.simulator import Simulator
 
@@ -20,7 +20,7 @@ RENEWALS = 5
 
 def has_shapes(one: Hypothesis) -> bool:
     """Whether a hypothesis has shapes to begin from."""
-    return one.effect is not None and one.wide[0].key == one.effect.shaped
+    return one.effect is not None and one.wide == (Wide(one.effect.shaped),)
 
 
 def reshaped(simulator: Simulator, one: Hypothesis, sd: Array) -> Optimum | None:

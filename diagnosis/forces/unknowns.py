@@ -52,7 +52,7 @@ def group(
     unit: str,
     names: Sequence[str] | int,
     sd: float | Array,
-    wide: float | None = None,
+    wide: float | Array | None = None,
     *,
     slot: str,
     first: int = 0,
@@ -64,8 +64,8 @@ def group(
     """A group; `names` may be a count, and priors are shared by all its entries unless given for each."""
     listed = tuple(str(i) for i in range(names)) if isinstance(names, int) else tuple(names)
     ones = np.ones(len(listed))
-    large = (sd if wide is None else wide) * ones
-    return Group(key, unit, listed, sd * ones, large, slot, first, basis, low, high, also or {})
+    large = sd if wide is None else wide
+    return Group(key, unit, listed, sd * ones, large * ones, slot, first, basis, low, high, also or {})
 
 
 @dataclass(frozen=True)

@@ -29,12 +29,13 @@ Array = NDArray[np.float64]
 ROUNDS = 40
 # What sound rigs leave at most [nats a line], in the simulated rig and after the fit of the force residuals. From rigs
 # without an effect: development family, housing with cross-coupling, the finite-element model; the latter limits are
-# those of the calibration family over the lines of its records (benchmarks/diagnosis_log.md).
+# those of the calibration family over the lines of its records (benchmarks/diagnosis_log.md). At the drive 65 drawn
+# sound rigs leave 0.7 of this at most.
 OUTSTANDING: Mapping[str, float] = {
-    "drive": 0.5, "driver-support": 1.2, "load": 1.2, "driven-support": 1.2, "mesh": 2.5,
+    "drive": 0.3, "driver-support": 1.2, "load": 1.2, "driven-support": 1.2, "mesh": 2.5,
 }  # fmt: skip
 SILENT: Mapping[str, float] = {
-    "drive": 0.2, "driver-support": 0.35, "load": 2.8, "driven-support": 0.35, "mesh": 1.8,
+    "drive": 0.12, "driver-support": 0.35, "load": 2.8, "driven-support": 0.35, "mesh": 1.8,
 }  # fmt: skip
 
 

@@ -28,7 +28,6 @@ from gearbench.diagnosis.errors import DiagnosisError
 from gearbench.diagnosis.evidence.separable import groups_of
 from gearbench.diagnosis.forces.condition import Condition
 from gearbench.diagnosis.intake.measurements import Measurement
-from gearbench.diagnosis.judging.decided import VISIBLE
 from gearbench.diagnosis.planning.added import larger_plans
 from gearbench.diagnosis.planning.known import known_of
 from gearbench.diagnosis.planning.planned import Planned, planned
@@ -42,8 +41,8 @@ from gearbench.rig.contract import rank_of
 Array = NDArray[np.float64]
 Report = Callable[[str], None]
 
-# Part of every block's level that the best rig is taken to leave: from there on a place stands out on sound rigs.
-LEFT = VISIBLE * POPULATION.structure
+# Part of every block's level that the best rig is taken to leave: half of what sound rigs leave at most.
+LEFT = 0.5 * POPULATION.structure
 SHARPER = 100.0  # times the information: what no plan betters
 QUIET = 0.25  # of the noise's variance: four times the periods
 SPARED = ("y_driver", "y_driven", "torque_driven")  # channels that a diagnosis can do without

@@ -15,7 +15,7 @@ NOUNS = {effect.name: effect.noun for effect in LIBRARY}
 HARDER, VAGUER = 1.25, 2.0
 FOR_NOTHING = 1.1  # below which nothing is lost
 TOLD = 3  # effects in a sentence
-FORMS = {"flanks": "along the flanks"}
+FORMS = {"flanks": "along the flanks", "slope": "slope and barrelling"}
 
 
 def said_of(

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.diagnosis.effects.effect import Hypothesis
-from gearbench.diagnosis.effects.profile_error import FLANKS
+from gearbench.diagnosis.effects.profile_error import uneven
 from gearbench.diagnosis.fitting.background import prior_of
 from gearbench.diagnosis.fitting.fit import Optimum, fit, fit_afresh
 from gearbench.diagnosis.fitting.restructured import better
@@ -108,9 +108,7 @@ def size_of(unknowns: Unknowns, one: Hypothesis, p: Array, told: Array | None = 
     `told` (entries,). Flanks that stand back everywhere have no error of form, and a driven angle that is early no
     delay: simulations follow it, so that whatever is wrong behind the gear may seem to be."""
     at = one.entries(unknowns)
-    values = p[at]
-    if any(wide.key == FLANKS for wide in one.wide):
-        values = values - np.average(values, weights=told)
+    values = uneven(unknowns, p)[at]
     if any(wide.key == FOLLOWED for wide in one.wide):
         values = np.maximum(values, 0.0)
     return float(np.sqrt(np.average((values / unknowns.prior()[at]) ** 2, weights=told)))

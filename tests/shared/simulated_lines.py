@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from gearbench.bench import simulate
 from gearbench.cases import case_files
@@ -50,12 +51,12 @@ def jacobian_at(simulator: Simulator, p: np.ndarray) -> np.ndarray:
 
 
 def off(
-    simulator: Simulator, column: np.ndarray, p: np.ndarray, at: int, step: float
+    simulator: Simulator, column: np.ndarray, p: np.ndarray, at: int | slice, step: float, along: ArrayLike = 1.0
 ) -> dict[str, tuple[float, float]]:
-    """By channel, how far the derivative `column` by the unknown `at` is from that between two simulations about `p`
-    (size,), and the size of the latter."""
-    before, after = p.copy(), p.copy()
-    before[at], after[at] = p[at] - step, p[at] + step
+    """By channel, how far the derivative `column` by the unknown `at`, or by several `along` a direction, is from that
+    between two simulations about `p` (size,), and the size of the latter."""
+    before, after, part = p.copy(), p.copy(), step * np.asarray(along)
+    before[at], after[at] = p[at] - part, p[at] + part
     lines = [simulator.lines(one) for one in (before, after)]
     assert lines[0] is not None and lines[1] is not None
     change, start, found = (lines[1] - lines[0]) / (2 * step), 0, {}

@@ -6,7 +6,7 @@ The truth is the non-linear lumped model in time domain, which knows nothing of 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import cos, pi, radians
 from pathlib import Path
 
@@ -21,6 +21,7 @@ from gearbench.bench.nonlinear.run import HEADROOM
 from gearbench.cases import case_files
 from gearbench.diagnosis.effects.effect import Effect, Estimate, Fitted, Hypothesis, added
 from gearbench.diagnosis.effects.library import LIBRARY, all_unknowns, hypotheses
+from gearbench.diagnosis.effects.profile_error import PARTS
 from gearbench.diagnosis.effects.recalibrated import recalibrated
 from gearbench.diagnosis.forces.condition import Condition, prepare
 from gearbench.diagnosis.forces.equations import Equation
@@ -86,6 +87,11 @@ def base() -> Bench:
     return bench("base")
 
 
+def of_places(form: list[float]) -> np.ndarray:
+    """The parts of a form [um] given at the places along the path."""
+    return np.linalg.solve(PARTS.T, 1e-6 * np.array(form))
+
+
 TURN = np.random.default_rng(8)
 # Values of the effect, and by how much the residuals must shrink. With friction, steps of the force where pairs enter
 # and leave fold back from beyond the sampled band; pitch errors shift where that happens; the coupling's loss is
@@ -108,7 +114,8 @@ EFFECTS: dict[str, tuple[dict[str, object], float]] = {
     "encoder-runout driver": ({"encoder-driver": (5e-6, -8e-6)}, 100.0),
     "encoder-runout driven": ({"encoder-driven": (-4e-6, 7e-6)}, 100.0),
     "profile-error": ({"profile": 1e-6 * np.array([2.0, -1.0, 0.0, 0.5, 0.3, *np.zeros(7)])}, 100.0),
-    "profile-error flanks": ({"flanks": 1e-6 * np.array([-3.0, -1.5, 0.2, 0.5, 0.0, -0.8, -2.0])}, 4.0),
+    "profile-error flanks": ({"flanks": of_places([-3.0, -1.5, 0.2, 0.5, 0.0, -0.8, -2.0])}, 4.0),
+    "profile-error slope": ({"flanks": 1e-6 * np.array([0.0, 2.0, -1.0, 0.0, 0.0, 0.0, 0.0])}, 3.0),
     "torque-ripple": ({"ripple": (1.0, -0.5, 0.3, 0.6, 0.0, -0.4, 0.2, 0.2)}, 20.0),
 }
 
@@ -225,6 +232,32 @@ def test_fields_and_estimates_of_effects(base: Bench) -> None:
     case, found = field("sensor-delay y_driven", {"delay-y_driven": -30e-6})
     assert case.rig.sensors.delay_y_driven == pytest.approx(-30e-6)
     assert case.rig.sensors.delay_angle_driver == 0.0 and found["y_driven.delay"].value == pytest.approx(-30.0)
+
+
+# Slope and barrelling [um], and of how much of either each estimate is made (of the barrelling's two valleys the one
+# where teeth come into mesh comes first).
+DRAWN = {
+    "slope": ((3.0, 0.0), {"peak_to_valley": (2.0, 0.0), "driven_tip": (-1.0, -1.0), "driver_tip": (1.0, -1.0)}),
+    "bow": ((0.0, 3.0), {"peak_to_valley": (1.0, 1.0), "driven_tip": (-1.0, -1.0), "driver_tip": (1.0, -1.0)}),
+}
+
+
+@pytest.mark.parametrize("name", DRAWN)
+def test_slope_and_barrelling_are_told_by_the_numbers_of_a_drawing(base: Bench, name: str) -> None:
+    """Excess a x + b (1/3 - x^2) along the path, x from -1 to 1: its mean over the path is nothing."""
+    values, expected = DRAWN[name]
+    form = 1e-6 * np.array([0.0, *values, 0.0, 0.0, 0.0, 0.0])
+    case, listed = base.applied("profile-error slope", base.values({"flanks": form}))
+    for one in listed:
+        parts = np.array(expected[one.name])
+        assert one.value == pytest.approx(parts @ values), one.name
+        assert one.std == pytest.approx(1e3 * np.hypot(*parts)), one.name  # the bench knows all unknowns to 1 mm
+    # What sound flanks seem to have is no error, however well the records tell it.
+    told = replace(base.fitted(base.values({"flanks": form})), std=np.zeros(base.unknowns.size))
+    good = 1e6 * base.unknowns.prior()[base.unknowns["flanks"]][1:3]
+    for one in added(base.nominal, base.hypothesis("profile-error slope"), told)[1]:
+        assert one.std == pytest.approx(np.hypot(*(good * expected[one.name]))), one.name
+    assert case.rig.driver.profile_form[-1] == pytest.approx(1e-6 * (values[0] - 2 * values[1] / 3))
 
 
 def test_fields_of_drive_effects(base: Bench) -> None:

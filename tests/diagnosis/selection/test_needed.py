@@ -109,13 +109,12 @@ def test_what_the_background_explains_as_well_must_be_far_larger(deviations: flo
 
 
 def test_flanks_that_stand_back_everywhere_have_no_error_of_form() -> None:
-    places = 5
-    here = unknowns_of([group(FLANKS, "m", places, 0.2, 1.2, slot="excess")], 2)
+    here = unknowns_of([group(FLANKS, "m", ("even", *"abcd"), 0.2, 1.2, slot="excess")], 2)
     flanks = Hypothesis("profile-error flanks", "mesh", (Wide(FLANKS),))
-    form = np.array([0.4, -0.4, 0.0, 0.4, -0.4])
-    assert size_of(here, flanks, form - 3.0) == pytest.approx(np.sqrt(0.8) * 2.0)
-    told = np.array([1.0, 1.0, 0.0, 0.0, 0.0])
-    assert size_of(here, flanks, form - 3.0, told) == pytest.approx(2.0)
+    form = np.array([-3.0, -0.4, 0.0, 0.4, -0.4])
+    assert size_of(here, flanks, form) == pytest.approx(np.sqrt(0.6) * 2.0)
+    told = np.array([0.0, 1.0, 0.0, 1.0, 0.0])
+    assert size_of(here, flanks, form, told) == pytest.approx(2.0)
 
 
 def test_a_driven_angle_that_is_early_is_no_delay() -> None:
