@@ -31,7 +31,7 @@ SD, WIDE = 0.08, 0.4
 # have a zigzag of their own, and far less of a slope or a barrelling, which are ground. What is even is no form.
 EVEN, NAMES = 0, ("even", "slope", "barrelling", "cubic", "quartic", "quintic", "sextic")
 GROUND = ("slope", "barrelling")
-SD_FORM = (0.08, 0.1, 0.13, 0.2, 0.2, 0.2, 0.2)
+SD_FORM = (0.08, 0.06, 0.08, 0.2, 0.2, 0.2, 0.2)
 WIDE_FORM = (0.5, 0.6, 1.2, 1.2, 1.2, 1.2, 1.2)
 PHASES = 128
 # Of reliefs to begin from: depths over the deflection of the mesh, and parts of the path of contact that they take.
