@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from math import log
 from typing import NamedTuple
 
+import numpy as np
+
 from gearbench.diagnosis.effects.temperature_drift import TEMPERATURE_DRIFT
 from gearbench.diagnosis.judging.decided import Decided
 from gearbench.diagnosis.judging.judged import Judged
@@ -30,9 +32,14 @@ def chances_of(
     """The chances of what was named, and of the best candidate, named or not, that nothing spoke against: of what had
     `entered` and is not named, its size or the judged record did. Evidence is that of the candidates: over the
     background alone, or, where that is more, beside the others that are named, but no more than over the rig that was
-    fitted without it; of a number of the nominal rig, over a rig with it where its uncertainty ends."""
-    evidence = best_evidence(judged.found.selection.weighed, decided.named)
-    nats = {one.hypothesis.name: _nats(judged, one, evidence[one.effect.name]) for one in decided.named}
+    fitted without it; of a number of the nominal rig, over a rig with it where its uncertainty ends; of a usual cause
+    also what its rare counterparts have beyond it."""
+    weighed = judged.found.selection.weighed
+    evidence = best_evidence(weighed, decided.named)
+    nats = {
+        one.hypothesis.name: _nats(judged, one, evidence[one.effect.name]) + _of_class(one, weighed)
+        for one in decided.named
+    }
     for name in {one.effect.name for one in decided.named}:
         evidence[name] = max(nats[one.hypothesis.name] for one in decided.named if one.effect.name == name)
     dropped = {one.effect.name for one in entered} - {one.effect.name for one in decided.named}
@@ -61,6 +68,15 @@ def _nats(judged: Judged, one: Weighed, worth: float) -> float:
     held = evidence_without(unknowns, selection, one, without)
     fitted = float(selection.best.evidence - held - log(one.hypothesis.choices))
     return min(worth, fitted) if has_own(unknowns, one.hypothesis) else max(worth, fitted)
+
+
+def _of_class(one: Weighed, weighed: Sequence[Weighed]) -> float:
+    """Nats that the records have beyond a named effect for it or its rare counterparts, which explain them as well: its
+    name stands for them all."""
+    alone = {other.hypothesis.name: other.log_bayes_factor for other in weighed}
+    own = alone.get(one.hypothesis.name)
+    rare = [alone[other.name] for other in one.rivals if other.name in alone and other.gives_way_to(one.hypothesis)]
+    return 0.0 if own is None else float(np.logaddexp.reduce([0.0, *(value - own for value in rare)]))
 
 
 def unlikely(decided: Decided, chances: Chances) -> Weighed | None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from math import log
+from dataclasses import replace
+from math import exp, log
 from types import SimpleNamespace
 from typing import Any
 
@@ -49,6 +50,25 @@ def test_what_shows_only_beside_another_effect_is_as_likely_as_it_is_worth_there
     named = chances_of(judged, decided, POPULATION, LINES, ()).named
     assert named["pitch-error"] == POPULATION.effect.of(effect_signs(90.0, LINES, 2.5)).value
     assert named["coupling"] == POPULATION.effect.of(effect_signs(300.0, LINES, 2.5)).value
+
+
+def test_a_name_that_stands_for_a_rare_counterpart_is_as_likely_as_either() -> None:
+    """Three nats more for the rare one: one in twenty of what speaks for either is for the usual one alone."""
+    usual, rare, other = weighed("eccentricity", 10.0), weighed("encoder-runout", 13.0), weighed("pitch-error", 12.0)
+    rare.hypothesis.gives_way_to = lambda one: one is usual.hypothesis
+    other.hypothesis.gives_way_to = lambda one: False
+    judged: Any = SimpleNamespace(
+        found=SimpleNamespace(selection=SimpleNamespace(weighed=(rare, other, usual))),
+        closings={"eccentricity": SimpleNamespace(growth=2.5, optimum=None)},
+    )
+
+    def best(*rivals: Any) -> tuple[float, ...]:
+        named = replace(usual, rivals=tuple(one.hypothesis for one in rivals))
+        decided: Any = SimpleNamespace(named=(named,), drift=None)
+        return chances_of(judged, decided, POPULATION, LINES, ()).best
+
+    assert best() == best(other) == effect_signs(10.0, LINES, 2.5)
+    assert best(rare, other) == pytest.approx(effect_signs(10.0 + log(1.0 + exp(3.0)), LINES, 2.5))
 
 
 @pytest.mark.parametrize(
