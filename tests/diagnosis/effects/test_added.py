@@ -229,6 +229,10 @@ def test_fields_and_estimates_of_effects(base: Bench) -> None:
     force = 100.0 / base.model.base_radius[0] * cos(radians(20.0))
     assert case.rig.support.driver.reference_deflection == pytest.approx(force / 1e8, rel=1e-3)
 
+    case, found = field("contact-nonlinearity", {"curvature": 0.3})
+    assert case.rig.mesh.exponent == pytest.approx(0.3) and found["exponent"].value == pytest.approx(0.3)
+    assert found["exponent"].std == pytest.approx(np.hypot(1e-3, 0.04))  # sound rigs seem to have as much
+
     case, found = field("sensor-delay y_driven", {"delay-y_driven": -30e-6})
     assert case.rig.sensors.delay_y_driven == pytest.approx(-30e-6)
     assert case.rig.sensors.delay_angle_driver == 0.0 and found["y_driven.delay"].value == pytest.approx(-30.0)
