@@ -26,6 +26,7 @@ Report = Callable[[str], None]
 GREATER = 0.5
 # Of what the rig without any effect leaves, from which one with effects goes another way.
 ASTRAY = 1.5
+NOTHING = 1e-9  # of the nominal gap: no less is left than this, where noise is all that is
 
 
 @dataclass(frozen=True)
@@ -172,7 +173,7 @@ class Judged:
 
     def grown(self, without: Mapping[str, Array]) -> float:
         """Factor by which all that is left grows in a rig with those signals, rms over rms."""
-        return float(np.sqrt(1.0 + self.share(without) / max(self.left, 1e-300) ** 2))
+        return float(np.sqrt(1.0 + self.share(without) / max(self.left, NOTHING) ** 2))
 
 
 @dataclass(frozen=True)

@@ -275,6 +275,8 @@ def test_parts_of_the_gap_are_energies_beyond_noise_in_units_of_each_channel(mon
     assert replace(made, closings={"friction": closing}).share_of(FRICTION) == made.share(half)
     assert made.grown(half) == pytest.approx(np.sqrt((0.4**2 + 0.1**2) / (2 * 0.1**2)), rel=0.05)
     assert made.grown(final) == 1.0
+    whole = replace(made, signals={name: values[0] for name, values in measured.items()})
+    assert whole.left == 0.0 and whole.grown(half) > 1e6
     value, low, high = rms_closed(None, "dte", half["dte"], final["dte"])  # type: ignore[arg-type]
     assert low < value < high < 1.1 * value and value == pytest.approx(np.sqrt(0.15) * gap["dte"].std(), rel=1e-6)
 
