@@ -82,10 +82,10 @@ def too_small(problem: Problem, judged: Judged, named: Sequence[Weighed]) -> Wei
 def _size_of(one: Hypothesis, unknowns: Unknowns, p: Array) -> float:
     """Rms of its unknowns, of all (size,), in standard deviations of the wide prior; teeth or flanks that all stand out
     alike are even."""
-    values_of, wide, out = uneven(unknowns, p), one.prior(unknowns), []
+    p, wide, out = uneven(unknowns, p), one.prior(unknowns), []
     for part in one.wide:
         at = part.entries(unknowns)
-        values = values_of[at] / wide[at]
+        values = p[at] / wide[at]
         alike = len(values) > len(SIDES) and part.key != FLANKS
         out.append(values - values.mean() if alike else values)
     return float(np.sqrt(np.mean(np.concatenate(out) ** 2)))

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from gearbench.diagnosis.effects.effect import Added, Effect, Estimate, Fitted, Hypothesis, Wide, changed
 from gearbench.diagnosis.effects.recalibrated import added
-from gearbench.diagnosis.forces.basis import PLACES_ON_PATH, SHAPE_ORDERS, waves
+from gearbench.diagnosis.forces.basis import FORM_PARTS, PLACES_ON_PATH, SHAPE_ORDERS, in_parts, waves
 from gearbench.diagnosis.forces.condition import Condition
 from gearbench.diagnosis.forces.nominal import NominalModel
 from gearbench.diagnosis.forces.unknowns import Group, Unknowns, group
@@ -29,7 +29,8 @@ KEY, FLANKS = "profile", "flanks"
 SD, WIDE = 0.08, 0.4
 # Of the form of the flanks along the path of contact, by its parts: teeth of another stiffness than the nominal ones
 # have a zigzag of their own, and far less of a slope or a barrelling, which are ground. What is even is no form.
-EVEN, NAMES = 0, ("even", "slope", "barrelling", "cubic", "quartic", "quintic", "sextic")
+NAMES = ("even", "slope", "barrelling", "cubic", "quartic", "quintic", "sextic")
+EVEN = NAMES.index("even")
 GROUND = ("slope", "barrelling")
 SD_FORM = (0.08, 0.06, 0.08, 0.2, 0.2, 0.2, 0.2)
 WIDE_FORM = (0.5, 0.6, 1.2, 1.2, 1.2, 1.2, 1.2)
@@ -40,20 +41,9 @@ MIDDLE = PLACES_ON_PATH.index(0.5)
 LEAST_ROLL = 1e-6  # rad; a table of a flank's form begins beyond the base circle
 
 
-def _parts() -> Array:
-    """Excess at the places (parts, places) per unit of every part of a form: even, a slope towards where teeth leave
-    the mesh, a barrelling without a mean over the path, and orthonormal polynomials of the degrees beyond."""
-    away = 2.0 * np.array(PLACES_ON_PATH) - 1.0
-    beyond = np.linalg.qr(np.polynomial.legendre.legvander(away, len(away) - 1))[0][:, 3:]
-    return np.vstack([np.ones_like(away), away, 1 / 3 - away**2, beyond.T])
-
-
-PARTS = _parts()
-
-
 def _flanks(condition: Condition) -> Array:
     """What the mesh has of each part of the form (parts, N)."""
-    return np.asarray(PARTS @ condition.flanks)
+    return condition.flanks
 
 
 def unknowns(model: NominalModel, conditions: Sequence[Condition]) -> tuple[Group, ...]:
@@ -83,7 +73,7 @@ def uneven(unknowns: Unknowns, p: Array) -> Array:
 
 
 def shapes(model: NominalModel) -> Array:
-    """Reliefs (n, places) that the nominal flanks lack, long and short, of either tip and of both, and such as they
+    """Reliefs (n, parts) that the nominal flanks lack, long and short, of either tip and of both, and such as they
     have too much: what is deeper than the mesh yields changes nothing more, so that no slope leads there."""
     place = np.array(PLACES_ON_PATH)
     out = []
@@ -92,14 +82,13 @@ def shapes(model: NominalModel) -> Array:
         for form in (entry, leaving, entry + leaving):
             out += [-depth * form for depth in DEPTHS]
         out.append(entry + leaving)
-    return np.asarray(model.deflection * np.linalg.solve(PARTS.T, np.array(out).T).T)
+    return model.deflection * in_parts(np.array(out))
 
 
 def add(rig: Rig, hypothesis: Hypothesis, fitted: Fitted) -> Added:
     """Gives the mesh the error over its phase that was fitted, and each gear the form from the pitch point to its tip,
     which its mate's root may have as well; sizes are told from peak to valley."""
-    model, values = fitted.model, fitted.of(KEY)
-    form = fitted.of(FLANKS) @ PARTS
+    model, values, form = fitted.model, fitted.of(KEY), fitted.of(FLANKS) @ FORM_PARTS
     cosine, sine = added(model.error_cos, values[0::2]), added(model.error_sin, values[1::2])
     rig = changed(rig, "mesh", error_cos=cosine, error_sin=sine)
     if form.any():
@@ -108,13 +97,12 @@ def add(rig: Rig, hypothesis: Hypothesis, fitted: Fitted) -> Added:
         of_driver = np.where(middle, form[MIDDLE], form)
         rig = changed(rig, "driver", **_formed(rig.driver, model, 0, travel, of_driver))
         rig = changed(rig, "driven", **_formed(rig.driven, model, 1, -travel[::-1], (form - of_driver)[::-1]))
-    chosen = [wide for wide in hypothesis.wide if wide.key == FLANKS]
-    if chosen:
-        at = np.concatenate([wide.entries(fitted.unknowns) for wide in chosen])
-        own = PARTS[at - fitted.unknowns[FLANKS].start]
+    if any(wide.key == FLANKS for wide in hypothesis.wide):
+        at = hypothesis.entries(fitted.unknowns)
+        own = FORM_PARTS[at - fitted.unknowns[FLANKS].start]
         # What sound flanks have of a form, teeth of another stiffness make: of that nothing is an error of theirs.
-        std = np.hypot(fitted.std[at], fitted.unknowns.prior()[at])
-        return rig, _along_path(fitted.p[at] @ own, std[:, None] * own)
+        both = np.hypot(fitted.std[at], fitted.unknowns.prior()[at])
+        return rig, _along_path(fitted.p[at] @ own, both[:, None] * own)
     size, std = _peak_to_valley(values, fitted.std_of(KEY))
     return rig, (Estimate("peak_to_valley", 1e6 * size, 1e6 * std, "um"),)
 
@@ -181,5 +169,5 @@ PROFILE_ERROR = Effect(
     unknowns=unknowns,
     shapes=shapes,
     shaped=FLANKS,
-    model_error=0.12,  # five drawn rigs, whose teeth are of another stiffness (benchmarks/diagnosis_log.md)
+    model_error=0.12,  # four drawn rigs, whose teeth are of another stiffness (benchmarks/diagnosis_log.md)
 )

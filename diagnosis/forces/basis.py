@@ -31,11 +31,28 @@ def smooth(values: Array, basis: Array) -> Complex:
     return out
 
 
+def _parts() -> Array:
+    """Rows of `FORM_PARTS`."""
+    away = 2.0 * np.array(PLACES_ON_PATH) - 1.0
+    beyond = np.linalg.qr(np.polynomial.legendre.legvander(away, len(away) - 1))[0][:, 3:]
+    return np.vstack([np.ones_like(away), away, 1 / 3 - away**2, beyond.T])
+
+
+# Of what forms of the flanks are made, at those places (parts, places): what is even, a slope towards where teeth leave
+# the mesh, a barrelling without a mean over the path, and orthonormal polynomials of the degrees beyond.
+FORM_PARTS = _parts()
+
+
+def in_parts(forms: Array) -> Array:
+    """How much of each part (..., parts) forms (..., places) have."""
+    return np.asarray(np.linalg.solve(FORM_PARTS.T, forms.T).T)
+
+
 def on_path(travel: Array, path: tuple[float, float]) -> Array:
-    """Piecewise linear basis (places, ...) over distances behind the pitch point [base pitches] of a path of contact
-    from its start to its end; constant beyond them."""
+    """The parts of a form (parts, ...) over distances behind the pitch point [base pitches] of a path of contact from
+    its start to its end; constant beyond them."""
     places = path[0] + (path[1] - path[0]) * np.array(PLACES_ON_PATH)
-    return np.stack([np.interp(travel, places, column) for column in np.eye(len(places))])
+    return np.stack([np.interp(travel, places, part) for part in FORM_PARTS])
 
 
 def waves(phase: Array) -> Array:

@@ -33,8 +33,8 @@ class Condition:
     `phase` (N,) mesh phase [cycles] with the centres' motion; `tooth` (2, N, n_o) tooth numbers of the pairs that
     touch, `load_share` (N, n_o) their shares of the load, `bending` (N, n_o, 2) the teeth's parts of their flexibility;
     `lever_arms` (3, N) of friction over base radius, for driver rotation, y and driven rotation; `waves` (2 orders, N)
-    of the rotation's mesh phase, `flanks` (places, N) what the mesh as a whole has of a unit of excess at each of the
-    `basis.PLACES_ON_PATH` of all pairs, `lobes` (2, 2, N) cosine and sine of both rotations, `leaning` (2, 2,
+    of the rotation's mesh phase, `flanks` (parts, N) what the mesh as a whole has of a unit of each of the
+    `basis.FORM_PARTS` on all pairs, `lobes` (2, 2, N) cosine and sine of both rotations, `leaning` (2, 2,
     3, N) what these parts of a unit of either gear's run-out add to the levers of `Departures` [1/m], `ends` (2, 2, N)
     how far they turn the mesh on [cycles/m]; `pitch_speed`
     rb speed [m/s]; `force_level` [N] and `stiffness_level` [N/m] of the mesh at the mean torque; `force_full` (N/2

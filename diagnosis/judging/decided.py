@@ -30,8 +30,8 @@ from gearbench.rig.contract import Place
 
 Array = NDArray[np.float64]
 
-# Of what sound rigs leave of a channel's fluctuation at most: from there on a place can stand out. Of 65 drawn sound
-# rigs none does so by more than 0.6 of both this and the limits of its place.
+# Of what sound rigs leave of a channel's fluctuation at most: from there on a place can stand out. Of 85 drawn sound
+# rigs one, whose records all rattle, does so by more than 0.7 of both this and the limits of its place.
 VISIBLE = 0.3
 # The same from which something is unknown whatever part of the gap it is: no rig without it is found that far off.
 PLAIN = 1.5

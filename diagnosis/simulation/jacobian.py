@@ -21,7 +21,7 @@ from gearbench.diagnosis.effects.encoder_runout import ADDS
 from gearbench.diagnosis.effects.encoder_runout import KEYS as ENCODERS
 from gearbench.diagnosis.effects.friction import KEY as FRICTION
 from gearbench.diagnosis.effects.pitch_error import KEYS as PITCHES
-from gearbench.diagnosis.effects.profile_error import FLANKS, PARTS
+from gearbench.diagnosis.effects.profile_error import FLANKS
 from gearbench.diagnosis.effects.sensor_delay import KEYS as DELAYS
 from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
 from gearbench.diagnosis.effects.torque_ripple import KEY as RIPPLE
@@ -121,7 +121,7 @@ def mesh_forces(layout: Layout, p: Array, along: Along, chosen: Flags) -> tuple[
     put(CONTRAST, stiffer * contrast_slope(layout.tangents, float(p[unknowns[CONTRAST]][0]), along.sharing)[:, None])
     put("shape", stiffer * (wave / series[:, None]))
     put("profile", along.of_excess(wave))
-    put(FLANKS, _of_flanks(along, numbers, layout.model.path) @ PARTS.T)
+    put(FLANKS, _of_flanks(along, numbers, layout.model.path))
     for side, key in enumerate(RUNOUTS.values()):
         put(key, in_mesh_of_runout(along, side))
     for side, key in enumerate(PITCHES.values()):
@@ -149,7 +149,7 @@ def _series_at(cosine: Sequence[float], sine: Sequence[float], phase: Array) -> 
 
 
 def _of_flanks(along: Along, numbers: NDArray[np.int64], path: tuple[float, float]) -> Array:
-    """Force (entries, places) [N] per unit of excess at places along the path of contact, of the pairs `numbers`
+    """Force (entries, parts) [N] per unit of each part of a form along the path of contact, of the pairs `numbers`
     (entries, n_o) that touch."""
     shape = on_path(along.phase[:, None] - numbers, path)
     return np.asarray((shape * along.form_stiffness).sum(axis=-1).T)

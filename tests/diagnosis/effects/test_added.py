@@ -21,8 +21,8 @@ from gearbench.bench.nonlinear.run import HEADROOM
 from gearbench.cases import case_files
 from gearbench.diagnosis.effects.effect import Effect, Estimate, Fitted, Hypothesis, added
 from gearbench.diagnosis.effects.library import LIBRARY, all_unknowns, hypotheses
-from gearbench.diagnosis.effects.profile_error import PARTS
 from gearbench.diagnosis.effects.recalibrated import recalibrated
+from gearbench.diagnosis.forces.basis import in_parts
 from gearbench.diagnosis.forces.condition import Condition, prepare
 from gearbench.diagnosis.forces.equations import Equation
 from gearbench.diagnosis.forces.nominal import NominalModel, nominal_model
@@ -87,11 +87,6 @@ def base() -> Bench:
     return bench("base")
 
 
-def of_places(form: list[float]) -> np.ndarray:
-    """The parts of a form [um] given at the places along the path."""
-    return np.linalg.solve(PARTS.T, 1e-6 * np.array(form))
-
-
 TURN = np.random.default_rng(8)
 # Values of the effect, and by how much the residuals must shrink. With friction, steps of the force where pairs enter
 # and leave fold back from beyond the sampled band; pitch errors shift where that happens; the coupling's loss is
@@ -114,7 +109,7 @@ EFFECTS: dict[str, tuple[dict[str, object], float]] = {
     "encoder-runout driver": ({"encoder-driver": (5e-6, -8e-6)}, 100.0),
     "encoder-runout driven": ({"encoder-driven": (-4e-6, 7e-6)}, 100.0),
     "profile-error": ({"profile": 1e-6 * np.array([2.0, -1.0, 0.0, 0.5, 0.3, *np.zeros(7)])}, 100.0),
-    "profile-error flanks": ({"flanks": of_places([-3.0, -1.5, 0.2, 0.5, 0.0, -0.8, -2.0])}, 4.0),
+    "profile-error flanks": ({"flanks": in_parts(1e-6 * np.array([-3.0, -1.5, 0.2, 0.5, 0.0, -0.8, -2.0]))}, 4.0),
     "profile-error slope": ({"flanks": 1e-6 * np.array([0.0, 2.0, -1.0, 0.0, 0.0, 0.0, 0.0])}, 3.0),
     "torque-ripple": ({"ripple": (1.0, -0.5, 0.3, 0.6, 0.0, -0.4, 0.2, 0.2)}, 20.0),
 }

@@ -9,7 +9,7 @@ import pytest
 from shared.simulated_lines import demonstration, jacobian_at, off
 
 from gearbench.diagnosis.effects.coupling import KEY as COMPLIANCE
-from gearbench.diagnosis.effects.profile_error import PARTS
+from gearbench.diagnosis.forces.basis import FORM_PARTS, in_parts
 from gearbench.diagnosis.simulation.simulator import Simulator
 from gearbench.diagnosis.structure.contrast import CONTRAST
 from gearbench.diagnosis.structure.layout import Layout
@@ -149,11 +149,13 @@ def test_a_derivative_of_a_nudged_motion_is_what_two_of_them_differ_by(
             assert error < CLOSE * size, channel
 
 
-@pytest.mark.parametrize("form", [*np.eye(len(PARTS))[[0, 3, 6]], *PARTS[1:3]], ids=[*"036", "slope", "barrelling"])
+@pytest.mark.parametrize(
+    "form", [*np.eye(len(FORM_PARTS))[[0, 3, 6]], *FORM_PARTS[1:3]], ids=[*"036", "slope", "barrelling"]
+)
 def test_the_derivative_by_a_form_of_the_flanks_is_close(bench: Bench, form: np.ndarray) -> None:
     """At places along the path, and of two parts. Between the nodes of two tables; supports feel what is left where the
     error takes up nearly all of the form."""
-    at, along = bench.layout.unknowns["flanks"], np.linalg.solve(PARTS.T, form)
+    at, along = bench.layout.unknowns["flanks"], in_parts(form)
     step = 0.1 * bench.layout.model.deflection
     found = off(bench.simulator, along @ bench.jacobian[at], np.zeros(bench.layout.size), at, step, along)
     for channel, within in (("dte", 0.06), ("y_driver", 0.2), ("y_driven", 0.2)):
