@@ -35,6 +35,7 @@ from gearbench.diagnosis.judging.chances import (
     sentence_of_astray,
     sentence_of_doubt,
     sentence_of_size,
+    signs_of_called,
     unlikely,
 )
 from gearbench.diagnosis.judging.closing import DUE
@@ -136,7 +137,7 @@ def _settled(
 ) -> _Settled:
     """The decision, made again without each effect that is named and is not likely, or smaller than the records tell,
     and without all where the rig is closer to the judged record without any."""
-    entered, doubts = found.selection.entered, list[str]()
+    entered, doubts, doubted = found.selection.entered, list[str](), dict[str, float]()
     judged = judged_of_size(of.problem, _judgeable(of, found, held_out), held_out, of.measurements, report)
     changing = changing_of(judged, changing_parts(of.steady, of.problem.conditions[0].band))
     place, _ = of.unsteady.worst(LIMITS.unsteady)
@@ -156,24 +157,25 @@ def _settled(
                   "remains": judged.remains, "searched": judged.searched, "hidden": judged.hidden,
                   "changing": changing}  # fmt: skip
         chances = chances_of(judged, decided, known, signs["lines"], (*entered, *judged.dropped))
-        out, said = _doubted(of, judged, decided, chances)
-        doubts += said
+        out, said, doubt = _doubted(of, judged, decided, chances)
+        doubts, doubted = [*doubts, *said], doubted | doubt
         if not out:
+            signs |= doubted | signs_of_called(chances, chances.named)
             return _Settled(judged, decided, chances, missing, signs, tuple(doubts))
         judged = judged_of_size(of.problem, left_out(found, out), held_out, of.measurements, report)
 
 
 def _doubted(
     of: Searched, judged: Judged, decided: Decided, chances: Chances
-) -> tuple[tuple[Weighed, ...], list[str]]:
-    """Of the named effects those that are to be left out next, and why."""
+) -> tuple[tuple[Weighed, ...], list[str], dict[str, float]]:
+    """Of the named effects those that are to be left out next, why, and the signs of what is too unlikely."""
     if decided.named and judged.is_astray:
-        return decided.named, [sentence_of_astray(one) for one in decided.named]
+        return decided.named, [sentence_of_astray(one) for one in decided.named], {}
     if one := unlikely(decided, chances):
-        return (one,), [sentence_of_doubt(one, chances)]
+        return (one,), [sentence_of_doubt(one, chances)], signs_of_called(chances, (one.hypothesis.name,))
     if one := _too_small(of, judged, decided.named):
-        return (one,), [sentence_of_size(one)]
-    return (), []
+        return (one,), [sentence_of_size(one)], {}
+    return (), [], {}
 
 
 def _too_small(of: Searched, judged: Judged, named: Sequence[Weighed]) -> Weighed | None:

@@ -1,8 +1,8 @@
 """What signs are worth: probabilities read off truth rigs whose answer was known, none of them a constant.
 
 Two logistic curves (Berkson 1944), each fitted to diagnoses of truth rigs. `effect`: is a candidate at work, given its
-log evidence over the number of independent lines, whether it was named, and by how much the gap of some part of the
-judged record grows without it? And
+log evidence over the number of independent lines, whether the judged record calls for it, and by how much the gap of
+some part of that grows without it? And
 `unknown`: where no effect of the library is at work, is something else, given the largest sign of it over its limit?
 Few rigs make flat curves: the weights have a Gaussian prior, and what they leave open is the interval of a probability.
 """
@@ -16,6 +16,8 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize
+from scipy.special import expit
 
 from gearbench.diagnosis.verdict import NINE_OF_TEN, Verdict
 
@@ -23,7 +25,7 @@ Array = NDArray[np.float64]
 
 PER_LINES = 100.0  # evidence is told in nats a hundred independent lines
 SMALLEST_SIGN = 1e-2
-ROUNDS = 50
+CONVERGED = {"ftol": 1e-14, "gtol": 1e-9}
 # Standard deviations of the weights before any rig was seen: logits that a unit of each sign may be worth.
 WIDTHS = {"effect": (4.0, 3.0, 3.0, 3.0), "unknown": (2.0, 2.0)}
 # How far the largest value on sound rigs may be exceeded, and the part of the limit before that remains at least: a few
@@ -54,11 +56,7 @@ class Odds:
         x = np.array(signs)
         middle = float(x @ np.array(self.weights))
         reach = NINE_OF_TEN * sqrt(max(float(x @ np.array(self.covariance) @ x), 0.0))
-        return Chance(*(_logistic(value) for value in (middle, middle - reach, middle + reach)))
-
-
-def _logistic(value: float) -> float:
-    return float(1.0 / (1.0 + np.exp(-np.clip(value, -40.0, 40.0))))
+        return Chance(*(float(expit(value)) for value in (middle, middle - reach, middle + reach)))
 
 
 def nothing_known(widths: Sequence[float]) -> Odds:
@@ -68,31 +66,23 @@ def nothing_known(widths: Sequence[float]) -> Odds:
 
 
 def fitted(prior: Odds, signs: Array, true: Sequence[bool]) -> Odds:
-    """The curve after cases with signs (cases, n): the prior's mode moved by Newton's method, and its curvature."""
+    """The curve after cases with signs (cases, n): the mode that the prior moves to, and its curvature. More of a sign
+    never makes less likely what it speaks for: no weight but the first is negative."""
     if not len(true):
         return prior
     centre, precision = np.array(prior.weights), np.linalg.inv(np.array(prior.covariance))
-    weights, wanted, x = centre.copy(), np.array(true, dtype=float), np.asarray(signs, dtype=float)
+    wanted, x = np.array(true, dtype=float), np.asarray(signs, dtype=float)
 
-    def cost(at: Array) -> float:
-        logits = x @ at
-        away = at - centre
-        return float(np.sum(np.logaddexp(0.0, logits) - wanted * logits) + 0.5 * away @ precision @ away)
+    def cost(at: Array) -> tuple[float, Array]:
+        logits, away = x @ at, at - centre
+        value = float(np.sum(np.logaddexp(0.0, logits) - wanted * logits) + 0.5 * away @ precision @ away)
+        return value, x.T @ (expit(logits) - wanted) + precision @ away
 
-    def curvature(at: Array) -> Array:
-        p = 1.0 / (1.0 + np.exp(-np.clip(x @ at, -40.0, 40.0)))
-        return np.asarray((x * (p * (1.0 - p))[:, None]).T @ x + precision)
-
-    for _ in range(ROUNDS):
-        p = 1.0 / (1.0 + np.exp(-np.clip(x @ weights, -40.0, 40.0)))
-        step = np.linalg.solve(curvature(weights), x.T @ (p - wanted) + precision @ (weights - centre))
-        length = 1.0
-        while cost(weights - length * step) > cost(weights) and length > 1e-6:
-            length *= 0.5
-        weights = weights - length * step
-        if np.abs(step).max() < 1e-9:
-            break
-    covariance = np.linalg.inv(curvature(weights))
+    bounds = [(None, None), *[(0.0, None)] * (len(centre) - 1)]
+    begin = np.concatenate((centre[:1], np.maximum(centre[1:], 0.0)))
+    weights = minimize(cost, begin, jac=True, method="L-BFGS-B", bounds=bounds, options=CONVERGED).x
+    p = expit(x @ weights)
+    covariance = np.linalg.inv((x * (p * (1.0 - p))[:, None]).T @ x + precision)
     return Odds(
         tuple(weights.tolist()),
         tuple(map(tuple, covariance.tolist())),
@@ -102,11 +92,16 @@ def fitted(prior: Odds, signs: Array, true: Sequence[bool]) -> Odds:
 
 
 def effect_signs(evidence: float, lines: float, grows: float | None) -> tuple[float, ...]:
-    """Signs of a candidate: nats of evidence over the background, number of independent lines, and of one that was
-    named the factor by which the gap of some part grows without it (None: not named)."""
+    """Signs of a candidate: nats of evidence over the background, number of independent lines, and of one that the
+    judged record calls for the factor by which the gap of some part grows without it (None: it does not)."""
     scaled = PER_LINES * evidence / max(lines, 1.0)
-    named = (0.0, 0.0) if grows is None else (1.0, log(max(grows, 1.0)))
-    return (1.0, log1p(scaled) if scaled > 0.0 else -log1p(-scaled), *named)
+    called = (0.0, 0.0) if grows is None else (1.0, log(max(grows, 1.0)))
+    return (1.0, log1p(scaled) if scaled > 0.0 else -log1p(-scaled), *called)
+
+
+def called_signs(effect: str, evidence: float, grows: float) -> dict[str, float]:
+    """The signs of a verdict that keep those of an effect that the judged record calls for, named or too unlikely."""
+    return {f"nats {effect}": evidence, f"grows {effect}": grows}
 
 
 def unknown_signs(sign: float) -> tuple[float, ...]:
@@ -187,13 +182,19 @@ def _limit(before: float, seen: Sequence[float]) -> float:
 
 
 def candidate_rows(one: Known) -> list[tuple[tuple[float, ...], bool]]:
-    """Signs of every single candidate of a diagnosis, and whether it was at work."""
-    named = {effect.name: effect.grows or 1.0 for effect in one.verdict.effects}
-    rows = []
-    for candidate in one.verdict.candidates:
-        if len(candidate.effects) != 1:
-            continue
-        (name,) = candidate.effects
-        signs = effect_signs(candidate.log_evidence, one.verdict.signs["lines"], named.get(name))
-        rows.append((signs, name in one.effects))
-    return rows
+    """Signs of every single candidate of a diagnosis, as its probability is read from them, and whether it was at work,
+    or what was and is not named is not told from it."""
+    signs, lines = one.verdict.signs, one.verdict.signs["lines"]
+    evidence = {the.effects[0]: the.log_evidence for the in one.verdict.candidates if len(the.effects) == 1}
+    called = {name.removeprefix("grows "): value for name, value in signs.items() if name.startswith("grows ")}
+    evidence |= {name: signs[f"nats {name}"] for name in called}
+    return [
+        (effect_signs(value, lines, called.get(name)), bool(_alike(one, name) & set(one.effects)))
+        for name, value in evidence.items()
+    ]
+
+
+def _alike(one: Known, name: str) -> set[str]:
+    """A candidate, and effects that its verdict neither names nor tells from it."""
+    classes = [set(members) for members in one.verdict.indistinguishable if name in members]
+    return {name, *set().union(*classes).difference(effect.name for effect in one.verdict.effects)}

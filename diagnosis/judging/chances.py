@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from math import log
 from typing import NamedTuple
 
@@ -11,7 +11,7 @@ import numpy as np
 from gearbench.diagnosis.effects.temperature_drift import TEMPERATURE_DRIFT
 from gearbench.diagnosis.judging.decided import Decided
 from gearbench.diagnosis.judging.judged import Judged
-from gearbench.diagnosis.odds import Calibration, effect_signs
+from gearbench.diagnosis.odds import Calibration, called_signs, effect_signs
 from gearbench.diagnosis.selection.selection import evidence_without
 from gearbench.diagnosis.selection.weighing import Weighed, best_evidence, has_own
 from gearbench.diagnosis.words import percent
@@ -19,11 +19,31 @@ from gearbench.diagnosis.words import percent
 LIKELY = 2 / 3  # an effect is named that is twice as likely at work as not: to blame one costs more than to miss one
 
 
+class Called(NamedTuple):
+    """An effect that the judged record calls for: nats of evidence, and the factor by which the gap of some part grows
+    without it."""
+
+    effect: str
+    nats: float
+    grows: float
+
+
 class Chances(NamedTuple):
-    """How likely each named effect is at work, by its hypothesis' name, and the signs of the likeliest candidate."""
+    """How likely each named effect is at work, and what speaks for it, by its hypothesis' name ("temperature-drift"
+    that of a drift), and the signs of the likeliest candidate."""
 
     named: dict[str, float]
+    called: dict[str, Called]
     best: tuple[float, ...]
+
+
+def signs_of_called(chances: Chances, names: Iterable[str]) -> dict[str, float]:
+    """What speaks for hypotheses that the judged record calls for, of an effect in the place where it is likeliest, as
+    a verdict keeps it for a calibration to learn from."""
+    signs: dict[str, float] = {}
+    for name in sorted(names, key=chances.named.__getitem__):
+        signs |= called_signs(*chances.called[name])
+    return signs
 
 
 def chances_of(
@@ -36,24 +56,20 @@ def chances_of(
     also what its rare counterparts have beyond it."""
     weighed = judged.found.selection.weighed
     evidence = best_evidence(weighed, decided.named)
-    nats = {
-        one.hypothesis.name: _nats(judged, one, evidence[one.effect.name]) + _of_class(one, weighed)
-        for one in decided.named
-    }
-    for name in {one.effect.name for one in decided.named}:
-        evidence[name] = max(nats[one.hypothesis.name] for one in decided.named if one.effect.name == name)
-    dropped = {one.effect.name for one in entered} - {one.effect.name for one in decided.named}
-    left = max((value for name, value in evidence.items() if name not in dropped), default=0.0)
-    named, all_signs = {}, [effect_signs(left, lines, None)]
+    called = {}
     for one in decided.named:
-        grows = judged.closings[one.hypothesis.name].growth
-        all_signs.append(effect_signs(nats[one.hypothesis.name], lines, grows))
-        named[one.hypothesis.name] = known.effect.of(all_signs[-1]).value
+        nats = _nats(judged, one, evidence[one.effect.name]) + _of_class(one, weighed)
+        called[one.hypothesis.name] = Called(one.effect.name, nats, judged.closings[one.hypothesis.name].growth)
     if decided.drift is not None:
-        all_signs.append(effect_signs(decided.drift.nats, lines, decided.drift.grows))
-        named[TEMPERATURE_DRIFT.name] = known.effect.of(all_signs[-1]).value
-    best = max(all_signs[1:] or all_signs, key=lambda signs: known.effect.of(signs).value)
-    return Chances(named, best)
+        name = TEMPERATURE_DRIFT.name
+        called[name] = Called(name, decided.drift.nats, decided.drift.grows)
+    signs = {name: effect_signs(one.nats, lines, one.grows) for name, one in called.items()}
+    named = {name: known.effect.of(its).value for name, its in signs.items()}
+    if signs:
+        return Chances(named, called, signs[max(named, key=named.__getitem__)])
+    refused = {one.effect.name for one in entered}
+    left = max((value for name, value in evidence.items() if name not in refused), default=0.0)
+    return Chances(named, called, effect_signs(left, lines, None))
 
 
 def _nats(judged: Judged, one: Weighed, worth: float) -> float:

@@ -14,6 +14,8 @@ from gearbench.diagnosis.odds import (
     Known,
     Odds,
     calibrated,
+    called_signs,
+    candidate_rows,
     effect_signs,
     fitted,
     nothing_known,
@@ -27,14 +29,15 @@ SIGNS = {"lines": 400.0, "unknown": 0.4, "left": 0.3, "remains": 0.04, "changing
 
 
 def known(kind: str, *, named: str = "", evidence: float = 1.0, effects: tuple[str, ...] = (), **signs: float) -> Known:
-    """A diagnosis with one candidate, "friction", of so many nats."""
+    """A diagnosis with one candidate, "friction", of so many nats, and what it names."""
+    called = called_signs(named, evidence, 3.0) if named else {}
     verdict = Verdict(
         verdict="effects" if named else "none",
         probability=Probabilities(effect=0.2, none=0.7, unknown=0.1),
         effects=(Effect(name=named, probability=0.9, grows=3.0),) if named else (),
         candidates=(Candidate(effects=(), log_evidence=0.0), Candidate(effects=("friction",), log_evidence=evidence)),
         place="mesh" if named else "none",
-        signs=SIGNS | signs,
+        signs=SIGNS | called | signs,
     )
     return Known(verdict, kind, effects)
 
@@ -107,6 +110,48 @@ def test_limits_of_a_rig_are_what_its_sound_rigs_leave() -> None:
     assert (calm.structure, calm.changing) == (0.5 * BLANK.structure, 0.5 * BLANK.changing)
     assert calm.outstanding == {"drive": 0.5}
     assert calibrated(BLANK, [known("foreign", remains=0.9)]).structure == BLANK.structure
+
+
+def test_no_sign_speaks_against_what_it_is_a_sign_of() -> None:
+    rng = np.random.default_rng(11)
+    x = np.stack([np.ones(60), rng.normal(size=60), rng.random(60)], axis=1)
+    true = list(rng.random(60) < 1 / (1 + np.exp(-(1.0 + x[:, 1] - 3.0 * x[:, 2]))))
+    found = fitted(nothing_known((2.0, 2.0, 2.0)), x, true)
+    assert found.weights[2] == 0.0
+    # What has no weight may as well not be there.
+    without = fitted(nothing_known((2.0, 2.0)), x[:, :2], true)
+    assert found.weights[:2] == pytest.approx(without.weights, abs=1e-5)
+    # Where it speaks for it, it has its weight: the same cases turned round.
+    turned = fitted(nothing_known((2.0, 2.0, 2.0)), x * [1.0, 1.0, -1.0], true)
+    assert turned.weights[2] > 1.0
+
+
+def test_what_the_record_calls_for_counts_by_its_own_evidence_named_or_not() -> None:
+    told = known("effect", evidence=1.0, effects=("friction",), **called_signs("friction", 40.0, 5.0))
+    assert candidate_rows(told) == [(effect_signs(40.0, 400.0, 5.0), True)]
+    # A drift is no candidate of the search, but is called for.
+    drift = known("effect", effects=("temperature-drift",), **called_signs("temperature-drift", 30.0, 2.0))
+    assert (effect_signs(30.0, 400.0, 2.0), True) in candidate_rows(drift)
+
+
+@pytest.mark.parametrize("truth, classes, right", [
+    ("eccentricity", (), True),
+    ("encoder-runout", (), False),
+    ("encoder-runout", (("eccentricity", "encoder-runout"),), True),
+    ("encoder-runout", (("pitch-error", "encoder-runout"),), False),
+    ("friction", (("eccentricity", "encoder-runout"),), False),
+])  # fmt: skip
+def test_a_name_is_true_where_the_true_one_is_not_told_from_it(
+    truth: str, classes: tuple[tuple[str, ...], ...], right: bool
+) -> None:
+    one = known("effect", named="eccentricity", evidence=30.0, effects=(truth,))
+    verdict = one.verdict.model_copy(update={"indistinguishable": classes})
+    rows = dict(zip(("friction", "eccentricity"), candidate_rows(one._replace(verdict=verdict)), strict=True))
+    assert rows["eccentricity"] == (effect_signs(30.0, 400.0, 3.0), right)
+    # What is named as well is no other name of it.
+    both = verdict.model_copy(update={"effects": (*verdict.effects, Effect(name="encoder-runout", probability=0.9))})
+    beside = dict(zip(("friction", "eccentricity"), candidate_rows(one._replace(verdict=both)), strict=True))
+    assert beside["eccentricity"][1] == (truth == "eccentricity")
 
 
 def test_what_was_named_wrongly_teaches_doubt() -> None:

@@ -102,11 +102,11 @@ def test_what_is_not_twice_as_likely_at_work_as_not_is_not_named() -> None:
     """The least likely goes first: what it leaves may speak for the others."""
     one, other, sure = weighed("friction", 9.0), weighed("sensor-delay", 8.0), weighed("coupling", 99.0)
     decided: Any = SimpleNamespace(named=(one, other, sure))
-    chances = Chances({"friction": 0.63, "sensor-delay": 0.41, "coupling": 0.98}, ())
+    chances = Chances({"friction": 0.63, "sensor-delay": 0.41, "coupling": 0.98}, {}, ())
     assert unlikely(decided, chances) is other
     assert unlikely(SimpleNamespace(named=(sure, one)), chances) is one  # type: ignore[arg-type]
     assert unlikely(SimpleNamespace(named=(sure,)), chances) is None  # type: ignore[arg-type]
-    assert unlikely(SimpleNamespace(named=(one,)), Chances({"friction": LIKELY}, ())) is None  # type: ignore[arg-type]
+    assert unlikely(SimpleNamespace(named=(one,)), Chances({"friction": LIKELY}, {}, ())) is None  # type: ignore[arg-type]
     other.hypothesis.effect.noun = "a delay of one sensor"
     said = sentence_of_doubt(other, chances)
     assert said.startswith("A delay of one sensor would close") and said.endswith("(41 %)")
