@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
-
-import numpy as np
 
 from gearbench.diagnosis.effects.effect import Hypothesis
 from gearbench.diagnosis.evidence.separable import APART
 from gearbench.diagnosis.fitting.fit import Optimum, fit
-from gearbench.diagnosis.selection.weighing import Weighed
+from gearbench.diagnosis.selection.weighing import LIMIT, Weighed, worth
 from gearbench.diagnosis.simulation.simulator import Simulator
 
 MOST_LEFT = 6.0  # nats still promised by fits that count for comparing them
@@ -34,29 +32,67 @@ def usual_of(weighed: Sequence[Weighed]) -> Weighed | None:
 
 
 def compared(simulator: Simulator, base: Optimum, weighed: Sequence[Weighed]) -> list[Weighed]:
-    """Those weighed beside `base`, the best first; where a rare one is ahead its usual counterparts are fitted again
-    from where that one got, with what it explains handed over."""
+    """Those weighed beside `base`, the best first. What decides between them is not which was fitted better on the way:
+    those whose fit stopped while it promised to overtake are gone on with, and usual counterparts of a rare one that
+    is ahead, and rare ones of a usual one, are fitted again from where that one got, with what it explains handed
+    over."""
     if not weighed:
         return []
-    best = weighed[0]
-    again = (_handed_over(simulator, base, best, one) if _is_usual(one, best) else one for one in weighed)
-    return sorted(again, key=lambda one: -one.log_bayes_factor)
+    ahead = weighed[0].log_bayes_factor
+    found = _ranked(_gone_on(simulator, base, one) if _may_overtake(one, base, ahead) else one for one in weighed)
+    best = found[0]
+    return _ranked(_handed_over(simulator, base, best, one) if _are_counterparts(one, best) else one for one in found)
 
 
-def _handed_over(simulator: Simulator, base: Optimum, rare: Weighed, usual: Weighed) -> Weighed:
-    """The usual one, or where it explains more its fit from where the rare one got."""
-    if rare.optimum is None or rare.hypothesis.usual is None:
-        return usual
-    unknowns, p = simulator.layout.unknowns, rare.optimum.p.copy()
-    own = rare.hypothesis.entries(unknowns)
-    p[usual.hypothesis.entries(unknowns)] += rare.hypothesis.usual[1] * p[own]
-    p[own] = 0.0
-    sd = usual.hypothesis.widened(unknowns, base.sd)
-    found = fit(simulator, p, sd, rare.optimum.sensitivity, renewals=RENEWALS)
+def _ranked(weighed: Iterable[Weighed]) -> list[Weighed]:
+    return sorted(weighed, key=lambda one: -one.log_bayes_factor)
+
+
+def _may_overtake(one: Weighed, base: Optimum, ahead: float) -> bool:
+    """Whether the fit of one promises enough, beyond what any rig has from there, to be as good as the one ahead."""
+    if one.optimum is None:
+        return False
+    promised = one.optimum.left - base.left
+    return promised > MOST_LEFT and one.log_bayes_factor + promised > max(ahead - APART, LIMIT)
+
+
+def _gone_on(simulator: Simulator, base: Optimum, one: Weighed) -> Weighed:
+    """One that was simulated, fitted on from where it got."""
+    assert one.optimum is not None
+    found = fit(simulator, one.optimum.p, one.optimum.sd, one.optimum.sensitivity, renewals=RENEWALS)
+    return _better(simulator, base, one, found)
+
+
+def _better(simulator: Simulator, base: Optimum, one: Weighed, found: Optimum | None) -> Weighed:
+    """One, or where it explains more another fit of it."""
     if found is None:
-        return usual
-    factor = found.evidence - base.evidence - float(np.log(usual.hypothesis.choices))
-    return usual if factor <= usual.log_bayes_factor else replace(usual, log_bayes_factor=factor, optimum=found)
+        return one
+    factor = worth(simulator, base, one.hypothesis, found)
+    return one if factor <= one.log_bayes_factor else replace(one, log_bayes_factor=factor, optimum=found)
+
+
+def _handed_over(simulator: Simulator, base: Optimum, best: Weighed, one: Weighed) -> Weighed:
+    """A counterpart of the best one, or where it explains more its fit from where that got."""
+    if best.optimum is None:
+        return one
+    unknowns, p = simulator.layout.unknowns, best.optimum.p.copy()
+    own = best.hypothesis.entries(unknowns)
+    p[one.hypothesis.entries(unknowns)] += _in_place_of(best.hypothesis, one.hypothesis) * p[own]
+    p[own] = 0.0
+    sd = one.hypothesis.widened(unknowns, base.sd)
+    return _better(simulator, base, one, fit(simulator, p, sd, best.optimum.sensitivity, renewals=RENEWALS))
+
+
+def _in_place_of(one: Hypothesis, other: Hypothesis) -> float:
+    """How many times the unknowns of one of two counterparts the other's are for the same transmission error."""
+    if one.gives_way_to(other):
+        assert one.usual is not None
+        return one.usual[1]
+    return 1.0 / _in_place_of(other, one)
+
+
+def _are_counterparts(one: Weighed, best: Weighed) -> bool:
+    return _is_usual(one, best) or _is_usual(best, one)
 
 
 def _is_usual(one: Weighed, rare: Weighed) -> bool:

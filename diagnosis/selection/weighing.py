@@ -124,11 +124,16 @@ def weigh(
             optimum = None
         if optimum is None:
             return Weighed(one, min(value, 0.0), None)
-        factor = optimum.evidence - base.evidence - float(np.log(one.choices))
-        return Weighed(one, min(factor, relief(unknowns, base.sd, one, optimum.p, optimum.sd)), optimum)
+        return Weighed(one, worth(simulator, base, one, optimum), optimum)
 
     out = side_by_side(weighed, promised)
     return sorted(out, key=lambda one: -one.log_bayes_factor)
+
+
+def worth(simulator: Simulator, base: Optimum, one: Hypothesis, found: Optimum) -> float:
+    """Log Bayes factor of a hypothesis that was `found` beside `base`."""
+    factor = found.evidence - base.evidence - float(np.log(one.choices))
+    return min(factor, relief(simulator.layout.unknowns, base.sd, one, found.p, found.sd))
 
 
 def first_look(base: Optimum, hypotheses: Sequence[Hypothesis], unknowns: Unknowns) -> Array:

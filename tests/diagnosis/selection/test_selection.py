@@ -149,9 +149,36 @@ def test_the_usual_one_is_fitted_from_where_the_rare_one_got() -> None:
     assert one.optimum is found.best and other.hypothesis.name == "tooth-crack 1"
     assert other.optimum is not None and other.optimum.p[6] == pytest.approx(0.0, abs=0.02)
     assert other.optimum.p[7] == pytest.approx(0.4, abs=0.05) and other.log_bayes_factor > LIMIT
-    # Nothing is handed over where the one ahead is usual.
-    plain = [replace(first, hypothesis=CRACKS[0]), Weighed(CRACKS[1], 2.0, None)]
+    # And a rare one from where the usual one got that is ahead; nothing is handed over to what is no counterpart.
+    usual = replace(first, hypothesis=CRACKS[0])
+    rare = Weighed(replace(CRACKS[1], usual=(("crack",), 0.5)), 2.0, None)
+    turned = compared(simulator, found.base, [usual, rare])[1]
+    assert turned.optimum is not None and turned.optimum.p[6:] == pytest.approx([0.0, 0.4], abs=0.05)
+    plain = [usual, Weighed(CRACKS[1], 2.0, None)]
     assert compared(simulator, found.base, plain) == plain
+
+
+def test_a_fit_that_stopped_while_it_promised_to_overtake_is_gone_on_with() -> None:
+    found = selected({6: 0.3})
+    true = found.weighed[0]
+    assert true.hypothesis.name == "tooth-crack 0" and true.optimum is not None
+    simulator = FakeSimulator(lambda q: q @ MATRIX, target(true.optimum.lines))
+
+    def among(promised: float) -> Weighed:
+        stopped = replace(found.base, sd=true.optimum.sd, left=found.base.left + promised)  # type: ignore[union-attr]
+        ahead = Weighed(FRICTION, 60.0, None)
+        return next(
+            one
+            for one in compared(simulator, found.base, [ahead, Weighed(true.hypothesis, 1.0, stopped)])
+            if one.hypothesis == true.hypothesis
+        )
+
+    over = among(100.0)
+    assert over.optimum is not None and over.optimum.p[6] == pytest.approx(0.3, abs=0.05)
+    assert over.log_bayes_factor > 60.0
+    # What would not reach the one ahead, or promises little, stays where it is.
+    assert among(50.0).log_bayes_factor == 1.0
+    assert among(60.0).log_bayes_factor > 1.0
 
 
 def test_two_effects_enter_the_larger_first_and_each_is_needed() -> None:
