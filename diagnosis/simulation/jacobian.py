@@ -26,8 +26,9 @@ from gearbench.diagnosis.effects.sensor_delay import KEYS as DELAYS
 from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
 from gearbench.diagnosis.effects.torque_ripple import KEY as RIPPLE
 from gearbench.diagnosis.effects.torque_ripple import orders_in
-from gearbench.diagnosis.forces.basis import on_path, waves
+from gearbench.diagnosis.forces.basis import waves
 from gearbench.diagnosis.intake.signals import has_both_y
+from gearbench.diagnosis.simulation.form import in_mesh_of_form
 from gearbench.diagnosis.simulation.runout import in_mesh_of_runout, lobes_of, on_gears_of_runout, turn_of
 from gearbench.diagnosis.simulation.target import Target
 from gearbench.diagnosis.structure.contrast import CONTRAST, contrast_slope
@@ -121,7 +122,7 @@ def mesh_forces(layout: Layout, p: Array, along: Along, chosen: Flags) -> tuple[
     put(CONTRAST, stiffer * contrast_slope(layout.tangents, float(p[unknowns[CONTRAST]][0]), along.sharing)[:, None])
     put("shape", stiffer * (wave / series[:, None]))
     put("profile", along.of_excess(wave))
-    put(FLANKS, _of_flanks(along, numbers, layout.model.path))
+    put(FLANKS, in_mesh_of_form(along, layout.meshing))
     for side, key in enumerate(RUNOUTS.values()):
         put(key, in_mesh_of_runout(along, side))
     for side, key in enumerate(PITCHES.values()):
@@ -146,13 +147,6 @@ def _series_at(cosine: Sequence[float], sine: Sequence[float], phase: Array) -> 
     """A series in the mesh phase, of amplitudes at the orders 1, 2, .., at phases (n,) [cycles]."""
     turns = 2 * np.pi * np.arange(1, len(cosine) + 1)[:, None] * phase
     return np.asarray(np.asarray(cosine) @ np.cos(turns) + np.asarray(sine) @ np.sin(turns))
-
-
-def _of_flanks(along: Along, numbers: NDArray[np.int64], path: tuple[float, float]) -> Array:
-    """Force (entries, parts) [N] per unit of each part of a form along the path of contact, of the pairs `numbers`
-    (entries, n_o) that touch."""
-    shape = on_path(along.phase[:, None] - numbers, path)
-    return np.asarray((shape * along.form_stiffness).sum(axis=-1).T)
 
 
 def _by_tooth(tooth: NDArray[np.int64], stiffness: Array, count: int) -> Array:

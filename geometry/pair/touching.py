@@ -12,6 +12,8 @@ p^2 rho / 2: 1 um where 25 um are taken off a tip of module 3 mm within 1.3 mm, 
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -27,9 +29,18 @@ STEEPEST, TRIALS = 0.2, 48
 NEAREST = 0.05  # least of a roll length over the base pitch: near a base circle an involute is a point
 
 
-def touching_excess(meshing: Pair, gears: tuple[Gear, Gear], rho: Array) -> Array:
-    """Excess [m] of a pair of flanks of driver and driven gear, all teeth alike, that would touch at the driver's roll
-    lengths `rho` (...) [m] were they involutes without end."""
+class Touching(NamedTuple):
+    """Where a pair of flanks touches: roll lengths [m] (places,) of the driver at which involutes without end would,
+    the `excess` [m] there, and the roll lengths of `driver` and `driven` gear at which these flanks do."""
+
+    involute: Array
+    excess: Array
+    driver: Array
+    driven: Array
+
+
+def touching(meshing: Pair, gears: tuple[Gear, Gear]) -> Touching:
+    """That of flanks of driver and driven gear, all teeth alike, along the line of action."""
     least = NEAREST * meshing.base_pitch
     one = np.linspace(least, meshing.line_of_action - least, PLACES)
     two = meshing.line_of_action - one
@@ -38,12 +49,21 @@ def touching_excess(meshing: Pair, gears: tuple[Gear, Gear], rho: Array) -> Arra
     side = np.linspace(-1.0, 1.0, 2 * TRIALS + 1)[:, None]
     slope = STEEPEST * side * np.abs(side)
     way, apart = slope / curvature, 0.5 * slope**2 / curvature
-    excess = np.zeros_like(apart)
+    excess, places = np.zeros_like(apart), []
     for shape, gear, at, turn in ((meshing.driver, gears[0], one, 1.0), (meshing.driven, gears[1], two, -1.0)):
         moved = np.sqrt(np.maximum(at**2 + 2.0 * turn * shape.base_radius * way, 0.0))
-        excess += profile_excess(shape, gear, 0, np.clip(moved, shape.rho_form, shape.rho_end))
+        places.append(np.clip(moved, shape.rho_form, shape.rho_end))
+        excess += profile_excess(shape, gear, 0, places[-1])
         apart = np.where((moved < shape.rho_form) | (moved > shape.rho_end), np.inf, apart)
-    with np.errstate(invalid="ignore"):
-        found = (excess - apart).max(axis=0) + apart.min(axis=0)
-    ends = np.isfinite(found)
-    return np.interp(rho, one[ends], found[ends])
+    ends = np.isfinite(apart).any(axis=0)
+    closed = (excess - apart)[:, ends]
+    here = (closed.argmax(axis=0), np.flatnonzero(ends))
+    found = closed.max(axis=0) + apart[:, ends].min(axis=0)
+    return Touching(one[ends], found, places[0][here], places[1][here])
+
+
+def touching_excess(meshing: Pair, gears: tuple[Gear, Gear], rho: Array) -> Array:
+    """Excess [m] of a pair of flanks of driver and driven gear, all teeth alike, that would touch at the driver's roll
+    lengths `rho` (...) [m] were they involutes without end."""
+    found = touching(meshing, gears)
+    return np.interp(rho, found.involute, found.excess)

@@ -163,6 +163,32 @@ def test_the_derivative_by_a_form_of_the_flanks_is_close(bench: Bench, form: np.
         assert error < within * size, channel
 
 
+@pytest.fixture(scope="module")
+def sloping() -> tuple[Simulator, np.ndarray, np.ndarray]:
+    """Simulator, unknowns and Jacobian of a rig whose flanks slope so steeply towards the end of the path that they
+    touch a thirtieth of a base pitch beside where involutes would."""
+    simulator = demonstration()
+    p, at = np.zeros(simulator.layout.size), simulator.layout.unknowns["flanks"]
+    p[at] = simulator.layout.model.deflection * in_parts(np.array([0.0, 0.3, 0.0, 0.0, 0.6, -1.5, 0.3]))
+    return simulator, p, jacobian_at(simulator, p)
+
+
+@pytest.mark.parametrize(
+    ("form", "within"),
+    [(np.eye(len(FORM_PARTS))[4], 0.06), (np.eye(len(FORM_PARTS))[5], 0.1), (FORM_PARTS[2], 0.04)],
+    ids=["4", "5", "barrelling"],
+)
+def test_so_it_is_of_flanks_that_slope(
+    sloping: tuple[Simulator, np.ndarray, np.ndarray], form: np.ndarray, within: float
+) -> None:
+    """Taken where involutes touch, the derivatives are 0.07, 0.22 and 0.07 off."""
+    simulator, p, jacobian = sloping
+    at, along = simulator.layout.unknowns["flanks"], in_parts(form)
+    step = 0.02 * simulator.layout.model.deflection
+    error, size = off(simulator, along @ jacobian[at], p, at, step, along)["dte"]
+    assert error < within * size
+
+
 def test_run_out_of_the_driven_encoder_is_seen_in_the_error_alone(bench: Bench) -> None:
     """The simulated gear turns as it was recorded, less that run-out, which shakes the rig a hundred times less."""
     at = bench.layout.unknowns["encoder-driven"].start
