@@ -40,11 +40,12 @@ class Along:
     of the mesh [N], negative on the back flanks, what each pair has of it on the working ones, force and tangent
     (entries, n_o), rate of the deflection [m/s], the logarithm of the force that the teeth's own law has over the one
     where an exponent changes nothing, the stiffness [N/m] by which more compliance that the pairs share takes from the
-    force, what it grows by per excess by the form of each pair's flanks (entries, n_o) [N/m], and how many times as
-    stiff they are for damping that grows with the force. `places` (samples, n) of all coordinates [m], sampled at
-    `sampling_rate`, and `turned` (samples,) what all that turns moves by besides, as the nominal rotation departs from
-    a steady one. `early` steps let free vibrations die out. Samples of forces are those of `instants`, or hold no more
-    than half the sampling rate. `led` (entries,): velocity [m/s] that the driver is nudged towards, if it is.
+    force, what it grows by per excess by the form of each pair's flanks (entries, n_o) [N/m] and per compliance that
+    the pair has less by itself [N2/m], and how many times as stiff they are for damping that grows with the force.
+    `places` (samples, n) of all coordinates [m], sampled at `sampling_rate`, and `turned` (samples,) what all that
+    turns moves by besides, as the nominal rotation departs from a steady one. `early` steps let free vibrations die
+    out. Samples of forces are those of `instants`, or hold no more than half the sampling rate. `led` (entries,):
+    velocity [m/s] that the driver is nudged towards, if it is.
     """
 
     model: NonLinear
@@ -55,6 +56,7 @@ class Along:
     level: Array
     sharing: Array
     form: Array
+    own: Array
     stiffer: Array
     tangent: Tangent
     substeps: int
@@ -186,6 +188,10 @@ class Along:
         """The same (entries, n_o) [N/m] per excess by the form of its flanks."""
         return self.form * self.stiffer[:, None]
 
+    def of_own_compliance(self, compliance: Array) -> Array:
+        """Force (entries,) [N] in the mesh of pairs that each yield by (entries, n_o) [m/N] more by themselves."""
+        return -(self.own * compliance).sum(axis=1) * self.stiffer
+
     def of_excess(self, excess: Array) -> Array:
         """Force (entries, columns) [N] that more material (entries, columns) [m] on all working flanks adds in the
         mesh: none while the back flanks touch."""
@@ -225,6 +231,7 @@ def along(steady: Steady) -> Along:
         level=found.level,
         sharing=found.sharing,
         form=found.form,
+        own=found.own,
         stiffer=found.stiffer,
         tangent=Tangent(
             *around,

@@ -48,7 +48,21 @@ def mesh_law(rig: Rig, simulation: Simulation, load_max_nm: float) -> MeshLaw:
     k(phase) that the case asks for. Raises GeometryError, ContactError, LumpedError or BenchError.
     """
     teeth = teeth_law(rig, simulation, load_max_nm)
-    return formed(teeth, flank_excess(teeth, rig, simulation), rig.mesh.shared_compliance)
+    return with_flanks(teeth, flank_excess(teeth, rig, simulation), rig)
+
+
+def with_flanks(teeth: MeshLaw, excess: Array | None, rig: Rig) -> MeshLaw:
+    """The `teeth_law` with the `flank_excess` and the compliances of a rig's mesh."""
+    return formed(teeth, excess, rig.mesh.shared_compliance, own_compliance(teeth, pair(rig), rig.mesh.end_compliance))
+
+
+def own_compliance(teeth: MeshLaw, meshing: Pair, ends: float) -> Array | None:
+    """What each pair yields more by itself (phases, n_o) [m/N] than by the `teeth_law`: `ends` times x^2 - 1/3, x its
+    place on the path of contact from -1 to 1, and no more beyond its ends; None for nothing."""
+    if ends == 0.0:
+        return None
+    phase = np.arange(teeth.phases)[:, None] / teeth.phases
+    return ends * meshing.towards_ends(phase - teeth.offsets)
 
 
 def flank_excess(teeth: MeshLaw, rig: Rig, simulation: Simulation) -> Array | None:

@@ -27,6 +27,7 @@ class Pushing(NamedTuple):
     pair_force: Array
     pair_tangent: Array
     form: Array
+    own: Array
     rate: Array
     level: Array
     sharing: Array
@@ -73,11 +74,11 @@ def pushing(steady: Steady, motion: Motion, substeps: int) -> Pushing:
     stiffness = slope * stiffer + _met(damping, force, closing, setup.step / 2)
     nominal = setup.phases(0, count)
     ahead = np.round(nominal - turned) - np.floor(nominal)
-    pairs = (_numbered(one, ahead) for one in (*of_pairs(model.law, at, travel), answer.form))
-    pair_force, pair_tangent, form = (np.where(idle[:, None], 0.0, one) for one in pairs)
+    pairs = (_numbered(one, ahead) for one in (*of_pairs(model.law, at, travel), answer.form, answer.own))
+    pair_force, pair_tangent, form, own = (np.where(idle[:, None], 0.0, one) for one in pairs)
     rubbed = _rubbed(setup, table, motion, turned * model.law.phases)
     return Pushing(
-        force, pair_force, pair_tangent, form, closing, answer.level, answer.sharing, stiffer, stiffness, damping,
+        force, pair_force, pair_tangent, form, own, closing, answer.level, answer.sharing, stiffer, stiffness, damping,
         onward, rubbed,
     )  # fmt: skip
 

@@ -9,12 +9,15 @@ from typing import Protocol
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from gearbench.diagnosis.forces.nominal import table_load
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.geometry import pair
 from gearbench.lumped.nonlinear.law import MeshLaw
 from gearbench.rig import Case
+
+Array = NDArray[np.float64]
 
 # Steps of a search are so much longer than those of a simulation: the fastest mode's frequency is then right to 2e-3,
 # and lines to 5e-4 where the finer steps leave 1e-4; any model of a record is wrong by more.
@@ -32,18 +35,24 @@ class Replay(Protocol):
 def law_of(sound: MeshLaw, case: Case) -> MeshLaw:
     """The law of sound teeth with the backlash and the flanks of the case's rig."""
     # Solving it compiles loops on import, which not every user of this module wants.
-    from gearbench.bench.nonlinear.law_table import flank_excess
+    from gearbench.bench.nonlinear.law_table import flank_excess, own_compliance
 
-    law = _with_backlash(sound, max(pair(case.rig).backlash_normal, 0.0))
-    excess, more = flank_excess(sound, case.rig, case.simulation), case.rig.mesh.shared_compliance
-    return _with_flanks(law, None if excess is None else excess.tobytes(), more)
+    meshing, mesh = pair(case.rig), case.rig.mesh
+    law = _with_backlash(sound, max(meshing.backlash_normal, 0.0))
+    excess, own = flank_excess(sound, case.rig, case.simulation), own_compliance(sound, meshing, mesh.end_compliance)
+    return _with_flanks(law, _key(excess), mesh.shared_compliance, _key(own))
+
+
+def _key(table: Array | None) -> bytes | None:
+    return None if table is None else table.tobytes()
 
 
 @lru_cache(maxsize=LAWS)
-def _with_flanks(law: MeshLaw, excess: bytes | None, more: float) -> MeshLaw:
+def _with_flanks(law: MeshLaw, excess: bytes | None, more: float, own: bytes | None) -> MeshLaw:
     from gearbench.lumped.nonlinear.forms import formed
 
-    return formed(law, None if excess is None else np.frombuffer(excess).reshape(law.share.shape), more)
+    tables = (None if key is None else np.frombuffer(key).reshape(law.share.shape) for key in (excess, own))
+    return formed(law, next(tables), more, next(tables))
 
 
 @lru_cache(maxsize=LAWS)

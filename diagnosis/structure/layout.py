@@ -31,6 +31,7 @@ from gearbench.diagnosis.forces.condition import Condition
 from gearbench.diagnosis.forces.nominal import NominalModel
 from gearbench.diagnosis.forces.unknowns import Group, Unknowns, unknowns_of
 from gearbench.diagnosis.structure.contrast import contrast_groups, contrasted, tangents_of
+from gearbench.diagnosis.structure.ends import Ends, ended, ends_groups, ends_of
 from gearbench.diagnosis.structure.structure import held, least_steps, sensed, structure_groups
 from gearbench.diagnosis.structure.viscous import viscous, viscous_groups
 from gearbench.geometry import Pair, pair
@@ -78,6 +79,11 @@ class Layout:
         """Stiffness (phases,) [N/m] of the nominal mesh over its phase, without its scale."""
         return tangents_of(self.model)
 
+    @cached_property
+    def ends(self) -> Ends:
+        """What the pairs of the nominal mesh yield by themselves, and where they touch."""
+        return ends_of(self.model, self.meshing)
+
     def case(self, p: Array, condition: str | None = None) -> Case:
         """The rig of these unknowns (size,), with the ripple of one condition, or the mean of all. Raises ValueError
         for values that no rig may have."""
@@ -90,6 +96,7 @@ class Layout:
         rig = _cracked(rig, self, p)
         rig = held(_supports(rig, self, p), self.model, self.unknowns, p)
         rig = contrasted(rig, self.tangents, self.unknowns, p)
+        rig = ended(rig, self.ends, self.unknowns, p)
         rig = viscous(rig, self.model, self.unknowns, p)
         rig = sensed(rig, self.model, self.unknowns, p, DELAYS)
         rig = _drive(rig, self, fitted, condition)
@@ -117,7 +124,7 @@ def layout_of(
     for effect in LIBRARY:
         groups += effect.unknowns(model, conditions)
     groups += structure_groups(nominal.rig, model)
-    groups += [*contrast_groups(), *viscous_groups(nominal, model)]
+    groups += [*contrast_groups(), *ends_groups(), *viscous_groups(nominal, model)]
     # What force residuals take for these has other errors of theirs in it.
     known = {CONTACT: SD_SIMULATED, RATIO: deviation(model)}
     plain = [_as_simulated(one, known.get(one.key)) for one in groups]

@@ -9,10 +9,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import acos, atan, inf, pi, sin, sqrt, tan
 
+import numpy as np
+from numpy.typing import NDArray
+
 from gearbench.geometry.error import GeometryError, at_least, at_most
 from gearbench.geometry.pair.interference import TOLERANCE, fillet_clearance, largest_tip
 from gearbench.geometry.tooth.profile import Profile, involute, profile
 from gearbench.rig import Rig
+
+Array = NDArray[np.float64]
 
 # Backlash and clearance more negative than this are refused; less is rounding of a centre distance in the
 # case.
@@ -75,6 +80,13 @@ class Pair:
         """Start and end of the path of contact behind the pitch point, in base pitches."""
         start, stop = ((rho - self.rho_pitch[0]) / self.base_pitch for rho in self.active_driver)
         return start, stop
+
+    def towards_ends(self, travel: Array) -> Array:
+        """x^2 - 1/3 at distances (...) behind the pitch point [base pitches], x from -1 to 1 along the path of contact,
+        over which it is nothing in the mean; beyond the ends as there."""
+        start, stop = self.path
+        place = np.clip((2.0 * travel - start - stop) / (stop - start), -1.0, 1.0)
+        return np.asarray(place**2 - 1.0 / 3.0)
 
     @property
     def contact_ratio(self) -> float:

@@ -200,6 +200,40 @@ def test_bodies_that_yield_otherwise_add_what_they_do_to_the_deflection(more: fl
     np.testing.assert_allclose(law.parts.sum(axis=2), law.force, rtol=1e-12)
 
 
+@pytest.mark.parametrize(("shared", "one", "two"), [(0.0, 3e-9, -1.5e-9), (1e-9, -1e-9, 2e-9)])
+def test_pairs_that_yield_more_by_themselves_are_softer_springs(shared: float, one: float, two: float) -> None:
+    """Two springs 1/(1/k + d_n) side by side, and the compliance c in series with both."""
+    law = formed(springs(shared), None, 0.0, np.tile([one, two], (8, 1)))
+    stiffness = np.array([1.0 / (1.0 / 2e8 + own) for own in (one, two)])
+    deflection = np.linspace(1e-6, 25e-6, 40)
+    force, tangent = law.evaluate(deflection, 0.3)
+    whole = 1.0 / (1.0 / stiffness.sum() + shared)
+    np.testing.assert_allclose(force, whole * deflection, rtol=1e-6)
+    np.testing.assert_allclose(tangent, whole, rtol=1e-6)
+    np.testing.assert_allclose(law.parts[:, 1:] / law.force[:, 1:, None], np.broadcast_to(
+        stiffness / stiffness.sum(), (8, len(law.approach) - 1, 2)), rtol=1e-6)  # fmt: skip
+    np.testing.assert_allclose(law.share, np.tile(stiffness / stiffness.sum(), (8, 1)), rtol=1e-6)
+
+
+def test_teeth_cannot_give_back_more_than_they_yield() -> None:
+    with pytest.raises(LumpedError, match=r"end_compliance_um_per_kn"):
+        formed(springs(), None, 0.0, np.full((8, 2), -4.6e-9))
+
+
+@pytest.mark.parametrize("compliance", [2e-9, -1e-9])
+def test_pairs_yield_more_at_the_ends_of_their_path_as_in_finite_elements(compliance: float) -> None:
+    rig = make_rig({})
+    law = elastic_rig(rig, SIMULATION).law
+    plain, changed = (
+        static_cycle(one, PHASE, torque=list(TORQUES)).transmission_error
+        for one in (law, law._replace(ends=compliance))
+    )
+    softer = rig.model_copy(update={"mesh": rig.mesh.model_copy(update={"end_compliance": compliance})})
+    found = lumped_error(softer) - lumped_error(rig)
+    for true, here in zip(changed - plain, found, strict=True):
+        assert np.sqrt(np.mean((here - true) ** 2)) < 0.05 * np.sqrt(np.mean(true**2))
+
+
 def test_bodies_and_flanks_together_are_bodies_after_flanks() -> None:
     excess = np.tile([0.0, -5e-6], (8, 1))
     both, after = formed(springs(1e-9), excess, 1e-9), formed(formed(springs(1e-9), excess), None, 1e-9)

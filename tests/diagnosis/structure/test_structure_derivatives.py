@@ -11,6 +11,7 @@ from shared.simulated_lines import demonstration, jacobian_at, off
 from gearbench.diagnosis.effects.bearing_nonlinearity import KEYS as BEARINGS
 from gearbench.diagnosis.simulation.simulator import Simulator
 from gearbench.diagnosis.structure.contrast import CONTRAST
+from gearbench.diagnosis.structure.ends import ENDS
 from gearbench.diagnosis.structure.structure import ACROSS, CROSS, HOUSING, MODE, SHAPE, with_motion
 from gearbench.diagnosis.structure.viscous import LOADED
 from gearbench.rig import Load, OutputShaft
@@ -52,6 +53,7 @@ def bench() -> Bench:
         ("mesh-ratio", 0, 0.05),
         (LOADED, 0, 0.05),
         (CONTRAST, 0, 0.02),
+        (ENDS, 0, 0.02),
         (BEARINGS["driver"], 0, 0.02),
         (ACROSS, 0, 0.02),
         (CROSS, 1, 0.02),
@@ -69,7 +71,7 @@ def test_a_derivative_is_what_two_simulations_differ_by(bench: Bench, key: str, 
     unknowns = bench.simulator.layout.unknowns
     at = unknowns[key].start + entry
     found = off(bench.simulator, bench.jacobian[at], bench.p, at, part * unknowns.prior()[at])
-    within = EDGES if key in (CONTRAST, "eccentricity-driven") else {}
+    within = EDGES if key in (CONTRAST, ENDS, "eccentricity-driven") else {}
     for channel, (error, size) in found.items():
         assert error <= within.get(channel, CLOSE) * size, channel
     assert max(size for _, size in found.values()) > 0.0

@@ -62,6 +62,7 @@ EFFECTS: dict[str, dict[str, Any]] = {
     "rocking": {"housing": Housing(mass=3.0, stiffness=1e8, rocking=Rocking(mass=2.0, stiffness=2e8, damping=1e3))},
     "scale": {"mesh": MeshCorrection(stiffness_scale=0.8)},
     "bodies": {"mesh": MeshCorrection(stiffness_scale=1.2, shared_compliance=4e-10)},
+    "ends": {"mesh": MeshCorrection(end_compliance=-8e-10)},
     "free": {
         "load": Load(boundary="torque", coupling=OutputShaft(inertia=3e-3, stiffness=1e5, damping=5.0)),
         "drive": Drive(coupling=Coupling(inertia=2e-3, stiffness=1e5, damping=5.0)),
