@@ -12,7 +12,15 @@ import pytest
 
 from gearbench.diagnosis.effects.effect import Wide
 from gearbench.diagnosis.forces.unknowns import group, unknowns_of
-from gearbench.diagnosis.judging.chances import LIKELY, Chances, chances_of, sentence_of_doubt, unlikely
+from gearbench.diagnosis.judging.chances import (
+    LIKELY,
+    Called,
+    Chances,
+    chances_of,
+    sentence_of_doubt,
+    signs_of_called,
+    unlikely,
+)
 from gearbench.diagnosis.odds import effect_signs
 from gearbench.diagnosis.population import POPULATION
 from gearbench.diagnosis.selection.weighing import Weighed
@@ -110,3 +118,14 @@ def test_what_is_not_twice_as_likely_at_work_as_not_is_not_named() -> None:
     other.hypothesis.effect.noun = "a delay of one sensor"
     said = sentence_of_doubt(other, chances)
     assert said.startswith("A delay of one sensor would close") and said.endswith("(41 %)")
+
+
+def test_a_verdict_keeps_what_speaks_for_an_effect_in_the_place_where_it_is_likeliest() -> None:
+    one, two = Called("sensor-delay", 20.0, 3.0), Called("sensor-delay", 30.0, 2.0)
+    named = {"sensor-delay y_driver": 0.9, "sensor-delay y_driven": 0.8, "friction": 0.4}
+    called = dict(zip(named, (one, two, Called("friction", 5.0, 1.5)), strict=True))
+    chances = Chances(named, called, ())
+    assert signs_of_called(chances, ["friction"]) == {"nats friction": 5.0, "grows friction": 1.5}
+    assert signs_of_called(chances, [name for name in named if name.startswith("sensor")]) == {
+        "nats sensor-delay": 20.0, "grows sensor-delay": 3.0,
+    }  # fmt: skip
