@@ -26,8 +26,10 @@ Array = NDArray[np.float64]
 PER_LINES = 100.0  # evidence is told in nats a hundred independent lines
 SMALLEST_SIGN = 1e-2
 CONVERGED = {"ftol": 1e-14, "gtol": 1e-9}
-# Standard deviations of the weights before any rig was seen: logits that a unit of each sign may be worth.
-WIDTHS = {"effect": (4.0, 3.0, 3.0, 3.0), "unknown": (2.0, 2.0)}
+# Standard deviations of the weights before any rig was seen: logits that a unit of each sign may be worth. Nearly all
+# that a judged record calls for is at work, so that rigs hardly tell what each sign is worth, and what is thought
+# before counts: a gap that grows e times as far makes nobody twice as sure.
+WIDTHS = {"effect": (4.0, 2.0, 2.0, 0.5), "unknown": (2.0, 2.0)}
 # How far the largest value on sound rigs may be exceeded, and the part of the limit before that remains at least: a few
 # rigs do not show the largest.
 MARGIN, LEAST = 1.25, 0.5

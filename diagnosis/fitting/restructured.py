@@ -26,6 +26,9 @@ RENEWALS = 3
 CLOSE = 0.2
 # The same of a block that answers the excitation, above which it is nearly all unexplained.
 FAR = 5.0
+# Part of any channel's fluctuation that is left, above which another is tried, too: where few lines carry it, nats do
+# not say so. Of the rigs that were found right few leave as much.
+OPEN = 0.05
 # Part of what one rig leaves of the excited lines above which another leaves nearly as much.
 ALIKE = 0.75
 # Cost of the nominal rig over that of a fit up to which another fit is begun there: mesh, offsets and flanks trade
@@ -60,10 +63,12 @@ def better(found: Optimum, other: Optimum | None) -> Optimum:
 
 
 def is_close(simulator: Simulator, found: Optimum) -> bool:
-    """Whether the median block is left with little beside its noise, and no block that answers the excitation with
-    much: a structure that is not there shows in the transmission error before it shows anywhere else."""
-    left = _left(simulator, found)
-    return bool(np.median(left) < CLOSE and not (simulator.target.excited & (left > FAR)).any())
+    """Whether the median block is left with little beside its noise, no block that answers the excitation with much,
+    and no channel with a part of its fluctuation that counts: a structure that is not there shows in the transmission
+    error before it shows anywhere else."""
+    left, target = _left(simulator, found), simulator.target
+    parts, _ = target.shares(target.lines - found.lines)
+    return bool(np.median(left) < CLOSE and parts.max() < OPEN and not (target.excited & (left > FAR)).any())
 
 
 def answers_alike(simulator: Simulator, before: Optimum, after: Optimum) -> bool:
