@@ -146,7 +146,7 @@ def _decided(of: _Told, unsteady: Unsteady, changing: float) -> Decided:
         return doubt
     if judged.left > 1.0 and left.size > 1.0:
         return Decided("unknown", _leading(missing), (), left.sign, (_astray(judged, named),))
-    if left.shown > PLAIN and left.seen > 1.0 and sum(shares) < judged.left**2:
+    if left.seen > 1.0 and sum(shares) < judged.left**2:
         return Decided("unknown", _leading(missing), (), left.sign, (_made_up(missing, named),))
     because = "simulated with it, the rig comes closer to the records than any rig without an effect"
     beside = (_beside(of.clear),) if of.clear else ()

@@ -155,11 +155,11 @@ def test_a_rig_further_from_the_judged_record_than_the_nominal_one_names_nothing
 
 
 def test_an_effect_that_closes_less_than_what_stands_out_elsewhere_only_makes_up_for_it() -> None:
-    far: dict[str, Any] = {"left": 0.5, "remains": 1.1 * PLAIN * STRUCTURE, "excess": at(0, 3 * OUTSTANDING["drive"])}
+    far: dict[str, Any] = {"left": 0.5, "remains": 1.1 * VISIBLE * STRUCTURE, "excess": at(0, 3 * OUTSTANDING["drive"])}
     made = decided(40.0, share=0.2, **far)
     assert (made.verdict, made.place, made.named) == ("unknown", "drive", ()) and "friction" in made.because[0]
     assert decided(40.0, share=0.3, **far).verdict == "effects"
-    assert decided(40.0, share=0.2, **(far | {"remains": 0.9 * PLAIN * STRUCTURE})).verdict == "effects"
+    assert decided(40.0, share=0.2, **(far | {"remains": 0.9 * VISIBLE * STRUCTURE})).verdict == "effects"
     assert decided(40.0, share=0.2, **(far | {"excess": QUIET})).verdict == "effects"
 
 
