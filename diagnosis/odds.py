@@ -2,9 +2,9 @@
 
 Two logistic curves (Berkson 1944), each fitted to diagnoses of truth rigs. `effect`: is a candidate at work, given its
 log evidence over the number of independent lines, whether the judged record calls for it, and by how much the gap of
-some part of that grows without it? And
-`unknown`: where no effect of the library is at work, is something else, given the largest sign of it over its limit?
-Few rigs make flat curves: the weights have a Gaussian prior, and what they leave open is the interval of a probability.
+some part of that grows without it? And `unknown`: where no effect of the library is at work, is something else, given
+the largest sign of it over its limit? Few rigs make flat curves: the weights have a Gaussian prior, and what they leave
+open is the interval of a probability.
 """
 
 from __future__ import annotations

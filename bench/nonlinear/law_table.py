@@ -48,12 +48,13 @@ def mesh_law(rig: Rig, simulation: Simulation, load_max_nm: float) -> MeshLaw:
     k(phase) that the case asks for. Raises GeometryError, ContactError, LumpedError or BenchError.
     """
     teeth = teeth_law(rig, simulation, load_max_nm)
-    return with_flanks(teeth, flank_excess(teeth, rig, simulation), rig)
+    return with_flanks(teeth, rig, simulation)
 
 
-def with_flanks(teeth: MeshLaw, excess: Array | None, rig: Rig) -> MeshLaw:
-    """The `teeth_law` with the `flank_excess` and the compliances of a rig's mesh."""
-    return formed(teeth, excess, rig.mesh.shared_compliance, own_compliance(teeth, pair(rig), rig.mesh.end_compliance))
+def with_flanks(teeth: MeshLaw, rig: Rig, simulation: Simulation) -> MeshLaw:
+    """The `teeth_law` with the flanks and the compliances of a rig's mesh."""
+    own = own_compliance(teeth, pair(rig), rig.mesh.end_compliance)
+    return formed(teeth, flank_excess(teeth, rig, simulation), rig.mesh.shared_compliance, own)
 
 
 def own_compliance(teeth: MeshLaw, meshing: Pair, ends: float) -> Array | None:

@@ -115,7 +115,7 @@ def nominal_model(nominal: Case, load: float, mean: float) -> NominalModel:
     there.
     """
     # Solving it compiles loops on import, which not every user of this module wants.
-    from gearbench.bench.nonlinear.law_table import flank_excess, teeth_law, with_flanks
+    from gearbench.bench.nonlinear.law_table import teeth_law, with_flanks
 
     rig = nominal.rig
     sound = teeth_law(rig, nominal.simulation, load)
@@ -155,7 +155,7 @@ def nominal_model(nominal: Case, load: float, mean: float) -> NominalModel:
         error_sin=rig.mesh.error_sin,
         friction=rig.friction.coefficient,
         transition=rig.friction.transition_speed,
-        law=with_flanks(sound, flank_excess(sound, rig, nominal.simulation), rig),
+        law=with_flanks(sound, rig, nominal.simulation),
         sound=sound,
         path=meshing.path,
         line=meshing.line_of_action,

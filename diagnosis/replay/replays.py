@@ -51,8 +51,11 @@ def _key(table: Array | None) -> bytes | None:
 def _with_flanks(law: MeshLaw, excess: bytes | None, more: float, own: bytes | None) -> MeshLaw:
     from gearbench.lumped.nonlinear.forms import formed
 
-    tables = (None if key is None else np.frombuffer(key).reshape(law.share.shape) for key in (excess, own))
-    return formed(law, next(tables), more, next(tables))
+    return formed(law, _table(law, excess), more, _table(law, own))
+
+
+def _table(law: MeshLaw, key: bytes | None) -> Array | None:
+    return None if key is None else np.frombuffer(key).reshape(law.share.shape)
 
 
 @lru_cache(maxsize=LAWS)

@@ -21,10 +21,9 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-def in_mesh_of_form(along: Along, meshing: Pair) -> Array:
-    """Force (entries, parts) [N] in the mesh per unit of each part of a form along the path of contact, on all pairs
-    that touch."""
-    travel = along.phase[:, None] - along.law.pairs(along.phase)[0]
+def in_mesh_of_form(along: Along, meshing: Pair, travel: Array) -> Array:
+    """Force (entries, parts) [N] in the mesh per unit of each part of a form along the path of contact, on all pairs,
+    which are `travel` (entries, n_o) [base pitches] behind the pitch point."""
     places, parts = parts_where_touching(along.model.rig, meshing, along.law)
     shape = np.stack([np.interp(travel, places, part) for part in parts])
     return np.asarray((shape * along.form_stiffness).sum(axis=-1).T)

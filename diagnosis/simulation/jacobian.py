@@ -107,6 +107,7 @@ def mesh_forces(layout: Layout, p: Array, along: Along, chosen: Flags) -> tuple[
         at.extend(indices[keep])
 
     numbers, bending = law.pairs(phase)[0], law.bending_of(phase)
+    travel = phase[:, None] - numbers
     wave = waves(phase).T
     damped = (along.tangent.damping * along.rate)[:, None]
     loaded = along.model.rig.damping
@@ -121,12 +122,12 @@ def mesh_forces(layout: Layout, p: Array, along: Along, chosen: Flags) -> tuple[
     put("curvature", stiffer * along.level[:, None] + 0.5 / (1.0 + mesh.exponent) * damped)
     series = 1.0 + _series_at(mesh.stiffness_cos, mesh.stiffness_sin, phase)
     put(CONTRAST, stiffer * contrast_slope(layout.tangents, float(p[unknowns[CONTRAST]][0]), along.sharing)[:, None])
-    more = layout.meshing.towards_ends(phase[:, None] - numbers) / layout.ends.mean
+    more = layout.meshing.towards_ends(travel) / layout.ends.mean
     kept = stiffer * ends_slope(layout.ends, float(p[unknowns[ENDS]][0]))
     put(ENDS, along.of_own_compliance(more)[:, None] + kept)
     put("shape", stiffer * (wave / series[:, None]))
     put("profile", along.of_excess(wave))
-    put(FLANKS, in_mesh_of_form(along, layout.meshing))
+    put(FLANKS, in_mesh_of_form(along, layout.meshing, travel))
     for side, key in enumerate(RUNOUTS.values()):
         put(key, in_mesh_of_runout(along, side))
     for side, key in enumerate(PITCHES.values()):

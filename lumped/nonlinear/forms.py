@@ -38,12 +38,11 @@ def formed(law: MeshLaw, excess: Array | None, more: float = 0.0, own: Array | N
     ones. Raises LumpedError for excess of another shape, or beyond reason, and for bodies or teeth that would push
     back.
     """
+    plain, nothing = more == 0.0 and own is None, np.zeros(law.share.shape)
     if excess is None:
-        if more == 0.0 and own is None:
+        if plain:
             return law
-        excess = np.zeros(law.share.shape)
-    plain = more == 0.0 and own is None
-    own = np.zeros(law.share.shape) if own is None else own
+        excess = nothing
     if excess.shape != law.share.shape:
         raise LumpedError(f"the excess on a mesh law's flanks has shape {excess.shape}, not {law.share.shape}")
     touching = law.parts[:, -1] > 0.0
@@ -53,7 +52,11 @@ def formed(law: MeshLaw, excess: Array | None, more: float = 0.0, own: Array | N
     lower = excess - lead
     if plain and lower[touching].min() > -NOTHING:
         return replace(law, lead=law.lead + lead)
-    _check_yielding(law, more, own)
+    _check_yielding(law, more)
+    if own is None:
+        own = nothing
+    else:
+        _check_teeth(law, own)
     left = law.approach[-1] - float(np.where(touching, lower, -np.inf).max(axis=1).min())
     deepest = left + more * float(law.force[:, -1].max() if more < 0.0 else law.force[:, -1].min())
     deepest += max(float((own * law.parts[:, -1]).max()), 0.0)
@@ -67,7 +70,6 @@ def formed(law: MeshLaw, excess: Array | None, more: float = 0.0, own: Array | N
         _press(law.approach, law.parts, standing_back, yielding, law.shared, sharing, trial, approach, parts)
         return parts
 
-    nothing = np.zeros(lower.shape)
     parts, before = of_pairs(lower, own, law.shared + more), of_pairs(nothing, nothing, law.shared)
     # The law's own shares are finer than its table: what the flanks change them by is read off two alike ones.
     level = law.reference_force
@@ -83,15 +85,19 @@ def formed(law: MeshLaw, excess: Array | None, more: float = 0.0, own: Array | N
     )
 
 
-def _check_yielding(law: MeshLaw, more: float, own: Array) -> None:
-    """Refuse bodies, and teeth, that yield so much less that deflections do not grow with the force."""
-    stiffest = float((np.diff(law.force, axis=1) / np.diff(law.approach)).max())
+def _check_teeth(law: MeshLaw, own: Array) -> None:
+    """Refuse teeth that yield so much less that deflections do not grow with the force."""
     slopes = np.diff(law.parts, axis=1) / np.diff(law.approach)[:, None]
     left = 1.0 - law.shared * slopes.sum(axis=2, keepdims=True)
     if (left + own[:, None] * slopes < (1.0 - LEAST_LEFT) * left).any():
         raise LumpedError(
             "rig.mesh.end_compliance_um_per_kn takes more than a pair of teeth yields by itself: it must lie nearer 0"
         )
+
+
+def _check_yielding(law: MeshLaw, more: float) -> None:
+    """Refuse bodies that yield so much less that deflections do not grow with the force."""
+    stiffest = float((np.diff(law.force, axis=1) / np.diff(law.approach)).max())
     if more * stiffest <= -LEAST_LEFT:
         raise LumpedError(
             f"rig.mesh.shared_compliance_um_per_kn = {1e9 * more:g} takes more than the mesh yields: it must lie above"

@@ -104,16 +104,19 @@ def uneven() -> tuple[Simulator, np.ndarray, np.ndarray]:
     return simulator, p, jacobian_at(simulator, p)
 
 
-@pytest.mark.parametrize(("key", "part"), [("curvature", 0.1), (CONTRAST, 0.1), ("scale", 0.1), (ENDS, 0.02)])
+@pytest.mark.parametrize(
+    ("key", "part", "within"),
+    [("curvature", 0.1, 0.06), (CONTRAST, 0.1, 0.06), ("scale", 0.1, 0.06), (ENDS, 0.02, 0.07)],
+)
 def test_teeth_that_differ_are_each_as_far_up_the_law_as_they_are_pressed(
-    uneven: tuple[Simulator, np.ndarray, np.ndarray], key: str, part: float
+    uneven: tuple[Simulator, np.ndarray, np.ndarray], key: str, part: float, within: float
 ) -> None:
     simulator, p, jacobian = uneven
     at = simulator.layout.unknowns[key].start
     found = off(simulator, jacobian[at], p, at, part * simulator.layout.unknowns.prior()[at])
     for channel, (error, size) in found.items():
         # Edges of contact that move: see EDGES of `test_structure_derivatives`.
-        assert error < (0.25 if channel == "torque_driven" else 0.07) * size, channel
+        assert error < (0.25 if channel == "torque_driven" else within) * size, channel
 
 
 @pytest.fixture(scope="module")
@@ -167,7 +170,7 @@ def test_the_derivative_by_a_form_of_the_flanks_is_close(bench: Bench, form: np.
 @pytest.fixture(scope="module")
 def sloping() -> tuple[Simulator, np.ndarray, np.ndarray]:
     """Simulator, unknowns and Jacobian of a rig whose flanks slope so steeply towards the end of the path that they
-    touch a thirtieth of a base pitch beside where involutes would."""
+    touch a fiftieth of a base pitch beside where involutes would."""
     simulator = demonstration()
     p, at = np.zeros(simulator.layout.size), simulator.layout.unknowns["flanks"]
     p[at] = simulator.layout.model.deflection * in_parts(np.array([0.0, 0.3, 0.0, 0.0, 0.6, -1.5, 0.3]))
