@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
 from gearbench.diagnosis.fitting.beginning import beginning, nearest
+from gearbench.diagnosis.fitting.closeness import better, is_close
 from gearbench.diagnosis.fitting.fit import Optimum, fit, fit_afresh
-from gearbench.diagnosis.fitting.restructured import better, is_close
+from gearbench.diagnosis.fitting.moved_motions import with_motions_moved
 from gearbench.diagnosis.fitting.shown import Shown
 from gearbench.diagnosis.simulation.simulator import Simulator
 
@@ -37,7 +38,7 @@ def background(
     if base is not None and begin is not nominal and not is_close(simulator, base):
         other = beginning(simulator, nominal, shown, sd)
         base = _raced(simulator, base, fit_afresh(simulator, other, sd, renewals=RENEWALS_FIRST))
-    return base
+    return with_motions_moved(simulator, base, report) if base is not None else None
 
 
 def _raced(simulator: Simulator, base: Optimum, other: Optimum | None) -> Optimum:

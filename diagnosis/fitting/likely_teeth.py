@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
+from gearbench.diagnosis.fitting.closeness import better
 from gearbench.diagnosis.fitting.fit import Optimum, Sensitivity, fit
-from gearbench.diagnosis.fitting.restructured import better
 from gearbench.diagnosis.simulation.quadratic import quadratic_of, real_parts
 from gearbench.diagnosis.simulation.simulator import Simulator
 

@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.diagnosis.fitting.beginning import levelled, seen_by
+from gearbench.diagnosis.fitting.closeness import better, is_close
 from gearbench.diagnosis.fitting.fit import Optimum, cost_of, fit, fit_afresh, gone_on
 from gearbench.diagnosis.fitting.hidden_housing import on_a_housing
+from gearbench.diagnosis.fitting.moved_motions import with_motions_moved
 from gearbench.diagnosis.fitting.rotation import but_rotation, with_rotation
 from gearbench.diagnosis.fitting.shown import Shown
 from gearbench.diagnosis.simulation.simulator import Simulator
@@ -22,15 +24,6 @@ Flags = NDArray[np.bool_]
 Report = Callable[[str], None]
 
 RENEWALS = 3
-# Nats an independent line that are left, in the median block, below which no other structure is tried.
-CLOSE = 0.2
-# The same of a block that answers the excitation, above which it is nearly all unexplained.
-FAR = 5.0
-# Part of any channel's fluctuation that is left, above which another is tried, too: where few lines carry it, nats do
-# not say so. Of the rigs that were found right few leave as much.
-OPEN = 0.05
-# Part of what one rig leaves of the excited lines above which another leaves nearly as much.
-ALIKE = 0.75
 # Cost of the nominal rig over that of a fit up to which another fit is begun there: mesh, offsets and flanks trade
 # along long valleys, and a rig without any of that can lie below their floors.
 NEAR = 1.5
@@ -57,34 +50,6 @@ def begun_at_nominal(simulator: Simulator, found: Optimum, kept: Flags) -> Optim
     return better(found, fit(simulator, p, found.sd, found.sensitivity, renewals=1))
 
 
-def better(found: Optimum, other: Optimum | None) -> Optimum:
-    """The one of more evidence."""
-    return other if other is not None and other.evidence > found.evidence else found
-
-
-def is_close(simulator: Simulator, found: Optimum) -> bool:
-    """Whether the median block is left with little beside its noise, no block that answers the excitation with much,
-    and no channel with a part of its fluctuation that counts: a structure that is not there shows in the transmission
-    error before it shows anywhere else."""
-    left, target = _left(simulator, found), simulator.target
-    parts, _ = target.shares(target.lines - found.lines)
-    return bool(np.median(left) < CLOSE and parts.max() < OPEN and not (target.excited & (left > FAR)).any())
-
-
-def answers_alike(simulator: Simulator, before: Optimum, after: Optimum) -> bool:
-    """Whether the lines that show structure are left with nearly as much by both rigs: what was not found beside the
-    one is not found beside the other."""
-    counts = simulator.target.excited_counts
-    one, other = (float((counts * _left(simulator, found)).sum()) for found in (before, after))
-    return other > ALIKE * one
-
-
-def _left(simulator: Simulator, found: Optimum) -> Array:
-    """Nats an independent line (blocks,) that the optimum leaves beside the noise."""
-    target = simulator.target
-    return np.asarray(target.nats(target.energies(target.lines - found.lines)) - target.nats(target.noise))
-
-
 def _from_around(simulator: Simulator, found: Optimum, shown: Shown | None, report: Report) -> Optimum | None:
     """The fit begun with what the records show of the rig around its mesh, beside the effects that were widened."""
     unknowns = simulator.layout.unknowns
@@ -98,7 +63,8 @@ def _from_around(simulator: Simulator, found: Optimum, shown: Shown | None, repo
     begin = levelled(simulator, seen, held, found.sd)
     chosen = but_rotation(unknowns, found.sd)
     best = fit_afresh(simulator, begin, found.sd, renewals=RENEWALS, chosen=chosen)
-    return with_rotation(simulator, found, best) if best else None
+    whole = with_rotation(simulator, found, best) if best else None
+    return with_motions_moved(simulator, whole, report) if better(found, whole) is whole and whole else whole
 
 
 def _on_a_housing(simulator: Simulator, found: Optimum, shown: Shown | None, report: Report) -> Optimum:

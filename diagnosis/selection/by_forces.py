@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from gearbench.diagnosis.effects.effect import Hypothesis
 from gearbench.diagnosis.fitting.beginning import levelled, linear_cost, seen_by
+from gearbench.diagnosis.fitting.closeness import better, is_close
 from gearbench.diagnosis.fitting.fit import Optimum, cost_of, fit, fit_afresh, gone_on
-from gearbench.diagnosis.fitting.restructured import better, is_close, restructured
+from gearbench.diagnosis.fitting.restructured import restructured
 from gearbench.diagnosis.fitting.shown import Shown
 from gearbench.diagnosis.simulation.simulator import Simulator
 

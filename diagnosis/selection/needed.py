@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from gearbench.diagnosis.effects.effect import Hypothesis
 from gearbench.diagnosis.effects.profile_error import uneven
 from gearbench.diagnosis.fitting.background import prior_of
+from gearbench.diagnosis.fitting.closeness import better
 from gearbench.diagnosis.fitting.fit import Optimum, fit, fit_afresh
-from gearbench.diagnosis.fitting.restructured import better
 from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.selection.weighing import Weighed, entering, has_own
 from gearbench.diagnosis.simulation.jacobian import FOLLOWED

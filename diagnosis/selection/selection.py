@@ -15,9 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.diagnosis.effects.effect import BEYOND, Hypothesis
+from gearbench.diagnosis.fitting.closeness import answers_alike, is_close
 from gearbench.diagnosis.fitting.fit import Optimum, fit, fit_afresh, gone_on, refreshed
+from gearbench.diagnosis.fitting.moved_motions import with_motions_moved
 from gearbench.diagnosis.fitting.reshaped import has_shapes
-from gearbench.diagnosis.fitting.restructured import answers_alike, begun_at_nominal, is_close, restructured
+from gearbench.diagnosis.fitting.restructured import begun_at_nominal, restructured
 from gearbench.diagnosis.fitting.shown import Shown
 from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.selection.by_forces import Start
@@ -74,7 +76,7 @@ def select(
     def begun_elsewhere(best: Optimum, kept: Sequence[Weighed]) -> Optimum:
         # Beside a base that is not close it was sought already.
         if is_close(simulator, base) or not answers_alike(simulator, base, best):
-            best = restructured(simulator, best, shown, report)
+            best = with_motions_moved(simulator, restructured(simulator, best, shown, report), report)
         report("simulating: all together, from the nominal rig")
         return begun_at_nominal(simulator, best, _entries(unknowns, kept))
 

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from gearbench.bench.plan.workers import side_by_side
 from gearbench.diagnosis.effects.effect import Effect, Hypothesis, Wide
+from gearbench.diagnosis.fitting.closeness import better
 from gearbench.diagnosis.fitting.fit import GAIN, Optimum, cost_of, fit, fit_afresh
 from gearbench.diagnosis.fitting.reshaped import has_shapes, reshaped
-from gearbench.diagnosis.fitting.restructured import better
 from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.selection.by_forces import Start
 from gearbench.diagnosis.simulation.jacobian import FOLLOWED

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from shared.fake_simulator import LINES, FakeSimulator, sensitivities, target, unknowns
 
+from gearbench.diagnosis.fitting.closeness import answers_alike, is_close
 from gearbench.diagnosis.fitting.fit import cost_of, fit, sensitivity_of
-from gearbench.diagnosis.fitting.restructured import answers_alike, begun_at_nominal, is_close
+from gearbench.diagnosis.fitting.restructured import begun_at_nominal
 
 MATRIX = sensitivities(3)
 
