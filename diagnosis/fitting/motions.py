@@ -16,13 +16,23 @@ from numpy.typing import NDArray
 
 from gearbench.diagnosis.effects.effect import SIDES
 from gearbench.diagnosis.forces.unknowns import Unknowns
-from gearbench.diagnosis.structure.structure import ACROSS, CROSS, HOUSING, MOTIONS, free_motions, with_motion
+from gearbench.diagnosis.structure.structure import (
+    ACROSS,
+    CROSS,
+    HOUSING,
+    MODE,
+    MOTIONS,
+    free_motions,
+    kind_of,
+    with_motion,
+)
 
 Array = NDArray[np.float64]
 
 # Where a motion is looked for: compliances over the supports', logarithms of its frequency over theirs.
 FROM, AT = (0.004, 0.012, 0.04), tuple(float(at) for at in np.linspace(-2.0, 1.3, 34))
-APART = 0.3  # of those logarithms, by which two of one kind are begun apart
+# Of those logarithms, within which two motions are the same, and compliance from which one counts.
+ALIKE, COUNTS = 0.1, 1e-3
 BEGUN = (4, 3)  # first motions that are begun in each rig, and second ones
 # Where one is looked for that moves along: the mesh pushes both gears apart, so that it answers faintly.
 FAINT_AT = (-1.0, -0.7, -0.4, 0.0)
@@ -60,17 +70,20 @@ def with_motions(account: Accounted, begun: Sequence[Array]) -> Array:
     rigs = [_crossing(account, p) for p in begun]
     tried = sorted(((account.cost(p), p) for p in rigs), key=_cost)
     for motion in range(len(MOTIONS)) if HOUSING in unknowns.slices else ():
-        trials = [trial for p in rigs for trial in _moving(account, p, BEGUN[motion])]
-        fitted = [account.compared(trial) for trial in trials]
+        trials = [_moving(account, p, BEGUN[motion]) for p in rigs]
+        faint = trials[0]
         if motion == 0:
             faint = [with_motion(unknowns, rigs[0], motion, at, FROM[-1], motion) for at in FAINT_AT]
-            fitted += [account.compared(trial, faint=True) for trial in faint]
+        fitted = [account.compared(trial) for each in trials for trial in each]
+        fitted += [account.compared(trial, faint=True) for trial in faint]
         found = sorted(((account.cost(p), p) for p in fitted), key=_cost)
         if tried[0][0] - found[0][0] < WORTH:
             break
-        tried = sorted([*tried, *found], key=_cost)
-        rigs = [p for _, p in found[:KEPT]]
-    ends = [account.ended(p) for _, p in tried[:ENDED]]
+        rigs = _apart(unknowns, found, KEPT)
+        # What the next one explains is more than a fit does that goes on.
+        ended = account.ended(rigs[0])
+        tried = sorted([*tried, *found, (account.cost(ended), ended)], key=_cost)
+    ends = [account.ended(p) for p in _apart(unknowns, tried, ENDED)]
     return min((begun[0], *(p for _, p in tried), *ends), key=account.cost)
 
 
@@ -96,14 +109,39 @@ def _crossing(account: Accounted, p: Array) -> Array:
 
 
 def _moving(account: Accounted, p: Array, most: int) -> list[Array]:
-    """`p` (size,) with one more motion of the housing, of any kind, where that explains most, at most so often."""
+    """`p` (size,) with one more motion of the housing, of any kind, where that explains more than a little above or
+    below, at most so often, where it explains most first."""
     unknowns = account.unknowns
-    trials = []
-    for (motion, kind), part, at in product(free_motions(unknowns, p), FROM, AT):
-        trial = with_motion(unknowns, p, motion, at, part, kind)
-        trials.append((account.misfit(trial), kind, at, trial))
-    out = list[tuple[int, float, Array]]()
-    for _, kind, at, trial in sorted(trials, key=lambda one: one[0]):
-        if len(out) < most and all(kind != other or abs(at - there) > APART for other, there, _ in out):
-            out.append((kind, at, trial))
-    return [trial for _, _, trial in out]
+    peaks = list[tuple[float, Array]]()
+    for motion, kind in free_motions(unknowns, p):
+        tried = [
+            min(((account.misfit(trial), trial) for trial in trials), key=_cost)
+            for trials in ([with_motion(unknowns, p, motion, at, part, kind) for part in FROM] for at in AT)
+        ]
+        costs = np.pad([cost for cost, _ in tried], 1, constant_values=np.inf)
+        lowest = (costs[1:-1] <= costs[:-2]) & (costs[1:-1] < costs[2:])
+        peaks += [tried[number] for number in np.flatnonzero(lowest)]
+    return [trial for _, trial in sorted(peaks, key=_cost)[:most]]
+
+
+def _apart(unknowns: Unknowns, rigs: Sequence[tuple[float, Array]], most: int) -> list[Array]:
+    """At most so many of `rigs` (size,), the best first, of which no two have the same motions."""
+    out = list[Array]()
+    for _, p in rigs:
+        if len(out) < most and not any(_alike(unknowns, p, other) for other in out):
+            out.append(p)
+    return out
+
+
+def _alike(unknowns: Unknowns, p: Array, other: Array) -> bool:
+    """Whether the motions of two rigs (size,) that count are of the same frequencies and kinds."""
+    one, two = (_motions(unknowns, rig) for rig in (p, other))
+    return len(one) == len(two) and all(
+        kind == its and abs(at - there) < ALIKE for (kind, at), (its, there) in zip(one, two, strict=True)
+    )
+
+
+def _motions(unknowns: Unknowns, p: Array) -> list[tuple[str, float]]:
+    """Kind and logarithm of the frequency of each motion that counts."""
+    there = np.flatnonzero(p[unknowns[HOUSING]] > COUNTS)
+    return sorted((kind_of(unknowns, p, int(number)), float(p[unknowns[MODE]][2 * number])) for number in there)

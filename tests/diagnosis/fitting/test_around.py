@@ -135,6 +135,23 @@ def test_a_housing_of_which_both_motions_rock_is_found(rig: tuple[Layout, Condit
     assert found[unknowns["stiffness"]] == pytest.approx(np.log([K1, K2] / np.array(layout.model.stiffness)), abs=0.01)
 
 
+@pytest.mark.parametrize(("first", "second"), [
+    ((0.9, (1.0, -1.0)), (0.2, (1.0, 0.3))),
+    # Both move along: the mesh pushes both gears apart, so that they answer faintly.
+    ((0.9, (0.7, 0.9)), (-0.2, (1.0, 0.9))),
+])  # fmt: skip
+def test_two_motions_are_found_of_which_neither_explains_most_alone(
+    rig: tuple[Layout, Condition], first: tuple[float, tuple[float, float]], second: tuple[float, tuple[float, float]]
+) -> None:
+    layout, like = rig
+    found = around(layout, [recorded(layout, like, first[0], shares=first[1], more=second)], np.zeros(layout.size))
+    assert found is not None
+    unknowns = layout.unknowns
+    assert sorted(found[unknowns[MODE]][[0, 2]]) == pytest.approx(sorted([first[0], second[0]]), abs=0.02)
+    true = np.log([K1, K2] / np.array(layout.model.stiffness))
+    assert found[unknowns["stiffness"]] == pytest.approx(true, abs=0.005)
+
+
 @pytest.mark.parametrize("parted", [False, True])
 def test_sensors_on_the_housing_are_found_with_it(rig: tuple[Layout, Condition], parted: bool) -> None:
     layout, like = rig
