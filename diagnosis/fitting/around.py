@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,12 +67,12 @@ def around(layout: Layout, conditions: Sequence[Condition], held: Array) -> Arra
             plain[unknowns[key]] = 0.0
     try:
         best = account.fitted(plain, KEYS, LEVELS[:1])
-        begun = [best]
-        if HOUSING in unknowns.slices and not held[unknowns[SEAT]].any():
-            begun.append(seated(unknowns, best))
-        return with_motions(account, begun)
     except ValueError:  # no rig there
         return None
+    begun = [best]
+    if HOUSING in unknowns.slices and not held[unknowns[SEAT]].any():
+        begun.append(seated(unknowns, best))
+    return with_motions(account, begun)
 
 
 @dataclass(frozen=True)
@@ -88,8 +89,11 @@ class Account:
 
     def misfit(self, p: Array) -> float:
         """Nats that the lines cost: those of the wide level, which see a resonance from afar, and a tenth of those of
-        the narrow one, which see a weak one. Raises ValueError where no rig is there."""
-        system = system_of(self.layout, p)
+        the narrow one, which see a weak one; infinite where no rig is there."""
+        try:
+            system = system_of(self.layout, p)
+        except ValueError:
+            return inf
         total = 0.0
         for one in self.lines:
             for level, rest in zip(LEVELS, left_over(self.layout, system, one, LEVELS), strict=True):
@@ -103,11 +107,18 @@ class Account:
     def compared(self, begin: Array, *, faint: bool = False) -> Array:
         """`begin` (size,) where a short fit leads that a rig with a housing is compared by; `faint`: one that sees what
         answers faintly."""
-        return self.fitted(begin, (*KEYS, *HOUSED), LEVELS[1:] if faint else LEVELS[:1], FIRST)
+        return self._led(begin, LEVELS[1:] if faint else LEVELS[:1], FIRST)
 
     def ended(self, begin: Array) -> Array:
         """`begin` (size,), which was compared, where a fit leads to the end."""
-        return self.fitted(begin, (*KEYS, *HOUSED), LEVELS[1:])
+        return self._led(begin, LEVELS[1:], EVALUATIONS)
+
+    def _led(self, begin: Array, levels: Sequence[float], evaluations: int) -> Array:
+        """`begin` (size,) where a fit of a rig with a housing leads; itself where that leads to what no rig may be."""
+        try:
+            return self.fitted(begin, (*KEYS, *HOUSED), levels, evaluations)
+        except ValueError:
+            return begin
 
     def fitted(
         self, begin: Array, keys: Sequence[str], levels: Sequence[float], evaluations: int = EVALUATIONS

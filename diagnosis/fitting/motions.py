@@ -44,7 +44,7 @@ WORTH = 3.0  # nats by which a resonance across, or one of a housing, must expla
 
 
 class Accounted(Protocol):
-    """What rigs leave unexplained; ValueError where no rig is there."""
+    """What rigs leave unexplained, infinitely much where no rig is there."""
 
     @property
     def unknowns(self) -> Unknowns:

@@ -13,7 +13,7 @@ from gearbench.cases import case_files
 from gearbench.diagnosis.effects.coupling import KEY as COMPLIANCE
 from gearbench.diagnosis.effects.coupling import LOSS
 from gearbench.diagnosis.evidence.problem import problem_of
-from gearbench.diagnosis.fitting.answering import left_over, left_over_moved, lines_of, slopes_of, system_of
+from gearbench.diagnosis.fitting.answering import System, left_over, left_over_moved, lines_of, slopes_of, system_of
 from gearbench.diagnosis.fitting.around import KEYS, MOVED, REACTION, around
 from gearbench.diagnosis.forces.condition import Condition
 from gearbench.diagnosis.forces.residuals import LOSS_FACTOR
@@ -150,6 +150,22 @@ def test_two_motions_are_found_of_which_neither_explains_most_alone(
     assert sorted(found[unknowns[MODE]][[0, 2]]) == pytest.approx(sorted([first[0], second[0]]), abs=0.02)
     true = np.log([K1, K2] / np.array(layout.model.stiffness))
     assert found[unknowns["stiffness"]] == pytest.approx(true, abs=0.005)
+
+
+def test_what_no_rig_may_have_costs_its_trial_not_the_rig(
+    rig: tuple[Layout, Condition], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    layout, like = rig
+    at = layout.unknowns[HOUSING]
+
+    def some(layout: Layout, p: NDArray[np.float64]) -> System:
+        if p[at].max() > 0.01:
+            raise ValueError("no rig has such a housing")
+        return system_of(layout, p)
+
+    monkeypatch.setattr("gearbench.diagnosis.fitting.around.system_of", some)
+    found = around(layout, [recorded(layout, like, 0.4)], np.zeros(layout.size))
+    assert found is not None and found[at].max() <= 0.01
 
 
 @pytest.mark.parametrize("parted", [False, True])
