@@ -18,7 +18,7 @@ from gearbench.diagnosis.judging.drift import Drift
 from gearbench.diagnosis.judging.free_forces import FreeForce
 from gearbench.diagnosis.judging.judged import GREATER, Judged
 from gearbench.diagnosis.judging.missing import Missing
-from gearbench.diagnosis.odds import Calibration
+from gearbench.diagnosis.odds import Calibration, unknown_signs
 from gearbench.diagnosis.population import POPULATION
 from gearbench.diagnosis.selection.needed import size_of
 from gearbench.diagnosis.selection.simulated import Simulated
@@ -46,6 +46,8 @@ TOLD, FAINT = 0.5, 0.2
 # Nats that a force without a name is worth beside the final rig from which it is one, its least rms over the linear
 # force at its place, and how far it may go against that: no damper drives.
 FREE, LEAST_FREE, AGAINST = 15.0, 0.05, -1.0
+# Probability from which something unknown is said to be at work.
+EVEN = 0.5
 # Over what sound rigs have: a lag of the drive's torque from which something is between its sensor and the rotor.
 LATE_LIMIT = 3.0
 
@@ -236,7 +238,19 @@ def _without(of: _Told, left: _Left) -> Decided:
     sign = max(left.sign, of.alone)
     if clear:
         return _explained(clear, sign)
+    likely = known.unknown.of(unknown_signs(sign)).value
+    if likely > EVEN:
+        return Decided("unknown", leading, (), sign, (_likelier(leading, likely),))
     return Decided("none", "none", (), sign, (_nothing(judged, known),))
+
+
+def _likelier(place: Place, likely: float) -> str:
+    """That something unknown is likelier than not though no single sign of it passes its limit."""
+    force = "what remains" if place == "none" else f"the force {at_place(place)} that remains"
+    return (
+        f"{force} is within the limits of sound rigs, but as large as few of them leave it: something that the library"
+        f" lacks is likelier at work than not ({percent(likely)})"
+    )
 
 
 def _nothing(judged: Judged, known: Calibration) -> str:

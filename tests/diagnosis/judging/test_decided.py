@@ -32,6 +32,7 @@ from gearbench.diagnosis.judging.decided import (
 from gearbench.diagnosis.judging.drift import Drift
 from gearbench.diagnosis.judging.free_forces import Form, FreeForce
 from gearbench.diagnosis.judging.missing import OUTSTANDING, Missing
+from gearbench.diagnosis.odds import Odds
 from gearbench.diagnosis.population import POPULATION
 from gearbench.diagnosis.selection.weighing import Weighed
 from gearbench.diagnosis.structure.structure import LATE
@@ -43,6 +44,7 @@ FRICTION = Hypothesis("friction", "mesh", (Wide("friction"),), effect=EFFECT)
 QUIET = np.zeros(5)
 STRUCTURE = POPULATION.structure
 CLOCK = unknowns_of([group(LATE, "s", ("torque_driver",), 1e-5, slot="structure")], 0)
+AT_LIMIT = Odds((-1e-9, 9.0), ((0.0, 0.0), (0.0, 0.0)))
 HAND = replace(LIMITS, competitor_factor=1.5, competitor_offset=20.0, free=10.0)
 
 
@@ -62,11 +64,13 @@ def decided(
     late: float = 0.0,
     kept: bool = False,
     forces: Sequence[FreeForce] = (),
+    curve: Odds | None = None,
 ) -> Decided:
     """`worth` nats of friction (None: nothing was kept), which closes `share` of the gap; `left` of the nominal gap,
     `remains` of a channel's fluctuation in the end, `searched` (None: as much) on the records of the search,
     whose noise may hide `hidden` of it; `forces` without a name; the drive acts `late` s, of sound rigs 1e-5; the
-    rig is `kept` on the record's way."""
+    rig is `kept` on the record's way. Something unknown is as likely as not where a sign of it is at its limit, unless
+    there is another `curve`."""
     entered: tuple[Any, ...] = ()
     if worth is not None:
         entered = (Weighed(FRICTION, worth, None),)
@@ -85,7 +89,7 @@ def decided(
     form = SimpleNamespace(hypothesis=Hypothesis("free drive", "drive", ()), log_bayes_factor=free)
     search: Any = SimpleNamespace(best_free=form if free else None, tried=())
     missing = Missing(excess, ((0.0, 100.0),), np.ones((1, 5)))
-    known = replace(POPULATION, changing=0.03)
+    known = replace(POPULATION, changing=0.03, unknown=curve or AT_LIMIT)
     unsettled = Unsteady(unsteady, unsteady)
     return decide_simulated(judged, search, missing, unsettled, changing, HAND, known, drift, forces)
 
@@ -190,6 +194,21 @@ def test_a_drive_that_acts_long_after_its_torque_is_measured_is_something_unknow
     assert "40 us after its channel" in made.because[0] and "before" in decided(None, late=-4e-5).because[0]
     assert decided(None, late=2e-5).verdict == "none"
     assert decided(40.0, late=4e-5).verdict == "effects"
+
+
+def test_what_is_likelier_unknown_than_not_is_so_below_every_limit() -> None:
+    """By what rigs with a known answer were found to leave, at the place that stands out."""
+    curve = Odds((1.0, 2.0), ((0.0, 0.0), (0.0, 0.0)))
+    even = np.exp(-0.5)
+    some = {"remains": 0.99 * even * STRUCTURE * VISIBLE, "excess": at(0, 2 * OUTSTANDING["drive"])}
+    made = decided(None, **some, curve=curve)
+    assert made.verdict == "none" and made.sign == pytest.approx(0.99 * even)
+    some["remains"] *= 1.02 / 0.99
+    made = decided(None, **some, curve=curve)
+    assert (made.verdict, made.place) == ("unknown", "drive") and made.sign == pytest.approx(1.02 * even)
+    likely = percent(1 / (1 + np.exp(-1 - 2 * np.log(1.02 * even))))
+    assert f"likelier at work than not ({likely})" in made.because[0]
+    assert decided(None, **some).verdict == "none"
 
 
 def test_the_sign_of_something_unknown_follows_the_remainder() -> None:
