@@ -49,6 +49,7 @@ from gearbench.diagnosis.judging.only_there import with_backlash_there
 from gearbench.diagnosis.judging.repeating import sentences_of_others
 from gearbench.diagnosis.judging.sifted import judged_of_size, left_out, seconded, sized
 from gearbench.diagnosis.odds import Calibration
+from gearbench.diagnosis.selection.rivals import unentered
 from gearbench.diagnosis.selection.simulated import Simulated
 from gearbench.diagnosis.selection.weighing import Weighed
 from gearbench.diagnosis.structure.contrast import other_flanks
@@ -92,7 +93,8 @@ def by_simulation(
     flanks = other_flanks(found.layout.unknowns, found.selection.best.p)
     way = judged.along
     signs |= {"along": way.kept / way.own} if way else {}
-    common["indistinguishable"] = with_rivals(common["indistinguishable"], decided.named)
+    named = [unentered(one, decided.named) for one in decided.named]
+    common["indistinguishable"] = with_rivals(common["indistinguishable"], named)
     return Finding(
         verdict=decided.verdict,
         probability=known.probabilities(chances.best, decided.sign),
@@ -103,7 +105,7 @@ def by_simulation(
         where=places_of(judged, kept, missing),
         recalibrated=found.recalibrated if kept else found.without_any,
         with_effect=found.with_effects if decided.named else None,
-        because=(*decided.because, *why(judged, decided.named), *settled.doubts, *flanks,
+        because=(*decided.because, *why(judged, named), *settled.doubts, *flanks,
                  *([way.sentence()] if way else []), *sentences_of_others(of.measurements, of.steady, band)),
         structure=structure_found(found.layout.unknowns, found.selection.best.p, found.std),
         missing=missing,

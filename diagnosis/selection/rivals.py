@@ -106,6 +106,14 @@ def rivals_of(winner: Weighed, weighed: Sequence[Weighed]) -> tuple[Hypothesis, 
     return tuple(one.hypothesis for one in weighed if _as_good(one, winner))
 
 
+def unentered(one: Weighed, entered: Sequence[Weighed]) -> Weighed:
+    """One of those that entered, with the rivals alone that did not enter, too: what is at work beside it is not in its
+    place."""
+    own = [other.hypothesis for other in entered]
+    rivals = (rival for rival in one.rivals if not any(is_same(rival, other) for other in own))
+    return replace(one, rivals=tuple(rivals))
+
+
 def _as_good(one: Weighed, winner: Weighed) -> bool:
     """Whether one explains the records as another cause does; of twins what tells them apart is a resonance, too."""
     behind = APART

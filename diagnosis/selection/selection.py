@@ -24,7 +24,7 @@ from gearbench.diagnosis.fitting.shown import Shown
 from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.selection.by_forces import Start
 from gearbench.diagnosis.selection.needed import FAR, beside, held_against_background, needed
-from gearbench.diagnosis.selection.rivals import compared, is_like, rivals_of, usual_of
+from gearbench.diagnosis.selection.rivals import compared, is_like, rivals_of, unentered, usual_of
 from gearbench.diagnosis.selection.weighing import Weighed, entering, is_own, weigh
 from gearbench.diagnosis.simulation.jacobian import WEIGHED
 from gearbench.diagnosis.simulation.simulator import Simulator
@@ -230,7 +230,7 @@ def only(simulator: Simulator, selection: Selection, kept: Sequence[Weighed]) ->
 
 
 def taken_out(simulator: Simulator, selection: Selection, effect: Weighed) -> Optimum:
-    """The optimum without any part of one of the effects that entered, or of its rivals.
+    """The optimum without any part of one of the effects that entered, or of its rivals that did not.
 
     The rig, its structure and the other effects that entered are fitted again; what a good rig has of all others stays
     as it is: pitch errors that take the shape of the run-out left out would make it seem to close nothing.
@@ -242,14 +242,14 @@ def taken_out(simulator: Simulator, selection: Selection, effect: Weighed) -> Op
     for one in selection.entered:
         held[one.hypothesis.entries(unknowns)] = False
     base = replace(selection.best, sd=np.where(held, 0.0, selection.best.sd))
-    return _without(simulator, base, [effect])
+    return _without(simulator, base, [unentered(effect, selection.entered)])
 
 
 def evidence_without(unknowns: Unknowns, selection: Selection, effect: Weighed, optimum: Optimum) -> float:
     """Log evidence of the `optimum` without one of the effects that entered, whose backgrounds were held for it, beside
     that of the optimum with all."""
     sd = selection.best.sd.copy()
-    for cause in effect.causes:
+    for cause in unentered(effect, selection.entered).causes:
         sd[cause.entries(unknowns)] = 0.0
     return optimum.evidence_under(sd)
 

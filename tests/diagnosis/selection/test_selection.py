@@ -16,8 +16,8 @@ from gearbench.diagnosis.forces.unknowns import group, unknowns_of
 from gearbench.diagnosis.selection import selection as module
 from gearbench.diagnosis.selection import weighing
 from gearbench.diagnosis.selection.by_forces import Start
-from gearbench.diagnosis.selection.rivals import compared, is_like, rivals_of, usual_of
-from gearbench.diagnosis.selection.selection import Selection, carried_on, known_within
+from gearbench.diagnosis.selection.rivals import compared, is_like, rivals_of, unentered, usual_of
+from gearbench.diagnosis.selection.selection import Selection, carried_on, evidence_without, known_within, taken_out
 from gearbench.diagnosis.selection.weighing import LIMIT, Weighed
 
 MATRIX = sensitivities(3)
@@ -80,6 +80,26 @@ def test_what_explains_the_records_as_well_is_a_rival_and_leaves_with_the_one_th
         listed = (FRICTION, RIPPLE, *(replace(CRACKS[one], usual=rare.get(one)) for one in range(2)))
         named = chosen(simulator, listed, [np.zeros(8)], {})
         assert named is not None and names(named) == [f"tooth-crack {other}"]
+
+
+def test_a_rival_that_entered_too_stays_where_the_other_is_taken_out() -> None:
+    """Two that were alike when the first entered, both of which the records call for: neither is in the other's
+    place, as it would be if only one had entered."""
+    true = np.array([0.08, -0.1, 0.02, 0.4, 0.3, -0.2, 0.0, 0.0])
+    simulator = FakeSimulator(lambda q: q @ MATRIX, target(true @ MATRIX))
+    found = chosen(simulator, LISTED, [np.zeros(8)], {})
+    assert found is not None and sorted(names(found)) == ["friction", "torque-ripple"]
+    both = {one.hypothesis.name: one for one in found.entered}
+    friction = replace(both["friction"], rivals=(RIPPLE,))
+    for entered, stays in ((friction, both["torque-ripple"]), True), ((friction,), False):
+        selection = replace(found, entered=entered)
+        rest = taken_out(simulator, selection, friction)
+        assert rest.p[3] == 0.0 and (np.abs(rest.p[4:6]) > 0.1).all() == stays
+        held = evidence_without(simulator.layout.unknowns, selection, friction, rest)
+        sd = selection.best.sd.copy()
+        sd[3:6] = (0.0, *sd[4:6]) if stays else 0.0
+        assert held == rest.evidence_under(sd)
+        assert unentered(friction, entered).causes == ((FRICTION,) if stays else (FRICTION, RIPPLE))
 
 
 def test_no_other_effect_beyond_a_good_rigs_takes_the_place_of_what_is_left_out() -> None:
