@@ -94,8 +94,9 @@ def test_what_is_named_counts_as_much_as_over_a_rig_that_was_fitted_without_it(
     one.hypothesis.entries = Wide(key).entries
     groups = [group("mesh-ratio", "1", 1, 0.4, slot="x"), group("friction", "1", 1, 0.01, 0.1, slot="y")]
     unknowns = unknowns_of(groups, 50)
+    best = SimpleNamespace(evidence=-70.0, sd=np.array([0.4, 0.1]))
     found = SimpleNamespace(
-        selection=SimpleNamespace(weighed=(one,), best=SimpleNamespace(evidence=-70.0, sd=np.array([0.4, 0.1]))),
+        selection=SimpleNamespace(weighed=(one,), entered=(one,), best=best),
         layout=SimpleNamespace(unknowns=unknowns),
     )
     held = {(0.0, 0.1): -100.0, (0.4, 0.0): -90.0}
