@@ -34,9 +34,9 @@ def with_motions_moved(simulator: Simulator, found: Optimum, report: Report = la
     for _ in range(ROUNDS):
         sizes = found.p[unknowns[HOUSING]]
         weaker, other = (int(number) for number in np.argsort(sizes))
-        # What is plain to see is where it is.
-        settled = sizes[other] > FEW and is_close(simulator, found)
-        for number in (weaker,) if settled else (weaker, other):
+        # What is plain to see is where it is; where there is none, either is the first one.
+        alone = sizes[other] <= FEW or is_close(simulator, found)
+        for number in (weaker,) if alone else (weaker, other):
             report("simulating: motions of a housing")
             again = _moved(simulator, found, number)
             if again is not None and again.evidence > found.evidence + WORTH:

@@ -76,7 +76,8 @@ def select(
     def begun_elsewhere(best: Optimum, kept: Sequence[Weighed]) -> Optimum:
         # Beside a base that is not close it was sought already.
         if is_close(simulator, base) or not answers_alike(simulator, base, best):
-            best = with_motions_moved(simulator, restructured(simulator, best, shown, report), report)
+            best = restructured(simulator, best, shown, report)
+            best = best if is_close(simulator, best) else with_motions_moved(simulator, best, report)
         report("simulating: all together, from the nominal rig")
         return begun_at_nominal(simulator, best, _entries(unknowns, kept))
 
