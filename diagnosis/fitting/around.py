@@ -66,7 +66,7 @@ def around(layout: Layout, conditions: Sequence[Condition], held: Array) -> Arra
         if key in unknowns.slices:
             plain[unknowns[key]] = 0.0
     try:
-        best = account.fitted(plain, KEYS, LEVELS[:1])
+        best = account.fitted(plain, KEYS, LEVELS[0], EVALUATIONS)
     except ValueError:  # no rig there
         return None
     begun = [best]
@@ -107,35 +107,30 @@ class Account:
     def compared(self, begin: Array, *, faint: bool = False) -> Array:
         """`begin` (size,) where a short fit leads that a rig with a housing is compared by; `faint`: one that sees what
         answers faintly."""
-        return self._led(begin, LEVELS[1:] if faint else LEVELS[:1], FIRST)
+        return self._led(begin, LEVELS[1] if faint else LEVELS[0], FIRST)
 
     def ended(self, begin: Array) -> Array:
         """`begin` (size,), which was compared, where a fit leads to the end."""
-        return self._led(begin, LEVELS[1:], EVALUATIONS)
+        return self._led(begin, LEVELS[1], EVALUATIONS)
 
-    def _led(self, begin: Array, levels: Sequence[float], evaluations: int) -> Array:
+    def _led(self, begin: Array, level: float, evaluations: int) -> Array:
         """`begin` (size,) where a fit of a rig with a housing leads; itself where that leads to what no rig may be."""
         try:
-            return self.fitted(begin, (*KEYS, *HOUSED), levels, evaluations)
+            return self.fitted(begin, (*KEYS, *HOUSED), level, evaluations)
         except ValueError:
             return begin
 
-    def fitted(
-        self, begin: Array, keys: Sequence[str], levels: Sequence[float], evaluations: int = EVALUATIONS
-    ) -> Array:
-        """`begin` (size,) with the unknowns of these keys where the misfit is least at one level after the other."""
+    def fitted(self, begin: Array, keys: Sequence[str], level: float, evaluations: int) -> Array:
+        """`begin` (size,) with the unknowns of these keys where the misfit is least at a level."""
         at, sd = self._free(begin, keys)
         low, high = (bound[at] for bound in self.unknowns.bounds())
-        values = np.clip(begin[at], low, high)
-        for level in levels:
-            fit = least_squares(
-                lambda trial, level=level: self._left(_with(begin, at, trial), level, trial / sd),
-                values,
-                lambda trial, level=level: self._slopes(_with(begin, at, trial), level, at, sd),
-                bounds=(low, high), x_scale=sd, max_nfev=evaluations, ftol=TOLERANCE, tr_solver="lsmr",
-            )  # fmt: skip
-            values = fit.x
-        return _with(begin, at, values)
+        fit = least_squares(
+            lambda trial: self._left(_with(begin, at, trial), level, trial / sd),
+            np.clip(begin[at], low, high),
+            lambda trial: self._slopes(_with(begin, at, trial), level, at, sd),
+            bounds=(low, high), x_scale=sd, max_nfev=evaluations, ftol=TOLERANCE, tr_solver="lsmr",
+        )  # fmt: skip
+        return _with(begin, at, fit.x)
 
     def _prior(self, p: Array) -> Array:
         """Prior standard deviations (size,): those of the background, a coupling's own where `p` (size,) has one."""

@@ -68,7 +68,7 @@ def with_motions(account: Accounted, begun: Sequence[Array]) -> Array:
     without, the first of which is as it is where there are none."""
     unknowns = account.unknowns
     rigs = [_crossing(account, p) for p in begun]
-    tried = sorted(((account.cost(p), p) for p in rigs), key=_cost)
+    tried = _ranked(account, rigs)
     for motion in range(len(MOTIONS)) if HOUSING in unknowns.slices else ():
         trials = [_moving(account, p, BEGUN[motion]) for p in rigs]
         faint = trials[0]
@@ -76,15 +76,19 @@ def with_motions(account: Accounted, begun: Sequence[Array]) -> Array:
             faint = [with_motion(unknowns, rigs[0], motion, at, FROM[-1], motion) for at in FAINT_AT]
         fitted = [account.compared(trial) for each in trials for trial in each]
         fitted += [account.compared(trial, faint=True) for trial in faint]
-        found = sorted(((account.cost(p), p) for p in fitted), key=_cost)
+        found = _ranked(account, fitted)
         if tried[0][0] - found[0][0] < WORTH:
             break
         rigs = _apart(unknowns, found, KEPT)
         # What the next one explains is more than a fit does that goes on.
-        ended = account.ended(rigs[0])
-        tried = sorted([*tried, *found, (account.cost(ended), ended)], key=_cost)
+        tried = sorted([*tried, *found, *_ranked(account, [account.ended(rigs[0])])], key=_cost)
     ends = [account.ended(p) for p in _apart(unknowns, tried, ENDED)]
-    return min((begun[0], *(p for _, p in tried), *ends), key=account.cost)
+    return min((*_ranked(account, [begun[0], *ends]), *tried), key=_cost)[1]
+
+
+def _ranked(account: Accounted, rigs: Sequence[Array]) -> list[tuple[float, Array]]:
+    """Rigs (size,) behind what each costs, the best first."""
+    return sorted(((account.cost(p), p) for p in rigs), key=_cost)
 
 
 def _cost(one: tuple[float, Array]) -> float:

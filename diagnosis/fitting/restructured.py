@@ -64,7 +64,9 @@ def _from_around(simulator: Simulator, found: Optimum, shown: Shown | None, repo
     chosen = but_rotation(unknowns, found.sd)
     best = fit_afresh(simulator, begin, found.sd, renewals=RENEWALS, chosen=chosen)
     whole = with_rotation(simulator, found, best) if best else None
-    return with_motions_moved(simulator, whole, report) if better(found, whole) is whole and whole else whole
+    if whole is None or whole.evidence <= found.evidence:
+        return whole
+    return with_motions_moved(simulator, whole, report)
 
 
 def _on_a_housing(simulator: Simulator, found: Optimum, shown: Shown | None, report: Report) -> Optimum:
