@@ -16,7 +16,7 @@ from gearbench.challenge.scoring.due import (
     true_of_named,
     within_intervals,
 )
-from gearbench.challenge.scoring.intervals import COVERAGE, Rate, brier, calibration_error, middle, reliability
+from gearbench.challenge.scoring.intervals import COVERAGE, Rate, brier, calibration_error, error_by_chance, middle, reliability
 from gearbench.challenge.scoring.outcomes import VERDICTS, Outcome, said
 from gearbench.challenge.scoring.reach import reach_table
 from gearbench.challenge.scoring.smallest import smallest_table
@@ -136,7 +136,7 @@ def _confusion(outcomes: Sequence[Outcome]) -> Table:
 
 def _calibration(outcomes: Sequence[Outcome]) -> Table:
     """Brier score over effect, none and unknown, and how often a stated probability came true: of the verdict
-    (whether it is the right one of the three) and of the named effect."""
+    (whether it is the right one of the three) and of the named effect; and what chance alone makes of that."""
     given = [o for o in outcomes if o.verdict is not None]
     stated = [[float(o.verdict["probability"][key]) for key in VERDICTS] for o in given if o.verdict is not None]
     truth = [VERDICTS.index(right_verdict(o)) for o in given]
@@ -154,6 +154,10 @@ def _calibration(outcomes: Sequence[Outcome]) -> Table:
         "verdict": verdict,
         "effect": effect,
         "error": {"verdict": calibration_error(verdict), "effect": calibration_error(effect)},
+        "error_by_chance": {
+            "verdict": error_by_chance(chosen).plain(),
+            "effect": error_by_chance([p for p, _ in named]).plain(),
+        },
         "of_verdicts": {"median": calibration_error(verdict), "low": None, "high": None, "total": len(given)},
     }
 

@@ -114,7 +114,11 @@ def _calibration(score: Table) -> str:
         ]
         error = calibration.get("error", {}).get(key)
         if error is not None:
-            lines.append(f"  {title}: calibration error {error:.2f}")
+            chance = calibration["error_by_chance"][key]
+            lines.append(
+                f"  {title}: calibration error {error:.2f}, where probabilities that all hold come out "
+                f"{chance['median']:.2f} ({chance['low']:.2f}-{chance['high']:.2f}) off by chance"
+            )
     return "\n".join(lines)
 
 

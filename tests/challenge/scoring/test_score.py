@@ -13,7 +13,7 @@ from shared.fake_verdicts import says_friction, verdict
 
 from gearbench.challenge.answers import Answer, read_answers, write_answers
 from gearbench.challenge.errors import ChallengeError
-from gearbench.challenge.scoring.intervals import Rate, brier, middle, reliability
+from gearbench.challenge.scoring.intervals import Rate, brier, error_by_chance, middle, reliability
 from gearbench.challenge.scoring.judge import score_folder
 from gearbench.challenge.scoring.outcomes import judge, without
 from gearbench.challenge.scoring.reach import REACHES
@@ -114,6 +114,24 @@ def test_reliability_counts_every_case_once() -> None:
     last = rows[-1]
     assert (last["from"], last["count"], last["total"]) == (0.95, 2, 3)
     assert last["stated"] == pytest.approx(0.98)
+
+
+def test_chance_alone_is_as_far_off_as_the_binomial_says() -> None:
+    """All of one bin: the error is that of one binomial share."""
+    found, total, stated = error_by_chance([0.85] * 40), 40, 0.85
+    shares = np.arange(total + 1) / total
+    away, weight = np.abs(shares - stated), binom.pmf(np.arange(total + 1), total, stated)
+    order = np.argsort(away)
+    below = np.cumsum(weight[order])
+    for got, quantile in ((found.low, 0.05), (found.value, 0.5), (found.high, 0.95)):
+        assert got is not None
+        # Of a distribution in steps a sample's quantile lies within a hundredth of probability.
+        low, high = (away[order][np.searchsorted(below, quantile + d)] for d in (-0.03, 0.03))
+        assert low - 1e-12 <= got <= high + 1e-12
+    # Of two bins the errors do not make up for each other.
+    both = error_by_chance([0.85] * 40 + [0.75] * 40)
+    assert both.value is not None and found.value is not None and both.value > 0.8 * found.value
+    assert error_by_chance([]).value is None
 
 
 def test_thirds_are_equal_in_the_logarithm() -> None:
