@@ -58,7 +58,7 @@ def add(rig: Rig, hypothesis: Hypothesis, fitted: Fitted) -> Added:
         }
     )
     rig = changed(rig, "support", **{side: support})
-    return rig, (Estimate(f"{side}.exponent", exponent, float(fitted.std_of(key)[0]), "1"),)
+    return rig, (Estimate(f"{side}.exponent", exponent, float(fitted.std_of(key)[0]), "1", signed=True),)
 
 
 BEARING_NONLINEARITY = Effect(

@@ -35,7 +35,7 @@ def add(rig: Rig, hypothesis: Hypothesis, fitted: Fitted) -> Added:
     exponent = fitted.model.hardening + float(fitted.of(KEY)[0])
     rig = changed(rig, "mesh", exponent=exponent, reference_force=fitted.model.reference_force)
     # What sound rigs seem to have is no part of the effect: eight of drawn rigs are off by 0.053 rms.
-    return rig, (Estimate("exponent", exponent, hypot(float(fitted.std_of(KEY)[0]), SD_SIMULATED), "1"),)
+    return rig, (Estimate("exponent", exponent, hypot(float(fitted.std_of(KEY)[0]), SD_SIMULATED), "1", signed=True),)
 
 
 CONTACT_NONLINEARITY = Effect(

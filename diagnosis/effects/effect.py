@@ -128,13 +128,14 @@ class Fitted:
 @dataclass(frozen=True)
 class Estimate:
     """One parameter of an effect as its users read it; `sized`: the simplicity of the model limits how well it is
-    known, as it does not limit a tooth's number or a phase."""
+    known, as it does not limit a tooth's number or a phase; `signed`: a size that may be less than nothing."""
 
     name: str
     value: float
     std: float
     unit: str
     sized: bool = True
+    signed: bool = False
 
 
 Added = tuple[Rig, tuple[Estimate, ...]]

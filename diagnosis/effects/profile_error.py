@@ -138,7 +138,7 @@ def _along_path(form: Array, parts: Array) -> tuple[Estimate, ...]:
     out = []
     for name, one, other in (("peak_to_valley", high, low), ("driven_tip", 0, MIDDLE), ("driver_tip", -1, MIDDLE)):
         value, std = form[one] - form[other], np.linalg.norm(parts[:, one] - parts[:, other])
-        out.append(Estimate(name, 1e6 * float(value), 1e6 * float(std), "um"))
+        out.append(Estimate(name, 1e6 * float(value), 1e6 * float(std), "um", signed=name != "peak_to_valley"))
     return tuple(out)
 
 

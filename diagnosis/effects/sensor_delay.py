@@ -48,7 +48,7 @@ def add(rig: Rig, hypothesis: Hypothesis, fitted: Fitted) -> Added:
     field, key = f"delay_{channel}", KEYS[channel]
     lag, std = float(fitted.of(key)[0]), float(fitted.std_of(key)[0])
     rig = changed(rig, "sensors", **{field: getattr(rig.sensors, field) + lag})
-    return rig, (Estimate(f"{channel}.delay", lag * 1e6, std * 1e6, "us"),)
+    return rig, (Estimate(f"{channel}.delay", lag * 1e6, std * 1e6, "us", signed=True),)
 
 
 SENSOR_DELAY = Effect(

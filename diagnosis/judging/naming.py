@@ -19,12 +19,15 @@ from gearbench.diagnosis.words import SHOWN_UNITS
 def parameters_of(
     effect: Library, estimates: Sequence[Estimate], *, by_forces: bool = False
 ) -> dict[str, Parameter]:
-    """Values with the interval that a normal distribution of the stated deviation has; `by_forces`: found by the force
-    residuals alone."""
+    """Values with the interval that a normal distribution of the stated deviation has, of what has no sign the part of
+    it above nothing; `by_forces`: found by the force residuals alone."""
     out = {}
     for e in estimates:
         reach = NINE_OF_TEN * effect.stated(e, by_forces=by_forces)
-        out[e.name] = Parameter(value=e.value, low=e.value - reach, high=e.value + reach, unit=e.unit)
+        low = e.value - reach
+        if e.sized and not e.signed and e.value >= 0.0:
+            low = max(low, 0.0)
+        out[e.name] = Parameter(value=e.value, low=low, high=e.value + reach, unit=e.unit)
     return out
 
 
@@ -56,7 +59,7 @@ def drifts_of(decided: Decided, changing: float, chances: Chances) -> tuple[Effe
     if drift is None:
         return ()
     of = "" if drift.place == "mesh" else f"{drift.place.removesuffix('-support')}."
-    estimate = Estimate(f"{of}stiffness_drift", drift.value, drift.std, "1")
+    estimate = Estimate(f"{of}stiffness_drift", drift.value, drift.std, "1", signed=True)
     return (
         Effect(
             name=effect.name,
