@@ -16,7 +16,15 @@ from gearbench.challenge.scoring.due import (
     true_of_named,
     within_intervals,
 )
-from gearbench.challenge.scoring.intervals import COVERAGE, Rate, brier, calibration_error, error_by_chance, middle, reliability
+from gearbench.challenge.scoring.intervals import (
+    COVERAGE,
+    Rate,
+    brier,
+    calibration_error,
+    error_by_chance,
+    middle,
+    reliability,
+)
 from gearbench.challenge.scoring.outcomes import VERDICTS, Outcome, said
 from gearbench.challenge.scoring.reach import reach_table
 from gearbench.challenge.scoring.smallest import smallest_table

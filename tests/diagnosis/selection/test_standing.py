@@ -1,0 +1,59 @@
+"""A late angle is behind all the time: the mean transmission error tells it from what only turns phases."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import pi
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from shared.simulated_lines import demonstration
+
+from gearbench.diagnosis.effects.effect import Hypothesis
+from gearbench.diagnosis.effects.sensor_delay import SENSOR_DELAY
+from gearbench.diagnosis.selection.standing import is_refuted
+from gearbench.diagnosis.simulation.simulator import Simulator
+
+LAG = 30e-6  # [s]
+
+
+@pytest.fixture(scope="module")
+def prompt() -> Simulator:
+    """The demonstration, none of whose sensors lags."""
+    return demonstration()
+
+
+def late(simulator: Simulator, channel: str, lag: float, **changes: Any) -> Simulator:
+    """The same with an angle that is behind by what its shaft turns on in that time [s], and changes of its record."""
+    (measured,) = simulator.target.measurements
+    teeth = int(measured.record.attrs[f"teeth_{channel.removeprefix('angle_')}"])
+    behind = 2 * pi * measured.mesh_frequency / teeth * lag
+    periods = {**measured.periods, channel: measured.periods[channel] - behind}
+    target = replace(simulator.target, measurements=(replace(measured, periods=periods, **changes),))
+    return replace(simulator, target=target)
+
+
+def lagging(simulator: Simulator, channel: str, lag: float) -> tuple[Hypothesis, Any]:
+    """The hypothesis of a late channel, and an optimum with that lag."""
+    unknowns = simulator.layout.unknowns
+    p = np.zeros(unknowns.size)
+    p[unknowns[f"delay-{channel}"]] = lag
+    (found,) = (one for one in SENSOR_DELAY.hypotheses(simulator.layout.model) if one.on == (channel,))
+    return found, SimpleNamespace(p=p)
+
+
+@pytest.mark.parametrize("channel", ["angle_driver", "angle_driven"])
+def test_the_mean_shows_a_late_angle_and_only_that(prompt: Simulator, channel: str) -> None:
+    at_work = late(prompt, channel, LAG)
+    assert not is_refuted(at_work, *lagging(prompt, channel, LAG))
+    assert is_refuted(prompt, *lagging(prompt, channel, LAG))
+    assert is_refuted(at_work, *lagging(prompt, channel, -LAG))
+    assert is_refuted(late(prompt, channel, 0.3 * LAG), *lagging(prompt, channel, LAG))
+
+
+def test_nothing_is_said_without_a_zero_or_of_a_displacement(prompt: Simulator) -> None:
+    adrift = late(prompt, "angle_driven", 0.0, zero_known=False)
+    assert not is_refuted(adrift, *lagging(prompt, "angle_driven", LAG))
+    assert not is_refuted(prompt, *lagging(prompt, "y_driver", LAG))
