@@ -28,6 +28,9 @@ KEYS = {side: f"pitch-{side}" for side in SIDES}
 # Of each tooth over the deflection of the mesh: an rms of 0.5 is severity 1 of the truth rigs of `challenge`; sound
 # gears have a tenth.
 SD, WIDE = 0.04, 0.4
+# Over the former, from which gears are uneven: fifty teeth tell half as much again of it from none, but not good gears
+# from very good ones, of which both are sound.
+LEAST = 2.5
 
 
 def unknowns(model: NominalModel, conditions: Sequence[Condition]) -> tuple[Group, ...]:
@@ -77,6 +80,7 @@ PITCH_ERROR = Effect(
     " see whether the pattern moves.",
     parameters={"rms": "rms of the pitch errors"},
     fields=of_gears("rig.{}.pitch_error"),
+    least_size=LEAST,
     hypotheses_of=hypotheses,
     add=add,
     unknowns=unknowns,

@@ -8,12 +8,15 @@ does not show is none.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.diagnosis.effects.effect import Hypothesis
 from gearbench.diagnosis.effects.sensor_delay import KEYS
 from gearbench.diagnosis.fitting.fit import Optimum
+from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.intake.signals import measured_channels
 from gearbench.diagnosis.simulation.simulator import Simulator
 
@@ -23,22 +26,37 @@ ANGLES = tuple(key for channel, key in KEYS.items() if channel.startswith("angle
 # Of the mean by which a delay moves the transmission error, what a record must show: true delays of drawn rigs show
 # 0.8 to 1.02 of it, delays that take the place of something else 0.1 at most.
 SHOWN = 0.5
+# Of the mean deflection under the load, what a rig's stiffness leaves unknown of it.
+UNKNOWN = 0.1
 
 
-def is_refuted(simulator: Simulator, one: Hypothesis, optimum: Optimum) -> bool:
-    """Whether the mean transmission error of the records shows less than half of what the lag of an angle, as it is in
-    the `optimum`, does to it. Never of other effects, nor where no record's zero is known."""
+def told_by_means(simulator: Simulator, one: Hypothesis, optimum: Optimum) -> float:
+    """What the mean transmission error says for the lag of an angle as it is in the `optimum` [nats]: -inf where the
+    records show less than half of what it does to their means. Nothing of other effects, nor where no record's zero is
+    known.
+
+    Means may be off otherwise, a zero or a load, in all records alike: they count as one number with Cauchy's
+    distribution.
+    """
     at = [wide.entries(simulator.layout.unknowns) for wide in one.wide if wide.key in ANGLES]
-    if not at:
-        return False
+    known = [measured for measured in simulator.target.measurements if measured.zero_known]
+    if not at or not known:
+        return 0.0
     prompt = optimum.p.copy()
     prompt[np.concatenate(at)] = 0.0
-    shown = moved = 0.0
-    for measured in simulator.target.measurements:
-        if not measured.zero_known:
-            continue
-        with_lag, without = (float(simulator.channels(p, measured)["dte"].mean()) for p in (optimum.p, prompt))
-        gap = float(measured_channels(measured)["dte"].mean()) - without
-        shown += gap * (with_lag - without)
-        moved += (with_lag - without) ** 2
-    return shown < SHOWN * moved
+    late, without = (_means(simulator, p, known) for p in (optimum.p, prompt))
+    mean, moved = _measured(known), late - without
+    if (mean - without) @ moved < SHOWN * moved @ moved:
+        return -np.inf
+    unknown = UNKNOWN * np.abs(without)
+    costs = [np.log1p(((mean - there) / unknown) ** 2).mean() for there in (without, late)]
+    return float(costs[0] - costs[1])
+
+
+def _means(simulator: Simulator, p: Array, known: Sequence[Measurement]) -> Array:
+    """Mean transmission error [m] of the rig `p` (size,) in every record."""
+    return np.array([simulator.channels(p, measured)["dte"].mean() for measured in known])
+
+
+def _measured(known: Sequence[Measurement]) -> Array:
+    return np.array([measured_channels(measured)["dte"].mean() for measured in known])

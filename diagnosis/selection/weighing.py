@@ -15,7 +15,7 @@ from gearbench.diagnosis.fitting.fit import GAIN, Optimum, cost_of, fit, fit_afr
 from gearbench.diagnosis.fitting.reshaped import has_shapes, reshaped
 from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.selection.by_forces import Start
-from gearbench.diagnosis.selection.standing import is_refuted
+from gearbench.diagnosis.selection.standing import told_by_means
 from gearbench.diagnosis.simulation.jacobian import FOLLOWED
 from gearbench.diagnosis.simulation.simulator import Simulator
 from gearbench.diagnosis.structure.contrast import is_strange
@@ -123,9 +123,10 @@ def weigh(
                 optimum = other if optimum is None else better(optimum, other)
         except ValueError:  # a fit that leads nowhere costs its hypothesis, not the verdict
             optimum = None
-        if optimum is None or is_refuted(simulator, one, optimum):
+        told = 0.0 if optimum is None else told_by_means(simulator, one, optimum)
+        if optimum is None or told == -np.inf:
             return Weighed(one, min(value, 0.0), None)
-        return Weighed(one, worth(simulator, base, one, optimum), optimum)
+        return Weighed(one, worth(simulator, base, one, optimum) + told, optimum)
 
     out = side_by_side(weighed, promised)
     return sorted(out, key=lambda one: -one.log_bayes_factor)
