@@ -214,17 +214,17 @@ def along(steady: Steady) -> Along:
     samples = len(steady.outputs)
     places = placed(model.size, steady.outputs)
     around = model.around(_mean_deflections(model, places))
-    substeps = _substeps(steady)
+    substeps, finer = _substeps(steady)
     entries = 2 * substeps * samples
     step = 1.0 / (setup.sampling_rate * substeps)
     times = IMPACTS if setup.apart(steady.outputs).any() else 1
     motion = (integrated if times > 1 else interpolated)(steady, around.mesh, times * entries)
     found = Pushing(*(averaged(one, times) for one in pushing(steady, motion, substeps * times)))
     decay = max(model.slowest_decay(float(steady.drive.fine.mean())), 1e-9)
-    finer = stepped(steady, substeps)
+    grid = stepped(steady, substeps)
     return Along(
         model=model,
-        phase=finer.phases(0, entries),
+        phase=grid.phases(0, entries),
         elastic=found.elastic,
         pairs=Pressed(found.pair_force, found.pair_tangent),
         rate=found.rate,
@@ -242,6 +242,7 @@ def along(steady: Steady) -> Along:
             model.turned_on(np.eye(model.size)),
             found.turning,
             found.rubbed,
+            finer,
         ),
         substeps=substeps,
         early=min(ceil(log(1 / TRANSIENT) / decay / step), samples * substeps),
@@ -249,7 +250,7 @@ def along(steady: Steady) -> Along:
         turned=setup.departures(samples) * model.law.base_pitch,
         sampling_rate=setup.sampling_rate,
         instants=steady.given.instants,
-        led=finer.led(0, entries),
+        led=grid.led(0, entries),
     )
 
 
@@ -288,13 +289,16 @@ def _mean_deflections(model: NonLinear, places: Array) -> tuple[float, float]:
     return one, two
 
 
-def _substeps(steady: Steady) -> int:
-    """Steps per sample: those of the motion, up to `MOST`, or as many as keep every mode stable at the mesh's largest
-    tangent."""
+def _substeps(steady: Steady) -> tuple[int, int]:
+    """Steps per sample of all that varies along the motion, its own up to `MOST` or a few more, and into how many each
+    is parted, for every mode to be stable at the mesh's largest tangent."""
     model, setup = steady.setup.model, steady.setup
     law, mesh = model.law, model.rig.mesh
     _, tangent = law.evaluate(law.approach[-1], np.arange(law.phases) / law.phases)
     stiffest = 1.5 * mesh.stiffness_scale * float(tangent.max())
     force = float(steady.drive.fine.mean())
     fastest = float(np.abs(np.linalg.eigvals(model.linearised(stiffest, force))).max())
-    return max(min(setup.substeps, MOST), ceil(fastest / (STABLE * setup.sampling_rate)))
+    least, needed = min(setup.substeps, MOST), fastest / (STABLE * setup.sampling_rate)
+    choices = ((substeps, max(ceil(needed / substeps), 1)) for substeps in range(least, 2 * least))
+    # A step costs about as much as what varies over it.
+    return min(choices, key=lambda one: one[0] * (1 + one[1]))

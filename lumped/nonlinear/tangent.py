@@ -11,7 +11,7 @@ s_i(t) from the mean one, f(t) the force that a change of the rig adds in the me
 unchanged motion, and g(t) those on coordinates: a support, the driver, its shaft. r(t) is the friction that comes
 with a normal force (`rubbing`); that its levers change with the departures, as sliding turns round, is left out. Many
 departures are carried at once by the classical Runge-Kutta method, in single precision, which leaves 1e-6 of the
-largest departure.
+largest departure. A stiff mode may need more steps than all that varies has entries, which is read between them then.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Tangent(NamedTuple):
     `step` [s] is two entries. Of supports whose stiffness varies what coordinates contribute to their deflection (b, n)
     and by how much it departs from that in K (entries, b). By how much coordinates turn the mesh on (n,) [cycles/m],
     and what its force grows by with that (entries,) [N/cycle]. `rubbed` (entries, n): what friction adds to the
-    direction of a force in the mesh."""
+    direction of a force in the mesh. A step is gone in `finer` ones, between whose entries all is read on a line."""
 
     springs: Array
     dampers: Array
@@ -56,6 +56,17 @@ class Tangent(NamedTuple):
     turned_on: Array
     turning: Array
     rubbed: Array
+    finer: int = 1
+
+
+class _Course(NamedTuple):
+    """What varies along a motion (entries, ...), or at one instant (...): stiffness, damping and what turning on adds
+    of the mesh (3,), what coordinates are pushed by per force in the mesh (n,), forces, and stiffer bearings (b,)."""
+
+    mesh: Single
+    pushed: Single
+    forces: Single
+    stiffer: Single
 
 
 def departures(
@@ -72,25 +83,47 @@ def departures(
     padded = ceil(columns / PIECE) * PIECE
     places, pushes = np.empty((samples, size, padded), np.float32), np.zeros((entries // 2, padded), np.float32)
     inverse = tangent.inverse[:, None]
-    values = (
-        -inverse * tangent.springs, -inverse * tangent.dampers, tangent.inverse, tangent.mesh,
-        -tangent.inverse * (tangent.mesh + tangent.rubbed), tangent.stiffness, tangent.damping, acting.values,
-        tangent.bearings, -inverse.T * tangent.bearings, tangent.stiffer, tangent.turned_on, tangent.turning,
+    varying = (
+        np.stack([tangent.stiffness, tangent.damping, tangent.turning], axis=1),
+        -tangent.inverse * (tangent.mesh + tangent.rubbed), acting.values, tangent.stiffer,
     )  # fmt: skip
-    single = (np.ascontiguousarray(one, np.float32) for one in values)
-    _run(*single, acting.on, acting.of, np.float32(tangent.step), substeps, early, np.array(weights, np.float32),
-         places, pushes)  # fmt: skip
+    course = _Course(*(np.ascontiguousarray(one, np.float32) for one in varying))
+    fixed = (
+        -inverse * tangent.springs, -inverse * tangent.dampers, tangent.inverse, tangent.mesh, tangent.bearings,
+        -inverse.T * tangent.bearings, tangent.turned_on,
+    )  # fmt: skip
+    single = (np.ascontiguousarray(one, np.float32) for one in fixed)
+    _run(*single, course, acting.on, acting.of, np.float32(tangent.step), substeps, tangent.finer, early,
+         np.array(weights, np.float32), places, pushes)  # fmt: skip
     return places[..., :columns], pushes[:, :columns]
 
 
 @compiled(fastmath=ROUNDING, **INLINED)
+def _read(course: _Course, first: int, place: np.float32, out: _Course) -> None:
+    """Into `out` what the course is `place` entries behind the first."""
+    behind = int(place)
+    part = place - np.float32(behind)
+    here = (first + behind) % len(course.mesh)
+    there = (here + 1) % len(course.mesh)
+    for n in range(3):
+        out.mesh[n] = course.mesh[here, n] + part * (course.mesh[there, n] - course.mesh[here, n])
+    for n in range(len(out.pushed)):
+        out.pushed[n] = course.pushed[here, n] + part * (course.pushed[there, n] - course.pushed[here, n])
+    for n in range(len(out.forces)):
+        out.forces[n] = course.forces[here, n] + part * (course.forces[there, n] - course.forces[here, n])
+    for n in range(len(out.stiffer)):
+        out.stiffer[n] = course.stiffer[here, n] + part * (course.stiffer[there, n] - course.stiffer[here, n])
+
+
+@compiled(fastmath=ROUNDING, **INLINED)
 def _rates(
-    q: Single, v: Single, springs: Single, dampers: Single, inverse: Single, mesh: Single, pushed: Single,
-    k: np.float32, c: np.float32, force: Single, bearings: Single, held: Single, stiffer: Single, turned: Single,
-    w: np.float32, on: Integers, of: Integers, out: Single, push: Single,
+    q: Single, v: Single, springs: Single, dampers: Single, inverse: Single, mesh: Single, bearings: Single,
+    held: Single, turned: Single, now: _Course, on: Integers, of: Integers, out: Single, push: Single,
 ) -> None:  # fmt: skip
     """Accelerations `out` (n, columns) and the force `push` (columns,) in the mesh."""
     size, columns = q.shape
+    force, pushed, stiffer = now.forces, now.pushed, now.stiffer
+    k, c, w = now.mesh[0], now.mesh[1], now.mesh[2]
     push[:] = 0.0
     for number in range(len(on)):
         if on[number] == IN_MESH:
@@ -128,51 +161,57 @@ def _gather(push: Single, weight: np.float32, number: int, pushes: Single) -> No
 
 @compiled(fastmath=ROUNDING)
 def _run(
-    springs: Single, dampers: Single, inverse: Single, mesh: Single, pushed: Single, stiffness: Single,
-    damping: Single, forces: Single, bearings: Single, held: Single, stiffer: Single, turned: Single, turning: Single,
-    on: Integers, of: Integers, h: np.float32, substeps: int, early: int, weights: Single, places: Single,
-    pushes: Single,
+    springs: Single, dampers: Single, inverse: Single, mesh: Single, bearings: Single, held: Single, turned: Single,
+    course: _Course, on: Integers, of: Integers, step: np.float32, substeps: int, finer: int, early: int,
+    weights: Single, places: Single, pushes: Single,
 ) -> None:  # fmt: skip
     """Fill places and pushes."""
-    entries, size, columns = len(forces), len(mesh), pushes.shape[1]
+    steps, size, columns = len(course.mesh) // 2, len(mesh), pushes.shape[1]
     q, v = np.zeros((size, columns), np.float32), np.zeros((size, columns), np.float32)
     q2, v2, v3, v4 = np.empty_like(q), np.empty_like(q), np.empty_like(q), np.empty_like(q)
     a1, a2, a3, a4 = np.empty_like(q), np.empty_like(q), np.empty_like(q), np.empty_like(q)
     push = np.empty(columns, np.float32)
-    steps = entries // 2
+    now = _Course(
+        np.empty(3, np.float32), np.empty(size, np.float32), np.empty(len(on), np.float32),
+        np.empty(len(bearings), np.float32),
+    )  # fmt: skip
+    h, stage = step / np.float32(finer), np.float32(1.0 / finer)
+    # Over a whole step its steps count alike; at its beginning only the first does.
+    shares = weights / np.float32(finer) if weights[1] > 0.0 else weights
     for number in range(-early, steps):
-        i = (2 * number) % entries
-        middle, after = i + 1, (i + 2) % entries
-        _rates(q, v, springs, dampers, inverse, mesh, pushed[i], stiffness[i], damping[i],
-               forces[i], bearings, held, stiffer[i], turned, turning[i], on, of, a1, push)  # fmt: skip
+        first = (2 * number) % len(course.mesh)
         if number >= 0 and number % substeps == 0:
             sample = number // substeps
             for c in range(size):
                 for p in range(columns):
                     places[sample, c, p] = q[c, p]
-        _gather(push, weights[0], number, pushes)
-        for c in range(size):
-            for p in range(columns):
-                q2[c, p] = q[c, p] + HALF * h * v[c, p]
-                v2[c, p] = v[c, p] + HALF * h * a1[c, p]
-        _rates(q2, v2, springs, dampers, inverse, mesh, pushed[middle], stiffness[middle], damping[middle],
-               forces[middle], bearings, held, stiffer[middle], turned, turning[middle], on, of, a2, push)  # fmt: skip
-        _gather(push, weights[1], number, pushes)
-        for c in range(size):
-            for p in range(columns):
-                q2[c, p] = q[c, p] + HALF * h * v2[c, p]
-                v3[c, p] = v[c, p] + HALF * h * a2[c, p]
-        _rates(q2, v3, springs, dampers, inverse, mesh, pushed[middle], stiffness[middle], damping[middle],
-               forces[middle], bearings, held, stiffer[middle], turned, turning[middle], on, of, a3, push)  # fmt: skip
-        _gather(push, weights[2], number, pushes)
-        for c in range(size):
-            for p in range(columns):
-                q2[c, p] = q[c, p] + h * v3[c, p]
-                v4[c, p] = v[c, p] + h * a3[c, p]
-        _rates(q2, v4, springs, dampers, inverse, mesh, pushed[after], stiffness[after], damping[after],
-               forces[after], bearings, held, stiffer[after], turned, turning[after], on, of, a4, push)  # fmt: skip
-        _gather(push, weights[3], number, pushes)
-        for c in range(size):
-            for p in range(columns):
-                q[c, p] += SIXTH * h * (v[c, p] + TWO * (v2[c, p] + v3[c, p]) + v4[c, p])
-                v[c, p] += SIXTH * h * (a1[c, p] + TWO * (a2[c, p] + a3[c, p]) + a4[c, p])
+        for fine in range(finer):
+            told = number if fine == 0 or weights[1] > 0.0 else -1
+            place = TWO * np.float32(fine) * stage
+            _read(course, first, place, now)
+            _rates(q, v, springs, dampers, inverse, mesh, bearings, held, turned, now, on, of, a1, push)
+            _gather(push, shares[0], told, pushes)
+            for c in range(size):
+                for p in range(columns):
+                    q2[c, p] = q[c, p] + HALF * h * v[c, p]
+                    v2[c, p] = v[c, p] + HALF * h * a1[c, p]
+            _read(course, first, place + stage, now)
+            _rates(q2, v2, springs, dampers, inverse, mesh, bearings, held, turned, now, on, of, a2, push)
+            _gather(push, shares[1], told, pushes)
+            for c in range(size):
+                for p in range(columns):
+                    q2[c, p] = q[c, p] + HALF * h * v2[c, p]
+                    v3[c, p] = v[c, p] + HALF * h * a2[c, p]
+            _rates(q2, v3, springs, dampers, inverse, mesh, bearings, held, turned, now, on, of, a3, push)
+            _gather(push, shares[2], told, pushes)
+            for c in range(size):
+                for p in range(columns):
+                    q2[c, p] = q[c, p] + h * v3[c, p]
+                    v4[c, p] = v[c, p] + h * a3[c, p]
+            _read(course, first, place + TWO * stage, now)
+            _rates(q2, v4, springs, dampers, inverse, mesh, bearings, held, turned, now, on, of, a4, push)
+            _gather(push, shares[3], told, pushes)
+            for c in range(size):
+                for p in range(columns):
+                    q[c, p] += SIXTH * h * (v[c, p] + TWO * (v2[c, p] + v3[c, p]) + v4[c, p])
+                    v[c, p] += SIXTH * h * (a1[c, p] + TWO * (a2[c, p] + a3[c, p]) + a4[c, p])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gearbench.lumped.nonlinear.coordinates import IN_MESH, Acting
-from gearbench.lumped.nonlinear.tangent import Tangent, departures
+from gearbench.lumped.nonlinear.tangent import OVER_STEP, Tangent, departures
 
 MASS, STIFFNESS, DAMPING = 2.0, 3e6, 400.0  # of the oscillator; the mesh has a third of the stiffness
 SUBSTEPS, SAMPLES = 4, 512
@@ -49,6 +49,27 @@ def test_an_oscillator_answers_as_its_receptance_says(on_drive: bool) -> None:
         push = (STIFFNESS + 1j * rate * DAMPING) / 3 * sign * receptance + (0.0 if on_drive else 1.0)
         mesh = push * amplitude * np.exp(1j * rate * steps)
         assert pushes[:, column] == pytest.approx(mesh.real, abs=1e-4 * np.abs(mesh).max())
+
+
+def test_a_mode_too_stiff_for_a_step_is_carried_in_finer_ones() -> None:
+    """A rate of six over the step, where Runge-Kutta bears 2.8; the force, far slower, is read between entries."""
+    tangent, rate = oscillator(1 / 3)
+    stiffness = MASS * (6.0 / tangent.step) ** 2
+    damping = 0.2 * np.sqrt(stiffness * MASS)
+    stiff = tangent._replace(springs=np.array([[stiffness]]), dampers=np.array([[damping]]))
+    force = np.cos(rate * np.arange(2 * SUBSTEPS * SAMPLES) * tangent.step / 2)[:, None]
+    acting, early = Acting(force, np.array([0]), np.array([0])), 200
+    whole = STIFFNESS / 3 + stiffness - rate**2 * MASS + 1j * rate * (DAMPING / 3 + damping)
+    motion = (np.exp(1j * rate * np.arange(SAMPLES) * SUBSTEPS * tangent.step) / whole).real
+    places, pushes = departures(stiff._replace(finer=4), acting, SUBSTEPS, early)
+    assert places[:, 0, 0] == pytest.approx(motion, abs=1e-4 / abs(whole))
+    push = (STIFFNESS + 1j * rate * DAMPING) / 3 / whole
+    steps = (push * np.exp(1j * rate * np.arange(SAMPLES * SUBSTEPS) * tangent.step)).real
+    assert pushes[:, 0] == pytest.approx(steps, abs=1e-4 * abs(push))
+    meant = departures(stiff._replace(finer=4), acting, SUBSTEPS, early, OVER_STEP)[1][:, 0]
+    middle = push * np.exp(1j * rate * (np.arange(SAMPLES * SUBSTEPS) + 0.5) * tangent.step)
+    assert meant == pytest.approx(middle.real, abs=1e-4 * abs(push))
+    assert not np.isfinite(departures(stiff, acting, SUBSTEPS, early)[0]).all()
 
 
 def test_forces_of_one_departure_add_up() -> None:
