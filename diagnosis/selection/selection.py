@@ -23,7 +23,7 @@ from gearbench.diagnosis.fitting.restructured import begun_at_nominal, restructu
 from gearbench.diagnosis.fitting.shown import Shown
 from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.selection.by_forces import Start
-from gearbench.diagnosis.selection.needed import FAR, beside, held_against_background, needed
+from gearbench.diagnosis.selection.needed import FAR, SAME, beside, held_against_background, needed
 from gearbench.diagnosis.selection.rivals import compared, is_like, rivals_of, unentered, usual_of
 from gearbench.diagnosis.selection.weighing import Weighed, entering, is_own, weigh
 from gearbench.diagnosis.simulation.jacobian import WEIGHED
@@ -37,6 +37,8 @@ MOST = 3  # effects
 # Renewals of the Jacobian of what entered in the end, whose structure has been found beside a gap that the effects now
 # close.
 RENEWALS_LAST = 2
+# Of the same begun where a rig without the effects is closer.
+RENEWALS_BARE = 4
 # Of what all is weighed over, where derivatives that were not renewed on the way led its fit astray.
 RENEWALS_FRESH = 3
 
@@ -81,8 +83,9 @@ def select(
         report("simulating: all together, from the nominal rig")
         return begun_at_nominal(simulator, best, _entries(unknowns, kept))
 
-    base, best, kept = _together(simulator, base, best, entered, report, begun_elsewhere, apart=apart)
-    return Selection(base, _bare(simulator, base, kept), best, kept, tuple(weighed))
+    found = _together(simulator, base, best, entered, report, begun_elsewhere, apart=apart)
+    base, bare, best, kept = _begun_at_bare(simulator, *found, report, apart=apart)
+    return Selection(base, bare, best, kept, tuple(weighed))
 
 
 def further(
@@ -105,11 +108,12 @@ def further(
     best, entered, _ = _forward(simulator, best, selection.entered, rest, starts, report, apart=apart)
     if len(entered) == len(selection.entered):
         return None
-    base, best, kept = _together(simulator, selection.base, best, entered, report, apart=apart)
+    together = _together(simulator, selection.base, best, entered, report, apart=apart)
+    base, bare, best, kept = _begun_at_bare(simulator, *together, report, apart=apart)
     # Nothing would tell the next time that the same was tried.
     if {one.hypothesis.name for one in kept} <= {one.hypothesis.name for one in selection.entered}:
         return None
-    return replace(selection, base=base, bare=_bare(simulator, base, kept), best=best, entered=kept)
+    return replace(selection, base=base, bare=bare, best=best, entered=kept)
 
 
 def carried_on(
@@ -133,10 +137,11 @@ def carried_on(
     if len(entered) == 1:
         alone = best.evidence - base.evidence - float(np.log(entered[0].hypothesis.choices))
         entered = [replace(entered[0], log_bayes_factor=alone)]
-    base, best, kept = _together(simulator, base, best, entered, report, apart=apart)
+    together = _together(simulator, base, best, entered, report, apart=apart)
+    base, bare, best, kept = _begun_at_bare(simulator, *together, report, apart=apart)
     if selection.entered:
         weighed = list(selection.weighed)
-    return Selection(base, _bare(simulator, base, kept), best, kept, tuple(weighed))
+    return Selection(base, bare, best, kept, tuple(weighed))
 
 
 def _together(
@@ -158,6 +163,28 @@ def _together(
         best = then(gone_on(simulator, best, RENEWALS_LAST, partial(report, "simulating: all together")), kept)
         base, best, kept = held_against_background(simulator, base, best, kept, report, apart=apart)
     return base, best if kept else base, kept
+
+
+def _begun_at_bare(
+    simulator: Simulator, base: Optimum, best: Optimum, kept: tuple[Weighed, ...], report: Report, *, apart: bool
+) -> tuple[Optimum, Optimum, Optimum, tuple[Weighed, ...]]:
+    """The background's optimum, that without any part of the effects `kept`, that with them, and those that stay.
+
+    Effects spoil nothing that a rig without them explains: where that answers the excitation better, the one with them
+    lies in another valley, and is begun there once more.
+    """
+    unknowns, target = simulator.layout.unknowns, simulator.target
+    bare = _bare(simulator, base, kept)
+    without, within = (target.excited_cost(target.lines - one.lines) for one in (bare, best))
+    if not kept or within < without + SAME:
+        return base, bare, best, kept
+    report("simulating: all together, from the rig without them")
+    begin = np.where(_entries(unknowns, kept), best.p, bare.p)
+    again = fit_afresh(simulator, begin, best.sd, renewals=RENEWALS_BARE)
+    if again is None or again.evidence <= best.evidence:
+        return base, bare, best, kept
+    base, best, kept = _together(simulator, base, again, kept, report, apart=apart)
+    return base, _bare(simulator, base, kept), best, kept
 
 
 def _with_only(simulator: Simulator, base: Optimum, best: Optimum, kept: Sequence[Weighed]) -> Optimum:
