@@ -235,9 +235,10 @@ def _without(of: _Told, left: _Left) -> Decided:
     late, sound = lag_of_drive(judged.found.layout.unknowns, judged.found.selection.best.p)
     if abs(late) > LATE_LIMIT * sound:
         return Decided("unknown", "drive", (), max(left.sign, abs(late) / (LATE_LIMIT * sound)), (_late(late),))
-    sign = max(left.sign, of.alone)
     if clear:
-        return _explained(clear, sign)
+        return _explained(clear, max(left.sign, of.alone))
+    # Below every limit a sign counts no more than the transmission error shows of it.
+    sign = min(max(left.sign, of.alone), judged.beyond_noise)
     likely = known.unknown.of(unknown_signs(sign)).value
     if likely > EVEN:
         return Decided("unknown", leading, (), sign, (_likelier(leading, likely),))

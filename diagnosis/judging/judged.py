@@ -119,6 +119,12 @@ class Judged:
         return float(np.sqrt(left / gap)) if gap > 0.0 else 0.0
 
     @property
+    def beyond_noise(self) -> float:
+        """What is left of the transmission error beyond its noise, rms over rms; no limit where either is not known."""
+        size = self.sizes.get("dte")
+        return max(self._left["dte"] / size.noise - 1.0, 0.0) if size and size.noise > 0.0 else np.inf
+
+    @property
     def remains(self) -> float:
         """The largest part of any channel's fluctuation that is left beyond noise."""
         return max(self._remaining.values(), default=0.0)

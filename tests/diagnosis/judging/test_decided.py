@@ -65,12 +65,13 @@ def decided(
     kept: bool = False,
     forces: Sequence[FreeForce] = (),
     curve: Odds | None = None,
+    beyond: float = np.inf,
 ) -> Decided:
     """`worth` nats of friction (None: nothing was kept), which closes `share` of the gap; `left` of the nominal gap,
     `remains` of a channel's fluctuation in the end, `searched` (None: as much) on the records of the search,
     whose noise may hide `hidden` of it; `forces` without a name; the drive acts `late` s, of sound rigs 1e-5; the
     rig is `kept` on the record's way. Something unknown is as likely as not where a sign of it is at its limit, unless
-    there is another `curve`."""
+    there is another `curve`. The transmission error is left with `beyond` times its noise more than that."""
     entered: tuple[Any, ...] = ()
     if worth is not None:
         entered = (Weighed(FRICTION, worth, None),)
@@ -85,6 +86,7 @@ def decided(
         searched=remains if searched is None else searched,
         hidden=hidden,
         kept={} if kept else None,
+        beyond_noise=beyond,
     )
     form = SimpleNamespace(hypothesis=Hypothesis("free drive", "drive", ()), log_bayes_factor=free)
     search: Any = SimpleNamespace(best_free=form if free else None, tried=())
@@ -209,6 +211,12 @@ def test_what_is_likelier_unknown_than_not_is_so_below_every_limit() -> None:
     likely = percent(1 / (1 + np.exp(-1 - 2 * np.log(1.02 * even))))
     assert f"likelier at work than not ({likely})" in made.because[0]
     assert decided(None, **some).verdict == "none"
+    # Nobody sees what the transmission error's noise hides.
+    hidden = decided(None, **some, curve=curve, beyond=0.5)
+    assert hidden.verdict == "none" and hidden.sign == 0.5
+    assert decided(None, **some, curve=curve, beyond=1.0).verdict == "unknown"
+    far = {"remains": 1.1 * VISIBLE * STRUCTURE, "excess": at(0, 1.1 * OUTSTANDING["drive"])}
+    assert decided(None, **far, beyond=0.5).verdict == "unknown"
 
 
 def test_the_sign_of_something_unknown_follows_the_remainder() -> None:

@@ -329,6 +329,7 @@ def test_beyond_the_lines_of_the_search_nothing_is_left(monkeypatch: pytest.Monk
     sizes = made.sizes["dte"]
     assert (sizes.fluctuation, sizes.nominal) == pytest.approx((np.sqrt(2.0), np.sqrt(2.0)))
     assert (sizes.plain, sizes.final, sizes.noise) == pytest.approx((np.sqrt(0.5), 0.2 * np.sqrt(0.5), 0.1))
+    assert made.beyond_noise == pytest.approx(2 * np.sqrt(0.5) - 1)
 
 
 
