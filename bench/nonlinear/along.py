@@ -151,7 +151,8 @@ class Along:
         here, there = _linear(self.model), _linear(replace(other, nudge=self.model.nudge))
         springs, dampers, masses = (two - one for one, two in zip(here, there, strict=True))
         for number in np.flatnonzero(springs.any(axis=1) | dampers.any(axis=1) | (masses != 0.0)):
-            lines = springs[number] @ self._lines + 1j * self._omega * (dampers[number] @ self._lines)
+            to = np.flatnonzero((springs[number] != 0.0) | (dampers[number] != 0.0))
+            lines = springs[number, to] @ self._lines[to] + 1j * self._omega * (dampers[number, to] @ self._lines[to])
             lines -= self._omega**2 * masses[number] * self._lines[number]
             moved[int(number)] = np.fft.irfft(lines, len(self.places))
         for one, two in zip(self.model.support_springs, other.support_springs, strict=True):

@@ -150,7 +150,8 @@ def _decided(of: _Told, unsteady: Unsteady, changing: float) -> Decided:
         return Decided("unknown", _leading(missing), (), left.sign, (_astray(judged, named),))
     if left.seen > 1.0 and sum(shares) < judged.left**2:
         return Decided("unknown", _leading(missing), (), left.sign, (_made_up(missing, named),))
-    because = "simulated with it, the rig comes closer to the records than any rig without an effect"
+    it = "it" if len(named) == 1 else "them"
+    because = f"simulated with {it}, the rig comes closer to the records than any rig without an effect"
     beside = (_beside(of.clear),) if of.clear else ()
     return Decided("effects", named[0].hypothesis.place, named, left.sign, (because, *beside, *aside))
 

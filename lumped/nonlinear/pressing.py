@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gearbench.lumped.errors import LumpedError
 from gearbench.lumped.nonlinear.law import MeshLaw
-from gearbench.lumped.nonlinear.reading import read_pairs
+from gearbench.lumped.nonlinear.reading import over_pairs, read_pairs
 
 Array = NDArray[np.float64]
 
@@ -68,7 +68,7 @@ def pressed(law: MeshLaw, at: Instants, travel: Array) -> Pressed:
     if not at.differ:
         return Pressed(at.gain * force, at.gain * tangent)
     pairs = of_pairs(law, at, travel)
-    working, stiff = pairs.force.sum(axis=-1), pairs.tangent.sum(axis=-1)
+    working, stiff = over_pairs(pairs.force), over_pairs(pairs.tangent)
     back = (force < 0.0) & (working == 0.0)
     return Pressed(np.where(back, at.gain * force, working), np.where(back, at.gain * tangent, stiff))
 

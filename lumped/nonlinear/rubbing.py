@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from gearbench.lumped.nonlinear.coordinates import U1, U2, X1, X2, Y1, Y2
 from gearbench.lumped.nonlinear.model import NonLinear
+from gearbench.lumped.nonlinear.reading import over_pairs
 
 Array = NDArray[np.float64]
 
@@ -32,9 +33,9 @@ def rubbed_along(model: NonLinear, position: Array, pace: Array, rates: Array, m
     carried = r.carried[row] + (position - row)[:, None] * (r.carried[row + 1] - r.carried[row])
     away = (position / rows - r.offset)[:, None] - np.arange(r.carried.shape[1])
     part = carried * r.coefficient * np.tanh((middle[:, None] + away * slope[:, None]) * r.steepness)
-    along = part.sum(axis=1)
-    out[:, U1] = (part * (r.centre1 + away * r.pitch1)).sum(axis=1)
-    out[:, U2] = -(part * (r.centre2 - away * r.pitch2)).sum(axis=1)
+    along = over_pairs(part)
+    out[:, U1] = over_pairs(part * (r.centre1 + away * r.pitch1))
+    out[:, U2] = -over_pairs(part * (r.centre2 - away * r.pitch2))
     out[:, Y1], out[:, Y2] = r.slide * along, -r.slide * along
     if further:
         out[:, X1], out[:, X2] = -model.factor * along, model.factor * along

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from gearbench.lumped.nonlinear.law import MeshLaw
 from gearbench.lumped.nonlinear.pressing import Instants, Pressed
-from gearbench.lumped.nonlinear.reading import read_pairs
+from gearbench.lumped.nonlinear.reading import over_pairs, read_pairs
 
 Array = NDArray[np.float64]
 
@@ -85,7 +85,7 @@ def _part(
     """That of one pair, or of all, where all are pressed by `depth` (n,) [m]."""
     n = exponent
     force, tangent = read_pairs(law, np.broadcast_to(depth[:, None], (depth.size, len(law.offsets))), phase)
-    whole, stiff = force.sum(axis=1), tangent.sum(axis=1)
+    whole, stiff = over_pairs(force), over_pairs(tangent)
     loaded = whole > 0.0
     safe = np.where(loaded, whole, 1.0)
     level = np.where(loaded, whole / reference, 0.0) ** (1.0 / (1.0 + n))
@@ -97,7 +97,7 @@ def _part(
     if pair is None:
         form = (1.0 + n) * bare
         return _Part(whole, whole * log, stiff * level * reference, form, form * plain)
-    alone = bare[:, pair] / np.maximum(1.0 - law.shared * bare.sum(axis=1) / lift, 1e-3)
+    alone = bare[:, pair] / np.maximum(1.0 - law.shared * over_pairs(bare) / lift, 1e-3)
     form = (n * force[:, pair] / safe - law.shared * alone / lift)[:, None] * bare
     form[:, pair] += alone
     return _Part(force[:, pair], force[:, pair] * log, tangent[:, pair] * level * reference, form, form * plain)

@@ -17,6 +17,7 @@ from gearbench.kernels.compiled import compiled
 from gearbench.lumped.nonlinear.ends import Ends, ends_of
 from gearbench.lumped.nonlinear.model import NonLinear
 from gearbench.lumped.nonlinear.pressing import Instants, alike
+from gearbench.lumped.nonlinear.reading import over_pairs
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -157,7 +158,7 @@ def instants(model: NonLinear, table: Table, end: int | None = None) -> Instants
         return alike(at, table.excess[:end], table.gain[:end], table.back[:end])
     columns = len(model.law.offsets)
     own = table.own[table.first_pair[:end].astype(np.int64)[:, None] + np.arange(columns)]
-    softer = (model.law.bending_of(at) * own[..., 1:]).sum(axis=-1)
+    softer = over_pairs(model.law.bending_of(at) * own[..., 1:])
     return Instants(
         at, table.excess[:end], table.gain[:end], table.back[:end], own[..., 0], 1.0 / (1.0 + softer)
     )
