@@ -48,7 +48,8 @@ def told_by_means(simulator: Simulator, one: Hypothesis, optimum: Optimum) -> fl
     mean, moved = _measured(known), late - without
     if (mean - without) @ moved < SHOWN * moved @ moved:
         return -np.inf
-    unknown = UNKNOWN * np.abs(without)
+    # Without displacements the supports' deflection is in it, too; a lag of the other angle may leave none.
+    unknown = UNKNOWN * np.maximum(np.abs(without), simulator.layout.model.deflection)
     costs = [np.log1p(((mean - there) / unknown) ** 2).mean() for there in (without, late)]
     return float(costs[0] - costs[1])
 

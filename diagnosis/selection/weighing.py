@@ -121,9 +121,9 @@ def weigh(
             if one.name in shaped:
                 other = reshaped(simulator, one, one.widened(unknowns, base.sd))
                 optimum = other if optimum is None else better(optimum, other)
+            told = 0.0 if optimum is None else told_by_means(simulator, one, optimum)
         except ValueError:  # a fit that leads nowhere costs its hypothesis, not the verdict
             optimum = None
-        told = 0.0 if optimum is None else told_by_means(simulator, one, optimum)
         if optimum is None or told == -np.inf:
             return Weighed(one, min(value, 0.0), None)
         return Weighed(one, worth(simulator, base, one, optimum) + told, optimum)
