@@ -20,6 +20,7 @@ from gearbench.lumped.nonlinear.coordinates import IN_MESH, LOAD, U1, U2, Acting
 from gearbench.lumped.nonlinear.law import MeshLaw
 from gearbench.lumped.nonlinear.model import NonLinear
 from gearbench.lumped.nonlinear.pressing import Pressed
+from gearbench.lumped.nonlinear.reading import over_pairs
 from gearbench.lumped.nonlinear.rest import inverse_masses, springs_and_dampers
 from gearbench.lumped.nonlinear.tangent import AT_ONCE, OVER_STEP, Tangent, departures
 
@@ -191,7 +192,7 @@ class Along:
 
     def of_own_compliance(self, compliance: Array) -> Array:
         """Force (entries,) [N] in the mesh of pairs that each yield by (entries, n_o) [m/N] more by themselves."""
-        return -(self.own * compliance).sum(axis=1) * self.stiffer
+        return -over_pairs(self.own * compliance) * self.stiffer
 
     def of_excess(self, excess: Array) -> Array:
         """Force (entries, columns) [N] that more material (entries, columns) [m] on all working flanks adds in the

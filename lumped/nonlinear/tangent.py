@@ -99,20 +99,23 @@ def departures(
 
 
 @compiled(fastmath=ROUNDING, **INLINED)
+def _between(values: Single, here: int, there: int, part: np.float32, out: Single) -> None:
+    """Into `out` (m,) the row of values (entries, m) that lies that part of the way from one to another."""
+    for n in range(len(out)):
+        out[n] = values[here, n] + part * (values[there, n] - values[here, n])
+
+
+@compiled(fastmath=ROUNDING, **INLINED)
 def _read(course: _Course, first: int, place: np.float32, out: _Course) -> None:
     """Into `out` what the course is `place` entries behind the first."""
     behind = int(place)
     part = place - np.float32(behind)
     here = (first + behind) % len(course.mesh)
     there = (here + 1) % len(course.mesh)
-    for n in range(3):
-        out.mesh[n] = course.mesh[here, n] + part * (course.mesh[there, n] - course.mesh[here, n])
-    for n in range(len(out.pushed)):
-        out.pushed[n] = course.pushed[here, n] + part * (course.pushed[there, n] - course.pushed[here, n])
-    for n in range(len(out.forces)):
-        out.forces[n] = course.forces[here, n] + part * (course.forces[there, n] - course.forces[here, n])
-    for n in range(len(out.stiffer)):
-        out.stiffer[n] = course.stiffer[here, n] + part * (course.stiffer[there, n] - course.stiffer[here, n])
+    _between(course.mesh, here, there, part, out.mesh)
+    _between(course.pushed, here, there, part, out.pushed)
+    _between(course.forces, here, there, part, out.forces)
+    _between(course.stiffer, here, there, part, out.stiffer)
 
 
 @compiled(fastmath=ROUNDING, **INLINED)
@@ -159,6 +162,15 @@ def _gather(push: Single, weight: np.float32, number: int, pushes: Single) -> No
             pushes[number, p] += weight * push[p]
 
 
+@compiled(fastmath=ROUNDING, **INLINED)
+def _ahead(q: Single, v: Single, h: np.float32, rates: Single, accelerations: Single, q2: Single, v2: Single) -> None:
+    """Places q2 and rates v2 (n, columns) after h [s] from q and v at these rates and accelerations."""
+    for c in range(q.shape[0]):
+        for p in range(q.shape[1]):
+            q2[c, p] = q[c, p] + h * rates[c, p]
+            v2[c, p] = v[c, p] + h * accelerations[c, p]
+
+
 @compiled(fastmath=ROUNDING)
 def _run(
     springs: Single, dampers: Single, inverse: Single, mesh: Single, bearings: Single, held: Single, turned: Single,
@@ -191,23 +203,14 @@ def _run(
             _read(course, first, place, now)
             _rates(q, v, springs, dampers, inverse, mesh, bearings, held, turned, now, on, of, a1, push)
             _gather(push, shares[0], told, pushes)
-            for c in range(size):
-                for p in range(columns):
-                    q2[c, p] = q[c, p] + HALF * h * v[c, p]
-                    v2[c, p] = v[c, p] + HALF * h * a1[c, p]
+            _ahead(q, v, HALF * h, v, a1, q2, v2)
             _read(course, first, place + stage, now)
             _rates(q2, v2, springs, dampers, inverse, mesh, bearings, held, turned, now, on, of, a2, push)
             _gather(push, shares[1], told, pushes)
-            for c in range(size):
-                for p in range(columns):
-                    q2[c, p] = q[c, p] + HALF * h * v2[c, p]
-                    v3[c, p] = v[c, p] + HALF * h * a2[c, p]
+            _ahead(q, v, HALF * h, v2, a2, q2, v3)
             _rates(q2, v3, springs, dampers, inverse, mesh, bearings, held, turned, now, on, of, a3, push)
             _gather(push, shares[2], told, pushes)
-            for c in range(size):
-                for p in range(columns):
-                    q2[c, p] = q[c, p] + h * v3[c, p]
-                    v4[c, p] = v[c, p] + h * a3[c, p]
+            _ahead(q, v, h, v3, a3, q2, v4)
             _read(course, first, place + TWO * stage, now)
             _rates(q2, v4, springs, dampers, inverse, mesh, bearings, held, turned, now, on, of, a4, push)
             _gather(push, shares[3], told, pushes)
