@@ -83,8 +83,7 @@ def select(
         report("simulating: all together, from the nominal rig")
         return begun_at_nominal(simulator, best, _entries(unknowns, kept))
 
-    found = _together(simulator, base, best, entered, report, begun_elsewhere, apart=apart)
-    base, bare, best, kept = _begun_at_bare(simulator, *found, report, apart=apart)
+    base, bare, best, kept = _together(simulator, base, best, entered, report, begun_elsewhere, apart=apart)
     return Selection(base, bare, best, kept, tuple(weighed))
 
 
@@ -108,8 +107,7 @@ def further(
     best, entered, _ = _forward(simulator, best, selection.entered, rest, starts, report, apart=apart)
     if len(entered) == len(selection.entered):
         return None
-    together = _together(simulator, selection.base, best, entered, report, apart=apart)
-    base, bare, best, kept = _begun_at_bare(simulator, *together, report, apart=apart)
+    base, bare, best, kept = _together(simulator, selection.base, best, entered, report, apart=apart)
     # Nothing would tell the next time that the same was tried.
     if {one.hypothesis.name for one in kept} <= {one.hypothesis.name for one in selection.entered}:
         return None
@@ -137,14 +135,29 @@ def carried_on(
     if len(entered) == 1:
         alone = best.evidence - base.evidence - float(np.log(entered[0].hypothesis.choices))
         entered = [replace(entered[0], log_bayes_factor=alone)]
-    together = _together(simulator, base, best, entered, report, apart=apart)
-    base, bare, best, kept = _begun_at_bare(simulator, *together, report, apart=apart)
+    base, bare, best, kept = _together(simulator, base, best, entered, report, apart=apart)
     if selection.entered:
         weighed = list(selection.weighed)
     return Selection(base, bare, best, kept, tuple(weighed))
 
 
 def _together(
+    simulator: Simulator,
+    base: Optimum,
+    best: Optimum,
+    entered: Sequence[Weighed],
+    report: Report,
+    then: Callable[[Optimum, Sequence[Weighed]], Optimum] = lambda best, kept: best,
+    *,
+    apart: bool,
+) -> tuple[Optimum, Optimum, Optimum, tuple[Weighed, ...]]:
+    """The background's optimum, that without any part of the effects that stay of what entered, that with them, fitted
+    to the end and what is done `then`, and these."""
+    found = _staying(simulator, base, best, entered, report, then, apart=apart)
+    return _begun_at_bare(simulator, *found, report, apart=apart)
+
+
+def _staying(
     simulator: Simulator,
     base: Optimum,
     best: Optimum,
@@ -183,7 +196,7 @@ def _begun_at_bare(
     again = fit_afresh(simulator, begin, best.sd, renewals=RENEWALS_BARE)
     if again is None or again.evidence <= best.evidence:
         return base, bare, best, kept
-    base, best, kept = _together(simulator, base, again, kept, report, apart=apart)
+    base, best, kept = _staying(simulator, base, again, kept, report, apart=apart)
     return base, _bare(simulator, base, kept), best, kept
 
 
