@@ -18,6 +18,8 @@ from gearbench.diagnosis.selection.selection import Selection, select
 from gearbench.diagnosis.simulation.target import Block, Target
 
 LINES, BLOCKS = 60, 6
+# Unknowns of `beyond_a_hill` as its rig has them.
+ACROSS = np.array([0.08, -0.1, 0.02, 0.4, 0.23, 0.21, 0.0, 0.0])
 
 
 def unknowns() -> Unknowns:
@@ -31,6 +33,26 @@ def unknowns() -> Unknowns:
         ],
         2,
     )
+
+
+def beyond_a_hill(matrix: np.ndarray) -> tuple[Unknowns, Callable[[np.ndarray], np.ndarray]]:
+    """Unknowns, and their lines by what each does (8, LINES): yielding across a little makes worse what `ACROSS` makes
+    right, so that no fit gets there from rigid."""
+    listed = unknowns_of(
+        [
+            group("stiffness", "1", ("driver", "driven", "more"), 0.1, slot="stiffness"),
+            group("friction", "1", ("coefficient",), 0.01, 0.5, slot="friction"),
+            group("across", "1", ("driver", "driven"), 0.15, slot="structure", low=0.0, high=1.0),
+            group("crack", "1", 2, 0.02, 0.35, slot="loss", low=0.0),
+        ],
+        2,
+    )
+
+    def lines_of(p: np.ndarray) -> np.ndarray:
+        across = p[4:6]
+        return np.asarray(np.concatenate([p[:4], 10 * (across**2 - 0.08 * across), p[6:]]) @ matrix)
+
+    return listed, lines_of
 
 
 def target(lines: np.ndarray, floor: float = 1e-6) -> Target:

@@ -8,11 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from shared.fake_simulator import LINES, FakeSimulator, sensitivities, target
+from shared.fake_simulator import ACROSS, LINES, FakeSimulator, beyond_a_hill, sensitivities, target
 
 from gearbench.diagnosis.effects.effect import Hypothesis, Wide
 from gearbench.diagnosis.fitting.fit import Optimum, fit_afresh
-from gearbench.diagnosis.forces.unknowns import group, unknowns_of
 from gearbench.diagnosis.selection import selection as module
 from gearbench.diagnosis.selection.weighing import Weighed
 
@@ -21,30 +20,16 @@ FRICTION = Hypothesis("friction", "mesh", (Wide("friction"),))
 
 def test_a_fit_with_effects_is_begun_again_where_the_rig_without_them_answers_better() -> None:
     """Run-out shows at orders of its shaft alone; beside it the fit had lost the structure that the rig without has."""
-    unknowns = unknowns_of(
-        [
-            group("stiffness", "1", ("driver", "driven", "more"), 0.1, slot="stiffness"),
-            group("friction", "1", ("coefficient",), 0.01, 0.5, slot="friction"),
-            group("across", "1", ("driver", "driven"), 0.15, slot="structure", low=0.0, high=1.0),
-            group("crack", "1", 2, 0.02, 0.35, slot="loss", low=0.0),
-        ],
-        2,
-    )
     lines_at = np.arange(LINES) % 6
     matrix = sensitivities(3) * np.where((np.arange(8)[:, None] == 3) == (lines_at >= 4), 1.0, 0.0)
-
-    def lines_of(p: np.ndarray) -> np.ndarray:
-        across = p[4:6]
-        return np.concatenate([p[:4], 10 * (across**2 - 0.08 * across), p[6:]]) @ matrix
-
-    true = np.array([0.08, -0.1, 0.02, 0.4, 0.23, 0.21, 0.0, 0.0])
-    plain = target(lines_of(true))
+    unknowns, lines_of = beyond_a_hill(matrix)
+    plain = target(lines_of(ACROSS))
     kinds = ("excited",) * 4 + ("operating",) * 2
     blocks = tuple(replace(one, kind=kind) for one, kind in zip(plain.blocks, kinds, strict=True))
     simulator: Any = FakeSimulator(lines_of, replace(plain, blocks=blocks), layout=SimpleNamespace(unknowns=unknowns))
     sd = unknowns.prior()
-    base = fit_afresh(simulator, np.where(np.arange(8) == 3, 0.0, true), sd, renewals=4)
-    lost = fit_afresh(simulator, np.where(np.arange(8) > 3, 0.0, true), FRICTION.widened(unknowns, sd), renewals=4)
+    base = fit_afresh(simulator, np.where(np.arange(8) == 3, 0.0, ACROSS), sd, renewals=4)
+    lost = fit_afresh(simulator, np.where(np.arange(8) > 3, 0.0, ACROSS), FRICTION.widened(unknowns, sd), renewals=4)
     assert base is not None and lost is not None and lost.p[4] < 0.1
 
     def begun(best: Optimum) -> Optimum:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from shared.fake_simulator import LINES, FakeSimulator, chosen, sensitivities, target
+from shared.fake_simulator import ACROSS, LINES, FakeSimulator, beyond_a_hill, chosen, sensitivities, target
 
 from gearbench.diagnosis.effects.effect import Hypothesis, Wide, twins_of
 from gearbench.diagnosis.fitting.shown import Shown
@@ -263,23 +263,9 @@ def test_a_start_keeps_what_only_its_own_rig_feels() -> None:
 
 def test_structure_beyond_a_hill_is_found_by_beginning_again() -> None:
     """A little yielding across makes it worse, what the rig has makes it right: no fit gets there from rigid."""
-    unknowns = unknowns_of(
-        [
-            group("stiffness", "1", ("driver", "driven", "more"), 0.1, slot="stiffness"),
-            group("friction", "1", ("coefficient",), 0.01, 0.5, slot="friction"),
-            group("across", "1", ("driver", "driven"), 0.15, slot="structure", low=0.0, high=1.0),
-            group("crack", "1", 2, 0.02, 0.35, slot="loss", low=0.0),
-        ],
-        2,
-    )
-
-    def lines_of(p: np.ndarray) -> np.ndarray:
-        across = p[4:6]
-        return np.concatenate([p[:4], 10 * (across**2 - 0.08 * across), p[6:]]) @ MATRIX
-
-    true = np.array([0.08, -0.1, 0.02, 0.4, 0.23, 0.21, 0.0, 0.0])
+    unknowns, lines_of = beyond_a_hill(MATRIX)
     rng = np.random.default_rng(11)
-    lines = lines_of(true) + 0.02 * (rng.standard_normal(LINES) + 1j * rng.standard_normal(LINES))
+    lines = lines_of(ACROSS) + 0.02 * (rng.standard_normal(LINES) + 1j * rng.standard_normal(LINES))
     simulator = FakeSimulator(lines_of, target(lines), layout=SimpleNamespace(unknowns=unknowns))
     found = chosen(simulator, (FRICTION,), [np.zeros(8)], {})
     assert found is not None and names(found) == ["friction"]
