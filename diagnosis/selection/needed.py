@@ -17,7 +17,7 @@ from gearbench.diagnosis.effects.effect import Hypothesis
 from gearbench.diagnosis.effects.profile_error import uneven
 from gearbench.diagnosis.fitting.background import prior_of
 from gearbench.diagnosis.fitting.closeness import better
-from gearbench.diagnosis.fitting.fit import Optimum, fit, fit_afresh
+from gearbench.diagnosis.fitting.fit import Optimum, cost_of, fit, fit_afresh
 from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.selection.weighing import Weighed, entering, has_own
 from gearbench.diagnosis.simulation.jacobian import FOLLOWED
@@ -34,24 +34,58 @@ FAR = 4.0
 RENEWALS = 4
 
 
-def needed(simulator: Simulator, best: Optimum, entered: Sequence[Weighed], apart: bool) -> tuple[Weighed, ...]:
-    """Each of the effects that entered that the others do not make needless, with what it is worth by the quadratic.
-    One that is not felt where it is, as flanks that part over a wider gap are not, keeps its worth."""
-    unknowns, kept = simulator.layout.unknowns, list[Weighed | None]()
-    for one in entered:
-        sd = best.sd.copy()
-        at = one.hypothesis.entries(unknowns)
-        if not np.isin(at, best.sensitivity.quadratic.active).any():
-            kept.append(one)
-            continue
-        sd[at] = prior_of(simulator, unknowns.prior())[at]
-        p = np.where((sd > 0.0) | (best.sd == 0.0), best.p, 0.0)
-        quadratic = best.sensitivity.quadratic
-        _, cost, information = quadratic.best(best.p, sd, _bounds_at(unknowns, p, best.p, sd))
-        worth = best.evidence - quadratic.evidence(cost, information, sd)
-        now = replace(one, log_bayes_factor=float(worth) if len(entered) > 1 else one.log_bayes_factor)
-        kept.append(entering(unknowns, now, apart))
-    return tuple(one for one in kept if one is not None)
+def needed(
+    simulator: Simulator,
+    base: Optimum,
+    best: Optimum,
+    entered: Sequence[Weighed],
+    report: Report = lambda step: None,
+    *,
+    apart: bool,
+) -> tuple[Optimum, tuple[Weighed, ...]]:
+    """The optimum without those of the effects that entered that the others make needless, and the ones that stay, each
+    with what it is worth by the quadratic: the least first, as a fit without it must bear out. Of two that stand in for
+    each other one stays; without a number that is far from the nominal one the quadratic promises what no fit keeps."""
+    stay, borne_out = list(entered), set[str]()
+    while len(entered) > 1:
+        stay = [one if one.hypothesis.name in borne_out else _promised(simulator, best, one) for one in stay]
+        open_yet = (one for one in stay if one.hypothesis.name not in borne_out)
+        one = min(open_yet, key=lambda one: one.log_bayes_factor, default=None)
+        if one is None or _enters(simulator, one, apart):
+            break
+        rest = [other for other in stay if other is not one]
+        report(f"simulating: without {one.hypothesis.name}")
+        without = (_refitted(simulator, base, best, rest) or best) if rest else base
+        now = replace(one, log_bayes_factor=_worth(one, best, without))
+        if without is not best and _enters(simulator, now, apart):
+            borne_out.add(one.hypothesis.name)
+            stay = [now if other is one else other for other in stay]
+        else:
+            best, stay = without, rest
+    kept = (entering(simulator.layout.unknowns, one, apart) for one in stay)
+    return best, tuple(one for one in kept if one is not None)
+
+
+def _enters(simulator: Simulator, one: Weighed, apart: bool) -> bool:
+    return entering(simulator.layout.unknowns, one, apart) is not None
+
+
+def _worth(one: Weighed, best: Optimum, without: Optimum) -> float:
+    """Log Bayes factor of an effect by the optima with and without it."""
+    return best.evidence - without.evidence - float(np.log(one.hypothesis.choices))
+
+
+def _promised(simulator: Simulator, best: Optimum, one: Weighed) -> Weighed:
+    """An effect with what it is worth by the quadratic. One that is not felt where it is, as flanks that part over a
+    wider gap are not, keeps its worth."""
+    unknowns, quadratic = simulator.layout.unknowns, best.sensitivity.quadratic
+    at = one.hypothesis.entries(unknowns)
+    if not np.isin(at, quadratic.active).any():
+        return one
+    sd = best.sd.copy()
+    sd[at] = prior_of(simulator, unknowns.prior())[at]
+    _, cost, information = quadratic.best(best.p, sd, _bounds_at(unknowns, best, sd))
+    return replace(one, log_bayes_factor=best.evidence - quadratic.evidence(cost, information, sd))
 
 
 def held_against_background(
@@ -71,15 +105,13 @@ def held_against_background(
             break
         rest = [other for other in stay if other is not one]
         report(f"simulating: no more than a good rig has of {one.hypothesis.name}")
-        without = beside(simulator, base, best, rest)
-        without = fit_afresh(simulator, without.p, without.sd, renewals=RENEWALS) if without else None
+        without = _refitted(simulator, base, best, rest)
         if without is None:
             continue
         if without.misfit < best.misfit:
             # Fitted on, it came to a better rig: the effect is worth what it is beside that.
             best = better(best, fit(simulator, without.p, best.sd, without.sensitivity, renewals=1))
-        worth = best.evidence - without.evidence - float(np.log(one.hypothesis.choices))
-        now = entering(unknowns, replace(one, log_bayes_factor=worth), apart)
+        now = entering(unknowns, replace(one, log_bayes_factor=_worth(one, best, without)), apart)
         if now is None or _is_background(unknowns, one.hypothesis, best, without):
             best, stay = without, rest
             base = base if rest else better(base, without)
@@ -88,14 +120,27 @@ def held_against_background(
     return base, best, tuple(stay)
 
 
+def _refitted(simulator: Simulator, base: Optimum, best: Optimum, kept: Sequence[Weighed]) -> Optimum | None:
+    """As `beside`, fitted to the end."""
+    without = beside(simulator, base, best, kept)
+    return fit_afresh(simulator, without.p, without.sd, renewals=RENEWALS) if without else None
+
+
 def beside(simulator: Simulator, base: Optimum, best: Optimum, kept: Sequence[Weighed]) -> Optimum | None:
     """The optimum near `best` with only these effects wide, the others no larger than in the background `base`; None
-    where that is no rig."""
-    sd = base.sd
+    where that is no rig. It is begun where the quadratic has it, or where all else stays as it is."""
+    unknowns, sd = simulator.layout.unknowns, base.sd
     for one in kept:
-        sd = one.hypothesis.widened(simulator.layout.unknowns, sd)
-    p = np.where(sd > 0.0, np.clip(best.p, -3.0 * sd, 3.0 * sd), 0.0)
-    return fit(simulator, p, sd, best.sensitivity)
+        sd = one.hypothesis.widened(unknowns, sd)
+    # What is no wider than before stays where it is, however far a fit led it.
+    within = np.where(sd < best.sd, np.clip(best.p, -3.0 * sd, 3.0 * sd), best.p)
+    begun = [np.where(sd > 0.0, within, 0.0)]
+    quadratic = best.sensitivity.quadratic
+    promised = begun[0].copy()
+    step, _, _ = quadratic.best(best.p, sd, _bounds_at(unknowns, best, sd))
+    promised[quadratic.active] = best.p[quadratic.active] + step
+    begun.append(promised)
+    return fit(simulator, min(begun, key=lambda p: cost_of(simulator, p, sd)), sd, best.sensitivity)
 
 
 def _is_background(unknowns: Unknowns, one: Hypothesis, best: Optimum, without: Optimum) -> bool:
@@ -114,8 +159,8 @@ def size_of(unknowns: Unknowns, one: Hypothesis, p: Array, told: Array | None = 
     return float(np.sqrt(np.average((values / unknowns.prior()[at]) ** 2, weights=told)))
 
 
-def _bounds_at(unknowns: Unknowns, wanted: Array, here: Array, sd: Array) -> tuple[Array, Array]:
-    """Bounds that hold at `wanted` what has no prior."""
+def _bounds_at(unknowns: Unknowns, best: Optimum, sd: Array) -> tuple[Array, Array]:
+    """Bounds that hold at zero what had a prior in `best` and has none in `sd` (size,)."""
     low, high = unknowns.bounds()
-    fixed = (sd == 0.0) & (wanted != here)
-    return np.where(fixed, wanted, low), np.where(fixed, wanted, high)
+    gone = (sd == 0.0) & (best.sd > 0.0)
+    return np.where(gone, 0.0, low), np.where(gone, 0.0, high)

@@ -169,9 +169,7 @@ def _staying(
 ) -> tuple[Optimum, Optimum, tuple[Weighed, ...]]:
     """The background's optimum, that with the effects that stay of what entered, fitted to the end and what is done
     `then`, and these."""
-    kept = needed(simulator, best, entered, apart)
-    if len(kept) < len(entered):
-        best = _with_only(simulator, base, best, kept)
+    best, kept = needed(simulator, base, best, entered, report, apart=apart)
     if kept:
         best = then(gone_on(simulator, best, RENEWALS_LAST, partial(report, "simulating: all together")), kept)
         base, best, kept = held_against_background(simulator, base, best, kept, report, apart=apart)

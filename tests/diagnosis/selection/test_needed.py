@@ -13,7 +13,8 @@ from gearbench.diagnosis.effects.profile_error import FLANKS
 from gearbench.diagnosis.fitting.background import prior_of
 from gearbench.diagnosis.fitting.fit import Optimum, fit_afresh
 from gearbench.diagnosis.forces.unknowns import group, unknowns_of
-from gearbench.diagnosis.selection.needed import CLEAR, held_against_background, size_of
+from gearbench.diagnosis.selection import needed as module
+from gearbench.diagnosis.selection.needed import CLEAR, beside, held_against_background, needed, size_of
 from gearbench.diagnosis.selection.weighing import LIMIT, PROVISIONAL, Weighed
 from gearbench.diagnosis.simulation.jacobian import FOLLOWED
 from gearbench.diagnosis.simulation.quadratic import prior_cost
@@ -90,6 +91,50 @@ def test_what_is_there_stays_and_is_worth_what_a_fit_without_it_lacks() -> None:
     assert found is best and [one.hypothesis.name for one in stay] == ["friction", "torque-ripple"]
     without = fitted(simulator, RIPPLE)
     assert stay[0].log_bayes_factor == pytest.approx(best.evidence - without.evidence, rel=0.05)
+
+
+def test_of_two_that_stand_in_for_each_other_one_stays() -> None:
+    """Beside the other each is needless; without both the gap is open."""
+    alike = MATRIX.copy()
+    alike[4] = alike[3]
+    simulator = FakeSimulator(lambda q: q @ alike, target(0.3 * alike[3]))
+    base, best = fitted(simulator), fitted(simulator, FRICTION, RIPPLE)
+    entered = [Weighed(one, 200.0, best) for one in (FRICTION, RIPPLE)]
+    found, stay = needed(simulator, base, best, entered, apart=False)  # type: ignore[arg-type]
+    (one,) = stay
+    assert found.evidence > base.evidence + LIMIT and one.log_bayes_factor > LIMIT
+    other = {"friction": 4, "torque-ripple": 3}[one.hypothesis.name]
+    assert abs(found.p[other]) < 4 * base.sd[other] < 0.3 and found.sd[other] == base.sd[other]
+
+
+def test_what_only_the_quadratic_can_do_without_stays() -> None:
+    """A number that moves the lines as friction does, but no further than a sixth of it."""
+
+    def lines_of(p: np.ndarray) -> np.ndarray:
+        return np.where(np.arange(8) == 0, 0.0, p) @ MATRIX + 0.05 * np.tanh(p[0] / 0.05) * MATRIX[3]
+
+    alike = MATRIX.copy()
+    alike[0] = alike[3]
+    simulator = FakeSimulator(lines_of, target(lines_of(np.array([0, 0, 0, 0.3, 0.2, -0.2, 0, 0]))))
+    simulator.jacobian = lambda p, sd, chosen, near=None: alike  # type: ignore[method-assign, assignment]
+    base, best = fitted(simulator), fitted(simulator, FRICTION, RIPPLE)
+    entered = [Weighed(one, 200.0, best) for one in (FRICTION, RIPPLE)]
+    assert best.p[3] == pytest.approx(0.3, abs=0.05)
+    found, stay = needed(simulator, base, best, entered, apart=False)  # type: ignore[arg-type]
+    assert found is best and {one.hypothesis.name for one in stay} == {"friction", "torque-ripple"}
+    assert min(one.log_bayes_factor for one in stay) > LIMIT
+
+
+def test_a_rig_without_an_effect_stays_as_far_from_the_nominal_one_as_it_was(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A number five of its standard deviations off is none of the effect that goes."""
+    true = np.array([0.5, -0.1, 0.02, 0.0, 0.0, 0.0, 0.0, 0.0])
+    simulator = FakeSimulator(lambda q: q @ MATRIX, target(true @ MATRIX))
+    best, base = fitted(simulator, FRICTION), fitted(simulator)
+    assert best.p[0] > 3.0 * best.sd[0]
+    begun: list[np.ndarray] = []
+    monkeypatch.setattr(module, "fit", lambda simulator, p, *rest: begun.append(p))
+    beside(simulator, base, best, ())  # type: ignore[arg-type]
+    np.testing.assert_allclose(begun[0], best.p, atol=0.02)
 
 
 @pytest.mark.parametrize(("deviations", "stays"), [(3.7, False), (4.5, True)])

@@ -13,6 +13,7 @@ from shared.fake_simulator import ACROSS, LINES, FakeSimulator, beyond_a_hill, c
 from gearbench.diagnosis.effects.effect import Hypothesis, Wide, twins_of
 from gearbench.diagnosis.fitting.shown import Shown
 from gearbench.diagnosis.forces.unknowns import group, unknowns_of
+from gearbench.diagnosis.selection import needed as needed_module
 from gearbench.diagnosis.selection import selection as module
 from gearbench.diagnosis.selection import weighing
 from gearbench.diagnosis.selection.by_forces import Start
@@ -139,7 +140,7 @@ def test_what_had_no_place_enters_when_another_is_out(monkeypatch: pytest.Monkey
     # Nothing that is out is tried again, and what was worth nothing is not tried at all.
     assert module.further(simulator, bare, (*found.entered, *more.entered)) is None  # type: ignore[arg-type]
     # What enters and does not stay would be tried for ever.
-    monkeypatch.setattr(module, "needed", lambda simulator, best, entered, apart: ())
+    monkeypatch.setattr(module, "needed", lambda simulator, base, best, entered, report, apart: (best, ()))
     assert module.further(simulator, bare, found.entered) is None  # type: ignore[arg-type]
 
 
@@ -312,10 +313,17 @@ def test_structure_that_the_rig_shows_around_its_mesh_is_begun_from() -> None:
 def test_nothing_of_what_proves_needless_is_left(monkeypatch: pytest.MonkeyPatch, left: tuple[str, ...]) -> None:
     """Of two that entered those not `left` go back to a good rig's share, of which their size is many."""
 
-    def only(_simulator: Any, _best: Any, entered: Any, _apart: bool) -> tuple[Weighed, ...]:
-        return tuple(one for one in entered if one.hypothesis.name in left)
+    worth, promised = needed_module._worth, needed_module._promised
 
-    monkeypatch.setattr(module, "needed", only)
+    def of(one: Weighed, value: float) -> float:
+        return value if one.hypothesis.name in left else 0.0
+
+    def held(simulator: Any, best: Any, one: Weighed) -> Weighed:
+        found = promised(simulator, best, one)
+        return replace(found, log_bayes_factor=of(one, found.log_bayes_factor))
+
+    monkeypatch.setattr(needed_module, "_promised", held)
+    monkeypatch.setattr(needed_module, "_worth", lambda one, *optima: of(one, worth(one, *optima)))
     found = selected({3: 0.4, 4: 0.3, 5: -0.2})
     assert names(found) == list(left)
     assert (found.best is found.base) == (not left)
