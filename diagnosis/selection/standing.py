@@ -3,7 +3,7 @@
 An angle that is recorded tau late is behind by Omega tau all the time, so that the mean transmission error moves by
 v tau, v = Omega r_b the speed of the base circle, tens of micrometres where lines hardly tell a delay from what a
 shaft, a filter or a support does to their phases. Where the angles' zero is unloaded contact, a delay that the mean
-does not show is none.
+does not show is none, and one that it does is where a fit begins.
 """
 
 from __future__ import annotations
@@ -15,12 +15,14 @@ from numpy.typing import NDArray
 
 from gearbench.diagnosis.effects.effect import Hypothesis
 from gearbench.diagnosis.effects.sensor_delay import KEYS
-from gearbench.diagnosis.fitting.fit import Optimum
+from gearbench.diagnosis.fitting.fit import Optimum, fit_afresh
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.intake.signals import measured_channels
+from gearbench.diagnosis.simulation.jacobian import FOLLOWED
 from gearbench.diagnosis.simulation.simulator import Simulator
 
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 ANGLES = tuple(key for channel, key in KEYS.items() if channel.startswith("angle"))
 # Of the mean by which a delay moves the transmission error, what a record must show: true delays of drawn rigs show
@@ -28,6 +30,10 @@ ANGLES = tuple(key for channel, key in KEYS.items() if channel.startswith("angle
 SHOWN = 0.5
 # Of the mean deflection under the load, what a rig's stiffness leaves unknown of it.
 UNKNOWN = 0.1
+# Nats that the means must say for a lag to be tried, its largest standard deviation, and renewals of the Jacobian
+# around it and of the fit in which it is free.
+CALLS, FARTHEST = 2.0, 4.0
+RENEWALS_HELD, RENEWALS = 4, 1
 
 
 def told_by_means(simulator: Simulator, one: Hypothesis, optimum: Optimum) -> float:
@@ -38,20 +44,72 @@ def told_by_means(simulator: Simulator, one: Hypothesis, optimum: Optimum) -> fl
     Means may be off otherwise, a zero or a load, in all records alike: they count as one number with Cauchy's
     distribution.
     """
-    at = [wide.entries(simulator.layout.unknowns) for wide in one.wide if wide.key in ANGLES]
-    known = [measured for measured in simulator.target.measurements if measured.zero_known]
-    if not at or not known:
+    at, known = _lags(simulator, one), _known(simulator)
+    if not at.size or not known:
         return 0.0
-    prompt = optimum.p.copy()
-    prompt[np.concatenate(at)] = 0.0
-    late, without = (_means(simulator, p, known) for p in (optimum.p, prompt))
-    mean, moved = _measured(known), late - without
+    mean, without = _measured(known), _means(simulator, _prompt(optimum.p, at), known)
+    late = _means(simulator, optimum.p, known)
+    moved = late - without
     if (mean - without) @ moved < SHOWN * moved @ moved:
         return -np.inf
+    return _said(simulator, mean, without, late)
+
+
+def called_for(simulator: Simulator, base: Optimum, one: Hypothesis) -> Array | None:
+    """Unknowns (size,) of the rig `base` with the lag of an angle that the means call for; None where they call for
+    none, or one that no chain of sensors has, and of the driven angle none that would be early."""
+    at, known = _lags(simulator, one), _known(simulator)
+    if not at.size or not known:
+        return None
+    begin, wide = _prompt(base.p, at), one.widened(simulator.layout.unknowns, base.sd)[at]
+    mean, without = _measured(known), _means(simulator, begin, known)
+    begin[at] = wide
+    moved = _means(simulator, begin, known) - without
+    part = float((mean - without) @ moved / (moved @ moved))
+    begin[at] = part * wide
+    early = part < 0.0 and any(one.key == FOLLOWED for one in one.wide)
+    if early or abs(part) > FARTHEST or _said(simulator, mean, without, without + part * moved) < CALLS:
+        return None
+    return begin
+
+
+def begun_late(simulator: Simulator, base: Optimum, one: Hypothesis, begin: Array) -> Optimum | None:
+    """The optimum of a late angle beside `base`, begun with the lag of `begin` (size,), which was `called_for`.
+
+    Numbers around it have moved to where the angle was prompt, and a fit in which it is free goes back there: the lag
+    is held until they have followed.
+    """
+    sd = one.widened(simulator.layout.unknowns, base.sd)
+    held = sd.copy()
+    held[_lags(simulator, one)] = 0.0
+    around = fit_afresh(simulator, begin, held, renewals=RENEWALS_HELD)
+    return fit_afresh(simulator, around.p, sd, renewals=RENEWALS) if around else None
+
+
+def _said(simulator: Simulator, mean: Array, without: Array, late: Array) -> float:
+    """Nats by which the means of the records speak for those of a rig with a lag against those without."""
     # Without displacements the supports' deflection is in it, too; a lag of the other angle may leave none.
     unknown = UNKNOWN * np.maximum(np.abs(without), simulator.layout.model.deflection)
     costs = [np.log1p(((mean - there) / unknown) ** 2).mean() for there in (without, late)]
     return float(costs[0] - costs[1])
+
+
+def _lags(simulator: Simulator, one: Hypothesis) -> Integers:
+    """Numbers of the hypothesis' unknowns that are lags of angles."""
+    at = [wide.entries(simulator.layout.unknowns) for wide in one.wide if wide.key in ANGLES]
+    return np.concatenate([np.empty(0, dtype=np.int64), *at])
+
+
+def _prompt(p: Array, at: Integers) -> Array:
+    """`p` (size,) without these lags."""
+    out = p.copy()
+    out[at] = 0.0
+    return out
+
+
+def _known(simulator: Simulator) -> list[Measurement]:
+    """The records whose zero is known."""
+    return [measured for measured in simulator.target.measurements if measured.zero_known]
 
 
 def _means(simulator: Simulator, p: Array, known: Sequence[Measurement]) -> Array:

@@ -15,7 +15,7 @@ from gearbench.diagnosis.fitting.fit import GAIN, Optimum, cost_of, fit, fit_afr
 from gearbench.diagnosis.fitting.reshaped import has_shapes, reshaped
 from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.selection.by_forces import Start
-from gearbench.diagnosis.selection.standing import told_by_means
+from gearbench.diagnosis.selection.standing import begun_late, called_for, told_by_means
 from gearbench.diagnosis.simulation.jacobian import FOLLOWED
 from gearbench.diagnosis.simulation.simulator import Simulator
 from gearbench.diagnosis.structure.contrast import is_strange
@@ -84,7 +84,7 @@ def weigh(
     reshape: bool = True,
 ) -> list[Weighed]:
     """All hypotheses beside what `base` holds, the best first: the most promising simulated, those that have shapes to
-    begin from also from these (`reshape`)."""
+    begin from also from these (`reshape`), and late angles from what the means call for."""
     unknowns, quadratic = simulator.layout.unknowns, base.sensitivity.quadratic
     # What moves nothing in these records cannot be weighed by them.
     hypotheses = [one for one in hypotheses if np.isin(one.entries(unknowns), quadratic.active).any()]
@@ -107,7 +107,8 @@ def weigh(
     names = [s.hypothesis.name for s in by_force[:BY_FORCES] if s.log_bayes_factor > WORTH]
     names = list(dict.fromkeys([*names, *(one.name for value, one, _ in promised[:TRIED] if value > WORTH)]))[:TRIED]
     shaped = [one.name for one in hypotheses if has_shapes(one)] if reshape and is_strange(unknowns, base.p) else []
-    names += [name for name in shaped if name not in names]
+    called = {one.name: begin for one in hypotheses if (begin := called_for(simulator, base, one)) is not None}
+    names += [name for name in (*shaped, *called) if name not in names]
 
     def weighed(item: tuple[float, Hypothesis, Array]) -> Weighed:
         value, one, step = item
@@ -120,6 +121,9 @@ def weigh(
             optimum = _refit(simulator, base, one, step, starts.get(one.name), renewals)
             if one.name in shaped:
                 other = reshaped(simulator, one, one.widened(unknowns, base.sd))
+                optimum = other if optimum is None else better(optimum, other)
+            if one.name in called:
+                other = begun_late(simulator, base, one, called[one.name])
                 optimum = other if optimum is None else better(optimum, other)
             told = 0.0 if optimum is None else told_by_means(simulator, one, optimum)
         except ValueError:  # a fit that leads nowhere costs its hypothesis, not the verdict

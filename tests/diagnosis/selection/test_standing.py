@@ -14,7 +14,8 @@ from shared.simulated_lines import demonstration
 from gearbench.diagnosis.effects.effect import Hypothesis
 from gearbench.diagnosis.effects.sensor_delay import SENSOR_DELAY
 from gearbench.diagnosis.intake.signals import measured_channels
-from gearbench.diagnosis.selection.standing import told_by_means
+from gearbench.diagnosis.selection import standing as module
+from gearbench.diagnosis.selection.standing import FARTHEST, begun_late, called_for, told_by_means
 from gearbench.diagnosis.simulation.simulator import Simulator
 
 LAG = 30e-6  # [s]
@@ -66,3 +67,42 @@ def test_nothing_is_said_without_a_zero_or_of_a_displacement(prompt: Simulator) 
     adrift = late(prompt, "angle_driven", 0.0, zero_known=False)
     assert told_by_means(adrift, *lagging(prompt, "angle_driven", LAG)) == 0.0
     assert told_by_means(prompt, *lagging(prompt, "y_driver", LAG)) == 0.0
+
+
+def beside(simulator: Simulator, channel: str, begun: float = 0.0) -> tuple[Hypothesis, Any]:
+    """The hypothesis of a late channel, and a base in which it lags by so much."""
+    one, optimum = lagging(simulator, channel, begun)
+    return one, SimpleNamespace(p=optimum.p, sd=simulator.layout.unknowns.prior())
+
+
+@pytest.mark.parametrize("channel", ["angle_driver", "angle_driven"])
+def test_the_means_call_for_the_lag_that_is_there(prompt: Simulator, channel: str) -> None:
+    one, base = beside(prompt, channel, 3e-6)
+    at = prompt.layout.unknowns[f"delay-{channel}"]
+    begin = called_for(late(prompt, channel, LAG), base, one)
+    assert begin is not None and begin[at] == pytest.approx(LAG, rel=0.02)
+    assert called_for(prompt, base, one) is None
+    # A driven angle is not early, and no chain of sensors is late by many times its prior.
+    early = called_for(late(prompt, channel, -LAG), base, one)
+    assert (early is None) == (channel == "angle_driven")
+    assert early is None or early[at] == pytest.approx(-LAG, rel=0.02)
+    far = 1.2 * FARTHEST * float(prompt.layout.unknowns.group(f"delay-{channel}").wide[0])
+    assert called_for(late(prompt, channel, far), base, one) is None
+    assert called_for(late(prompt, channel, LAG, zero_known=False), base, one) is None
+
+
+def test_a_lag_is_held_until_the_rig_has_followed(prompt: Simulator, monkeypatch: pytest.MonkeyPatch) -> None:
+    one, base = beside(prompt, "angle_driver")
+    at, fits = prompt.layout.unknowns["delay-angle_driver"], []
+
+    def fit(simulator: Simulator, p: np.ndarray, sd: np.ndarray, renewals: int) -> Any:
+        fits.append((p.copy(), sd))
+        return SimpleNamespace(p=p + 1e-9)
+
+    monkeypatch.setattr(module, "fit_afresh", fit)
+    begin = base.p.copy()
+    begin[at] = LAG
+    assert begun_late(prompt, base, one, begin) is not None
+    (first, held), (second, free) = fits
+    assert first[at] == LAG and held[at] == 0.0 and (held[: at.start] == base.sd[: at.start]).all()
+    assert (second == first + 1e-9).all() and free[at] > base.sd[at]
