@@ -5,8 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from matplotlib.figure import Figure
 
 from gearbench.diagnosis.verdict import Effect, Gap, Range
+from gearbench.figures.gaps import diagnosis_waterfall as module
 from gearbench.figures.gaps.diagnosis_waterfall import draw_waterfall, steps_of
 
 
@@ -55,3 +57,20 @@ def test_it_is_a_picture(tmp_path: Path) -> None:
     assert "without it" not in words
     draw_waterfall(tmp_path / "x.svg", (gap(3e-6),), (effect("friction", 12.0),), "held-out")
     assert "3.00; 12.4 without it" in (tmp_path / "x.svg").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("name", ["friction", "bearing-nonlinearity"])
+def test_what_is_told_beside_a_bar_is_in_the_picture(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    """However long the words before the axis are."""
+    kept: list[Figure] = []
+    monkeypatch.setattr(module, "save", lambda drawing, path: kept.append(drawing))
+    draw_waterfall(tmp_path / "w.png", (gap(3e-6),), (effect(name, 40.0),), "held-out")
+    (drawing,) = kept
+    drawing.draw_without_rendering()
+    (axes,) = drawing.axes
+    told = [one for one in axes.texts if one.get_text()]
+    assert len(told) == 4 and "3.00; 40.1 without it" in [one.get_text() for one in told]
+    ends = [one.get_window_extent().x1 / axes.get_window_extent().x1 for one in told]
+    assert 0.95 < max(ends) <= 1.0

@@ -11,11 +11,15 @@ from gearbench.figures.plotting import BLUE, GREEN, GREY, ORANGE, figure, save
 from gearbench.words.diagnosis import CHANNELS, SHOWN_UNITS, effects_in_words, length, whole_band
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.text import Text
+
     from gearbench.diagnosis.verdict import Effect, Gap
 
 PALE = 0.22  # opacity of what a step takes off
 MORE = 1.1  # times the gap before a step, that must come back without its effect to be drawn
-ROOM, MORE_ROOM = 1.14, 1.5  # of the axis over the largest bar, for what is told beside it
+GAP, MARGIN = 0.015, 0.02  # of the largest bar, before what is told beside one; of the axis, behind that
 
 
 class Step(NamedTuple):
@@ -61,22 +65,32 @@ def draw_waterfall(path: Path, gaps: Sequence[Gap], effects: Sequence[Effect], r
     rows = steps_of(gap, effects)
     unit = SHOWN_UNITS.get(gap.unit, (1.0, gap.unit))[1]
     largest = max(max(one.left, one.without or 0.0) for one in rows)
+    beside: list[Text] = []
     with figure(1, 1, (7.0, 1.0 + 0.46 * len(rows))) as (drawing, axes):
         for number, one in enumerate(rows):
             y, value = len(rows) - 1 - number, one.left
             axes.barh(y, value, height=0.6, color=one.colour)
-            before = rows[number - 1].left if number else value
-            if one.colour != GREY and before > value:
+            before = rows[number - 1].left if number and one.colour != GREY else value
+            if before > value:
                 axes.barh(y, before - value, left=value, height=0.6, color=one.colour, alpha=PALE)
             told, end = length(value), max(before, value)
             if one.without is not None:
                 axes.barh(y, one.without, height=0.6, fill=False, edgecolor=one.colour, linestyle="--")
                 told, end = f"{told}; {length(one.without)} without it", one.without
-            axes.text(end + 0.015 * largest, y, told, va="center", fontsize=10)
+            beside.append(axes.text(end + GAP * largest, y, told, va="center", fontsize=10, in_layout=False))
             if number and one.colour != GREY:
                 axes.plot((before, before), (y + 0.3, y + 0.7), color=GREY, linewidth=0.8)
         axes.set_yticks(range(len(rows)), [one.words for one in reversed(rows)])
-        axes.set_xlim(0, (MORE_ROOM if any(one.without is not None for one in rows) else ROOM) * largest)
         axes.grid(visible=False, axis="y")
         axes.set_xlabel(f"rms gap of the {CHANNELS.get(gap.channel, gap.channel)} on record {record} [{unit}]")
+        axes.set_xlim(0, _reach(drawing, axes, beside))
         save(drawing, path)
+
+
+def _reach(drawing: Figure, axes: Axes, beside: Sequence[Text]) -> float:
+    """End of an axis that begins at nothing and has room for what is told `beside` its bars, whatever the words before
+    the axis leave of the picture."""
+    drawing.draw_without_rendering()
+    whole = float(axes.get_window_extent().width)
+    parts = ((one.get_position()[0], one.get_window_extent().width / whole) for one in beside)
+    return max(float(at) / max(1.0 - MARGIN - part, MARGIN) for at, part in parts)
