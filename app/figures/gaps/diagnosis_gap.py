@@ -25,6 +25,7 @@ MARKS = {"nominal": "s", "recalibrated": "o", "with_effect": "D", "floor": "|"}
 WIDTHS = (3.0, 1.8, 1.1)
 # Bands of an octave in the spectrum of the gap.
 PER_OCTAVE = 6
+HEAD = 0.15  # of the decades that it spans, what is left above it for a legend
 
 
 def draw_gap(path: Path, gaps: Sequence[Gap], record: str) -> None:
@@ -101,7 +102,9 @@ def _spectra(axes: Any, traces: Traces, micro: float, unit: str) -> None:
     axes.set_xlabel("frequency [Hz]")
     axes.set_ylabel(f"rms per 1/{PER_OCTAVE} octave [{unit}]")
     axes.set_title("Spectrum of the difference")
-    axes.legend(loc="best", ncols=4)
+    low, high = axes.get_ylim()
+    axes.set_ylim(low, high * (high / low) ** HEAD)
+    axes.legend(loc="upper left", ncols=4)
 
 
 def octave_bands(lines: Array, spacing: float) -> tuple[Array, Array]:
