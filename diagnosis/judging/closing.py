@@ -26,8 +26,6 @@ SEEN = 0.05
 # By how much a part must grow where no channel's whole gap is smaller with the effect: what it makes worse elsewhere is
 # as large as a part of less.
 PLAIN = 2.0
-# Nats from which a part that grows so much is no chance of motions that go their own way, where the whole is no worse.
-LOUD = 50.0
 
 
 @dataclass(frozen=True)
@@ -60,14 +58,13 @@ class Closing:
 
 
 def free_closing(target: Target, without: Mapping[str, Array], with_all: Mapping[str, Array]) -> Closing:
-    """What an effect closes by simulations that go their own way: some part of the gap, and of the whole as much, or of
-    that part so much that the record says it aloud. Where flanks part, one part or another is closer by chance."""
+    """What an effect closes by simulations that go their own way: some part of the gap, and of the whole as much. Where
+    flanks part, one part or another is closer by chance."""
     closing = closing_of(target, without, with_all)
     lost, kept = (target.energies(target.lines - target.gathered([one])) for one in (without, with_all))
     size = target.sizes / target.of_channels(target.energies(target.lines) * target.sizes)
     whole = float(np.sqrt((lost * size).sum() / max(((kept + target.noise) * size).sum(), 1e-300)))
-    aloud = closing.gain > LOUD and closing.growth > PLAIN and whole > 1.0
-    return closing if aloud else replace(closing, growth=min(closing.growth, whole))
+    return replace(closing, growth=min(closing.growth, whole))
 
 
 def both(nudged: Closing, *free: Closing) -> Closing:

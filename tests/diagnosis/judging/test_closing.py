@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from shared.fake_simulator import LINES, of_lines
 
-from gearbench.diagnosis.judging.closing import GAIN, closing_of, free_closing
+from gearbench.diagnosis.judging.closing import GAIN, closing_of
 
 NOTHING = np.zeros(LINES, dtype=complex)
 
@@ -41,24 +39,3 @@ def test_what_makes_the_whole_worse_is_spoken_against() -> None:
     found = closing_of(held, one, worse)
     assert found.gain > GAIN and not found.due and not found.open
     assert closing_of(held, one, little).open
-
-
-@pytest.mark.parametrize(
-    ("small", "large", "growth"),
-    [
-        ((1.0, 0.05), (5.0, 5.0), 20.0),  # a twentieth of a part and the whole no worse: no chance
-        ((1.0, 0.05), (5.0, 5.2), 0.98),  # the whole is worse
-        ((1.0, 0.6), (5.0, 5.0), 1.01),  # of a part too little
-    ],
-)
-def test_motions_that_go_their_own_way_must_close_the_whole_or_say_it_aloud(
-    small: tuple[float, float], large: tuple[float, float], growth: float
-) -> None:
-    held = of_lines(np.ones(LINES, dtype=complex))
-    held = replace(held, noise=np.zeros_like(held.noise), counts=20.0 * held.counts)
-    one, other = ({"lines": 1.0 + np.where(held.of_line == 0, *pair)} for pair in zip(small, large, strict=True))
-    found = free_closing(held, one, other)
-    assert found.gain > 0.0 and found.growth == pytest.approx(growth, abs=0.02)
-    # Less than that many nats are none of it.
-    quiet = replace(held, counts=0.01 * held.counts)
-    assert free_closing(quiet, one, other).growth == pytest.approx(min(growth, 1.02), abs=0.02)
