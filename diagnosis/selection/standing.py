@@ -34,6 +34,7 @@ UNKNOWN = 0.1
 # around it and of the fit in which it is free.
 CALLS, FARTHEST = 2.0, 4.0
 RENEWALS_HELD, RENEWALS = 4, 1
+TINY = 1e-30  # [m^2]: less no lag moves a mean by
 
 
 def told_by_means(simulator: Simulator, one: Hypothesis, optimum: Optimum) -> float:
@@ -62,10 +63,14 @@ def called_for(simulator: Simulator, base: Optimum, one: Hypothesis) -> Array | 
     if not at.size or not known:
         return None
     begin, wide = _prompt(base.p, at), one.widened(simulator.layout.unknowns, base.sd)[at]
-    mean, without = _measured(known), _means(simulator, begin, known)
-    begin[at] = wide
-    moved = _means(simulator, begin, known) - without
-    part = float((mean - without) @ moved / (moved @ moved))
+    try:
+        without = _means(simulator, begin, known)
+        begin[at] = wide
+        moved = _means(simulator, begin, known) - without
+    except ValueError:  # so late no rig answers
+        return None
+    mean = _measured(known)
+    part = float((mean - without) @ moved) / max(float(moved @ moved), TINY)
     begin[at] = part * wide
     early = part < 0.0 and any(one.key == FOLLOWED for one in one.wide)
     if early or abs(part) > FARTHEST or _said(simulator, mean, without, without + part * moved) < CALLS:

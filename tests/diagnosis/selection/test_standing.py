@@ -91,6 +91,20 @@ def test_the_means_call_for_the_lag_that_is_there(prompt: Simulator, channel: st
     assert called_for(late(prompt, channel, LAG, zero_known=False), base, one) is None
 
 
+def test_a_lag_with_which_no_rig_answers_is_not_called_for(prompt: Simulator) -> None:
+    """It costs its own beginning, and no more."""
+    one, base = beside(prompt, "angle_driver")
+    at_work = late(prompt, "angle_driver", LAG)
+
+    def failing(case: Any, record: Any, nudge: float = 0.0) -> Any:
+        if case.rig.sensors.delay_angle_driver > 0.0:
+            raise ValueError("does not settle")
+        return prompt.simulate(case, record, nudge)
+
+    assert called_for(at_work, base, one) is not None
+    assert called_for(replace(at_work, simulate=failing), base, one) is None
+
+
 def test_a_lag_is_held_until_the_rig_has_followed(prompt: Simulator, monkeypatch: pytest.MonkeyPatch) -> None:
     one, base = beside(prompt, "angle_driver")
     at, fits = prompt.layout.unknowns["delay-angle_driver"], []
