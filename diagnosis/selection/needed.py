@@ -134,13 +134,12 @@ def beside(simulator: Simulator, base: Optimum, best: Optimum, kept: Sequence[We
         sd = one.hypothesis.widened(unknowns, sd)
     # What is no wider than before stays where it is, however far a fit led it.
     within = np.where(sd < best.sd, np.clip(best.p, -3.0 * sd, 3.0 * sd), best.p)
-    begun = [np.where(sd > 0.0, within, 0.0)]
-    quadratic = best.sensitivity.quadratic
-    promised = begun[0].copy()
+    begin = np.where(sd > 0.0, within, 0.0)
+    quadratic, promised = best.sensitivity.quadratic, begin.copy()
     step, _, _ = quadratic.best(best.p, sd, _bounds_at(unknowns, best, sd))
     promised[quadratic.active] = best.p[quadratic.active] + step
-    begun.append(promised)
-    return fit(simulator, min(begun, key=lambda p: cost_of(simulator, p, sd)), sd, best.sensitivity)
+    nearer = min((begin, promised), key=lambda p: cost_of(simulator, p, sd))
+    return fit(simulator, nearer, sd, best.sensitivity)
 
 
 def _is_background(unknowns: Unknowns, one: Hypothesis, best: Optimum, without: Optimum) -> bool:

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from gearbench.bench.plan.workers import side_by_side
 from gearbench.diagnosis.effects.effect import Effect, Hypothesis, Wide
-from gearbench.diagnosis.fitting.closeness import better
 from gearbench.diagnosis.fitting.fit import GAIN, Optimum, cost_of, fit, fit_afresh
 from gearbench.diagnosis.fitting.reshaped import has_shapes, reshaped
 from gearbench.diagnosis.forces.unknowns import Unknowns
@@ -118,13 +117,12 @@ def weigh(
         # What any further step from there promises says nothing for this one.
         renewals = RENEWALS if value - base.left > LIMIT else 0
         try:
-            optimum = _refit(simulator, base, one, step, starts.get(one.name), renewals)
+            begun = [_refit(simulator, base, one, step, starts.get(one.name), renewals)]
             if one.name in shaped:
-                other = reshaped(simulator, one, one.widened(unknowns, base.sd))
-                optimum = other if optimum is None else better(optimum, other)
+                begun.append(reshaped(simulator, one, one.widened(unknowns, base.sd)))
             if one.name in called:
-                other = begun_late(simulator, base, one, called[one.name])
-                optimum = other if optimum is None else better(optimum, other)
+                begun.append(begun_late(simulator, base, one, called[one.name]))
+            optimum = max((found for found in begun if found), key=lambda found: found.evidence, default=None)
             told = 0.0 if optimum is None else told_by_means(simulator, one, optimum)
         except ValueError:  # a fit that leads nowhere costs its hypothesis, not the verdict
             optimum = None
