@@ -38,6 +38,7 @@ from gearbench.diagnosis.judging.chances import (
     signs_of_called,
     unlikely,
 )
+from gearbench.diagnosis.judging.changing_place import place_of_changes
 from gearbench.diagnosis.judging.closing import DUE
 from gearbench.diagnosis.judging.decided import Decided, decide_simulated
 from gearbench.diagnosis.judging.drift import drift_of
@@ -85,6 +86,7 @@ def by_simulation(
     report: Report,
 ) -> Finding:
     """The finding that simulation justifies."""
+    of = replace(of, unsteady=_acting(of, found))
     settled = _settled(of, found, held_out, known, report)
     judged, decided, chances, missing = settled.judged, settled.decided, settled.chances, settled.missing
     found, signs, changing = judged.found, settled.signs, settled.signs["changing"]
@@ -198,6 +200,16 @@ def _judgeable(of: Searched, found: Simulated, held_out: Measurement | None) -> 
     if held_out is None or not held_out.phase_known or BACKLASH.name in of.without:
         return found
     return with_backlash_there(of.problem, found, held_out)
+
+
+def _acting(of: Searched, found: Simulated) -> Unsteady:
+    """What changes between repetitions, with the place at which the rig found would be moved like that."""
+    if of.unsteady.worst(LIMITS.unsteady)[1] <= 1.0:
+        return of.unsteady
+    try:
+        return of.unsteady._replace(acts=place_of_changes(found, of.steady))
+    except ValueError:  # a rig without steady motion tells no place
+        return of.unsteady
 
 
 def _free(found: Simulated) -> tuple[FreeForce, ...]:

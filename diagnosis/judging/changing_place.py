@@ -1,0 +1,128 @@
+"""Where the force acts that changes from one repetition to the next, by what it moves in the rig found.
+
+A force at one place moves all channels at once, in proportions that are the rig's own: of a line's departures between
+repetitions in all channels one complex size is left open, and what is left beside it says how well the place explains
+them. No stiffness or filter of an equation of motion is needed, and none of them can be wrong.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearbench.diagnosis.forces.equations import PLACES
+from gearbench.diagnosis.forces.steadiness import COLOURED, scatter_of
+from gearbench.diagnosis.intake.measurements import Measurement
+from gearbench.diagnosis.intake.signals import measured_channels
+from gearbench.diagnosis.judging.free_forces import motion_of
+from gearbench.diagnosis.selection.simulated import Simulated
+from gearbench.diagnosis.simulation.simulator import Simulator
+from gearbench.diagnosis.simulation.target import FITTED, TINY
+from gearbench.lumped.nonlinear.coordinates import IN_MESH, LOAD, U2, Acting
+from gearbench.rig.contract import Place
+
+if TYPE_CHECKING:
+    from gearbench.bench.nonlinear.along import Along
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Integers = NDArray[np.int64]
+
+# Part of what changes, by energy, that a force at a place must explain for it to act there, and of what the next best
+# place leaves, the part that the best one may leave.
+EXPLAINS, TOLD = 0.5, 0.5
+# Mesh phases at which the rig is struck: the mean over them has no part of what meshing moves to other lines.
+STRUCK = 8
+
+
+def place_of_changes(found: Simulated, steady: Collection[Measurement]) -> Place | None:
+    """The place at which a force explains most of what changes between repetitions of the `steady` records, among those
+    of the search; None where none explains half, another does nearly as well, or channels are too few to tell. Raises
+    ValueError where the rig has no steady motion in one of them."""
+    simulator = found.simulator.free
+    names = {one.name for one in steady}
+    energy, left, channels = 0.0, np.zeros(len(PLACES)), 0
+    for measured in simulator.target.measurements:
+        if measured.name not in names or measured.repetitions < 2:
+            continue
+        departures, at, units = _changing(simulator, measured)
+        if at.size:
+            answers = unit_answers(simulator, found.selection.best.p, measured, int(at[-1]))
+            moved = np.stack([answers[name][:, at] / unit for name, unit in units.items()], axis=1)
+            energy += float((np.abs(departures) ** 2).sum())
+            left += left_beside(departures, moved)
+            channels = max(channels, len(units))
+    order = np.argsort(left)
+    best, following = left[order[:2]]
+    if channels < 2 or best > (1.0 - EXPLAINS) * energy or best >= TOLD * following:
+        return None
+    return PLACES[int(order[0])]
+
+
+def left_beside(departures: Complex, moved: Complex) -> Array:
+    """Energy (places,) that is left of departures (P, channels, K) beside those of a force at each place, of any size
+    in each line and repetition; `moved` (places, channels, K): what a unit force moves."""
+    whole = float((np.abs(departures) ** 2).sum())
+    squares = np.maximum((np.abs(moved) ** 2).sum(axis=1), TINY)
+    along = np.einsum("ick,pck->ipk", moved.conj(), departures)
+    return np.asarray(whole - (np.abs(along) ** 2 / squares[:, None]).sum(axis=(1, 2)))
+
+
+def unit_answers(simulator: Simulator, p: Array, measured: Measurement, last: int) -> Mapping[str, Complex]:
+    """What the channels of a record change by (places, lines up to the `last`) under a unit force at each place of the
+    rig of unknowns (size,), in its own line, in some unit that all share: the mean over strokes at all mesh phases."""
+    motion = motion_of(simulator, p, measured)
+    entries = len(motion.phase)
+    # Each a mesh cycle and a part of the next one after the one before.
+    cycle = (entries - 1) / abs(float(motion.phase[-1] - motion.phase[0]))
+    at = np.arange(STRUCK) * (1.0 + 1.0 / STRUCK) * cycle / entries
+    earlier = np.exp(-2j * np.pi * np.outer(at, np.arange(last + 1)))
+    strokes = np.fft.irfft(earlier, entries, axis=1).T
+    values, on, of = [], [], []
+    for number, coordinates in enumerate(_coordinates(motion)):
+        for coordinate, factor in coordinates:
+            values.append(factor * strokes)
+            on.append(np.full(STRUCK, coordinate))
+            of.append(number * STRUCK + np.arange(STRUCK))
+    acting = Acting(np.concatenate(values, axis=1, dtype=np.float32), np.concatenate(on), np.concatenate(of))
+    out = {}
+    for channel, lines in simulator.answers(measured, motion, acting).items():
+        struck = lines[:, : last + 1].reshape(len(PLACES), STRUCK, -1)
+        out[channel] = (struck / earlier).mean(axis=1)
+    return out
+
+
+def _coordinates(motion: Along) -> list[tuple[tuple[int, float], ...]]:
+    """The coordinates that a force at each place acts on, each with its part."""
+    model = motion.model
+    one, two = (tuple((number, part) for number, part in enumerate(spring.along) if part)
+                for spring in model.support_springs)  # fmt: skip
+    load = LOAD if model.rig.load.twists else U2
+    by_place: dict[Place, tuple[tuple[int, float], ...]] = {
+        "drive": ((motion.drive, 1.0),),
+        "driver-support": one,
+        "load": ((load, 1.0),),
+        "driven-support": two,
+        "mesh": ((IN_MESH, 1.0),),
+    }
+    return [by_place[place] for place in PLACES]
+
+
+def _changing(simulator: Simulator, measured: Measurement) -> tuple[Complex, Integers, dict[str, float]]:
+    """Repetitions' departures (P, channels, K) from their mean, in units of the noise, at the lines at which any
+    channel changes, these lines (K,), and the unit by channel."""
+    last = max(int(bins[-1]) for number, _, bins in simulator.target.plan
+               if simulator.target.measurements[number] is measured)  # fmt: skip
+    channels = measured_channels(measured)
+    lines = {name: np.fft.rfft(channels[name])[:, : last + 1] / channels[name].shape[-1]
+             for name in FITTED if name in channels}  # fmt: skip
+    changing, units = np.zeros(last + 1, dtype=bool), {}
+    for name, several in lines.items():
+        apart, white = scatter_of(several[:, 1:])
+        changing[1:] |= apart > COLOURED * white
+        units[name] = float(np.sqrt(max(white, TINY)))
+    departures = [(several - several.mean(axis=0))[:, changing] / units[name] for name, several in lines.items()]
+    return np.stack(departures, axis=1), np.flatnonzero(changing), units
