@@ -179,7 +179,8 @@ def _left_of(judged: Judged, missing: Missing, known: Calibration) -> _Left:
 
 def _outbid(of: _Told, named: tuple[Weighed, ...], left: _Left) -> Decided | None:
     """What a form without a name that explains the records clearly better than what is named says: beside that, or by
-    the force residuals where more is left than sound rigs leave."""
+    the force residuals where more is left than sound rigs leave. These know no structure: where the rig found says
+    whence what it lacks acts, it is there."""
     worth = max(one.log_bayes_factor for one in named)
     unnamed, free = of.unnamed, of.forces.best_free
 
@@ -191,8 +192,11 @@ def _outbid(of: _Told, named: tuple[Weighed, ...], left: _Left) -> Decided | Non
     by_force = needed(max(worth, _by_force(of.forces, named)))
     if left.size <= 1.0 or not free or free.log_bayes_factor <= by_force:
         return None
-    place = free.hypothesis.place
-    because = f"a force {at_place(place)} without any given form explains the records clearly better"
+    formed, leading = free.hypothesis.place, _leading(of.missing)
+    place = formed if leading == "none" else leading
+    because = f"a force {at_place(formed)} without any given form explains the records clearly better"
+    if place != formed:
+        because += f", but what the rig found lacks stands out {at_place(place)}"
     return Decided("unknown", place, (), free.log_bayes_factor / by_force, (because,))
 
 

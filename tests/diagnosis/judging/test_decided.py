@@ -259,6 +259,11 @@ def test_a_form_without_a_name_outbids_only_an_effect_that_leaves_the_gap() -> N
     assert decided(None, free=900.0, remains=seen).verdict == "none"
     # Where nothing that can be seen is left a form without a name has nothing to explain.
     assert decided(40.0, free=900.0, remains=0.9 * STRUCTURE).verdict == "effects"
+    # Its place, by equations without structure, gives way to that where the rig found lacks a force.
+    assert decided(40.0, free=90.0, remains=seen).place == "drive"
+    made = decided(40.0, free=90.0, remains=seen, excess=at(4, 2 * OUTSTANDING["mesh"]))
+    assert made.place == "mesh" and "at the drive without any given form" in made.because[0]
+    assert made.because[0].endswith("stands out in the mesh")
 
 
 def test_what_changes_counts_by_its_part_of_the_gap() -> None:
