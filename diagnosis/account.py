@@ -12,7 +12,7 @@ from gearbench.diagnosis.effects.effect import Hypothesis
 from gearbench.diagnosis.forces.equations import PLACES
 from gearbench.diagnosis.judging.closing import Closing
 from gearbench.diagnosis.judging.judged import Judged
-from gearbench.diagnosis.judging.missing import Missing
+from gearbench.diagnosis.remainder.missing import Missing
 from gearbench.diagnosis.verdict import Gap, Part, Range, Share
 from gearbench.diagnosis.words import CHANNELS, SHOWN_UNITS, band_in_words, length, number, percent
 from gearbench.diagnosis.words import PLACES as IN_WORDS

@@ -17,9 +17,9 @@ from gearbench.diagnosis.found_by_forces import by_forces_alone, fitted, left_of
 from gearbench.diagnosis.found_by_simulation import Searched, by_simulation
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.judging.decided import unexplained
-from gearbench.diagnosis.judging.repeating import repeating
 from gearbench.diagnosis.odds import Calibration
 from gearbench.diagnosis.population import POPULATION
+from gearbench.diagnosis.remainder.repeating import repeating
 from gearbench.diagnosis.replay.replays import COARSER, Replays
 from gearbench.diagnosis.selection.simulated import carried, simulated
 from gearbench.rig import Case

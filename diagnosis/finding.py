@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from gearbench.diagnosis.evidence.problem import Problem
 from gearbench.diagnosis.judging.judged import Judged
-from gearbench.diagnosis.judging.missing import Missing
+from gearbench.diagnosis.remainder.missing import Missing
 from gearbench.diagnosis.verdict import Candidate, Effect, Found, Outcome, Share
 from gearbench.rig import Case
 from gearbench.rig.contract import Place

@@ -38,18 +38,18 @@ from gearbench.diagnosis.judging.chances import (
     signs_of_called,
     unlikely,
 )
-from gearbench.diagnosis.judging.changing_place import place_of_changes
 from gearbench.diagnosis.judging.closing import DUE
 from gearbench.diagnosis.judging.decided import Decided, decide_simulated
-from gearbench.diagnosis.judging.drift import drift_of
-from gearbench.diagnosis.judging.free_forces import FreeForce, free_forces
 from gearbench.diagnosis.judging.judged import Judged
-from gearbench.diagnosis.judging.missing import Missing, missing_forces, nothing_missing
 from gearbench.diagnosis.judging.naming import drifts_of, effects_of
 from gearbench.diagnosis.judging.only_there import with_backlash_there
-from gearbench.diagnosis.judging.repeating import sentences_of_others
 from gearbench.diagnosis.judging.sifted import judged_of_size, left_out, seconded, sized
 from gearbench.diagnosis.odds import Calibration
+from gearbench.diagnosis.remainder.changing_place import place_of_changes
+from gearbench.diagnosis.remainder.drift import drift_of
+from gearbench.diagnosis.remainder.free_forces import FreeForce, free_forces
+from gearbench.diagnosis.remainder.missing import Missing, missing_forces, nothing_missing
+from gearbench.diagnosis.remainder.repeating import sentences_of_others
 from gearbench.diagnosis.selection.rivals import unentered
 from gearbench.diagnosis.selection.simulated import Simulated
 from gearbench.diagnosis.selection.weighing import Weighed

@@ -45,7 +45,7 @@ ROOMS: dict[str, tuple[str, ...]] = {
     "identification": ("excitation", "spectra", "lpm", "smooth", "truth", "response", "feedback", "nonlinear"),
     "diagnosis": (
         *("intake", "forces", "effects", "evidence", "replay", "structure", "simulation", "fitting", "selection"),
-        *("judging", "detection", "planning"),
+        *("remainder", "judging", "detection", "planning"),
     ),
     "challenge": ("truth", "making", "scoring"),
     "app": ("shell", "words", "figures", "report", "commands"),

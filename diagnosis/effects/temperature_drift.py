@@ -1,7 +1,7 @@
 """A stiffness that drifts while a record is taken, as it does where a rig warms up.
 
 No repetition is like another then. What differs is what the rig's derivative by that stiffness says
-(`diagnosis.judging.drift`), so that it is read off between repetitions and not searched for among forces.
+(`diagnosis.remainder.drift`), so that it is read off between repetitions and not searched for among forces.
 """
 
 from __future__ import annotations

@@ -14,12 +14,12 @@ from gearbench.diagnosis.evidence.decision import Decision, at_place, worst
 from gearbench.diagnosis.evidence.search import Search, told
 from gearbench.diagnosis.forces.equations import PLACES
 from gearbench.diagnosis.forces.steadiness import Unsteady
-from gearbench.diagnosis.judging.drift import Drift
-from gearbench.diagnosis.judging.free_forces import FreeForce
 from gearbench.diagnosis.judging.judged import GREATER, Judged
-from gearbench.diagnosis.judging.missing import Missing
 from gearbench.diagnosis.odds import Calibration, unknown_signs
 from gearbench.diagnosis.population import POPULATION
+from gearbench.diagnosis.remainder.drift import Drift
+from gearbench.diagnosis.remainder.free_forces import FreeForce
+from gearbench.diagnosis.remainder.missing import Missing
 from gearbench.diagnosis.selection.needed import size_of
 from gearbench.diagnosis.selection.simulated import Simulated
 from gearbench.diagnosis.selection.weighing import Weighed

@@ -23,7 +23,7 @@ from gearbench.diagnosis.effects.encoder_runout import ENCODER_RUNOUT
 from gearbench.diagnosis.effects.friction import FRICTION
 from gearbench.diagnosis.forces.equations import PLACES
 from gearbench.diagnosis.judging.closing import Closing
-from gearbench.diagnosis.judging.missing import OUTSTANDING, SILENT, Missing, nothing_missing
+from gearbench.diagnosis.remainder.missing import OUTSTANDING, SILENT, Missing, nothing_missing
 from gearbench.diagnosis.verdict import Gap, Range
 
 BANDS = ((0.0, 200.0), (200.0, 3000.0))

@@ -29,11 +29,11 @@ from gearbench.diagnosis.judging.decided import (
     decide_simulated,
     unexplained,
 )
-from gearbench.diagnosis.judging.drift import Drift
-from gearbench.diagnosis.judging.free_forces import Form, FreeForce
-from gearbench.diagnosis.judging.missing import OUTSTANDING, Missing
 from gearbench.diagnosis.odds import Odds
 from gearbench.diagnosis.population import POPULATION
+from gearbench.diagnosis.remainder.drift import Drift
+from gearbench.diagnosis.remainder.free_forces import Form, FreeForce
+from gearbench.diagnosis.remainder.missing import OUTSTANDING, Missing
 from gearbench.diagnosis.selection.weighing import Weighed
 from gearbench.diagnosis.structure.structure import LATE
 from gearbench.diagnosis.verdict import Outcome

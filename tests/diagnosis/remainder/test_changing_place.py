@@ -16,7 +16,7 @@ from gearbench.bench import simulate
 from gearbench.diagnosis.evidence.problem import problem_of
 from gearbench.diagnosis.forces.equations import PLACES
 from gearbench.diagnosis.intake.measurements import measurement
-from gearbench.diagnosis.judging.changing_place import place_of_changes, unit_answers
+from gearbench.diagnosis.remainder.changing_place import place_of_changes, unit_answers
 from gearbench.diagnosis.replay.replays import Replays
 from gearbench.diagnosis.simulation.simulator import Simulator
 from gearbench.diagnosis.simulation.target import target_of

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 from shared.synthetic import SAMPLES, measurement
 
-from gearbench.diagnosis.judging.repeating import repeating, sentences_of_others
+from gearbench.diagnosis.remainder.repeating import repeating, sentences_of_others
 
 ATTRIBUTES = {"base_radius_driver": 0.028, "base_radius_driven": 0.042, "working_pressure_angle": 0.35}
 

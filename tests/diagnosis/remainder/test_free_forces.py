@@ -15,7 +15,7 @@ from gearbench.diagnosis.evidence.problem import problem_of
 from gearbench.diagnosis.fitting.fit import fit_afresh
 from gearbench.diagnosis.intake.measurements import measurement
 from gearbench.diagnosis.judging.decided import FREE
-from gearbench.diagnosis.judging.free_forces import FreeForce, free_forces, lines_of_forms, motion_of
+from gearbench.diagnosis.remainder.free_forces import FreeForce, free_forces, lines_of_forms, motion_of
 from gearbench.diagnosis.replay.replays import Replays
 from gearbench.diagnosis.simulation.simulator import Simulator
 from gearbench.diagnosis.simulation.target import target_of

@@ -17,7 +17,7 @@ from gearbench.diagnosis.forces.equations import PLACES
 from gearbench.diagnosis.forces.steadiness import COLOURED, scatter_of
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.intake.signals import measured_channels
-from gearbench.diagnosis.judging.free_forces import motion_of
+from gearbench.diagnosis.remainder.free_forces import motion_of
 from gearbench.diagnosis.selection.simulated import Simulated
 from gearbench.diagnosis.simulation.simulator import Simulator
 from gearbench.diagnosis.simulation.target import FITTED, TINY

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from gearbench.diagnosis.forces.unknowns import group, unknowns_of
-from gearbench.diagnosis.judging import drift as module
-from gearbench.diagnosis.judging.drift import Drift, drift_of
+from gearbench.diagnosis.remainder import drift as module
+from gearbench.diagnosis.remainder.drift import Drift, drift_of
 from gearbench.rig.contract import Place
 
 SAMPLES, REPETITIONS, NOISE = 4096, 4, 1e-3

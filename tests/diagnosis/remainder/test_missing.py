@@ -14,7 +14,7 @@ from gearbench.cases import case_files
 from gearbench.diagnosis.evidence.problem import Problem, problem_of
 from gearbench.diagnosis.forces.equations import PLACES
 from gearbench.diagnosis.intake.measurements import measurement
-from gearbench.diagnosis.judging.missing import Missing, missing_forces
+from gearbench.diagnosis.remainder.missing import Missing, missing_forces
 from gearbench.rig import Case, Housing, Ripple, read_case
 
 
