@@ -9,6 +9,7 @@ does not show is none, and one that it does is where a fit begins.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,9 +31,10 @@ ANGLES = tuple(key for channel, key in KEYS.items() if channel.startswith("angle
 SHOWN = 0.5
 # Of the mean deflection under the load, what a rig's stiffness leaves unknown of it.
 UNKNOWN = 0.1
-# Nats that the means must say for a lag to be tried, its largest standard deviation, and renewals of the Jacobian
-# around it and of the fit in which it is free.
-CALLS, FARTHEST = 2.0, 4.0
+# Nats that the means must say for a lag to be tried, and its largest standard deviation; over that of a sound rig's,
+# what two of its angles differ by at most: in 95 % of rigs no more than twice its root of two.
+CALLS, FARTHEST, SOUND = 2.0, 4.0, 2.0 * sqrt(2.0)
+# Renewals of the Jacobian around a lag that is held, and of the fit in which it is free.
 RENEWALS_HELD, RENEWALS = 4, 1
 TINY = 1e-30  # [m^2]: less no lag moves a mean by
 
@@ -58,7 +60,8 @@ def told_by_means(simulator: Simulator, one: Hypothesis, optimum: Optimum) -> fl
 
 def called_for(simulator: Simulator, base: Optimum, one: Hypothesis) -> Array | None:
     """Unknowns (size,) of the rig `base` with the lag of an angle that the means call for; None where they call for
-    none, or one that no chain of sensors has, and of the driven angle none that would be early."""
+    none, for one that sound rigs have or that no chain of sensors has, and of the driven angle none that would be
+    early."""
     at, known = _lags(simulator, one), _known(simulator)
     if not at.size or not known:
         return None
@@ -73,7 +76,8 @@ def called_for(simulator: Simulator, base: Optimum, one: Hypothesis) -> Array | 
     part = float((mean - without) @ moved) / max(float(moved @ moved), TINY)
     begin[at] = part * wide
     early = part < 0.0 and any(one.key == FOLLOWED for one in one.wide)
-    if early or abs(part) > FARTHEST or _said(simulator, mean, without, without + part * moved) < CALLS:
+    sound = bool((np.abs(begin[at]) < SOUND * base.sd[at]).all())
+    if early or sound or abs(part) > FARTHEST or _said(simulator, mean, without, without + part * moved) < CALLS:
         return None
     return begin
 

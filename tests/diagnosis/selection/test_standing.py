@@ -91,6 +91,14 @@ def test_the_means_call_for_the_lag_that_is_there(prompt: Simulator, channel: st
     assert called_for(late(prompt, channel, LAG, zero_known=False), base, one) is None
 
 
+@pytest.mark.parametrize(("part", "called"), [(1.1, True), (0.9, False)])
+def test_a_lag_that_sound_rigs_have_is_not_called_for(prompt: Simulator, part: float, called: bool) -> None:
+    """They share a clock to some deviation each, and differ by twice its root of two in one rig of twenty."""
+    one, base = beside(prompt, "angle_driver")
+    base.sd[prompt.layout.unknowns["delay-angle_driver"]] = LAG / (2.0 * 2.0**0.5) / part
+    assert (called_for(late(prompt, "angle_driver", LAG), base, one) is not None) == called
+
+
 def test_a_lag_with_which_no_rig_answers_is_not_called_for(prompt: Simulator) -> None:
     """It costs its own beginning, and no more."""
     one, base = beside(prompt, "angle_driver")
