@@ -86,7 +86,6 @@ def by_simulation(
     report: Report,
 ) -> Finding:
     """The finding that simulation justifies."""
-    of = replace(of, unsteady=_acting(of, found))
     settled = _settled(of, found, held_out, known, report)
     judged, decided, chances, missing = settled.judged, settled.decided, settled.chances, settled.missing
     found, signs, changing = judged.found, settled.signs, settled.signs["changing"]
@@ -144,7 +143,8 @@ def _settled(
     entered, doubts, doubted = found.selection.entered, list[str](), dict[str, float]()
     judged = judged_of_size(of.problem, _judgeable(of, found, held_out), held_out, of.measurements, report)
     changing = changing_of(judged, changing_parts(of.steady, of.problem.conditions[0].band))
-    place, _ = of.unsteady.worst(LIMITS.unsteady)
+    unsteady = _acting(of, judged.found, changing > known.changing)
+    place, _ = unsteady.worst(LIMITS.unsteady)
     while True:
         found = judged.found
         free = _free(found)
@@ -153,7 +153,7 @@ def _settled(
         missing = replace(missing, factors=np.array([known.outstanding.get(place, 1.0) for place in PLACES]))
         drift = None if TEMPERATURE_DRIFT.name in of.without else drift_of(found, place)
         decided = decide_simulated(
-            judged, of.result, missing, of.unsteady, changing, known=known, drift=drift, free=free
+            judged, of.result, missing, unsteady, changing, known=known, drift=drift, free=free
         )
         signs |= {f"free {one.form.name}": one.worth for one in free}
         signs |= {f"size {one.form.name}": one.size for one in free}
@@ -202,9 +202,10 @@ def _judgeable(of: Searched, found: Simulated, held_out: Measurement | None) -> 
     return with_backlash_there(of.problem, found, held_out)
 
 
-def _acting(of: Searched, found: Simulated) -> Unsteady:
-    """What changes between repetitions, with the place at which the rig found would be moved like that."""
-    if of.unsteady.worst(LIMITS.unsteady)[1] <= 1.0:
+def _acting(of: Searched, found: Simulated, much: bool) -> Unsteady:
+    """What changes between repetitions, where that is `much` or seen by the force residuals with the place at which the
+    rig found would be moved like that."""
+    if not much and of.unsteady.worst(LIMITS.unsteady)[1] <= 1.0:
         return of.unsteady
     try:
         return of.unsteady._replace(acts=place_of_changes(found, of.steady))

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from math import inf
 from typing import NamedTuple
 
 import numpy as np
@@ -43,7 +44,7 @@ NEIGHBOURS = 41  # quiet lines that tell the noise of a line between them
 class Unsteady(NamedTuple):
     """What scatters between repetitions beyond noise, by equation, the mesh last: `excess` (equations + 1,), the sum
     over blocks of bins of count log lambda, for PER_LINES of them, and `force` (equations + 1,), its rms [N]; `acts`:
-    the place of that force, where something else tells it."""
+    where the rig that was found tells it, the place at which something changes, whatever its equation shows."""
 
     excess: Array
     force: Array
@@ -55,13 +56,13 @@ class Unsteady(NamedTuple):
         return cls(np.zeros(len(PLACES)), np.zeros(len(PLACES)))
 
     def worst(self, limits: Mapping[str, float]) -> tuple[Place, float]:
-        """The place that something changes at, and the largest excess of any over its limit. Where nothing else tells
-        it, of the places beyond it that of most force: what changes at one place makes an equation wrong at another by
-        as much as its numbers are, and a displacement tells little of that from noise."""
+        """The place that something changes at, and the largest excess of any over its limit, infinite where a place is
+        told otherwise. Else it is, of the places beyond it, that of most force: what changes at one place makes an
+        equation wrong at another by as much as its numbers are, and a displacement tells little of that from noise."""
         over = self.excess / np.array([limits[place] for place in PLACES])
         beyond = over > 1.0
         at = np.argmax(np.where(beyond, self.force, -1.0) if beyond.any() else over)
-        return self.acts or PLACES[int(at)], float(over.max())
+        return (self.acts, inf) if self.acts else (PLACES[int(at)], float(over.max()))
 
 
 def unsteadiness(

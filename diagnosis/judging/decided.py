@@ -85,7 +85,7 @@ def decide_simulated(
     _, over = unsteady.worst(limits.unsteady)
     # `changing` is more than nothing where what is left grows by it, whatever part of the nominal gap that is.
     large = drift is not None and changing > (0.0 if drift.beyond_sound else known.changing)
-    if drift is None or over <= 1.0 or not large:
+    if drift is None or not large or (over <= 1.0 and not drift.shown):
         return _decided(all_told, unsteady, changing)
     # What a drift explains speaks neither for something unknown nor against an effect.
     rest = _decided(all_told, Unsteady.nothing(), changing)

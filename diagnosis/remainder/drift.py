@@ -18,6 +18,7 @@ from gearbench.diagnosis.forces.steadiness import COLOURED, scatter_of
 from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.intake.signals import measured_channels
 from gearbench.diagnosis.selection.simulated import Simulated
+from gearbench.diagnosis.selection.weighing import LIMIT
 from gearbench.diagnosis.simulation.target import INDEPENDENT
 from gearbench.rig.contract import Place
 
@@ -51,6 +52,12 @@ class Drift:
     def beyond_sound(self) -> bool:
         """Whether it is, within two deviations, more than sound rigs have."""
         return abs(self.value) - 2.0 * self.std > SOUND
+
+    @property
+    def shown(self) -> bool:
+        """Whether it is that and the records call for it as they do for an effect: whatever the force residuals see,
+        whose equations may have more noise than a displacement."""
+        return self.beyond_sound and self.nats > LIMIT
 
     @property
     def grows(self) -> float:

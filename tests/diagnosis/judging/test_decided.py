@@ -300,6 +300,10 @@ def test_a_drift_that_explains_what_changes_is_named_and_speaks_against_nothing(
                                      (-0.012, 0.2, "effects")):  # fmt: skip
         smaller = replace(drift, value=value)
         assert decided(None, unsteady=support, changing=changing, drift=smaller).verdict == verdict
+    # Forces that see nothing do not speak against one beyond a sound rig's that the records call for.
+    for unseen, verdict in ((drift, "effects"), (replace(drift, value=-0.012), "none"),
+                            (replace(drift, nats=7.0), "none")):  # fmt: skip
+        assert decided(None, changing=0.2, drift=unseen).verdict == verdict
     left = decided(None, unsteady=support, changing=0.2, drift=drift, left=0.9, remains=0.9)
     assert left.verdict == "unknown" and left.drift is None and "98 %" in left.because[-1]
 
