@@ -1,14 +1,15 @@
 """A stiffness that drifts over a record, read off what differs between its repetitions.
 
 Repetition r of P is the rig at the mean stiffness of its time: about the mean of all, its lines move by
-tau_r delta dY/d(ln k), tau_r = (r + 1/2)/P - 1/2, where delta is the change of ln k from the first sample to the last.
-The derivative is that of the rig found. One number explains all lines of all channels and records, or none.
+tau_r delta dY/d(ln k), tau_r = (r + 1/2)/P - 1/2, where delta is the change of ln k from the first sample to the last,
+so that k itself changes by exp(delta) - 1. The derivative is that of the rig found. One number explains all lines of
+all channels and records, or none.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import sqrt
+from math import exp, expm1, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -118,7 +119,8 @@ def _drift_at(parts: list[_Part], place: Place) -> Drift:
     left = np.array([one.left(place, value) for one in parts])
     lines = np.array([one.departures.shape[1] for one in parts])
     nats = np.minimum(INDEPENDENT, lines) * np.log(energies / np.maximum(left, lines))
-    return Drift(place, float(value), std, float(1.0 - left.sum() / energies.sum()), float(nats.sum()))
+    share = float(1.0 - left.sum() / energies.sum())
+    return Drift(place, expm1(value), exp(value) * std, share, float(nats.sum()))
 
 
 def _parts(found: Simulated) -> list[_Part]:

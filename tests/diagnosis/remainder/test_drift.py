@@ -60,9 +60,9 @@ def found(
 
 
 def drifting(row: int, by: float) -> np.ndarray:
-    """What repetitions have whose stiffness has changed by so much from the first sample to the last."""
+    """What repetitions have whose stiffness has changed by so much of itself from the first sample to the last."""
     passed = (np.arange(REPETITIONS) + 0.5) / REPETITIONS
-    return by * passed[:, None] * derivatives()[row]
+    return np.log1p(by * passed)[:, None] * derivatives()[row]
 
 
 @pytest.mark.parametrize(
