@@ -45,7 +45,7 @@ from gearbench.diagnosis.judging.naming import drifts_of, effects_of
 from gearbench.diagnosis.judging.only_there import with_backlash_there
 from gearbench.diagnosis.judging.sifted import judged_of_size, left_out, seconded, sized
 from gearbench.diagnosis.odds import Calibration
-from gearbench.diagnosis.remainder.changing_place import place_of_changes
+from gearbench.diagnosis.remainder.changing_place import placed
 from gearbench.diagnosis.remainder.drift import drift_of
 from gearbench.diagnosis.remainder.free_forces import FreeForce, free_forces
 from gearbench.diagnosis.remainder.missing import Missing, missing_forces, nothing_missing
@@ -143,7 +143,7 @@ def _settled(
     entered, doubts, doubted = found.selection.entered, list[str](), dict[str, float]()
     judged = judged_of_size(of.problem, _judgeable(of, found, held_out), held_out, of.measurements, report)
     changing = changing_of(judged, changing_parts(of.steady, of.problem.conditions[0].band))
-    unsteady = _acting(of, judged.found, changing > known.changing)
+    unsteady = placed(of.unsteady, LIMITS, judged.found, of.steady, much=changing > known.changing)
     place, _ = unsteady.worst(LIMITS.unsteady)
     while True:
         found = judged.found
@@ -200,17 +200,6 @@ def _judgeable(of: Searched, found: Simulated, held_out: Measurement | None) -> 
     if held_out is None or not held_out.phase_known or BACKLASH.name in of.without:
         return found
     return with_backlash_there(of.problem, found, held_out)
-
-
-def _acting(of: Searched, found: Simulated, much: bool) -> Unsteady:
-    """What changes between repetitions, where that is `much` or seen by the force residuals with the place at which the
-    rig found would be moved like that."""
-    if not much and of.unsteady.worst(LIMITS.unsteady)[1] <= 1.0:
-        return of.unsteady
-    try:
-        return of.unsteady._replace(acts=place_of_changes(found, of.steady))
-    except ValueError:  # a rig without steady motion tells no place
-        return of.unsteady
 
 
 def _free(found: Simulated) -> tuple[FreeForce, ...]:

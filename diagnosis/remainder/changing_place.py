@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from gearbench.diagnosis.evidence.calibration import Limits
 from gearbench.diagnosis.forces.equations import PLACES
-from gearbench.diagnosis.forces.steadiness import COLOURED, scatter_of
+from gearbench.diagnosis.forces.steadiness import COLOURED, Unsteady, scatter_of
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.intake.signals import measured_channels
 from gearbench.diagnosis.remainder.free_forces import motion_of
@@ -36,6 +37,20 @@ Integers = NDArray[np.int64]
 EXPLAINS, TOLD = 0.5, 0.5
 # Mesh phases at which the rig is struck: the mean over them has no part of what meshing moves to other lines.
 STRUCK = 8
+
+
+def placed(
+    unsteady: Unsteady, limits: Limits, found: Simulated, steady: Collection[Measurement], *, much: bool
+) -> Unsteady:
+    """What changes between repetitions with the place at which the rig found is moved like that, where the force
+    residuals see it beyond their limits, or more changes than on sound rigs (`much`)."""
+    # Flanks that part in all records meet again a little otherwise, which acts in the mesh of a sound rig too.
+    if unsteady.worst(limits.unsteady)[1] <= 1.0 and not (much and found.simulator.anchored):
+        return unsteady
+    try:
+        return unsteady._replace(acts=place_of_changes(found, steady))
+    except ValueError:  # a rig without steady motion tells no place
+        return unsteady
 
 
 def place_of_changes(found: Simulated, steady: Collection[Measurement]) -> Place | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -13,10 +13,13 @@ import xarray as xr
 from shared.truth_plants import CASES
 
 from gearbench.bench import simulate
+from gearbench.diagnosis.evidence.calibration import LIMITS
 from gearbench.diagnosis.evidence.problem import problem_of
 from gearbench.diagnosis.forces.equations import PLACES
+from gearbench.diagnosis.forces.steadiness import Unsteady
 from gearbench.diagnosis.intake.measurements import measurement
-from gearbench.diagnosis.remainder.changing_place import place_of_changes, unit_answers
+from gearbench.diagnosis.remainder import changing_place as module
+from gearbench.diagnosis.remainder.changing_place import place_of_changes, placed, unit_answers
 from gearbench.diagnosis.replay.replays import Replays
 from gearbench.diagnosis.simulation.simulator import Simulator
 from gearbench.diagnosis.simulation.target import target_of
@@ -143,3 +146,27 @@ def test_nothing_is_told_of_noise_of_two_places_or_of_one_channel(bench: Bench) 
 def test_records_that_need_not_repeat_are_not_asked(bench: Bench) -> None:
     found, _ = bench.found(bench.changing(["drive"]))
     assert place_of_changes(found, []) is None
+
+
+@pytest.mark.parametrize(
+    ("seen", "much", "anchored", "asked"),
+    [(1.1, False, False, True), (0.9, False, True, False), (0.9, True, True, True), (0.9, True, False, False)],
+)
+def test_the_rig_is_asked_where_forces_see_something_or_much_changes_and_flanks_stay_together(
+    monkeypatch: pytest.MonkeyPatch, seen: float, much: bool, anchored: bool, asked: bool
+) -> None:
+    monkeypatch.setattr(module, "place_of_changes", lambda found, steady: "drive")
+    force = seen * np.array([LIMITS.unsteady[place] for place in PLACES])
+    found: Any = SimpleNamespace(simulator=SimpleNamespace(anchored=anchored))
+    made = placed(Unsteady(force, force), LIMITS, found, [], much=much)
+    assert made.acts == ("drive" if asked else None)
+
+
+def test_a_rig_without_steady_motion_tells_no_place(monkeypatch: pytest.MonkeyPatch) -> None:
+    def failing(found: Any, steady: Any) -> Place:
+        raise ValueError("does not settle")
+
+    monkeypatch.setattr(module, "place_of_changes", failing)
+    force = np.full(len(PLACES), 1e5)
+    before, found = Unsteady(force, force), object()
+    assert placed(before, LIMITS, cast("Any", found), [], much=True) is before
