@@ -2,7 +2,7 @@
 
 A force at one place moves all channels at once, in proportions that are the rig's own: of a line's departures between
 repetitions in all channels one complex size is left open, and what is left beside it says how well the place explains
-them. No stiffness or filter of an equation of motion is needed, and none of them can be wrong.
+them. It is as right as that rig, and needs no equation of motion with numbers and filters of its own.
 """
 
 from __future__ import annotations
