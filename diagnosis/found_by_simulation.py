@@ -143,15 +143,17 @@ def _settled(
     entered, doubts, doubted = found.selection.entered, list[str](), dict[str, float]()
     judged = judged_of_size(of.problem, _judgeable(of, found, held_out), held_out, of.measurements, report)
     changing = changing_of(judged, changing_parts(of.steady, of.problem.conditions[0].band))
-    unsteady = placed(of.unsteady, LIMITS, judged.found, of.steady, much=changing > known.changing)
-    place, _ = unsteady.worst(LIMITS.unsteady)
     while True:
         found = judged.found
+        unsteady = placed(of.unsteady, LIMITS, found, of.steady, much=changing > known.changing)
+        place, _ = unsteady.worst(LIMITS.unsteady)
         free = _free(found)
         missing = _missing(of, found)
         signs = {f"over {place}": float(over) for place, over in zip(PLACES, missing.over, strict=True)}
         missing = replace(missing, factors=np.array([known.outstanding.get(place, 1.0) for place in PLACES]))
-        drift = None if TEMPERATURE_DRIFT.name in of.without else drift_of(found, place)
+        drift = None
+        if TEMPERATURE_DRIFT.name not in of.without:
+            drift = drift_of(found, of.steady, place, told=unsteady.acts is not None)
         decided = decide_simulated(
             judged, of.result, missing, unsteady, changing, known=known, drift=drift, free=free
         )

@@ -148,6 +148,17 @@ def changing_parts(measurements: Sequence[Measurement], band: float) -> dict[str
     return largest
 
 
+def driven_otherwise(measured: Measurement, last: int) -> NDArray[np.bool_]:
+    """Lines (0 to `last`) at which the torque that is measured on the driver changes between repetitions: what answers
+    it is no force that is missing."""
+    changing = np.zeros(last + 1, dtype=bool)
+    if "torque_driver" in measured.periods:
+        torque = measured.periods["torque_driver"]
+        apart, white = scatter_of(np.fft.rfft(torque, axis=-1)[:, 1 : last + 1])
+        changing[1:] = (apart > COLOURED * white) & (apart > 0.0)
+    return changing
+
+
 def scatter_of(lines: Complex) -> tuple[Array, float]:
     """Variance (K,) of lines (P, K) between repetitions, and that of the white noise which most of them have."""
     apart = (np.abs(lines - lines.mean(axis=0)) ** 2).sum(axis=0) / (len(lines) - 1)

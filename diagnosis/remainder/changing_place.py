@@ -2,7 +2,9 @@
 
 A force at one place moves all channels at once, in proportions that are the rig's own: of a line's departures between
 repetitions in all channels one complex size is left open, and what is left beside it says how well the place explains
-them. It is as right as that rig, and needs no equation of motion with numbers and filters of its own.
+them. It is as right as that rig, and needs no equation of motion with numbers and filters of its own. Lines at which
+the torque that is measured on the driver changes tell nothing of a force that is missing, nor does what one sensor
+alone would show.
 """
 
 from __future__ import annotations
@@ -15,7 +17,7 @@ from numpy.typing import NDArray
 
 from gearbench.diagnosis.evidence.calibration import Limits
 from gearbench.diagnosis.forces.equations import PLACES
-from gearbench.diagnosis.forces.steadiness import COLOURED, Unsteady, scatter_of
+from gearbench.diagnosis.forces.steadiness import COLOURED, Unsteady, driven_otherwise, scatter_of
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.intake.signals import measured_channels
 from gearbench.diagnosis.remainder.free_forces import motion_of
@@ -55,26 +57,43 @@ def placed(
 
 def place_of_changes(found: Simulated, steady: Collection[Measurement]) -> Place | None:
     """The place at which a force explains most of what changes between repetitions of the `steady` records, among those
-    of the search; None where none explains half, another does nearly as well, or channels are too few to tell. Raises
-    ValueError where the rig has no steady motion in one of them."""
-    simulator = found.simulator.free
+    of the search; None where none explains half, another or one sensor does nearly as well, or channels are too few to
+    tell. Raises ValueError where the rig has no steady motion in one of them."""
+    simulator, p = found.simulator.free, found.end_of(found.selection.best)
     names = {one.name for one in steady}
-    energy, left, channels = 0.0, np.zeros(len(PLACES)), 0
+    energy, left, sensors = 0.0, np.zeros(len(PLACES)), dict.fromkeys(FITTED, 0.0)
     for measured in simulator.target.measurements:
         if measured.name not in names or measured.repetitions < 2:
             continue
         departures, at, units = _changing(simulator, measured)
-        if at.size:
-            answers = unit_answers(simulator, found.selection.best.p, measured, int(at[-1]))
+        if at.size and len(units) > 1:
+            answers = unit_answers(simulator, p, measured, int(at[-1]))
             moved = np.stack([answers[name][:, at] / unit for name, unit in units.items()], axis=1)
             energy += float((np.abs(departures) ** 2).sum())
             left += left_beside(departures, moved)
-            channels = max(channels, len(units))
+            shown = _of_sensors(simulator, units, at.size)
+            for name, beside in zip(shown, left_beside(departures, np.array(list(shown.values()))), strict=True):
+                sensors[name] += float(beside)
     order = np.argsort(left)
-    best, following = left[order[:2]]
-    if channels < 2 or best > (1.0 - EXPLAINS) * energy or best >= TOLD * following:
+    best, following = left[order[0]], min(left[order[1]], *(one for one in sensors.values() if one > 0.0), np.inf)
+    if best > (1.0 - EXPLAINS) * energy or best >= TOLD * following:
         return None
     return PLACES[int(order[0])]
+
+
+def _of_sensors(simulator: Simulator, units: Mapping[str, float], lines: int) -> dict[str, Complex]:
+    """What each sensor alone would show (channels, K): a displacement's is in the transmission error, too, which stands
+    for the angles."""
+    model, names = simulator.layout.model, list(units)
+    out = {}
+    for number, name in enumerate(names):
+        shown = np.zeros((len(names), lines), dtype=complex)
+        shown[number] = 1.0 / units[name]
+        if name.startswith("y_") and "dte" in units and {"y_driver", "y_driven"} <= set(names):
+            sense = 1.0 if name == "y_driver" else -1.0
+            shown[names.index("dte")] = sense * model.support_factor / units["dte"]
+        out[name] = shown
+    return out
 
 
 def left_beside(departures: Complex, moved: Complex) -> Array:
@@ -88,7 +107,7 @@ def left_beside(departures: Complex, moved: Complex) -> Array:
 
 def unit_answers(simulator: Simulator, p: Array, measured: Measurement, last: int) -> Mapping[str, Complex]:
     """What the channels of a record change by (places, lines up to the `last`) under a unit force at each place of the
-    rig of unknowns (size,), in its own line, in some unit that all share: the mean over strokes at all mesh phases."""
+    rig of unknowns (size,), in its own line [per N]: the mean over strokes at all mesh phases."""
     motion = motion_of(simulator, p, measured)
     entries = len(motion.phase)
     # Each a mesh cycle and a part of the next one after the one before.
@@ -106,7 +125,7 @@ def unit_answers(simulator: Simulator, p: Array, measured: Measurement, last: in
     out = {}
     for channel, lines in simulator.answers(measured, motion, acting).items():
         struck = lines[:, : last + 1].reshape(len(PLACES), STRUCK, -1)
-        out[channel] = (struck / earlier).mean(axis=1)
+        out[channel] = (struck / earlier).mean(axis=1) * (entries / measured.phase.size)
     return out
 
 
@@ -134,10 +153,14 @@ def _changing(simulator: Simulator, measured: Measurement) -> tuple[Complex, Int
     channels = measured_channels(measured)
     lines = {name: np.fft.rfft(channels[name])[:, : last + 1] / channels[name].shape[-1]
              for name in FITTED if name in channels}  # fmt: skip
-    changing, units = np.zeros(last + 1, dtype=bool), {}
+    changing, units, departures = np.zeros(last + 1, dtype=bool), {}, []
     for name, several in lines.items():
         apart, white = scatter_of(several[:, 1:])
-        changing[1:] |= apart > COLOURED * white
-        units[name] = float(np.sqrt(max(white, TINY)))
-    departures = [(several - several.mean(axis=0))[:, changing] / units[name] for name, several in lines.items()]
-    return np.stack(departures, axis=1), np.flatnonzero(changing), units
+        # A channel that is the same in all repetitions is none that was measured.
+        if white > 0.0:
+            changing[1:] |= apart > COLOURED * white
+            units[name] = float(np.sqrt(white))
+            departures.append((several - several.mean(axis=0)) / units[name])
+    changing &= ~driven_otherwise(measured, last)
+    at = np.flatnonzero(changing)
+    return np.array([one[:, at] for one in departures]).swapaxes(0, 1), at, units

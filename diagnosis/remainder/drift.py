@@ -8,6 +8,7 @@ all channels and records, or none.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from math import exp, expm1, sqrt
 
@@ -15,12 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.diagnosis.effects.effect import SIDES, SUPPORT_PLACES
-from gearbench.diagnosis.forces.steadiness import COLOURED, scatter_of
+from gearbench.diagnosis.forces.steadiness import COLOURED, driven_otherwise, scatter_of
 from gearbench.diagnosis.forces.unknowns import Unknowns
+from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.intake.signals import measured_channels
 from gearbench.diagnosis.selection.simulated import Simulated
 from gearbench.diagnosis.selection.weighing import LIMIT
-from gearbench.diagnosis.simulation.target import INDEPENDENT
+from gearbench.diagnosis.simulation.target import INDEPENDENT, TINY
 from gearbench.rig.contract import Place
 
 Array = NDArray[np.float64]
@@ -36,18 +38,22 @@ TOLD = 0.5
 AS_WELL = 0.9
 # Change of a stiffness over a record that sound rigs stay below, which settle by 0.4 % or so.
 SOUND = 0.01
+# Change of the logarithm of a stiffness up to which lines change in proportion to it; more is something else.
+LARGEST = 0.5
 
 
 @dataclass(frozen=True)
 class Drift:
     """Relative change of the stiffness at `place` from the first sample of a record to the last, with its standard
-    deviation, the part of all that changes between repetitions that it explains, by energy, and nats of evidence."""
+    deviation, the part of all that changes between repetitions that it explains, by energy, and nats of evidence;
+    `anchored`: whether records show it whose flanks stay together."""
 
     place: Place
     value: float
     std: float
     share: float
     nats: float
+    anchored: bool = True
 
     @property
     def beyond_sound(self) -> bool:
@@ -56,9 +62,9 @@ class Drift:
 
     @property
     def shown(self) -> bool:
-        """Whether it is that and the records call for it as they do for an effect: whatever the force residuals see,
-        whose equations may have more noise than a displacement."""
-        return self.beyond_sound and self.nats > LIMIT
+        """Whether it is that and records whose flanks stay together call for it as they do for an effect: whatever the
+        force residuals see, whose equations may have more noise than a displacement."""
+        return self.anchored and self.beyond_sound and self.nats > LIMIT
 
     @property
     def grows(self) -> float:
@@ -90,41 +96,53 @@ class _Part:
         return float((np.abs(self.departures - value * self.time * self.derivatives[place]) ** 2).sum())
 
 
-def drift_of(found: Simulated, by_forces: Place | None = None) -> Drift | None:
-    """The drift that explains most of what changes between repetitions of the records of the search, or nearly all of
-    it at the place where most force changes (`by_forces`); None where it explains less than half, where another place
-    would explain nearly as much, or nothing changes beyond noise."""
-    parts = _parts(found)
+def drift_of(
+    found: Simulated, steady: Collection[Measurement], place: Place | None = None, *, told: bool = False
+) -> Drift | None:
+    """The drift that explains most of what changes between repetitions of the `steady` records, among those of the
+    search, or nearly all of it at the `place` where what changes acts; where the rig found has `told` that place none
+    at another one explains it. None where it explains less than half, where another place would explain nearly as much,
+    or nothing changes beyond noise."""
+    parts = _parts(found, {one.name for one in steady})
     if not parts:
         return None
-    drifts = sorted((_drift_at(parts, place) for place in parts[0].derivatives), key=lambda one: -one.share)
-    there = next((one for one in drifts if one.place == by_forces and one.share > AS_WELL), None)
+    anchored = found.simulator.anchored
+    every = (_drift_at(parts, one, anchored) for one in parts[0].derivatives if not told or one == place)
+    drifts = sorted(every, key=lambda one: -one.share)
+    if not drifts:
+        return None
+    there = next((one for one in drifts if one.place == place and one.share > AS_WELL), None)
     if there is not None:
         return there
-    best, following = drifts[:2]
-    told = 1.0 - best.share < TOLD * (1.0 - following.share)
-    return best if best.share > EXPLAINS and told else None
+    best, *others = drifts
+    alone = all(1.0 - best.share < TOLD * (1.0 - one.share) for one in others)
+    return best if best.share > EXPLAINS and alone else None
 
 
-def _drift_at(parts: list[_Part], place: Place) -> Drift:
-    """The drift at one place, from all parts; its scatter over them is how well it is known."""
+def _drift_at(parts: list[_Part], place: Place, anchored: bool) -> Drift:
+    """The drift at one place, from all parts; how well it is known is the larger of its scatter over them and of what
+    all lines leave."""
     slopes = np.array([one.slope(place) for one in parts])
     total, weight = slopes.sum(axis=0)
-    if weight == 0.0:
-        return Drift(place, 0.0, 0.0, 0.0, 0.0)
-    value, seen = total / weight, slopes[:, 1] > 0.0
+    value = total / max(weight, TINY)
+    if weight == 0.0 or abs(value) > LARGEST:
+        return Drift(place, 0.0, 0.0, 0.0, 0.0, anchored)
+    seen = slopes[:, 1] > 0.0
     apart = slopes[seen, 0] / slopes[seen, 1] - value
-    std = float(np.sqrt((slopes[seen, 1] * apart**2).sum() / weight / max(seen.sum() - 1, 1)))
     energies = np.array([one.energy for one in parts])
     left = np.array([one.left(place, value) for one in parts])
     lines = np.array([one.departures.shape[1] for one in parts])
+    free = sum((len(one.departures) - 1) * one.departures.shape[1] for one in parts)
+    scatter = (slopes[seen, 1] * apart**2).sum() / max(seen.sum() - 1, 1), left.sum() / free
+    std = sqrt(max(scatter) / weight)
     nats = np.minimum(INDEPENDENT, lines) * np.log(energies / np.maximum(left, lines))
     share = float(1.0 - left.sum() / energies.sum())
-    return Drift(place, expm1(value), exp(value) * std, share, float(nats.sum()))
+    return Drift(place, expm1(value), exp(value) * std, share, float(nats.sum()), anchored)
 
 
-def _parts(found: Simulated) -> list[_Part]:
-    """The channels of all records in which lines change between repetitions."""
+def _parts(found: Simulated, steady: Collection[str]) -> list[_Part]:
+    """The channels of the `steady` records in which lines change between repetitions, but for those at which the torque
+    on the driver does."""
     target, rows, out, start = found.simulator.target, _rows(found.layout.unknowns), [], 0
     jacobian = _jacobian(found, list(rows.values()))
     smooth = found.simulator.smooth
@@ -132,10 +150,11 @@ def _parts(found: Simulated) -> list[_Part]:
         stop = start + len(bins)
         repetitions = measured_channels(target.measurements[number])[channel]
         count = len(repetitions)
-        if count > 1 and number in smooth:
+        if count > 1 and number in smooth and target.measurements[number].name in steady:
             lines = np.fft.rfft(repetitions, axis=-1)[:, bins] / repetitions.shape[-1]
             apart, white = scatter_of(lines)
             changing = apart > COLOURED * white
+            changing &= ~driven_otherwise(target.measurements[number], int(bins[-1]))[bins]
             unit = np.sqrt(white) if white > 0.0 else 1.0
             columns = {place: jacobian[row, start:stop][changing] / unit for place, row in rows.items()}
             time = ((np.arange(count) + 0.5) / count - 0.5)[:, None]

@@ -38,10 +38,14 @@ def found(
     changes: np.ndarray,
     monkeypatch: pytest.MonkeyPatch,
     columns: np.ndarray | None = None,
-    by_forces: Place | None = None,
+    place: Place | None = None,
+    *,
+    told: bool = False,
+    torque: np.ndarray | None = None,
+    steady: bool = True,
 ) -> Drift | None:
     """`changes` (repetitions, lines of two channels): what each repetition has beside the others and noise; `columns`
-    (3, lines): what the rig is said to do, if not what it does."""
+    (3, lines): what the rig is said to do, if not what it does; `torque` (repetitions, samples) on the driver."""
     rng, channels = np.random.default_rng(7), {}
     for number, name in enumerate(("dte", "y_driver")):
         spectrum = np.zeros((REPETITIONS, SAMPLES // 2 + 1), dtype=complex)
@@ -49,14 +53,15 @@ def found(
         noise = NOISE * (rng.standard_normal(spectrum.shape) + 1j * rng.standard_normal(spectrum.shape))
         channels[name] = np.fft.irfft((spectrum + noise) * SAMPLES, SAMPLES)
     monkeypatch.setattr(module, "measured_channels", lambda one: channels)
-    target = SimpleNamespace(plan=((0, "dte", BINS), (0, "y_driver", BINS)), measurements=(None,))
+    measured: Any = SimpleNamespace(name="one", periods={} if torque is None else {"torque_driver": torque})
+    target = SimpleNamespace(plan=((0, "dte", BINS), (0, "y_driver", BINS)), measurements=(measured,))
     optimum = SimpleNamespace(sensitivity=SimpleNamespace(jacobian=derivatives() if columns is None else columns))
     simulated: Any = SimpleNamespace(
-        simulator=SimpleNamespace(nudges={}, target=target, smooth=(0,)),
+        simulator=SimpleNamespace(nudges={}, target=target, smooth=(0,), anchored=True),
         selection=SimpleNamespace(best=optimum),
         layout=SimpleNamespace(unknowns=UNKNOWNS),
     )
-    return drift_of(simulated, by_forces)
+    return drift_of(simulated, [measured] if steady else [], place, told=told)
 
 
 def drifting(row: int, by: float) -> np.ndarray:
@@ -105,3 +110,39 @@ def test_the_place_of_most_force_is_that_of_the_drift_where_it_explains_nearly_a
     assert [one.place for one in told.values() if one] == ["mesh", "driver-support", "mesh"]
     there = told["driver-support"]
     assert there is not None and there.value == pytest.approx(-0.07, rel=0.05)
+
+
+def test_no_drift_is_told_at_another_place_than_the_rig_found_tells(monkeypatch: pytest.MonkeyPatch) -> None:
+    changes = drifting(DRIVER, -0.07)
+    at_drive, there = (found(changes, monkeypatch, None, place, told=True) for place in ("drive", "driver-support"))
+    assert at_drive is None and there is not None and there.place == "driver-support"
+
+
+def test_what_a_stiffness_hardly_moves_is_no_drift_of_any_size(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Else its logarithm would be of hundreds."""
+    for sign in (-1.0, 1.0):
+        assert found(sign * drifting(DRIVER, 0.07), monkeypatch, 1e-6 * derivatives()) is None
+
+
+def test_records_that_need_not_repeat_have_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert found(drifting(DRIVER, -0.07), monkeypatch, steady=False) is None
+
+
+def test_lines_whose_torque_changes_tell_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A drive that grows over the record moves everything as a rig that softens would."""
+    rng = np.random.default_rng(4)
+    lines = 1e-4 * (rng.standard_normal((REPETITIONS, SAMPLES // 2 + 1)) + 0j)
+    same = np.fft.irfft(lines * SAMPLES, SAMPLES)
+    lines[:, BINS[SHOWN]] += np.arange(REPETITIONS)[:, None]
+    changing = np.fft.irfft(lines * SAMPLES, SAMPLES)
+    told = [found(drifting(DRIVER, -0.07), monkeypatch, torque=torque) for torque in (same, changing)]
+    assert told[0] is not None and told[1] is None
+
+
+def test_one_channel_alone_does_not_make_a_drift_certain(monkeypatch: pytest.MonkeyPatch) -> None:
+    """There is no other to scatter from; what its lines leave says how well it is known."""
+    alone, other = drifting(DRIVER, -0.07), drifting(DRIVEN, -0.07)
+    alone[:, BINS.size :] = 0.0
+    mixed = alone + 0.7 * other * (alone != 0.0)
+    one = found(mixed, monkeypatch)
+    assert one is not None and one.std > 0.01 * abs(one.value)
