@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gearbench.diagnosis.effects.mesh_damping import MESH_DAMPING
 from gearbench.diagnosis.evidence.calibration import LIMITS, Limits
 from gearbench.diagnosis.evidence.decision import Decision, at_place, worst
 from gearbench.diagnosis.evidence.search import Search, told
@@ -18,7 +19,7 @@ from gearbench.diagnosis.judging.judged import GREATER, Judged
 from gearbench.diagnosis.odds import Calibration, unknown_signs
 from gearbench.diagnosis.population import POPULATION
 from gearbench.diagnosis.remainder.drift import Drift
-from gearbench.diagnosis.remainder.free_forces import FreeForce
+from gearbench.diagnosis.remainder.free_forces import Form, FreeForce
 from gearbench.diagnosis.remainder.missing import Missing
 from gearbench.diagnosis.selection.needed import size_of
 from gearbench.diagnosis.selection.simulated import Simulated
@@ -46,6 +47,8 @@ TOLD, FAINT = 0.5, 0.2
 # Nats that a force without a name is worth beside the final rig from which it is one, its least rms over the linear
 # force at its place, and how far it may go against that: no damper drives.
 FREE, LEAST_FREE, AGAINST = 15.0, 0.05, -1.0
+# Effects that stand for the linear part of a force without a name, as far as that has one.
+LINEAR = {Form("damper", "mesh"): MESH_DAMPING.name}
 # Probability from which something unknown is said to be at work.
 EVEN = 0.5
 # Over what sound rigs have: a lag of the drive's torque from which something is between its sensor and the rotor.
@@ -143,7 +146,7 @@ def _decided(of: _Told, unsteady: Unsteady, changing: float) -> Decided:
     if not named:
         made = _without(of, left)
         return replace(made, because=(*made.because, *aside)) if made.verdict == "none" else made
-    doubt = _outbid(of, named, left) if share < CLOSES else None
+    doubt = _linearly(of, named, left) or (_outbid(of, named, left) if share < CLOSES else None)
     if doubt is not None:
         return doubt
     if judged.left > 1.0 and left.size > 1.0:
@@ -175,6 +178,19 @@ def _left_of(judged: Judged, missing: Missing, known: Calibration) -> _Left:
     size = max(shown, judged.hidden / HIDING)
     seen = min(outstanding(missing)[1], size / VISIBLE)
     return _Left(size, shown, seen, max(min(judged.left / GREATER, size), seen, shown / PLAIN))
+
+
+def _linearly(of: _Told, named: tuple[Weighed, ...], left: _Left) -> Decided | None:
+    """What a force without a name says of which the only effect that is named would be the linear part: where the law
+    is another one, its number may only make up for that."""
+    clear = of.clear
+    if clear is None or [one.effect.name for one in named] != [LINEAR.get(clear.form)]:
+        return None
+    stands = (
+        f"{clear.form.words} explains what is left clearly better ({_worth_of(clear)}): {_nouns(named)} may only make"
+        " up for it"
+    )
+    return Decided("unknown", clear.form.place, (), max(left.sign, of.alone), (stands,))
 
 
 def _outbid(of: _Told, named: tuple[Weighed, ...], left: _Left) -> Decided | None:

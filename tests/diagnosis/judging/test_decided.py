@@ -12,6 +12,7 @@ import pytest
 
 from gearbench.diagnosis.effects.effect import Hypothesis, Wide
 from gearbench.diagnosis.effects.library import LIBRARY
+from gearbench.diagnosis.effects.mesh_damping import MESH_DAMPING
 from gearbench.diagnosis.evidence.calibration import LIMITS
 from gearbench.diagnosis.evidence.decision import Decision
 from gearbench.diagnosis.forces.equations import PLACES
@@ -40,6 +41,7 @@ from gearbench.diagnosis.verdict import Outcome
 from gearbench.diagnosis.words import percent
 
 EFFECT = next(one for one in LIBRARY if one.name == "friction")
+DAMPING = Hypothesis("mesh-damping", "mesh", (Wide("friction"),), effect=MESH_DAMPING)
 FRICTION = Hypothesis("friction", "mesh", (Wide("friction"),), effect=EFFECT)
 QUIET = np.zeros(5)
 STRUCTURE = POPULATION.structure
@@ -66,15 +68,16 @@ def decided(
     forces: Sequence[FreeForce] = (),
     curve: Odds | None = None,
     beyond: float = np.inf,
+    effects: Sequence[Hypothesis] = (FRICTION,),
 ) -> Decided:
-    """`worth` nats of friction (None: nothing was kept), which closes `share` of the gap; `left` of the nominal gap,
+    """`worth` nats of `effects` (None: nothing was kept), which closes `share` of the gap; `left` of the nominal gap,
     `remains` of a channel's fluctuation in the end, `searched` (None: as much) on the records of the search,
     whose noise may hide `hidden` of it; `forces` without a name; the drive acts `late` s, of sound rigs 1e-5; the
     rig is `kept` on the record's way. Something unknown is as likely as not where a sign of it is at its limit, unless
     there is another `curve`. The transmission error is left with `beyond` times its noise more than that."""
     entered: tuple[Any, ...] = ()
     if worth is not None:
-        entered = (Weighed(FRICTION, worth, None),)
+        entered = tuple(Weighed(one, worth, None) for one in effects)
     judged: Any = SimpleNamespace(
         found=SimpleNamespace(
             selection=SimpleNamespace(entered=entered, weighed=entered, best=SimpleNamespace(p=np.array([late]))),
@@ -148,6 +151,18 @@ def test_a_force_without_a_name_outbids_what_closes_little_whatever_is_left() ->
     made = decided(40.0, **much, share=0.6)
     assert made.verdict == "effects" and made.because[1].startswith(f"{DAMPER} explains what is left")
     assert len(decided(40.0, forces=[damper(0.9 * FREE)]).because) == 1
+
+
+def test_a_damping_ratio_that_stands_for_another_law_is_unknown() -> None:
+    other = FreeForce(Form("damper", "mesh"), 1.2 * FREE, 0.4)
+    made = decided(190.0, share=0.8, forces=[other], effects=[DAMPING])
+    assert (made.verdict, made.place, made.named) == ("unknown", "mesh", ()) and made.sign == pytest.approx(1.2)
+    assert made.because[0].endswith(f"{MESH_DAMPING.noun} may only make up for it")
+    # Not where it is no more than sound rigs have, elsewhere, or beside another effect.
+    assert decided(190.0, forces=[replace(other, worth=0.9 * FREE)], effects=[DAMPING]).verdict == "effects"
+    assert decided(190.0, forces=[damper(1.2 * FREE)], effects=[DAMPING]).verdict == "effects"
+    assert decided(190.0, forces=[other], effects=[DAMPING, FRICTION]).verdict == "effects"
+    assert decided(190.0, forces=[other]).verdict == "effects"
 
 
 def test_a_rig_further_from_the_judged_record_than_the_nominal_one_names_nothing() -> None:
