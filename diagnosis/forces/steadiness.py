@@ -30,6 +30,7 @@ from gearbench.rig.contract import Place
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+Flags = NDArray[np.bool_]
 
 ROUNDS = 60
 # Lines that scatter beyond white noise by this factor do not scatter by chance: one in 160 000.
@@ -63,6 +64,18 @@ class Unsteady(NamedTuple):
         beyond = over > 1.0
         at = np.argmax(np.where(beyond, self.force, -1.0) if beyond.any() else over)
         return (self.acts, inf) if self.acts else (PLACES[int(at)], float(over.max()))
+
+
+class Scatter(NamedTuple):
+    """Variance `apart` (K,) of lines between repetitions, and that of the `white` noise which most of them have."""
+
+    apart: Array
+    white: float
+
+    @property
+    def changing(self) -> Flags:
+        """Which lines (K,) do not scatter by chance."""
+        return np.asarray(self.apart > COLOURED * self.white)
 
 
 def unsteadiness(
@@ -111,7 +124,7 @@ def least_unsteadiness(
     return min(every, key=lambda one: float(one.excess.sum()))
 
 
-def quiet_level(scatter: Complex, quiet: NDArray[np.bool_]) -> Array:
+def quiet_level(scatter: Complex, quiet: Flags) -> Array:
     """Variance (equations, K) of the scatter (P, equations, K) as neighbouring quiet lines (K,) have it; zero without
     enough of them."""
     rows, lines = scatter.shape[1], scatter.shape[2]
@@ -140,29 +153,25 @@ def changing_parts(measurements: Sequence[Measurement], band: float) -> dict[str
         for name, repetitions in measured_channels(measured).items():
             last = int(band * repetitions.shape[-1] / measured.sampling_rate)
             lines = np.fft.rfft(repetitions, axis=-1)[:, 1 : max(last, 2)]
-            apart, white = scatter_of(lines)
-            coloured = float(apart[apart > COLOURED * white].sum())
+            scatter = scatter_of(lines)
+            coloured = float(scatter.apart[scatter.changing].sum())
             level = float((np.abs(lines.mean(axis=0)) ** 2).sum())
             if level > 0.0:
                 largest[name] = max(largest.get(name, 0.0), float(np.sqrt(coloured / level)))
     return largest
 
 
-def driven_otherwise(measured: Measurement, last: int) -> NDArray[np.bool_]:
+def driven_otherwise(measured: Measurement, last: int) -> Flags:
     """Lines (0 to `last`) at which the torque that is measured on the driver changes between repetitions: what answers
     it is no force that is missing."""
-    changing = np.zeros(last + 1, dtype=bool)
-    if "torque_driver" in measured.periods:
-        torque = measured.periods["torque_driver"]
-        apart, white = scatter_of(np.fft.rfft(torque, axis=-1)[:, 1 : last + 1])
-        changing[1:] = (apart > COLOURED * white) & (apart > 0.0)
-    return changing
+    lines = np.fft.rfft(measured.periods["torque_driver"], axis=-1)[:, 1 : last + 1]
+    return np.append(False, scatter_of(lines).changing)
 
 
-def scatter_of(lines: Complex) -> tuple[Array, float]:
-    """Variance (K,) of lines (P, K) between repetitions, and that of the white noise which most of them have."""
+def scatter_of(lines: Complex) -> Scatter:
+    """That of lines (P, K) between repetitions."""
     apart = (np.abs(lines - lines.mean(axis=0)) ** 2).sum(axis=0) / (len(lines) - 1)
-    return apart, float(np.median(apart)) / float(np.log(2.0))
+    return Scatter(apart, float(np.median(apart)) / float(np.log(2.0)))
 
 
 def excess_of(scatter: Complex, mesh_factor: Complex, variance: Array) -> Unsteady:

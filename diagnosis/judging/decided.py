@@ -88,7 +88,9 @@ def decide_simulated(
     _, over = unsteady.worst(limits.unsteady)
     # `changing` is more than nothing where what is left grows by it, whatever part of the nominal gap that is.
     large = drift is not None and changing > (0.0 if drift.beyond_sound else known.changing)
-    if drift is None or not large or (over <= 1.0 and not drift.shown):
+    # As of what changes (`remainder.changing_place`): where flanks part in all records, forces must see it, too.
+    seen = over > 1.0 or (drift is not None and drift.shown and judged.found.simulator.anchored)
+    if drift is None or not large or not seen:
         return _decided(all_told, unsteady, changing)
     # What a drift explains speaks neither for something unknown nor against an effect.
     rest = _decided(all_told, Unsteady.nothing(), changing)
@@ -186,11 +188,8 @@ def _linearly(of: _Told, named: tuple[Weighed, ...], left: _Left) -> Decided | N
     clear = of.clear
     if clear is None or [one.effect.name for one in named] != [LINEAR.get(clear.form)]:
         return None
-    stands = (
-        f"{clear.form.words} explains what is left clearly better ({_worth_of(clear)}): {_nouns(named)} may only make"
-        " up for it"
-    )
-    return Decided("unknown", clear.form.place, (), max(left.sign, of.alone), (stands,))
+    because = f"{_better(clear)}: {_nouns(named)} may only make up for it"
+    return Decided("unknown", clear.form.place, (), max(left.sign, of.alone), (because,))
 
 
 def _outbid(of: _Told, named: tuple[Weighed, ...], left: _Left) -> Decided | None:
@@ -225,8 +224,12 @@ def _explained(by: FreeForce, sign: float) -> Decided:
 
 def _beside(more: FreeForce) -> str:
     """That something without a name is at work besides."""
-    better = f"{more.form.words} explains what is left clearly better ({_worth_of(more)})"
-    return f"{better}: something else may be at work besides"
+    return f"{_better(more)}: something else may be at work besides"
+
+
+def _better(more: FreeForce) -> str:
+    """What it explains beside what is named."""
+    return f"{more.form.words} explains what is left clearly better ({_worth_of(more)})"
 
 
 def _worth_of(one: FreeForce) -> str:

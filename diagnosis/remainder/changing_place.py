@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from gearbench.diagnosis.evidence.calibration import Limits
 from gearbench.diagnosis.forces.equations import PLACES
-from gearbench.diagnosis.forces.steadiness import COLOURED, Unsteady, driven_otherwise, scatter_of
+from gearbench.diagnosis.forces.steadiness import Unsteady, driven_otherwise, scatter_of
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.intake.signals import measured_channels
 from gearbench.diagnosis.remainder.free_forces import motion_of
@@ -61,7 +61,7 @@ def place_of_changes(found: Simulated, steady: Collection[Measurement]) -> Place
     tell. Raises ValueError where the rig has no steady motion in one of them."""
     simulator, p = found.simulator.free, found.end_of(found.selection.best)
     names = {one.name for one in steady}
-    energy, left, sensors = 0.0, np.zeros(len(PLACES)), dict.fromkeys(FITTED, 0.0)
+    energy, left, sensors = 0.0, np.zeros(len(PLACES)), dict[str, float]()
     for measured in simulator.target.measurements:
         if measured.name not in names or measured.repetitions < 2:
             continue
@@ -73,9 +73,9 @@ def place_of_changes(found: Simulated, steady: Collection[Measurement]) -> Place
             left += left_beside(departures, moved)
             shown = _of_sensors(simulator, units, at.size)
             for name, beside in zip(shown, left_beside(departures, np.array(list(shown.values()))), strict=True):
-                sensors[name] += float(beside)
+                sensors[name] = sensors.get(name, 0.0) + float(beside)
     order = np.argsort(left)
-    best, following = left[order[0]], min(left[order[1]], *(one for one in sensors.values() if one > 0.0), np.inf)
+    best, following = left[order[0]], min([left[order[1]], *sensors.values()])
     if best > (1.0 - EXPLAINS) * energy or best >= TOLD * following:
         return None
     return PLACES[int(order[0])]
@@ -155,11 +155,11 @@ def _changing(simulator: Simulator, measured: Measurement) -> tuple[Complex, Int
              for name in FITTED if name in channels}  # fmt: skip
     changing, units, departures = np.zeros(last + 1, dtype=bool), {}, []
     for name, several in lines.items():
-        apart, white = scatter_of(several[:, 1:])
+        scatter = scatter_of(several[:, 1:])
         # A channel that is the same in all repetitions is none that was measured.
-        if white > 0.0:
-            changing[1:] |= apart > COLOURED * white
-            units[name] = float(np.sqrt(white))
+        if scatter.white > 0.0:
+            changing[1:] |= scatter.changing
+            units[name] = float(np.sqrt(scatter.white))
             departures.append((several - several.mean(axis=0)) / units[name])
     changing &= ~driven_otherwise(measured, last)
     at = np.flatnonzero(changing)

@@ -16,13 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.diagnosis.effects.effect import SIDES, SUPPORT_PLACES
-from gearbench.diagnosis.forces.steadiness import COLOURED, driven_otherwise, scatter_of
+from gearbench.diagnosis.forces.steadiness import driven_otherwise, scatter_of
 from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.intake.signals import measured_channels
 from gearbench.diagnosis.selection.simulated import Simulated
 from gearbench.diagnosis.selection.weighing import LIMIT
-from gearbench.diagnosis.simulation.target import INDEPENDENT, TINY
+from gearbench.diagnosis.simulation.target import INDEPENDENT
 from gearbench.rig.contract import Place
 
 Array = NDArray[np.float64]
@@ -45,15 +45,13 @@ LARGEST = 0.5
 @dataclass(frozen=True)
 class Drift:
     """Relative change of the stiffness at `place` from the first sample of a record to the last, with its standard
-    deviation, the part of all that changes between repetitions that it explains, by energy, and nats of evidence;
-    `anchored`: whether records show it whose flanks stay together."""
+    deviation, the part of all that changes between repetitions that it explains, by energy, and nats of evidence."""
 
     place: Place
     value: float
     std: float
     share: float
     nats: float
-    anchored: bool = True
 
     @property
     def beyond_sound(self) -> bool:
@@ -62,9 +60,9 @@ class Drift:
 
     @property
     def shown(self) -> bool:
-        """Whether it is that and records whose flanks stay together call for it as they do for an effect: whatever the
-        force residuals see, whose equations may have more noise than a displacement."""
-        return self.anchored and self.beyond_sound and self.nats > LIMIT
+        """Whether it is that and records call for it as they do for an effect: whatever the force residuals see, whose
+        equations may have more noise than a displacement."""
+        return self.beyond_sound and self.nats > LIMIT
 
     @property
     def grows(self) -> float:
@@ -106,8 +104,7 @@ def drift_of(
     parts = _parts(found, {one.name for one in steady})
     if not parts:
         return None
-    anchored = found.simulator.anchored
-    every = (_drift_at(parts, one, anchored) for one in parts[0].derivatives if not told or one == place)
+    every = (_drift_at(parts, one) for one in parts[0].derivatives if not told or one == place)
     drifts = sorted(every, key=lambda one: -one.share)
     if not drifts:
         return None
@@ -119,15 +116,14 @@ def drift_of(
     return best if best.share > EXPLAINS and alone else None
 
 
-def _drift_at(parts: list[_Part], place: Place, anchored: bool) -> Drift:
+def _drift_at(parts: list[_Part], place: Place) -> Drift:
     """The drift at one place, from all parts; how well it is known is the larger of its scatter over them and of what
     all lines leave."""
     slopes = np.array([one.slope(place) for one in parts])
     total, weight = slopes.sum(axis=0)
-    value = total / max(weight, TINY)
-    if weight == 0.0 or abs(value) > LARGEST:
-        return Drift(place, 0.0, 0.0, 0.0, 0.0, anchored)
-    seen = slopes[:, 1] > 0.0
+    if weight == 0.0 or abs(total) > LARGEST * weight:
+        return Drift(place, 0.0, 0.0, 0.0, 0.0)
+    value, seen = total / weight, slopes[:, 1] > 0.0
     apart = slopes[seen, 0] / slopes[seen, 1] - value
     energies = np.array([one.energy for one in parts])
     left = np.array([one.left(place, value) for one in parts])
@@ -137,7 +133,7 @@ def _drift_at(parts: list[_Part], place: Place, anchored: bool) -> Drift:
     std = sqrt(max(scatter) / weight)
     nats = np.minimum(INDEPENDENT, lines) * np.log(energies / np.maximum(left, lines))
     share = float(1.0 - left.sum() / energies.sum())
-    return Drift(place, expm1(value), exp(value) * std, share, float(nats.sum()), anchored)
+    return Drift(place, expm1(value), exp(value) * std, share, float(nats.sum()))
 
 
 def _parts(found: Simulated, steady: Collection[str]) -> list[_Part]:
@@ -145,17 +141,20 @@ def _parts(found: Simulated, steady: Collection[str]) -> list[_Part]:
     on the driver does."""
     target, rows, out, start = found.simulator.target, _rows(found.layout.unknowns), [], 0
     jacobian = _jacobian(found, list(rows.values()))
-    smooth = found.simulator.smooth
+    asked = {number: target.measurements[number] for number in found.simulator.smooth}
+    asked = {number: one for number, one in asked.items() if one.name in steady and one.repetitions > 1}
+    channels = {number: measured_channels(one) for number, one in asked.items()}
+    last = max(int(bins[-1]) for _, _, bins in target.plan)
+    driven = {number: driven_otherwise(one, last) for number, one in asked.items()}
     for number, channel, bins in target.plan:
         stop = start + len(bins)
-        repetitions = measured_channels(target.measurements[number])[channel]
-        count = len(repetitions)
-        if count > 1 and number in smooth and target.measurements[number].name in steady:
+        if number in asked:
+            repetitions = channels[number][channel]
+            count = len(repetitions)
             lines = np.fft.rfft(repetitions, axis=-1)[:, bins] / repetitions.shape[-1]
-            apart, white = scatter_of(lines)
-            changing = apart > COLOURED * white
-            changing &= ~driven_otherwise(target.measurements[number], int(bins[-1]))[bins]
-            unit = np.sqrt(white) if white > 0.0 else 1.0
+            scatter = scatter_of(lines)
+            changing = scatter.changing & ~driven[number][bins]
+            unit = np.sqrt(scatter.white) if scatter.white > 0.0 else 1.0
             columns = {place: jacobian[row, start:stop][changing] / unit for place, row in rows.items()}
             time = ((np.arange(count) + 0.5) / count - 0.5)[:, None]
             departures = (lines - lines.mean(axis=0))[:, changing] / unit

@@ -69,6 +69,7 @@ def decided(
     curve: Odds | None = None,
     beyond: float = np.inf,
     effects: Sequence[Hypothesis] = (FRICTION,),
+    anchored: bool = True,
 ) -> Decided:
     """`worth` nats of `effects` (None: nothing was kept), which closes `share` of the gap; `left` of the nominal gap,
     `remains` of a channel's fluctuation in the end, `searched` (None: as much) on the records of the search,
@@ -82,6 +83,7 @@ def decided(
         found=SimpleNamespace(
             selection=SimpleNamespace(entered=entered, weighed=entered, best=SimpleNamespace(p=np.array([late]))),
             layout=SimpleNamespace(unknowns=CLOCK),
+            simulator=SimpleNamespace(anchored=anchored),
         ),
         share_of=lambda effect: share,
         left=left,
@@ -319,6 +321,9 @@ def test_a_drift_that_explains_what_changes_is_named_and_speaks_against_nothing(
     for unseen, verdict in ((drift, "effects"), (replace(drift, value=-0.012), "none"),
                             (replace(drift, nats=7.0), "none")):  # fmt: skip
         assert decided(None, changing=0.2, drift=unseen).verdict == verdict
+    # Where flanks part in all records they must.
+    assert decided(None, changing=0.2, drift=drift, anchored=False).verdict == "none"
+    assert decided(None, unsteady=support, changing=0.2, drift=drift, anchored=False).verdict == "effects"
     left = decided(None, unsteady=support, changing=0.2, drift=drift, left=0.9, remains=0.9)
     assert left.verdict == "unknown" and left.drift is None and "98 %" in left.because[-1]
 

@@ -53,11 +53,12 @@ def found(
         noise = NOISE * (rng.standard_normal(spectrum.shape) + 1j * rng.standard_normal(spectrum.shape))
         channels[name] = np.fft.irfft((spectrum + noise) * SAMPLES, SAMPLES)
     monkeypatch.setattr(module, "measured_channels", lambda one: channels)
-    measured: Any = SimpleNamespace(name="one", periods={} if torque is None else {"torque_driver": torque})
+    driven = np.zeros((REPETITIONS, SAMPLES)) if torque is None else torque
+    measured: Any = SimpleNamespace(name="one", repetitions=REPETITIONS, periods={"torque_driver": driven})
     target = SimpleNamespace(plan=((0, "dte", BINS), (0, "y_driver", BINS)), measurements=(measured,))
     optimum = SimpleNamespace(sensitivity=SimpleNamespace(jacobian=derivatives() if columns is None else columns))
     simulated: Any = SimpleNamespace(
-        simulator=SimpleNamespace(nudges={}, target=target, smooth=(0,), anchored=True),
+        simulator=SimpleNamespace(nudges={}, target=target, smooth=(0,)),
         selection=SimpleNamespace(best=optimum),
         layout=SimpleNamespace(unknowns=UNKNOWNS),
     )
