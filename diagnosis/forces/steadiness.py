@@ -39,6 +39,7 @@ COLOURED = 12.0
 SLOW = 3e-3
 # Lines of all repetitions that an excess is told for: the more there are, the larger is the sum.
 PER_LINES = 20_000
+ROUNDED = 1e-6  # part of a line of the torque by which it may change for nothing
 NEIGHBOURS = 41  # quiet lines that tell the noise of a line between them
 
 
@@ -165,7 +166,9 @@ def driven_otherwise(measured: Measurement, last: int) -> Flags:
     """Lines (0 to `last`) at which the torque that is measured on the driver changes between repetitions: what answers
     it is no force that is missing."""
     lines = np.fft.rfft(measured.periods["torque_driver"], axis=-1)[:, 1 : last + 1]
-    return np.append(False, scatter_of(lines).changing)
+    scatter = scatter_of(lines)
+    # A torque without noise is rounded, most where it is largest.
+    return np.append(False, scatter.changing & (scatter.apart > (ROUNDED * np.abs(lines.mean(axis=0))) ** 2))
 
 
 def scatter_of(lines: Complex) -> Scatter:
