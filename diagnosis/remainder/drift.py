@@ -140,9 +140,11 @@ def _parts(found: Simulated, steady: Collection[str]) -> list[_Part]:
     """The channels of the `steady` records in which lines change between repetitions, but for those at which the torque
     on the driver does."""
     target, rows, out, start = found.simulator.target, _rows(found.layout.unknowns), [], 0
-    jacobian = _jacobian(found, list(rows.values()))
     asked = {number: target.measurements[number] for number in found.simulator.smooth}
     asked = {number: one for number, one in asked.items() if one.name in steady and one.repetitions > 1}
+    if not asked:
+        return out
+    jacobian = _jacobian(found, list(rows.values()))
     channels = {number: measured_channels(one) for number, one in asked.items()}
     last = max(int(bins[-1]) for _, _, bins in target.plan)
     driven = {number: driven_otherwise(one, last) for number, one in asked.items()}
