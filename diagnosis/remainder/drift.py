@@ -139,7 +139,7 @@ def _drift_at(parts: list[_Part], place: Place) -> Drift:
 def _parts(found: Simulated, steady: Collection[str]) -> list[_Part]:
     """The channels of the `steady` records in which lines change between repetitions, but for those at which the torque
     on the driver does."""
-    target, rows, out, start = found.simulator.target, _rows(found.layout.unknowns), [], 0
+    target, rows, out, start = found.simulator.target, _rows(found.layout.unknowns), list[_Part](), 0
     asked = {number: target.measurements[number] for number in found.simulator.smooth}
     asked = {number: one for number, one in asked.items() if one.name in steady and one.repetitions > 1}
     if not asked:
