@@ -10,7 +10,7 @@ import os
 import secrets
 import shutil
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -27,7 +27,7 @@ from gearbench.challenge.errors import ChallengeError
 from gearbench.challenge.making.drawn import drawn_nominal
 from gearbench.challenge.making.nominal import nominal_text
 from gearbench.challenge.making.plan import MOST_CASES, Mix, Plan, make_plan
-from gearbench.challenge.making.traces import traces_of
+from gearbench.challenge.making.traces import Recorder, traces_of
 from gearbench.challenge.truth.effects import EFFECTS, FOREIGN, Drawn
 from gearbench.challenge.truth.elastic import measure_elastic, within_uncertainty
 from gearbench.challenge.truth.levels import background
@@ -52,12 +52,14 @@ Progress = Callable[[float, str], None]
 @dataclass(frozen=True)
 class Truth:
     """One truth rig complete: structure and levels, and the answer that belongs to it; `elastic`: in place of the
-    structure the nominal case within its uncertainty, to be simulated by finite elements."""
+    structure the nominal case within its uncertainty, to be simulated by finite elements; `soft`: its coupling
+    yields."""
 
     structure: Structure
     drawn: Drawn
     answer: Answer
     elastic: Case | None = None
+    soft: bool = False
 
 
 def draw_truth(
@@ -97,7 +99,7 @@ def draw_truth(
         number,
         tuple(places),
     )
-    return Truth(structure, drawn, answer, elastic), rngs[3]
+    return Truth(structure, drawn, answer, elastic, "coupling" in {*plan.effects} - {left_out}), rngs[3]
 
 
 def nominal_stiffness(nominal: Case) -> float:
@@ -154,7 +156,7 @@ def make_challenge(
     if not drawn:
         scale = scale_of(nominal) if torques else None
         shared = make_bench(nominal, nominal_stiffness(nominal), scale, torques), nominal_text(nominal)
-    missing = [name for name in sorted(answers) if not (out / name).is_dir() or _untraced(answers[name], plans)]
+    missing = [name for name, one in sorted(answers.items()) if not (out / name).is_dir() or _untraced(one)]
     stop = threading.Event()
 
     def run(name: str) -> tuple[str, dict[str, float]]:
@@ -167,11 +169,8 @@ def make_challenge(
         bench, text = shared or (make_bench(rig, nominal_stiffness(rig), scale), nominal_text(rig))
         if not (out / name).is_dir():
             _write_case(bench, truth, name, text, out, rng)
-        if plan.elastic:
-            return name, {}
         fewer = {one: draw_truth(rig, family, seed, number, plan, scale, one)[0] for one in plan.effects}
-        without = {one: rest.drawn.levels for one, rest in fewer.items()}
-        return name, traces_of(bench, truth.structure, truth.drawn.levels, without)
+        return name, traces_of(bench, _recorder(truth), {one: _recorder(rest) for one, rest in fewer.items()})
 
     with ThreadPoolExecutor(processors()) as pool:
         futures = [pool.submit(run, name) for name in missing]
@@ -205,9 +204,9 @@ def check_apart(out: Path, answers_file: Path) -> None:
         raise ChallengeError(f"--answers {answers_file} lies inside --out {out}: answers must lie somewhere else")
 
 
-def _untraced(answer: Answer, plans: Sequence[Plan]) -> bool:
+def _untraced(answer: Answer) -> bool:
     """Whether it is not known yet how far the effects of a case show."""
-    return bool(answer.effects) and not answer.traces and not plans[answer.number].elastic
+    return bool(answer.effects) and not answer.traces
 
 
 def _claim(out: Path, answers_file: Path, truths: list[Answer]) -> dict[str, Answer]:
@@ -258,5 +257,9 @@ def _record(bench: Bench, truth: Truth, condition: Condition, name: str, rng: np
     levels = truth.drawn.levels
     if truth.elastic is None:
         return measure(bench, truth.structure, levels, condition, name, rng)
-    soft = "coupling" in truth.answer.effects
-    return measure_elastic(bench, truth.elastic, levels, condition, soft, name, rng)
+    return measure_elastic(bench, truth.elastic, levels, condition, truth.soft, name, rng)
+
+
+def _recorder(truth: Truth) -> Recorder:
+    """How a bench measures that truth rig."""
+    return lambda bench, condition: _record(bench, truth, condition, "", np.random.default_rng(0))

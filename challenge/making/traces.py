@@ -7,7 +7,7 @@ touch leaves no trace, and nobody can owe it.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -15,10 +15,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from gearbench.bench.plan.schedule import schedule
-from gearbench.challenge.truth.levels import Levels
-from gearbench.challenge.truth.measure import attributes_of, measure, noisy
+from gearbench.challenge.truth.measure import attributes_of, noisy
 from gearbench.challenge.truth.rigs import Bench, conditions_of
-from gearbench.challenge.truth.structure import Structure
 from gearbench.records import make_record
 from gearbench.records.transmission_error import AngleOnlyWarning, dte_of_channels
 from gearbench.rig import Condition
@@ -26,13 +24,16 @@ from gearbench.rig import Condition
 Array = NDArray[np.float64]
 
 HELD_OUT = "held-out"
+
+# How a truth rig's record of one condition is made on a bench.
+Recorder = Callable[[Bench, Condition], xr.Dataset]
 TINY = 1e-12  # in a channel's unit: of sensors without noise
 
 
-def traces_of(bench: Bench, structure: Structure, levels: Levels, without: Mapping[str, Levels]) -> dict[str, float]:
-    """For each effect the rms change of the held-out record (the last one, if none has that name) between the levels
-    and those `without` it, over the noise of the mean over the record's periods: the largest of transmission error and
-    channels, the driver's torque among them, which replays are given."""
+def traces_of(bench: Bench, whole: Recorder, without: Mapping[str, Recorder]) -> dict[str, float]:
+    """For each effect the rms change of the held-out record (the last one, if none has that name) between that of the
+    `whole` rig and those `without` it, over the noise of the mean over the record's periods: the largest of
+    transmission error and channels, the driver's torque among them, which replays are given."""
     if not without:
         return {}
     conditions = conditions_of(bench.nominal)
@@ -40,16 +41,16 @@ def traces_of(bench: Bench, structure: Structure, levels: Levels, without: Mappi
     rig = bench.nominal.rig
     sensors = rig.sensors.model_copy(update={"noise_angle": 0.0, "noise_displacement": 0.0, "noise_torque": 0.0})
     silent = bench.nominal.model_copy(update={"rig": rig.model_copy(update={"sensors": sensors})})
-    quiet, rng = replace(bench, nominal=silent), np.random.default_rng(0)
+    quiet = replace(bench, nominal=silent)
 
     def seen(record: xr.Dataset) -> dict[str, Array]:
         return _mean_period(record, condition.experiment.periods)
 
-    record = measure(quiet, structure, levels, condition, "", rng)
-    here, noise = seen(record), seen(_noise(bench, condition, record, rng))
+    record = whole(quiet, condition)
+    here, noise = seen(record), seen(_noise(bench, condition, record, np.random.default_rng(0)))
     out = {}
     for effect, fewer in without.items():
-        rest = seen(measure(quiet, structure, fewer, condition, "", rng))
+        rest = seen(fewer(quiet, condition))
         out[effect] = max(float((rest[name] - here[name]).std() / max(noise[name].std(), TINY)) for name in here)
     return out
 

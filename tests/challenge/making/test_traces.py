@@ -10,11 +10,13 @@ import numpy as np
 import pytest
 from shared.truth_plants import drawn_levels, short_bench, short_case
 
+from gearbench.bench import simulate
 from gearbench.challenge.answers import read_answers
-from gearbench.challenge.making.cases import make_challenge
-from gearbench.challenge.making.plan import parse_mix
-from gearbench.challenge.making.traces import traces_of
-from gearbench.challenge.truth.levels import Foreign
+from gearbench.challenge.making.cases import draw_truth, make_challenge
+from gearbench.challenge.making.plan import Plan, parse_mix
+from gearbench.challenge.making.traces import Recorder, traces_of
+from gearbench.challenge.truth import elastic
+from gearbench.challenge.truth.levels import Foreign, Levels
 from gearbench.challenge.truth.measure import measure
 from gearbench.challenge.truth.rigs import conditions_of
 from gearbench.challenge.truth.structure import draw_structure
@@ -25,9 +27,16 @@ LEVELS = replace(drawn_levels(), delay=(0.0, 0.0, 0.0, 0.0))
 LATE = 40e-6  # [s]
 
 
+def recorder(levels: Levels) -> Recorder:
+    """How the rig with these levels is measured."""
+    return lambda bench, condition: measure(bench, RIG, levels, condition, "", np.random.default_rng(0))
+
+
 def test_a_late_angle_shows_as_far_as_its_signal_moves_in_that_time() -> None:
     experiment, sensors = conditions_of(BENCH.nominal)[0].experiment, BENCH.nominal.rig.sensors
-    found = traces_of(BENCH, RIG, replace(LEVELS, delay=(LATE, 0.0, 0.0, 0.0)), {"sensor-delay": LEVELS})
+    found = traces_of(
+        BENCH, recorder(replace(LEVELS, delay=(LATE, 0.0, 0.0, 0.0))), {"sensor-delay": recorder(LEVELS)}
+    )
     record = measure(BENCH, RIG, LEVELS, conditions_of(BENCH.nominal)[0], "x", np.random.default_rng(2))
     angle = record["angle_driver"].values[0]
     time = np.arange(angle.size) / record.attrs["sampling_rate"]
@@ -44,25 +53,39 @@ def test_a_late_angle_shows_as_far_as_its_signal_moves_in_that_time() -> None:
 
 def test_a_torque_that_is_recorded_otherwise_shows_though_no_motion_changes() -> None:
     behind = replace(LEVELS, foreign=Foreign(filter_frequency=800.0, filter_order=1))
-    assert traces_of(BENCH, RIG, behind, {"torque-filter": LEVELS})["torque-filter"] > 10.0
+    assert traces_of(BENCH, recorder(behind), {"torque-filter": recorder(LEVELS)})["torque-filter"] > 10.0
 
 
 def test_more_backlash_shows_only_where_flanks_part() -> None:
-    assert traces_of(BENCH, RIG, LEVELS, {"backlash": replace(LEVELS, backlash_more=80e-6)})["backlash"] < 1e-6
+    wider = recorder(replace(LEVELS, backlash_more=80e-6))
+    assert traces_of(BENCH, recorder(LEVELS), {"backlash": wider})["backlash"] < 1e-6
 
 
-def test_a_challenge_tells_how_far_its_effects_show_and_makes_up_for_it(tmp_path: Path) -> None:
+def test_a_challenge_tells_how_far_its_effects_show_and_makes_up_for_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of rigs of finite elements, too, whoever simulates them."""
+    monkeypatch.setattr(elastic, "simulate", lambda case, model, workers: simulate(case, "lumped", workers=workers))
+
     def made() -> dict[str, float]:
-        make_challenge(short_case(), parse_mix("controls=1,foreign=1,pairs=1"), 3, tmp_path / "cases", file)
+        make_challenge(short_case(), parse_mix("controls=1,foreign=1,pairs=1,reduced=2"), 3, tmp_path / "cases", file)
         answers = read_answers(file).values()
         assert all(set(one.traces) == set(one.effects) for one in answers)
         return {name: size for one in answers for name, size in one.traces.items()}
 
     file = tmp_path / "answers.json"
     first = made()
-    assert len(first) == 3 and max(first.values()) > 3.0
+    assert len(first) == 4 and max(first.values()) > 3.0
     tree = json.loads(file.read_text())
     for one in tree.values():
         del one["traces"]
     file.write_text(json.dumps(tree))
     assert made() == first
+
+
+def test_a_rig_of_finite_elements_without_its_coupling_is_stiff() -> None:
+    """Its shaft yields for that effect alone: no other level says so."""
+    for effect, rest in (("coupling", False), ("friction", True)):
+        plan = Plan("effect", ("coupling", "friction"), (1.0, 1.0), elastic=True)
+        assert draw_truth(short_case(), "test", 1, 0, plan)[0].soft
+        assert draw_truth(short_case(), "test", 1, 0, plan, left_out=effect)[0].soft == rest
