@@ -32,7 +32,8 @@ def is_close(simulator: Simulator, found: Optimum) -> bool:
     error before it shows anywhere else."""
     left, target = _left(simulator, found), simulator.target
     parts, _ = target.shares(target.lines - found.lines)
-    return bool(np.median(left) < CLOSE and parts.max() < OPEN and not (target.excited & (left > FAR)).any())
+    median, far = float(np.median(left[target.fluctuating])), target.excited & (left > FAR)
+    return bool(median < CLOSE and parts.max() < OPEN and not far.any())
 
 
 def answers_alike(simulator: Simulator, before: Optimum, after: Optimum) -> bool:

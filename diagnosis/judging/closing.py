@@ -62,7 +62,7 @@ def free_closing(target: Target, without: Mapping[str, Array], with_all: Mapping
     flanks part, one part or another is closer by chance."""
     closing = closing_of(target, without, with_all)
     lost, kept = (target.energies(target.lines - target.gathered([one])) for one in (without, with_all))
-    size = target.sizes / target.of_channels(target.energies(target.lines) * target.sizes)
+    size = target.fluctuating * target.sizes / target.of_channels(target.energies(target.lines) * target.sizes)
     whole = float(np.sqrt((lost * size).sum() / max(((kept + target.noise) * size).sum(), 1e-300)))
     return replace(closing, growth=min(closing.growth, whole))
 
@@ -80,7 +80,7 @@ def feels(target: Target, without: Mapping[str, Array], with_all: Mapping[str, A
     """Whether a record can speak for or against an effect: some block's gap could grow by 5 % without it."""
     one, other = (target.gathered([signals]) for signals in (without, with_all))
     left = target.energies(target.lines - other) + target.noise
-    return bool((target.energies(one - other) > FELT * left).any())
+    return bool((target.energies(one - other) > FELT * left)[target.fluctuating].any())
 
 
 def closing_of(target: Target, without: Mapping[str, Array], with_all: Mapping[str, Array]) -> Closing:
@@ -102,7 +102,7 @@ def growth_of(target: Target, without: Array, with_all: Array) -> tuple[float, t
     noise = target.noise * target.sizes
     best, where = 0.0, ("", "")
     for channel in dict.fromkeys(block.channel for block in target.blocks):
-        inside = np.array([block.channel == channel for block in target.blocks])
+        inside = target.fluctuating & np.array([block.channel == channel for block in target.blocks])
         whole = float(lost[inside].sum())
         labels = [(block.kind, f"{block.band[0]:g}–{block.band[1]:g}") for block in target.blocks]
         for label in sorted({one for part, here in zip(labels, inside, strict=True) if here for one in part}):

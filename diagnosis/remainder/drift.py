@@ -155,7 +155,7 @@ def _parts(found: Simulated, steady: Collection[str]) -> list[_Part]:
             count = len(repetitions)
             lines = np.fft.rfft(repetitions, axis=-1)[:, bins] / repetitions.shape[-1]
             scatter = scatter_of(lines)
-            changing = scatter.changing & ~driven[number][bins]
+            changing = scatter.changing & ~driven[number][bins] & (bins > 0)
             unit = np.sqrt(scatter.white) if scatter.white > 0.0 else 1.0
             columns = {place: jacobian[row, start:stop][changing] / unit for place, row in rows.items()}
             time = ((np.arange(count) + 0.5) / count - 0.5)[:, None]

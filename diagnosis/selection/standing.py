@@ -29,7 +29,7 @@ ANGLES = tuple(key for channel, key in KEYS.items() if channel.startswith("angle
 # Of the mean by which a delay moves the transmission error, what a record must show: true delays of drawn rigs show
 # 0.8 to 1.02 of it, delays that take the place of something else 0.1 at most.
 SHOWN = 0.5
-# Of the mean deflection under the load, what a rig's stiffness leaves unknown of it.
+# Of the mean deflection under the load, what is unknown of it where no fit has asked for it.
 UNKNOWN = 0.1
 # Nats that the means must say for a lag to be tried, and its largest standard deviation; over that of a sound rig's,
 # what two of its angles differ by at most: in 95 % of rigs no more than twice its root of two.
@@ -39,23 +39,16 @@ RENEWALS_HELD, RENEWALS = 4, 1
 TINY = 1e-30  # [m^2]: less no lag moves a mean by
 
 
-def told_by_means(simulator: Simulator, one: Hypothesis, optimum: Optimum) -> float:
-    """What the mean transmission error says for the lag of an angle as it is in the `optimum` [nats]: -inf where the
-    records show less than half of what it does to their means. Nothing of other effects, nor where no record's zero is
-    known.
-
-    Means may be off otherwise, a zero or a load, in all records alike: they count as one number with Cauchy's
-    distribution.
-    """
+def denied_by_means(simulator: Simulator, one: Hypothesis, optimum: Optimum) -> bool:
+    """Whether the records show less than half of what the lag of an angle, as it is in the `optimum`, does to their
+    means. What these are worth is among the lines of a fit (`simulation.target`). Nothing denies other effects, nor a
+    lag where no record's zero is known."""
     at, known = _lags(simulator, one), _known(simulator)
     if not at.size or not known:
-        return 0.0
-    mean, without = _measured(known), _means(simulator, _prompt(optimum.p, at), known)
-    late = _means(simulator, optimum.p, known)
-    moved = late - without
-    if (mean - without) @ moved < SHOWN * moved @ moved:
-        return -np.inf
-    return _said(simulator, mean, without, late)
+        return False
+    without = _means(simulator, _prompt(optimum.p, at), known)
+    moved = _means(simulator, optimum.p, known) - without
+    return bool((_measured(known) - without) @ moved < SHOWN * moved @ moved)
 
 
 def called_for(simulator: Simulator, base: Optimum, one: Hypothesis) -> Array | None:

@@ -14,7 +14,7 @@ from gearbench.diagnosis.fitting.fit import GAIN, Optimum, cost_of, fit, fit_afr
 from gearbench.diagnosis.fitting.reshaped import has_shapes, reshaped
 from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.selection.by_forces import Start
-from gearbench.diagnosis.selection.standing import begun_late, called_for, told_by_means
+from gearbench.diagnosis.selection.standing import begun_late, called_for, denied_by_means
 from gearbench.diagnosis.simulation.jacobian import FOLLOWED
 from gearbench.diagnosis.simulation.simulator import Simulator
 from gearbench.diagnosis.structure.contrast import is_strange
@@ -123,12 +123,13 @@ def weigh(
             if one.name in called:
                 begun.append(begun_late(simulator, base, one, called[one.name]))
             optimum = max((found for found in begun if found), key=lambda found: found.evidence, default=None)
-            told = 0.0 if optimum is None else told_by_means(simulator, one, optimum)
+            if optimum is not None and denied_by_means(simulator, one, optimum):
+                optimum = None
         except ValueError:  # a fit that leads nowhere costs its hypothesis, not the verdict
             optimum = None
-        if optimum is None or told == -np.inf:
+        if optimum is None:
             return Weighed(one, min(value, 0.0), None)
-        return Weighed(one, worth(simulator, base, one, optimum) + told, optimum)
+        return Weighed(one, worth(simulator, base, one, optimum), optimum)
 
     out = side_by_side(weighed, promised)
     return sorted(out, key=lambda one: -one.log_bayes_factor)

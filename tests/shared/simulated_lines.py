@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,13 +18,19 @@ from gearbench.diagnosis.structure.layout import layout_of
 from gearbench.rig import Case, Load, read_case
 
 
-def demonstration(load: Load | None = None, faster: int = 1, without: Sequence[str] = ()) -> Simulator:
-    """Replays of one record of `gap_demo`, or of it with this load, at so many times its speed or without these
-    channels, whose tooth 3 may be cracked."""
+def demonstration(
+    load: Load | None = None, faster: int = 1, without: Sequence[str] = (), lags: Mapping[str, float] | None = None
+) -> Simulator:
+    """Replays of one record of `gap_demo`, or of it with this load, at so many times its speed, without these channels
+    or with lags of these [s], whose tooth 3 may be cracked."""
     nominal = quicker(faster, 1)
     case = nominal.under(nominal.conditions[0])
     if load is not None:
         case = case.model_copy(update={"rig": case.rig.model_copy(update={"load": load})})
+    if lags:
+        late = {f"delay_{channel}": lag for channel, lag in lags.items()}
+        sensors = case.rig.sensors.model_copy(update=late)
+        case = case.model_copy(update={"rig": case.rig.model_copy(update={"sensors": sensors})})
     measured = measurement(simulate(case).drop_vars(without), nominal.conditions[0].name, nominal)
     problem = problem_of([measured], nominal)
     layout = layout_of(nominal, problem.model, problem.conditions, (3,))
@@ -53,15 +59,27 @@ def jacobian_at(simulator: Simulator, p: np.ndarray) -> np.ndarray:
 def off(
     simulator: Simulator, column: np.ndarray, p: np.ndarray, at: int | slice, step: float, along: ArrayLike = 1.0
 ) -> dict[str, tuple[float, float]]:
-    """By channel, how far the derivative `column` by the unknown `at`, or by several `along` a direction, is from that
-    between two simulations about `p` (size,), and the size of the latter."""
+    """By channel, how far the derivative `column` of its fluctuation by the unknown `at`, or by several `along` a
+    direction, is from that between two simulations about `p` (size,), and the size of the latter."""
+    change, start, found = _change(simulator, p, at, step, along), 0, {}
+    for _, channel, bins in simulator.target.plan:
+        own = np.arange(start, start + len(bins))[bins > 0]
+        start += len(bins)
+        found[channel] = (float(np.linalg.norm(column[own] - change[own])), float(np.linalg.norm(change[own])))
+    return found
+
+
+def of_mean(simulator: Simulator, column: np.ndarray, p: np.ndarray, at: int, step: float) -> tuple[float, float]:
+    """Derivative `column` of the mean transmission error by the unknown `at`, and that between two simulations about
+    `p` (size,)."""
+    (own,) = np.flatnonzero(~simulator.target.fluctuating[simulator.target.of_line])
+    return float(column[own].real), float(_change(simulator, p, at, step, 1.0)[own].real)
+
+
+def _change(simulator: Simulator, p: np.ndarray, at: int | slice, step: float, along: ArrayLike) -> np.ndarray:
+    """Change of all lines (K,) for a unit of unknowns, between two simulations."""
     before, after, part = p.copy(), p.copy(), step * np.asarray(along)
     before[at], after[at] = p[at] - part, p[at] + part
     lines = [simulator.lines(one) for one in (before, after)]
     assert lines[0] is not None and lines[1] is not None
-    change, start, found = (lines[1] - lines[0]) / (2 * step), 0, {}
-    for _, channel, bins in simulator.target.plan:
-        own = slice(start, start + len(bins))
-        start += len(bins)
-        found[channel] = (float(np.linalg.norm(column[own] - change[own])), float(np.linalg.norm(change[own])))
-    return found
+    return np.asarray((lines[1] - lines[0]) / (2 * step))

@@ -1,0 +1,112 @@
+"""The mean transmission error among the lines: a line of every fit, and no part of a gap."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import pi
+
+import numpy as np
+import pytest
+from shared.simulated_lines import demonstration, jacobian_at, of_mean
+
+from gearbench.diagnosis.fitting.fit import fit_afresh
+from gearbench.diagnosis.forces.condition import Condition, prepare
+from gearbench.diagnosis.intake.measurements import Measurement
+from gearbench.diagnosis.judging.closing import closing_of, feels, free_closing
+from gearbench.diagnosis.simulation.simulator import Simulator
+from gearbench.diagnosis.simulation.target import MEAN, Target, target_of
+from gearbench.diagnosis.structure.ends import ENDS
+
+LAG = 9e-6  # [s]
+
+
+@pytest.fixture(scope="module")
+def prompt() -> Simulator:
+    """The demonstration, none of whose sensors lags."""
+    return demonstration()
+
+
+def behind(measured: Measurement, lag: float) -> Measurement:
+    """The same with a driven angle that is behind by what its shaft turns on in that time [s]."""
+    turned = 2 * pi * measured.mesh_frequency / int(measured.record.attrs["teeth_driven"]) * lag
+    late = measured.periods["angle_driven"] - turned
+    return replace(measured, periods={**measured.periods, "angle_driven": late})
+
+
+def lines_of(simulator: Simulator, *measurements: Measurement) -> Target:
+    """The lines of records of that rig."""
+    return target_of(measurements, [condition(simulator, one) for one in measurements])
+
+
+def condition(simulator: Simulator, measured: Measurement) -> Condition:
+    return prepare(measured, simulator.layout.model, 1500.0)
+
+
+def means(target: Target) -> np.ndarray:
+    """Which blocks are means."""
+    return np.array([block.kind == MEAN for block in target.blocks])
+
+
+def test_a_mean_is_known_to_a_twentieth_of_the_deflection_where_the_zero_is(prompt: Simulator) -> None:
+    (measured,) = prompt.target.measurements
+    target = lines_of(prompt, measured, behind(measured, 1e-3), replace(measured, zero_known=False))
+    at = np.flatnonzero(means(target))
+    assert [target.blocks[one].record for one in at] == 2 * [measured.name] and (target.counts[at] == 1.0).all()
+    deflection, moved = (target.lines[target.of_line == one].item() for one in at)
+    # The mean of the mesh's compliance is a little more than one over its mean stiffness.
+    assert np.sqrt(target.floors[at]) == pytest.approx(0.05 * deflection.real, rel=0.05)
+    # A mean of a millisecond's turning does not make it known worse: the displacements are measured.
+    base_pitch = 2 * pi * measured.record.attrs["base_radius_driver"] / measured.record.attrs["teeth_driver"]
+    assert (moved - deflection).real == pytest.approx(measured.mesh_frequency * base_pitch * 1e-3)
+
+
+def test_without_displacements_the_mean_is_known_to_a_twentieth_of_itself() -> None:
+    bare = demonstration(without=("y_driver", "y_driven"))
+    line = bare.target.lines[np.flatnonzero(bare.target.of_line == np.flatnonzero(means(bare.target))[0])]
+    assert np.sqrt(bare.target.floors[means(bare.target)]) == pytest.approx(0.05 * line.real)
+
+
+def test_a_mean_is_no_part_of_a_gap(prompt: Simulator) -> None:
+    (measured,) = prompt.target.measurements
+    signals = prompt.channels(np.zeros(prompt.layout.size), measured)
+    ripple = 1e-7 * np.cos(2 * pi * measured.phase)
+    late = lines_of(prompt, behind(measured, 1e-3))
+    worse, apart = ({**signals, "dte": signals["dte"] + more} for more in (ripple, 1e-4))
+    for target in (lines_of(prompt, measured), late):
+        assert np.allclose(*(target.shares(target.lines - target.gathered([one])) for one in (signals, apart)))
+        assert feels(target, worse, signals) and not feels(target, apart, signals)
+        for closing in (closing_of, free_closing):
+            still = closing(target, signals, signals).growth
+            assert closing(target, apart, signals).growth == pytest.approx(still)
+            assert closing(target, worse, signals).growth > 2.0 * still
+    # It counts among what a record is likely by.
+    assert closing_of(late, signals, {**signals, "dte": signals["dte"] + 4.43e-4}).gain > 3.0
+
+
+@pytest.mark.parametrize(
+    ("key", "size"),
+    [("scale", 0.5e-6), ("shape", 0.03e-6), ("delay-angle_driver", 1.6e-6), ("delay-angle_driven", 1.6e-6),
+     ("pitch-driven", 0.01e-6), ("flanks", 0.6e-6), (ENDS, 0.1e-6), ("delay-y_driver", 0.0)],
+)  # fmt: skip
+def test_a_derivative_of_the_mean_is_what_two_simulations_differ_by(prompt: Simulator, key: str, size: float) -> None:
+    """In metres a standard deviation, of which it has that `size` at least."""
+    unknowns, p = prompt.layout.unknowns, np.zeros(prompt.layout.size)
+    at = unknowns[key].start
+    sd = unknowns.prior()[at]
+    found, expected = of_mean(prompt, jacobian_at(prompt, p)[at], p, at, 0.05 * sd)
+    assert found * sd == pytest.approx(expected * sd, rel=0.01, abs=1e-12)
+    assert abs(expected * sd) >= size
+
+
+@pytest.mark.parametrize("zero_known", [True, False])
+def test_a_fit_takes_the_lag_of_the_driven_angle_from_the_mean(zero_known: bool) -> None:
+    """Lines hardly show that angle's lag: without a zero it stays where it is."""
+    late = demonstration(lags={"angle_driven": LAG})
+    (measured,) = late.target.measurements
+    unknowns, sd = late.layout.unknowns, late.layout.unknowns.prior()
+    driver, driven = unknowns["delay-angle_driver"].start, unknowns["delay-angle_driven"].start
+    assert 2.0 < LAG / sd[driven] < 3.0
+    told = late.of_target(lines_of(late, replace(measured, zero_known=zero_known)))
+    best = fit_afresh(told, np.zeros(unknowns.size), sd, renewals=1)
+    assert best is not None
+    assert (best.p[driven] - best.p[driver] == pytest.approx(LAG, rel=0.2)) == zero_known
