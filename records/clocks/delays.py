@@ -38,6 +38,11 @@ class Delays:
         step = float(self.tried[1] - self.tried[0])
         return least(self.accounts, relations, names, coarse + step * np.linspace(-1.0, 1.0, 41))
 
+    def misfits(self, relations: list[tuple[str, str]], names: frozenset[str], delay: float) -> list[float]:
+        """What a delay [s] of some channels leaves of the misfit of each relation."""
+        turns = _turns(self.accounts, np.array([delay]))
+        return [float(self.accounts.misfit(relation, names, turns)[0]) for relation in relations]
+
     @cached_property
     def _turns(self) -> Complexes:
         """What the delays turn lines by (D, lines): the same for every channel."""

@@ -66,6 +66,10 @@ def _late_channel(delays: Delays) -> Lag | None:
         # Accounts that disagree as much without the channel do not say that it is late: bodies that twist do that.
         if floor > CLEARLY * now:
             continue
+        # A delay that is one spoils no account: where a resonance is most of the force, half its period turns it over.
+        turned = delays.misfits(relations, frozenset([name]), delay)
+        if any(spoilt > max(EXACT, NOISE * had) for spoilt, had in zip(turned, misfits, strict=True)):
+            continue
         clean = after < max(EXACT, FLOOR * floor) and explains(now, after)
         noisy = after < NOISE * floor and after < CLEARLY * now
         if (clean or noisy) and (best is None or after < best.left):
