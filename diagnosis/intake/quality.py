@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+ANGLES = ("angle_driver", "angle_driven")
 NOISE_IN_WORDS = "noise cannot be told from what the rig does, so that small effects stay hidden"
 # A change counts as drift beyond this many standard deviations of what white noise does ...
 BEYOND_NOISE = 6.0
@@ -35,11 +36,7 @@ def drift_of(periods: Mapping[str, Array], base_radii: tuple[float, float], note
         # A gear held at constant speed has no motion to measure its drift by: take the other one's.
         size["angle_driven"] = max(size["angle_driven"], size["angle_driver"] * ratio)
         size["angle_driver"] = max(size["angle_driver"], size["angle_driven"] / ratio)
-    drifts, growths = {}, {}
-    for name, repetitions in periods.items():
-        if size[name] > 0.0:
-            drifts[name] = _level_change(repetitions) / size[name]
-            growths[name] = _growth(repetitions, size[name])
+    drifts = {name: _level_change(one) / size[name] for name, one in periods.items() if size[name] > 0.0}
     worst = max(drifts, key=lambda name: drifts[name], default="")
     found = drifts.get(worst, 0.0)
     found = found if found > LEVEL else 0.0
@@ -48,15 +45,35 @@ def drift_of(periods: Mapping[str, Array], base_radii: tuple[float, float], note
             f"{worst} drifts: over the record its level changes by {100 * found:.2g} % of its rms, more than noise"
             " explains; such slow changes do not come from the gears"
         )
-    noisiest = max(growths, key=lambda name: growths[name], default="")
-    if noisiest:
-        limit = GROWTH + BEYOND_NOISE / np.sqrt(periods[noisiest].shape[1] / 2)
-        if growths[noisiest] > limit:
-            notes.append(
-                f"the scatter of {noisiest} changes {growths[noisiest]:.3g}-fold within the record (limit {limit:.3g}):"
-                " its noise is not steady, so that small effects stay hidden"
-            )
+    _tell_growth(periods, base_radii, size, notes)
     return found
+
+
+def _tell_growth(
+    periods: Mapping[str, Array], base_radii: tuple[float, float], size: Mapping[str, float], notes: list[str]
+) -> None:
+    """Append a sentence for the channel whose scatter grows most, if it does. What both gears turn on otherwise from
+    one repetition to the next is the speed's, and no noise of an angle: these are judged by what they differ by."""
+    scatter = {name: repetitions for name, repetitions in periods.items() if size[name] > 0.0}
+    angles = [scatter.pop(name) for name in ANGLES] if set(ANGLES) <= set(scatter) else []
+    growths = {name: _growth(one, size[name]) for name, one in scatter.items()}
+    if angles:
+        one, two = (radius * angle for radius, angle in zip(base_radii, angles, strict=True))
+        growths["the transmission error"] = _growth(one - two, float((one - two).std()))
+    noisiest = max(growths, key=lambda name: growths[name], default="")
+    samples = next(iter(periods.values())).shape[1] if periods else 1
+    limit = GROWTH + BEYOND_NOISE / np.sqrt(samples / 2)
+    if noisiest and growths[noisiest] > limit:
+        notes.append(
+            f"the scatter of {noisiest} changes {growths[noisiest]:.3g}-fold within the record (limit {limit:.3g}):"
+            " its noise is not steady, so that small effects stay hidden"
+        )
+    elif angles and _growth(one + two, float((one - two).std())) > limit:
+        change = float(np.abs(np.diff(one + two, axis=0)).max()) / 2
+        notes.append(
+            "the speed wanders: from one repetition to the next both gears turn on otherwise by up to"
+            f" {1e6 * change:.2g} um on their base circles, which is no noise of the angles"
+        )
 
 
 def _level_change(repetitions: Array) -> float:

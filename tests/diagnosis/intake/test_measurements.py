@@ -268,6 +268,27 @@ def test_growing_scatter_is_said() -> None:
     assert notes == []
 
 
+def test_a_speed_that_wanders_is_no_noise_of_the_angles() -> None:
+    rng = np.random.default_rng(4)
+    time = np.linspace(0.0, 1.0, 4000)
+    tones = np.array([(0.1, 2.3, 0.2), (1.4, 0.4, 3.0), (0.3, 2.2, 0.1)]) @ np.cos(np.outer((2, 3, 5), 6.0 * time))
+    wander = 1e-6 * tones * (0.2 + time)
+    radii = (0.03, 0.06)
+    rms = 5e-8
+    angles = [(wander + rms * rng.normal(size=wander.shape)) / radius for radius in radii]
+    notes: list[str] = []
+    drift_of({"angle_driver": angles[0], "angle_driven": angles[1]}, radii, notes)
+    (sentence,) = (one for one in notes if "drifts" not in one)
+    assert sentence.startswith("the speed wanders")
+    told = float(sentence.split("up to ")[1].split(" um")[0])
+    assert told == pytest.approx(1e6 * np.abs(np.diff(wander, axis=0)).max(), rel=0.05)
+    # Noise of one angle that grows is still told, beside the same wander.
+    notes.clear()
+    louder = angles[0] + 20 * rms / radii[0] * (0.01 + time) * rng.normal(size=wander.shape)
+    drift_of({"angle_driver": louder, "angle_driven": angles[1]}, radii, notes)
+    assert any(one.startswith("the scatter of the transmission error") for one in notes)
+
+
 def test_an_angle_zero_that_is_not_contact_is_said_and_taken_off() -> None:
     values = channels()
     made = taken({**values, "angle_driven": values["angle_driven"] + 2.0})
