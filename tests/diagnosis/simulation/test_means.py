@@ -110,3 +110,20 @@ def test_a_fit_takes_the_lag_of_the_driven_angle_from_the_mean(zero_known: bool)
     best = fit_afresh(told, np.zeros(unknowns.size), sd, renewals=1)
     assert best is not None
     assert (best.p[driven] - best.p[driver] == pytest.approx(LAG, rel=0.2)) == zero_known
+
+
+def test_a_zero_that_is_off_spoils_nothing(prompt: Simulator) -> None:
+    """Of twenty times what is unknown of a mean on a fit believes no rig that would explain it."""
+    (measured,) = prompt.target.measurements
+    unknowns, sd = prompt.layout.unknowns, prompt.layout.unknowns.prior()
+
+    def fitted(off: float) -> np.ndarray:
+        moved = measured.periods["angle_driven"] - off / measured.record.attrs["base_radius_driven"]
+        record = replace(measured, periods={**measured.periods, "angle_driven": moved})
+        best = fit_afresh(prompt.of_target(lines_of(prompt, record)), np.zeros(unknowns.size), sd, renewals=1)
+        assert best is not None
+        return best.p
+
+    right = fitted(0.0)
+    for off in (2e-5, 4e-4):
+        assert (np.abs(fitted(off) - right) <= 0.2 * sd).all()
