@@ -24,6 +24,8 @@ BASE_RADIUS = 1e-3
 WORKING_ANGLE_DEG = 0.5
 # A record that bears the name of one of the case's conditions must be of that condition.
 NAMED_SPEED, NAMED_TORQUE = 0.05, 0.3
+# Up to which a record that names none is of the nearest one; else that is said.
+LIKE = 0.05
 # Beyond these factors of every condition the nominal rig is another rig, or the unit another unit.
 FAR = 3.0
 # Displacements against the static deflection under the largest torque.
@@ -203,7 +205,7 @@ def _check_condition(
         (measured[1], wanted.torque_mean, NAMED_TORQUE, "mean torque", "N m", TORQUE_UNITS, "torque_driver"),
     ):
         off = got / nominal
-        if abs(off - 1) <= tolerance:
+        if abs(off - 1) <= (tolerance if named else min(tolerance, LIKE)):
             continue
         said = f"{words} {got:.4g} {unit}, where the case's {where} has {nominal:.4g} {unit}"
         if named or not 1 / FAR < off < FAR:

@@ -242,6 +242,9 @@ def test_one_period_and_averaged_periods_are_said() -> None:
 def test_a_condition_that_the_case_does_not_have_is_said_and_a_far_one_refused() -> None:
     made = measurement(record(channels(torque=150.0)), "extra", nominal())
     assert made.condition == "base" and "150 N m" in made.warnings[0]
+    made = measurement(record(channels(torque=120.0)), "extra", nominal())
+    assert made.condition == "base" and "120 N m" in made.warnings[0]
+    assert not measurement(record(channels(torque=104.0)), "extra", nominal()).warnings
     with pytest.raises(DiagnosisError, match=r"400 N m.*a factor 3"):
         measurement(record(channels(torque=400.0)), "extra", nominal())
 
