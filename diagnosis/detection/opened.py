@@ -48,7 +48,7 @@ class Changed:
 
     def feels(self, more: float) -> bool:
         """Whether the records would change beside what is left of them."""
-        return bool((self.energies(more) > FELT * self.floors).any())
+        return bool((self.energies(more) > FELT * self.floors)[self.simulator.target.fluctuating].any())
 
     def growth(self, more: float) -> float:
         """By how much the gap of some part grows without it."""

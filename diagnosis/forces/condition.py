@@ -39,7 +39,8 @@ class Condition:
     how far they turn the mesh on [cycles/m]; `pitch_speed`
     rb speed [m/s]; `force_level` [N] and `stiffness_level` [N/m] of the mesh at the mean torque; `force_full` (N/2
     + 1,) spectrum of the mesh force that a nominal equation gives, zero beyond the used bins; `hats_full` basis of
-    smooth functions of frequency (knots, N/2 + 1).
+    smooth functions of frequency (knots, N/2 + 1). `rest_known`: the mean displacements, if there are two, are about
+    those of the supports, as of sensors whose zero is without load.
     """
 
     name: str
@@ -67,6 +68,7 @@ class Condition:
     stiffness_level: float
     force_full: Complex
     hats_full: Array
+    rest_known: bool
 
 
 def prepare(measured: Measurement, model: NominalModel, band: float) -> Condition:
@@ -109,6 +111,7 @@ def prepare(measured: Measurement, model: NominalModel, band: float) -> Conditio
         stiffness_level=_stiffness(model, abs(mean) / rb1),
         force_full=force,
         hats_full=hats(omega / (2 * np.pi), band),
+        rest_known=_rest(model, spectra)[1],
     )
 
 
@@ -134,20 +137,22 @@ def _turned_on(model: NominalModel, spectra: Mapping[str, Complex], samples: int
         lines[0] = 0.0
         return np.asarray(np.fft.irfft(lines, samples) * samples)
 
-    closed = swing("y_driver") - swing("y_driven") + _rest(model, spectra)
+    closed = swing("y_driver") - swing("y_driven") + _rest(model, spectra)[0]
     leaning = leaning_of(model.base_radius, model.cross_factor > 0.0)
     return np.asarray((swing("angle_driven") - leaning * model.support_factor * closed) / model.law.base_pitch)
 
 
-def _rest(model: NominalModel, spectra: Mapping[str, Complex]) -> float:
+def _rest(model: NominalModel, spectra: Mapping[str, Complex]) -> tuple[float, bool]:
     """Mean difference [m] of both centres' displacements: the nominal supports' under the mean torque, or the measured
-    one where that is near it, as that of sensors is which have their zero without load."""
+    one where that is near it, as that of sensors is which have their zero without load; and whether it is, if there are
+    two."""
     force = float(spectra["torque_driver"][0].real) / model.base_radius[0] * model.support_factor
     rest = -force * (1.0 / model.stiffness[0] + 1.0 / model.stiffness[1])
     if "y_driver" not in spectra or "y_driven" not in spectra:
-        return rest
+        return rest, True
     seen = float((spectra["y_driver"][0] - spectra["y_driven"][0]).real)
-    return seen if abs(seen - rest) < NEAR * abs(rest) else rest
+    near = abs(seen - rest) < NEAR * abs(rest)
+    return (seen if near else rest), near
 
 
 def _spectra(measured: Measurement, model: NominalModel) -> tuple[dict[str, Complex], dict[str, float]]:

@@ -110,8 +110,8 @@ def _prompt(p: Array, at: Integers) -> Array:
 
 
 def _known(simulator: Simulator) -> list[Measurement]:
-    """The records whose zero is known."""
-    return [measured for measured in simulator.target.measurements if measured.zero_known]
+    """The records whose zeros are known."""
+    return [measured for measured in simulator.target.meant if measured.zero_known]
 
 
 def _means(simulator: Simulator, p: Array, known: Sequence[Measurement]) -> Array:

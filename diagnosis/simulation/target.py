@@ -7,8 +7,9 @@ no model is right, and C the mean square of measured minus simulated, the block 
 the discrepancy between rig and model is there is not known and has been maximised out. Neighbouring lines err alike: n
 is at most 8, and of a shaft with many teeth half of these.
 
-The mean of the transmission error is a block of its own where the zero of the angles is unloaded contact: a late angle
-is behind all the time, which lines hardly show of the driven one. It is no part of a gap, which fluctuates.
+The mean of the transmission error is a block of its own where its channels' zeros are those of unloaded contact: a
+late angle is behind all the time, which lines hardly show of the driven one. It is no part of a gap, which fluctuates.
+A zero or a load may be off in all records alike: their means count as one line.
 """
 
 from __future__ import annotations
@@ -152,10 +153,16 @@ class Target:
         """Which blocks (blocks,) answer the excitation."""
         return np.array([block.kind == "excited" for block in self.blocks])
 
+    @cached_property
+    def meant(self) -> tuple[Measurement, ...]:
+        """The records whose mean transmission error is among the lines."""
+        names = {block.record for block in self.blocks if block.kind == MEAN}
+        return tuple(one for one in self.measurements if one.name in names)
+
     @property
     def excited_counts(self) -> Array:
-        """Independent lines (blocks,) that answer the excitation; all where nothing is excited."""
-        return np.where(self.excited, self.counts, 0.0) if self.excited.any() else self.counts
+        """Independent lines (blocks,) that answer the excitation; all but means where nothing is excited."""
+        return np.where(self.excited if self.excited.any() else self.fluctuating, self.counts, 0.0)
 
     @property
     def most_excited(self) -> int:
@@ -178,14 +185,16 @@ def target_of(
 ) -> Target:
     """The lines of measurements, which have those conditions, up to the end of the excitation; `residual`: for each the
     parts (parts, N) of the noise that the channels' residuals have, that of their repetitions where not given."""
+    pairs = list(zip(measurements, conditions, strict=True))
+    meant = [one.zero_known and condition.rest_known for one, condition in pairs]
     plan: list[tuple[int, str, Integers]] = []
     lines: list[Complex] = []
     labels: list[Integers] = []
     blocks: list[Block] = []
     floors: list[float] = []
     noises: list[float] = []
-    counts: list[int] = []
-    for number, (one, condition) in enumerate(zip(measurements, conditions, strict=True)):
+    counts: list[float] = []
+    for number, (one, condition) in enumerate(pairs):
         kinds, frequency = with_products(condition), frequencies(one)[: condition.bins]
         parts = residual[number] if residual is not None else {}
         for channel, repetitions in measured_channels(one).items():
@@ -205,12 +214,12 @@ def target_of(
                 noises.append(float(noise[inside].mean()))
                 floors.append(noises[-1] + LEVEL**2 * level + leak + TINY)
                 counts.append(min(_independent(kind, condition.teeth), int(inside.sum())))
-            if channel == "dte" and one.zero_known:
+            if channel == "dte" and meant[number]:
                 label[0] = len(blocks)
                 blocks.append(Block(one.name, channel, MEAN, (0.0, 0.0)))
                 noises.append(float(noise[0]))
-                floors.append(noises[-1] + (UNKNOWN * _deflection(one, condition, spectrum)) ** 2)
-                counts.append(1)
+                floors.append(noises[-1] + (UNKNOWN * _deflection(one, condition, spectrum)) ** 2 + TINY)
+                counts.append(1.0 / sum(meant))
             kept = np.flatnonzero(label >= 0)
             plan.append((number, channel, kept))
             lines.append(spectrum[kept])
