@@ -9,7 +9,7 @@ is at most 8, and of a shaft with many teeth half of these.
 
 The mean of the transmission error is a block of its own where its channels' zeros are those of unloaded contact: a
 late angle is behind all the time, which lines hardly show of the driven one. It is no part of a gap, which fluctuates.
-A zero or a load may be off in all records alike: their means count as one line.
+A zero may be off in all records alike, which at one speed is a lag: the means count as one line for every speed.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +42,8 @@ PRODUCTS, FEW = (2, 3, 4, 5), 0.25
 DISTORTED, MEAN = "distorted", "mean"
 # Of the mean deflection under the load, what a rig's stiffness leaves unknown of it: fits to lines alone leave 0.03.
 UNKNOWN = 0.05
+# Of two speeds that a lag tells from a zero which is off, at least.
+APART = 1.05
 LEVEL = 1e-2  # part of the measured level below which no model is right
 REACH = 1e-4  # part of the channel's whole fluctuation that leaks into any line
 TINY = 1e-60
@@ -187,6 +190,7 @@ def target_of(
     parts (parts, N) of the noise that the channels' residuals have, that of their repetitions where not given."""
     pairs = list(zip(measurements, conditions, strict=True))
     meant = [one.zero_known and condition.rest_known for one, condition in pairs]
+    told = _different([condition.pitch_speed for (_, condition), known in zip(pairs, meant, strict=True) if known])
     plan: list[tuple[int, str, Integers]] = []
     lines: list[Complex] = []
     labels: list[Integers] = []
@@ -219,7 +223,7 @@ def target_of(
                 blocks.append(Block(one.name, channel, MEAN, (0.0, 0.0)))
                 noises.append(float(noise[0]))
                 floors.append(noises[-1] + (UNKNOWN * _deflection(one, condition, spectrum)) ** 2 + TINY)
-                counts.append(1.0 / sum(meant))
+                counts.append(told / sum(meant))
             kept = np.flatnonzero(label >= 0)
             plan.append((number, channel, kept))
             lines.append(spectrum[kept])
@@ -236,6 +240,12 @@ def target_of(
         np.array(counts, dtype=float),
         np.bincount(of_line, minlength=len(blocks)).astype(float),
     )
+
+
+def _different(speeds: Sequence[float]) -> int:
+    """How many of the speeds differ."""
+    ordered = sorted(speeds)
+    return len(ordered[:1]) + sum(after > APART * before for before, after in pairwise(ordered))
 
 
 def _deflection(one: Measurement, condition: Condition, error: Complex) -> float:

@@ -61,6 +61,15 @@ def test_a_mean_is_known_to_a_twentieth_of_the_deflection_where_the_zero_is(prom
     assert (moved - deflection).real == pytest.approx(measured.mesh_frequency * base_pitch * 1e-3)
 
 
+def test_means_count_as_one_line_for_every_speed(prompt: Simulator) -> None:
+    (measured,) = prompt.target.measurements
+    here = condition(prompt, measured)
+    for speeds, lines in (((1.0, 1.0, 1.0), 1), ((1.0, 1.25, 1.0), 2), ((0.8, 1.25, 1.0, 1.03), 3)):
+        conditions = [replace(here, pitch_speed=one * here.pitch_speed) for one in speeds]
+        target = target_of([measured] * len(speeds), conditions)
+        assert target.counts[means(target)] == pytest.approx(lines / len(speeds))
+
+
 def test_without_displacements_the_mean_is_known_to_a_twentieth_of_itself() -> None:
     bare = demonstration(without=("y_driver", "y_driven"))
     line = bare.target.lines[np.flatnonzero(bare.target.of_line == np.flatnonzero(means(bare.target))[0])]
