@@ -48,6 +48,7 @@ from gearbench.diagnosis.odds import Calibration
 from gearbench.diagnosis.remainder.changing_place import placed
 from gearbench.diagnosis.remainder.drift import drift_of
 from gearbench.diagnosis.remainder.free_forces import FreeForce, free_forces
+from gearbench.diagnosis.remainder.means import sentences_of_means
 from gearbench.diagnosis.remainder.missing import Missing, missing_forces, nothing_missing
 from gearbench.diagnosis.remainder.repeating import sentences_of_others
 from gearbench.diagnosis.selection.rivals import unentered
@@ -107,7 +108,8 @@ def by_simulation(
         recalibrated=found.recalibrated if kept else found.without_any,
         with_effect=found.with_effects if decided.named else None,
         because=(*decided.because, *why(judged, named), *settled.doubts, *flanks,
-                 *([way.sentence()] if way else []), *sentences_of_others(of.measurements, of.steady, band)),
+                 *([way.sentence()] if way else []), *sentences_of_means(found),
+                 *sentences_of_others(of.measurements, of.steady, band)),
         structure=structure_found(found.layout.unknowns, found.selection.best.p, found.std),
         missing=missing,
         places=tuple(one.place for one in kept),

@@ -1,0 +1,55 @@
+"""Means that no rig explains are told, with the lag that would make them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import pi
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from shared.simulated_lines import demonstration
+
+from gearbench.diagnosis.forces.condition import prepare
+from gearbench.diagnosis.remainder.means import sentences_of_means
+from gearbench.diagnosis.simulation.simulator import Simulator
+from gearbench.diagnosis.simulation.target import target_of
+
+LAG = 60e-6  # [s]
+
+
+@pytest.fixture(scope="module")
+def prompt() -> Simulator:
+    return demonstration()
+
+
+def said(simulator: Simulator, gear: str, lag: float, **changes: Any) -> tuple[str, ...]:
+    """What is said of the nominal rig where that gear's angle is recorded so late, but for changes of the record."""
+    (measured,) = simulator.target.measurements
+    turned = 2 * pi * measured.mesh_frequency / int(measured.record.attrs[f"teeth_{gear}"]) * lag
+    periods = {**measured.periods, f"angle_{gear}": measured.periods[f"angle_{gear}"] - turned}
+    late = replace(measured, periods=periods, **changes)
+    told = simulator.of_target(target_of([late], [prepare(late, simulator.layout.model, 1500.0)]))
+    lines = told.lines(np.zeros(told.layout.size))
+    found: Any = SimpleNamespace(
+        simulator=told, layout=told.layout, selection=SimpleNamespace(best=SimpleNamespace(lines=lines))
+    )
+    return sentences_of_means(found)
+
+
+@pytest.mark.parametrize(("gear", "other"), [("driver", "driven"), ("driven", "driver")])
+def test_a_late_angle_that_the_rig_lacks_is_told(prompt: Simulator, gear: str, other: str) -> None:
+    (sentence,) = said(prompt, gear, LAG)
+    assert f"A {gear} angle that is recorded" in sentence and f"later than the {other} one" in sentence
+    told = float(sentence.split("is recorded ")[1].split(" us")[0])
+    assert told == pytest.approx(1e6 * LAG, rel=0.02)
+    (measured,) = prompt.target.measurements
+    base_pitch = 2 * pi * measured.record.attrs["base_radius_driver"] / measured.record.attrs["teeth_driver"]
+    off = float(sentence.split("error is ")[1].split(" um")[0])
+    assert off == pytest.approx(1e6 * measured.mesh_frequency * base_pitch * LAG, rel=0.02)
+
+
+def test_nothing_is_said_of_sound_means_or_unknown_zeros(prompt: Simulator) -> None:
+    assert said(prompt, "driven", 0.0) == said(prompt, "driven", 3e-6) == ()
+    assert said(prompt, "driven", LAG, zero_known=False) == ()
