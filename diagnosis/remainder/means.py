@@ -27,11 +27,11 @@ def sentences_of_means(found: Simulated) -> tuple[str, ...]:
     speeds = np.array([pace[name] for name in names])
     late = float(off @ speeds / (speeds @ speeds))
     worst = int(np.argmax(np.abs(off)))
-    gears = ("driven", "driver") if late > 0.0 else ("driver", "driven")
+    gear = "driven" if late > 0.0 else "driver"
     size, lag, made = (length(1e6 * abs(one)) for one in (off[worst], late, late * speeds[worst]))
     return (
         f"The mean of the transmission error is {size} um off in the record {names[worst]}, in all records"
-        f" {number(over, 2)} times what a rig's stiffness leaves unknown of it. A {gears[0]} angle that is recorded"
-        f" {lag} us later than the {gears[1]} one makes {made} um of that; else look at the zeros of angles and"
+        f" {number(over, 2)} times what a rig's stiffness leaves unknown of it. A {gear} angle that is recorded"
+        f" {lag} us later than in the rig found makes {made} um of that; else look at the zeros of angles and"
         " displacements, and at the mean torque",
     )

@@ -38,10 +38,10 @@ def said(simulator: Simulator, gear: str, lag: float, **changes: Any) -> tuple[s
     return sentences_of_means(found)
 
 
-@pytest.mark.parametrize(("gear", "other"), [("driver", "driven"), ("driven", "driver")])
-def test_a_late_angle_that_the_rig_lacks_is_told(prompt: Simulator, gear: str, other: str) -> None:
+@pytest.mark.parametrize("gear", ["driver", "driven"])
+def test_a_late_angle_that_the_rig_lacks_is_told(prompt: Simulator, gear: str) -> None:
     (sentence,) = said(prompt, gear, LAG)
-    assert f"A {gear} angle that is recorded" in sentence and f"later than the {other} one" in sentence
+    assert f"A {gear} angle that is recorded" in sentence
     told = float(sentence.split("is recorded ")[1].split(" us")[0])
     assert told == pytest.approx(1e6 * LAG, rel=0.02)
     (measured,) = prompt.target.measurements
