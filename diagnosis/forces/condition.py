@@ -75,7 +75,8 @@ def prepare(measured: Measurement, model: NominalModel, band: float) -> Conditio
     """The condition of a measurement; `band` [Hz] is where the used bins end."""
     rate, samples = measured.sampling_rate, measured.phase.size
     spectra, noise = _spectra(measured, model)
-    phase = measured.phase + _turned_on(model, spectra, samples)
+    rest, rest_known = _rest(model, spectra)
+    phase = measured.phase + _turned_on(model, spectra, samples, rest)
     omega = np.asarray(2 * np.pi * np.fft.rfftfreq(samples, 1 / rate), dtype=np.float64)
     bins = min(int(np.searchsorted(omega, 2 * np.pi * band, side="right")), samples // 2)
     numbers, share = model.law.pairs(phase)
@@ -104,14 +105,14 @@ def prepare(measured: Measurement, model: NominalModel, band: float) -> Conditio
         lobes=np.stack([(np.cos(turn), np.sin(turn)) for turn in turns]),
         leaning=np.stack([_leaning(model, side, turn) for side, turn in enumerate(turns)]),
         ends=np.stack([turned_by(phase, turn, side, ends) for side, turn in enumerate(turns)]),
-        pitch_speed=2 * np.pi * measured.mesh_frequency / model.teeth[0] * rb1,
+        pitch_speed=model.pitch_speed(measured.mesh_frequency),
         teeth=model.teeth,
         torque_mean=mean,
         force_level=abs(mean) / rb1,
         stiffness_level=_stiffness(model, abs(mean) / rb1),
         force_full=force,
         hats_full=hats(omega / (2 * np.pi), band),
-        rest_known=_rest(model, spectra)[1],
+        rest_known=rest_known,
     )
 
 
@@ -126,9 +127,9 @@ def _leaning(model: NominalModel, side: int, turn: Array) -> Array:
     return out
 
 
-def _turned_on(model: NominalModel, spectra: Mapping[str, Complex], samples: int) -> Array:
+def _turned_on(model: NominalModel, spectra: Mapping[str, Complex], samples: int, rest: float) -> Array:
     """How far (samples,) [cycles] the driven gear's vibration and the centres' motion turn the mesh on, as in the
-    lumped model: the motion as measured, about where the supports rest."""
+    lumped model: the motion as measured, about where the supports `rest` [m]."""
 
     def swing(channel: str) -> Array:
         if channel not in spectra:
@@ -137,7 +138,7 @@ def _turned_on(model: NominalModel, spectra: Mapping[str, Complex], samples: int
         lines[0] = 0.0
         return np.asarray(np.fft.irfft(lines, samples) * samples)
 
-    closed = swing("y_driver") - swing("y_driven") + _rest(model, spectra)[0]
+    closed = swing("y_driver") - swing("y_driven") + rest
     leaning = leaning_of(model.base_radius, model.cross_factor > 0.0)
     return np.asarray((swing("angle_driven") - leaning * model.support_factor * closed) / model.law.base_pitch)
 

@@ -102,6 +102,10 @@ class NominalModel:
         """Of the mesh under the mean torque [m]: what lengths count as large by."""
         return abs(self.torque_mean) / self.base_radius[0] / self.mesh_stiffness
 
+    def pitch_speed(self, mesh_frequency: float) -> float:
+        """Speed [m/s] of the base circles at a mesh frequency [Hz]."""
+        return 2 * pi * mesh_frequency / self.teeth[0] * self.base_radius[0]
+
     @property
     def resonance(self) -> float:
         """Of the turning parts on the mesh [Hz]: what frequencies count as high by."""

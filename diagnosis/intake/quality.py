@@ -7,9 +7,10 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from gearbench.diagnosis.intake.passing import ANGLES
+
 Array = NDArray[np.float64]
 
-ANGLES = ("angle_driver", "angle_driven")
 NOISE_IN_WORDS = "noise cannot be told from what the rig does, so that small effects stay hidden"
 # A change counts as drift beyond this many standard deviations of what white noise does ...
 BEYOND_NOISE = 6.0
@@ -32,7 +33,7 @@ def drift_of(periods: Mapping[str, Array], base_radii: tuple[float, float], note
     """
     ratio = base_radii[0] / base_radii[1]
     size = {name: float(repetitions.std()) for name, repetitions in periods.items()}
-    if {"angle_driver", "angle_driven"} <= set(size):
+    if set(ANGLES) <= set(size):
         # A gear held at constant speed has no motion to measure its drift by: take the other one's.
         size["angle_driven"] = max(size["angle_driven"], size["angle_driver"] * ratio)
         size["angle_driver"] = max(size["angle_driver"], size["angle_driven"] / ratio)

@@ -23,7 +23,7 @@ def sentences_of_means(found: Simulated) -> tuple[str, ...]:
     if over <= OFF:
         return ()
     names = [target.blocks[block].record for block in target.of_line[at]]
-    pace = {one.name: one.mesh_frequency * found.layout.model.law.base_pitch for one in target.meant}
+    pace = {one.name: found.layout.model.pitch_speed(one.mesh_frequency) for one in target.meant}
     speeds = np.array([pace[name] for name in names])
     late = float(off @ speeds / (speeds @ speeds))
     worst = int(np.argmax(np.abs(off)))

@@ -111,7 +111,7 @@ def _prompt(p: Array, at: Integers) -> Array:
 
 def _known(simulator: Simulator) -> list[Measurement]:
     """The records whose zeros are known."""
-    return [measured for measured in simulator.target.meant if measured.zero_known]
+    return list(simulator.target.meant)
 
 
 def _means(simulator: Simulator, p: Array, known: Sequence[Measurement]) -> Array:

@@ -241,8 +241,6 @@ def sensor_columns(
     omega = 2 * np.pi * np.fft.rfftfreq(samples, 1 / one.sampling_rate)
     g = layout.model.support_factor if has_both_y(one) else 0.0
     into = {"angle_driver": 1.0, "y_driver": g, "y_driven": -g}
-    # The angle that turns on while its sensor lags, which the fluctuation is without.
-    speed = 2 * np.pi * one.mesh_frequency / layout.model.teeth[0] * layout.model.base_radius[0]
     zero = np.zeros(omega.size, dtype=complex)
     found: dict[int, dict[str, Complex]] = {}
     for channel, key in DELAYS.items():
@@ -250,7 +248,8 @@ def sensor_columns(
             continue
         late = -1j * omega * np.fft.rfft(channels[channel])
         if channel == "angle_driver":
-            late[0] = -speed * samples
+            # It turns on while its sensor lags, which the fluctuation is without.
+            late[0] = -layout.model.pitch_speed(one.mesh_frequency) * samples
         found[unknowns[key].start] = {channel: late, "dte": into[channel] * late}
     if "torque_driven" in channels:
         found[unknowns[GAIN].start] = {"torque_driven": np.fft.rfft(channels["torque_driven"])}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,12 +11,15 @@ from numpy.typing import ArrayLike
 from gearbench.bench import simulate
 from gearbench.cases import case_files
 from gearbench.diagnosis.evidence.problem import problem_of
-from gearbench.diagnosis.intake.measurements import measurement
+from gearbench.diagnosis.forces.condition import prepare
+from gearbench.diagnosis.intake.measurements import Measurement, measurement
 from gearbench.diagnosis.replay.replays import Replays
 from gearbench.diagnosis.simulation.simulator import Simulator
 from gearbench.diagnosis.simulation.target import target_of
 from gearbench.diagnosis.structure.layout import layout_of
 from gearbench.rig import Case, Load, read_case
+
+BAND = 1500.0  # [Hz], where the lines of other records end
 
 
 def demonstration(
@@ -35,6 +39,19 @@ def demonstration(
     problem = problem_of([measured], nominal)
     layout = layout_of(nominal, problem.model, problem.conditions, (3,))
     return Simulator(layout, target_of([measured], problem.conditions), Replays(problem.model.law))
+
+
+def behind(measured: Measurement, gear: str, lag: float) -> Measurement:
+    """A record whose angle of that gear is behind by what its shaft turns on in that time [s]."""
+    turned = 2 * np.pi * measured.mesh_frequency / int(measured.record.attrs[f"teeth_{gear}"]) * lag
+    name = f"angle_{gear}"
+    return replace(measured, periods={**measured.periods, name: measured.periods[name] - turned})
+
+
+def of_records(simulator: Simulator, *measurements: Measurement) -> Simulator:
+    """The same rig held against other records, up to BAND."""
+    conditions = [prepare(one, simulator.layout.model, BAND) for one in measurements]
+    return simulator.of_target(target_of(measurements, conditions))
 
 
 def quicker(faster: int, conditions: int) -> Case:

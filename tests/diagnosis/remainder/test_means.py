@@ -9,12 +9,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from shared.simulated_lines import demonstration
+from shared.simulated_lines import behind, demonstration, of_records
 
-from gearbench.diagnosis.forces.condition import prepare
 from gearbench.diagnosis.remainder.means import sentences_of_means
 from gearbench.diagnosis.simulation.simulator import Simulator
-from gearbench.diagnosis.simulation.target import target_of
 
 LAG = 60e-6  # [s]
 
@@ -27,10 +25,7 @@ def prompt() -> Simulator:
 def said(simulator: Simulator, gear: str, lag: float, **changes: Any) -> tuple[str, ...]:
     """What is said of the nominal rig where that gear's angle is recorded so late, but for changes of the record."""
     (measured,) = simulator.target.measurements
-    turned = 2 * pi * measured.mesh_frequency / int(measured.record.attrs[f"teeth_{gear}"]) * lag
-    periods = {**measured.periods, f"angle_{gear}": measured.periods[f"angle_{gear}"] - turned}
-    late = replace(measured, periods=periods, **changes)
-    told = simulator.of_target(target_of([late], [prepare(late, simulator.layout.model, 1500.0)]))
+    told = of_records(simulator, replace(behind(measured, gear, lag), **changes))
     lines = told.lines(np.zeros(told.layout.size))
     found: Any = SimpleNamespace(
         simulator=told, layout=told.layout, selection=SimpleNamespace(best=SimpleNamespace(lines=lines))

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import pi
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
-from shared.simulated_lines import demonstration
+from shared.simulated_lines import behind, demonstration, of_records
 
 from gearbench.diagnosis.effects.effect import Hypothesis
 from gearbench.diagnosis.effects.sensor_delay import SENSOR_DELAY
@@ -29,11 +28,7 @@ def prompt() -> Simulator:
 def late(simulator: Simulator, channel: str, lag: float, **changes: Any) -> Simulator:
     """The same with an angle that is behind by what its shaft turns on in that time [s], and changes of its record."""
     (measured,) = simulator.target.measurements
-    teeth = int(measured.record.attrs[f"teeth_{channel.removeprefix('angle_')}"])
-    behind = 2 * pi * measured.mesh_frequency / teeth * lag
-    periods = {**measured.periods, channel: measured.periods[channel] - behind}
-    target = replace(simulator.target, measurements=(replace(measured, periods=periods, **changes),))
-    return replace(simulator, target=target)
+    return of_records(simulator, replace(behind(measured, channel.removeprefix("angle_"), lag), **changes))
 
 
 def lagging(simulator: Simulator, channel: str, lag: float) -> tuple[Hypothesis, Any]:

@@ -7,11 +7,10 @@ from math import pi
 
 import numpy as np
 import pytest
-from shared.simulated_lines import demonstration, jacobian_at, of_mean
+from shared.simulated_lines import BAND, behind, demonstration, jacobian_at, of_mean, of_records
 
 from gearbench.diagnosis.fitting.fit import Optimum, fit_afresh
-from gearbench.diagnosis.forces.condition import Condition, prepare
-from gearbench.diagnosis.intake.measurements import Measurement
+from gearbench.diagnosis.forces.condition import prepare
 from gearbench.diagnosis.judging.closing import closing_of, feels, free_closing
 from gearbench.diagnosis.selection.weighing import LIMIT
 from gearbench.diagnosis.simulation.simulator import Simulator
@@ -27,22 +26,6 @@ def prompt() -> Simulator:
     return demonstration()
 
 
-def behind(measured: Measurement, lag: float) -> Measurement:
-    """The same with a driven angle that is behind by what its shaft turns on in that time [s]."""
-    turned = 2 * pi * measured.mesh_frequency / int(measured.record.attrs["teeth_driven"]) * lag
-    late = measured.periods["angle_driven"] - turned
-    return replace(measured, periods={**measured.periods, "angle_driven": late})
-
-
-def lines_of(simulator: Simulator, *measurements: Measurement) -> Target:
-    """The lines of records of that rig."""
-    return target_of(measurements, [condition(simulator, one) for one in measurements])
-
-
-def condition(simulator: Simulator, measured: Measurement) -> Condition:
-    return prepare(measured, simulator.layout.model, 1500.0)
-
-
 def means(target: Target) -> np.ndarray:
     """Which blocks are means."""
     return np.array([block.kind == MEAN for block in target.blocks])
@@ -50,7 +33,8 @@ def means(target: Target) -> np.ndarray:
 
 def test_a_mean_is_known_to_a_twentieth_of_the_deflection_where_the_zero_is(prompt: Simulator) -> None:
     (measured,) = prompt.target.measurements
-    target = lines_of(prompt, measured, behind(measured, 1e-3), replace(measured, zero_known=False))
+    late, adrift = behind(measured, "driven", 1e-3), replace(measured, zero_known=False)
+    target = of_records(prompt, measured, late, adrift).target
     at = np.flatnonzero(means(target))
     assert [target.blocks[one].record for one in at] == 2 * [measured.name] and (target.counts[at] == 0.5).all()
     deflection, moved = (target.lines[target.of_line == one].item() for one in at)
@@ -63,7 +47,7 @@ def test_a_mean_is_known_to_a_twentieth_of_the_deflection_where_the_zero_is(prom
 
 def test_means_count_as_one_line_for_every_speed(prompt: Simulator) -> None:
     (measured,) = prompt.target.measurements
-    here = condition(prompt, measured)
+    here = prepare(measured, prompt.layout.model, BAND)
     for speeds, lines in (((1.0, 1.0, 1.0), 1), ((1.0, 1.25, 1.0), 2), ((0.8, 1.25, 1.0, 1.03), 3)):
         conditions = [replace(here, pitch_speed=one * here.pitch_speed) for one in speeds]
         target = target_of([measured] * len(speeds), conditions)
@@ -80,9 +64,9 @@ def test_a_mean_is_no_part_of_a_gap(prompt: Simulator) -> None:
     (measured,) = prompt.target.measurements
     signals = prompt.channels(np.zeros(prompt.layout.size), measured)
     ripple = 1e-7 * np.cos(2 * pi * measured.phase)
-    late = lines_of(prompt, behind(measured, 1e-3))
+    late = of_records(prompt, behind(measured, "driven", 1e-3)).target
     worse, apart = ({**signals, "dte": signals["dte"] + more} for more in (ripple, 1e-4))
-    for target in (lines_of(prompt, measured), late):
+    for target in (of_records(prompt, measured).target, late):
         assert np.allclose(*(target.shares(target.lines - target.gathered([one])) for one in (signals, apart)))
         assert feels(target, worse, signals) and not feels(target, apart, signals)
         for closing in (closing_of, free_closing):
@@ -118,7 +102,7 @@ def test_a_fit_takes_the_lag_of_the_driven_angle_from_the_mean(zero_known: bool)
     unknowns, sd = late.layout.unknowns, late.layout.unknowns.prior()
     driver, driven = unknowns["delay-angle_driver"].start, unknowns["delay-angle_driven"].start
     assert 2.0 < LAG / sd[driven] < 3.0
-    told = late.of_target(lines_of(late, replace(measured, zero_known=zero_known)))
+    told = of_records(late, replace(measured, zero_known=zero_known))
     best = fit_afresh(told, np.zeros(unknowns.size), sd, renewals=1)
     assert best is not None
     assert (best.p[driven] - best.p[driver] == pytest.approx(LAG, rel=0.2)) == zero_known
@@ -138,7 +122,7 @@ def test_a_zero_that_is_off_spoils_nothing(prompt: Simulator, records: int) -> N
         moved = measured.periods["angle_driven"] - off / measured.record.attrs["base_radius_driven"]
         record = replace(measured, periods={**measured.periods, "angle_driven": moved})
         alike = [replace(record, name=f"{record.name}-{number}") for number in range(records)]
-        best = fit_afresh(prompt.of_target(lines_of(prompt, *alike)), np.zeros(unknowns.size), prior, renewals=1)
+        best = fit_afresh(of_records(prompt, *alike), np.zeros(unknowns.size), prior, renewals=1)
         assert best is not None
         return best
 
@@ -155,6 +139,6 @@ def test_a_mean_of_displacements_without_a_zero_is_none(prompt: Simulator) -> No
     """Sensors that see what moves alone: the transmission error's mean lacks the supports' then."""
     (measured,) = prompt.target.measurements
     moving = {name: one - one.mean() for name, one in measured.periods.items() if name.startswith("y_")}
-    assert means(lines_of(prompt, measured)).any()
-    bare = lines_of(prompt, replace(measured, periods={**measured.periods, **moving}))
+    assert means(of_records(prompt, measured).target).any()
+    bare = of_records(prompt, replace(measured, periods={**measured.periods, **moving})).target
     assert not means(bare).any() and bare.meant == ()
