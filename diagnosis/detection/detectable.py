@@ -54,7 +54,7 @@ def detectable_of(
     measured = ("driver", "driven", *judged.measured.periods)
     listed = [one for one in library(problem.model, without) if one.wide[0].key not in (CRACK, KEY)]
     listed = [one for one in listed if all(name in measured for name in one.on)]
-    told = _by_information(found, simulator, [*listed, *_cracks(problem, found, without)], *answer)
+    told = _by_information(judged, simulator, [*listed, *_cracks(problem, found, without)], *answer)
     out = [_told(one, sizes) for one, sizes in told]
     if BACKLASH.name not in without:
         out.append(_backlash(problem, Changed(simulator, found.selection.best.p, answer[1]), searched, found))
@@ -73,7 +73,7 @@ def too_small(problem: Problem, judged: Judged, named: Sequence[Weighed]) -> Wei
     if answer is None:
         return None
     unknowns, p, parts = found.layout.unknowns, found.selection.best.p, dict[str, float]()
-    for one, sizes in _by_information(found, simulator, [one.hypothesis for one in slight], *answer):
+    for one, sizes in _by_information(judged, simulator, [one.hypothesis for one in slight], *answer):
         parts[one.name] = _size_of(one, unknowns, p) / (np.inf if sizes.found is None else sizes.found)
     small = [one for one in slight if parts.get(one.hypothesis.name, 1.0) < 1.0]
     return min(small, key=lambda one: parts[one.hypothesis.name], default=None)
@@ -127,22 +127,24 @@ def _cracks(problem: Problem, found: Simulated, without: Sequence[str]) -> list[
 
 
 def _by_information(
-    found: Simulated, simulator: Simulator, hypotheses: Sequence[Hypothesis], residual: Complex, left: Array
+    judged: Judged, simulator: Simulator, hypotheses: Sequence[Hypothesis], residual: Complex, left: Array
 ) -> list[tuple[Hypothesis, Sizes]]:
     """Of effects whose traces grow with them."""
+    found = judged.found
     unknowns, best, base = found.layout.unknowns, found.selection.best, found.selection.base
     search = best.sensitivity.quadratic
     chosen = np.isin(np.arange(unknowns.size), search.active)
     jacobian = simulator.jacobian(best.p, unknowns.prior(), chosen)
     if jacobian is None:
         return []
-    judged = quadratic_of(replace(simulator.target, floors=left), residual, jacobian, search.active)
+    there = quadratic_of(replace(simulator.target, floors=left), residual, jacobian, search.active)
+    apart = not any(one is judged.measured for one in found.simulator.target.measurements)
     out = []
     for one in hypotheses:
         # Beside what is named, but not beside itself.
         narrow, at = best.sd.copy(), one.entries(unknowns)
         narrow[at] = base.sd[at]
-        view = View(Known(unknowns, search.active, narrow, Blocks(search), Blocks(judged)), (one,))
+        view = View(Known(unknowns, search.active, narrow, Blocks(search), Blocks(there), apart), (one,))
         out.append((one, sizes_of(found.layout, view, 0)))
     return out
 

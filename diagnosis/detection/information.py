@@ -68,10 +68,11 @@ class Blocks:
 @dataclass(frozen=True)
 class Known:
     """Blocks of the records of the search and of the judged one, over the unknowns `active` (q,) that they show;
-    `narrow` (size,): priors of the background."""
+    `narrow` (size,): priors of the background; `apart`: whether the judged record had no part in the search."""
 
     unknowns: Unknowns
     active: NDArray[np.int64]
     narrow: Array
     search: Blocks
     judged: Blocks
+    apart: bool = False

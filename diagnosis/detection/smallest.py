@@ -6,7 +6,8 @@ of its wide prior, an effect of size a raises the evidence of a hypothesis over 
     a^2 d' I (C_hypothesis - C_background) I d / 2 + constants,
 
 which is what `evidence.separable` has on average over a prior. It is named from the size on at which that clears the
-limit of the selection, priors of a good rig do not hold as much, and the judged record's gap grows without it.
+limit of the selection, or a judged record that had no part in the search makes up for what it lacks up to that, priors
+of a good rig do not hold as much, and the judged record's gap grows without it.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from gearbench.diagnosis.evidence.separable import APART
 from gearbench.diagnosis.judging.closing import DUE, GAIN, growth_of
 from gearbench.diagnosis.selection.rivals import NEARLY
 from gearbench.diagnosis.selection.selection import known_within
-from gearbench.diagnosis.selection.weighing import is_own, limit_of
+from gearbench.diagnosis.selection.weighing import Weighed, entering, is_own, limit_of
 
 Array = NDArray[np.float64]
 
@@ -123,7 +124,8 @@ def smallest(view: View, number: int) -> float | None:
     low, high = LEAST, largest(known, one)
 
     def named(size: float) -> bool:
-        return _enters(view, number, size) and judged.due(size)
+        lacking = _lacking(view, number, size)
+        return lacking is not None and judged.due(size, lacking)
 
     if not named(high):
         return None
@@ -133,25 +135,25 @@ def smallest(view: View, number: int) -> float | None:
     return high
 
 
-def _enters(view: View, number: int, size: float) -> bool:
-    """Whether an effect of that size clears the limit of the selection, and is larger than a good rig's share of it."""
+def _lacking(view: View, number: int, size: float) -> float | None:
+    """The nats that an effect of that size lacks up to the limit of the selection; None: it does not enter, or is no
+    larger than a good rig's share of it."""
     known, one = view.known, view.hypotheses[number]
     assert one.effect is not None
-    limit = limit_of(known.unknowns, one)
-    if view.evidence(number, size)[number] < limit:
-        return False
     at = one.entries(known.unknowns)
     at = at[np.isin(at, known.active)]
     place = np.searchsorted(known.active, at)
     covariance, wide = view.posteriors[number][0], wide_prior(known, one)[at]
     found = size * (covariance @ view.information @ direction(known, one)[known.active])[place]
     narrow, sound = known.narrow[at], known.unknowns.prior()[at]
-    # What widening its own prior can add to the evidence at most (`output.selection.relief`).
-    if narrow.all() and 0.5 * float((found**2 * (narrow**-2.0 - wide**-2.0)).sum()) < limit:
-        return False
+    evidence = view.evidence(number, size)[number]
+    # What widening its own prior can add to the evidence at most (`selection.weighing.relief`).
+    if narrow.all():
+        evidence = min(evidence, 0.5 * float((found**2 * (narrow**-2.0 - wide**-2.0)).sum()))
     told = np.clip(1.0 - np.diag(covariance)[place] / wide**2, 1e-6, 1.0)
     relative = float(np.sqrt(np.average((found / sound) ** 2, weights=told)))
-    return relative > LIMITS.size_of(one.effect)
+    entered = entering(known.unknowns, Weighed(one, float(evidence), None), known.apart)
+    return None if entered is None or relative <= LIMITS.size_of(one.effect) else entered.lacking
 
 
 class _Judge:
@@ -180,12 +182,12 @@ class _Judge:
             at = one.entries(unknowns)
             self.held = float(known_within(unknowns.prior()[at])[1][0] / wide_prior(known, one)[at][0])
 
-    def due(self, size: float) -> bool:
-        """Whether an effect of that size closes a part of the gap."""
+    def due(self, size: float, lacking: float) -> bool:
+        """Whether an effect of that size, which lacked so many nats in the search, closes a part of the gap."""
         more = self.energies * max(size - self.held, 0.0) ** 2
         gain = float(np.sum(self.target.counts * np.log1p(more / self.floors)))
         factor, _ = growth_of(self.target, self.floors + more, self.floors)
-        return gain > GAIN and factor > DUE
+        return gain > GAIN + lacking and factor > DUE
 
 
 def rivals_at(view: View, number: int, size: float, usual: bool = True) -> tuple[int, ...]:

@@ -32,4 +32,6 @@ def known_of(plan: Planned) -> Known:
         )
     active = found.quadratic.active
     judged = quadratic_of(other.target, other.target.lines - here, jacobian, active)
-    return Known(unknowns, active, prior_of(simulator, unknowns.prior()), Blocks(found.quadratic), Blocks(judged))
+    apart = not any(measured is one for measured in plan.fitted)
+    narrow = prior_of(simulator, unknowns.prior())
+    return Known(unknowns, active, narrow, Blocks(found.quadratic), Blocks(judged), apart)

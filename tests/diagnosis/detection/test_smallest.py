@@ -10,12 +10,22 @@ import pytest
 from shared.fake_simulator import LINES, sensitivities, target, unknowns
 
 from gearbench.diagnosis.detection.information import Blocks, Known, Without
-from gearbench.diagnosis.detection.smallest import View, apart_from, direction, largest, rivals_at, smallest, wide_prior
+from gearbench.diagnosis.detection.smallest import (
+    View,
+    _Judge,
+    apart_from,
+    direction,
+    largest,
+    rivals_at,
+    smallest,
+    wide_prior,
+)
 from gearbench.diagnosis.effects.effect import Hypothesis, Wide
 from gearbench.diagnosis.effects.friction import FRICTION
 from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
 from gearbench.diagnosis.effects.tooth_crack import TOOTH_CRACK
 from gearbench.diagnosis.effects.torque_ripple import TORQUE_RIPPLE
+from gearbench.diagnosis.judging.closing import GAIN
 from gearbench.diagnosis.selection.weighing import LIMIT
 from gearbench.diagnosis.simulation.quadratic import quadratic_of
 
@@ -63,6 +73,22 @@ def test_what_is_named_is_named_at_any_larger_size() -> None:
         assert view.evidence(number, found)[number] >= LIMIT
         assert apart_from(view, number, found) == pytest.approx(found)
         assert rivals_at(view, number, found) == ()
+
+
+def test_a_record_of_its_own_makes_up_for_what_the_search_lacks() -> None:
+    """As it does where effects are selected: fewer nats enter, and those that lack are gained where nothing was
+    fitted. Few lines judge, so that it is their nats that decide."""
+    one = known(0.02 * sensitivities())
+    quadratic = one.judged.quadratic
+    few = replace(quadratic.target, counts=0.5 * quadratic.target.counts)
+    one = replace(one, judged=Blocks(replace(quadratic, target=few)))
+    view = View(replace(one, apart=True), HYPOTHESES)
+    for number in range(len(HYPOTHESES)):
+        within, found = smallest(View(one, HYPOTHESES), number), smallest(view, number)
+        assert within is not None and found is not None and found < within
+        evidence, judged = view.evidence(number, found)[number], _Judge(view, number)
+        gain = float(np.sum(few.counts * np.log1p(judged.energies * found**2 / judged.floors)))
+        assert evidence < LIMIT and gain + evidence == pytest.approx(GAIN + LIMIT, rel=1e-6)
 
 
 def test_fewer_records_and_more_noise_find_less() -> None:
