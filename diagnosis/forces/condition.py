@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from gearbench.diagnosis.forces.basis import hats, on_path, waves
 from gearbench.diagnosis.forces.nominal import NominalModel
 from gearbench.diagnosis.intake.measurements import Measurement
+from gearbench.diagnosis.intake.signals import about_rest
 from gearbench.lumped.nonlinear.coordinates import leaning_of
 from gearbench.lumped.nonlinear.ends import aside_of, ends_between, turned_by
 
@@ -19,8 +20,6 @@ Complex = NDArray[np.complex128]
 
 TINY = 1e-40  # variance that no channel falls below: divisions stay finite
 CHANNELS = ("angle_driver", "angle_driven", "y_driver", "y_driven", "torque_driver", "torque_driven")
-
-NEAR = 0.5  # of the nominal deflection of the supports, within which a measured mean is one
 
 
 @dataclass(frozen=True)
@@ -152,7 +151,7 @@ def _rest(model: NominalModel, spectra: Mapping[str, Complex]) -> tuple[float, b
     if "y_driver" not in spectra or "y_driven" not in spectra:
         return rest, True
     seen = float((spectra["y_driver"][0] - spectra["y_driven"][0]).real)
-    near = abs(seen - rest) < NEAR * abs(rest)
+    near = about_rest(seen, rest)
     return (seen if near else rest), near
 
 

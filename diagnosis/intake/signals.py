@@ -31,6 +31,8 @@ CHANNELS = ("dte", "angle_driver", "angle_driven", "y_driver", "y_driven", "torq
 UNITS = {**dict.fromkeys(CHANNELS, "m"), "torque_driven": "N m"}
 # Upper ends of the bands that a gap is told in, below the end of the excitation, over it.
 BAND_ENDS = (1 / 15, 1 / 3)
+# Of the deflection of the nominal supports, within which a measured mean is one, and not a sensor's zero.
+NEAR = 0.5
 # A line is excited when its torque exceeds this part of the strongest line's (the mean apart).
 EXCITED = 0.1
 
@@ -57,6 +59,12 @@ def simulated_channels(measurement: Measurement, replay: xr.Dataset) -> dict[str
 def has_both_y(measurement: Measurement) -> bool:
     """Whether both displacements are measured: without them the transmission error is that of the rotations alone."""
     return "y_driver" in measurement.periods and "y_driven" in measurement.periods
+
+
+def about_rest(seen: float, rest: float) -> bool:
+    """Whether a mean displacement is about where nominal supports come to `rest`, in one unit: its zero is without
+    load, then."""
+    return abs(seen - rest) < NEAR * abs(rest)
 
 
 def _channels(values: Mapping[str, Array], attributes: Mapping[str, float], with_y: bool) -> dict[str, Array]:

@@ -14,8 +14,8 @@ The sum is taken as chi-square with the degrees of freedom of that mean and vari
 low and high. The floor is the noise of the repetitions' mean with 2 (P - 1) degrees of freedom a line.
 
 Band [0, 0] is the difference of the mean values, with the standard error of the repetitions' means. It is given where
-zero means something: for angles and DTE only if their zero is unloaded contact (`Measurement.zero_known`), for
-displacements and torque always. Elsewhere the mean is left out on both sides.
+zero means something: for angles if it is unloaded contact (`Measurement.zero_known`), for displacements if they are
+about where the nominal supports come to rest, for the DTE if both are so, for the torque always.
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.intake.signals import (
     CHANNELS,
     UNITS,
+    about_rest,
     bands,
     frequencies,
     line_energy,
@@ -94,13 +95,22 @@ def gaps_of(
         residuals = [repetitions[channel].mean(axis=0) - values[channel] for values in simulated]
         for band in shown:
             found.append(_band_gap(held_out, channel, band, repetitions[channel], residuals))
-        if zero_known(held_out, channel):
+        if zero_known(held_out, channel, repetitions, simulated[0]):
             found.append(_mean_gap(held_out, channel, repetitions[channel], residuals))
     return tuple(found)
 
 
-def zero_known(measurement: Measurement, channel: str) -> bool:
-    """Whether the mean value of a channel means something."""
+def zero_known(
+    measurement: Measurement, channel: str, repetitions: Mapping[str, Array], nominal: Mapping[str, Array]
+) -> bool:
+    """Whether the mean value of a channel means something, by its repetitions (channel -> (P, N)) and the nominal rig's
+    signals (channel -> (N,))."""
+    displaced = [one for one in ("y_driver", "y_driven") if one in repetitions and one in nominal]
+    if channel in displaced:
+        return about_rest(float(repetitions[channel].mean()), float(nominal[channel].mean()))
+    if channel == "dte" and len(displaced) > 1:
+        seen, rest = (float((of[displaced[0]] - of[displaced[1]]).mean()) for of in (repetitions, nominal))
+        return measurement.zero_known and about_rest(seen, rest)
     return measurement.zero_known or channel not in ("dte", "angle_driver", "angle_driven")
 
 

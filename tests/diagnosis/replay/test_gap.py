@@ -111,6 +111,24 @@ def test_means_are_given_where_zero_means_something() -> None:
     assert find(found, "angle_driver", (0.0, 150.0)).nominal.value < 1e-12
 
 
+@pytest.mark.parametrize(
+    ("zeros", "means"),
+    [
+        ({"y_driver": 0.7}, {"y_driven", "dte"}),
+        ({"y_driver": -0.4}, {"y_driver", "y_driven", "dte"}),
+        ({"y_driver": -1.0, "y_driven": -1.0}, set()),
+    ],
+)
+def test_displacements_that_see_what_moves_alone_have_no_mean(zeros: dict[str, float], means: set[str]) -> None:
+    """Zeros off by those parts of the support's rest: the transmission error has the difference of both."""
+    values = channels(noise=0.0)
+    for channel, off in zeros.items():
+        values[channel] = values[channel] + off * values[channel].mean()
+    found = gaps(NOMINAL, BETTER, None, measurement(record(values), "held-out", nominal()), simulate=simulator({}))
+    told = {gap.channel for gap in found if gap.band_hz == (0.0, 0.0)}
+    assert told == means | {"angle_driver", "torque_driven"}
+
+
 def test_the_floor_is_the_noise_of_the_mean() -> None:
     for periods in (2, 3, 8):
         measured = held_out(noise=1.0, periods=periods)
