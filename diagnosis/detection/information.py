@@ -29,8 +29,7 @@ class Without:
 def floors_of(target: Target, quiet: float = 1.0, left: float = 0.0) -> Array:
     """Mean squares (blocks,) below which nothing is seen: s^2 with `quiet` times the variance of the noise, and what
     the best rig leaves of a block, the part `left` of its level."""
-    level = np.bincount(target.of_line, np.abs(target.lines) ** 2, len(target.blocks)) / target.sizes
-    return np.asarray(target.floors - (1.0 - quiet) * target.noise + left**2 * level)
+    return np.asarray(target.floors - (1.0 - quiet) * target.noise + left**2 * target.energies(target.lines))
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +57,11 @@ class Blocks:
         noise = quiet * self.quadratic.energy / self.target.sizes
         weights = 2 * self.target.counts / ((self.floors(quiet, left) + noise) * self.target.sizes)
         return np.asarray(np.tensordot(weights * self.kept(without), self.quadratic.squares, axes=1))
+
+    def rest(self, quiet: float, left: float) -> Array:
+        """Mean squares (blocks,) of the gap to the best rig, its noise included."""
+        noise = quiet * self.quadratic.energy / self.target.sizes
+        return np.asarray(noise + left**2 * self.target.energies(self.target.lines))
 
     def energies(self, step: Array) -> Array:
         """Mean squares (blocks,) of the lines that a step (q,) of the unknowns changes."""

@@ -52,7 +52,9 @@ class Changed:
 
     def growth(self, more: float) -> float:
         """By how much the gap of some part grows without it."""
-        return growth_of(self.simulator.target, self.floors + self.energies(more), self.floors)[0]
+        target = self.simulator.target
+        rest = np.maximum(self.floors - target.floors, target.noise)
+        return growth_of(target, rest + self.energies(more), rest)[0]
 
 
 class Backlashes(NamedTuple):

@@ -173,6 +173,7 @@ class _Judge:
         blocks = known.judged
         self.target = replace(blocks.target, noise=view.quiet / view.sharper * blocks.target.noise)
         self.floors = blocks.floors(view.quiet, view.left) / view.sharper
+        self.rest = blocks.rest(view.quiet, view.left) / view.sharper
         # A record that is left out of the search is judged on all the same; a channel that is not measured is not.
         kept = blocks.kept(Without(channels=view.without.channels))
         self.energies = blocks.energies(whole - covariance @ view.information @ whole) * kept
@@ -186,7 +187,7 @@ class _Judge:
         """Whether an effect of that size, which lacked so many nats in the search, closes a part of the gap."""
         more = self.energies * max(size - self.held, 0.0) ** 2
         gain = float(np.sum(self.target.counts * np.log1p(more / self.floors)))
-        factor, _ = growth_of(self.target, self.floors + more, self.floors)
+        factor, _ = growth_of(self.target, self.rest + more, self.rest)
         return gain > GAIN + lacking and factor > DUE
 
 

@@ -63,7 +63,7 @@ def free_closing(target: Target, without: Mapping[str, Array], with_all: Mapping
     closing = closing_of(target, without, with_all)
     lost, kept = (target.energies(target.lines - target.gathered([one])) for one in (without, with_all))
     size = target.fluctuating * target.sizes / target.of_channels(target.energies(target.lines) * target.sizes)
-    whole = float(np.sqrt((lost * size).sum() / max(((kept + target.noise) * size).sum(), 1e-300)))
+    whole = float(np.sqrt((lost * size).sum() / max((np.maximum(kept, target.noise) * size).sum(), 1e-300)))
     return replace(closing, growth=min(closing.growth, whole))
 
 

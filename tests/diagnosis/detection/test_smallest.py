@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from math import sqrt
+from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
@@ -10,6 +12,7 @@ import pytest
 from shared.fake_simulator import LINES, sensitivities, target, unknowns
 
 from gearbench.diagnosis.detection.information import Blocks, Known, Without
+from gearbench.diagnosis.detection.opened import Changed
 from gearbench.diagnosis.detection.smallest import (
     View,
     _Judge,
@@ -20,12 +23,14 @@ from gearbench.diagnosis.detection.smallest import (
     smallest,
     wide_prior,
 )
+from gearbench.diagnosis.effects.backlash import KEY
 from gearbench.diagnosis.effects.effect import Hypothesis, Wide
 from gearbench.diagnosis.effects.friction import FRICTION
 from gearbench.diagnosis.effects.tooth_crack import KEY as CRACK
 from gearbench.diagnosis.effects.tooth_crack import TOOTH_CRACK
 from gearbench.diagnosis.effects.torque_ripple import TORQUE_RIPPLE
-from gearbench.diagnosis.judging.closing import GAIN
+from gearbench.diagnosis.forces.unknowns import group, unknowns_of
+from gearbench.diagnosis.judging.closing import DUE, GAIN
 from gearbench.diagnosis.selection.weighing import LIMIT
 from gearbench.diagnosis.simulation.quadratic import quadratic_of
 
@@ -89,6 +94,34 @@ def test_a_record_of_its_own_makes_up_for_what_the_search_lacks() -> None:
         evidence, judged = view.evidence(number, found)[number], _Judge(view, number)
         gain = float(np.sum(few.counts * np.log1p(judged.energies * found**2 / judged.floors)))
         assert evidence < LIMIT and gain + evidence == pytest.approx(GAIN + LIMIT, rel=1e-6)
+
+
+def test_the_judged_gap_grows_by_a_tenth_from_what_the_rig_leaves_there() -> None:
+    """Which is a tenth of the level below which no model counts as right. So many lines tell that nothing else decides;
+    the effect adds its energy to what is left."""
+    rest = 0.5 * np.exp(1j * np.arange(LINES))
+    found, seen = known(sensitivities(), floor=1e-9), known(sensitivities(), floor=25.0).judged.quadratic
+    many = replace(seen.target, counts=1e5 * seen.target.counts)
+    judged = Blocks(replace(seen.moved(rest), target=many))
+    view = View(replace(found, judged=judged), HYPOTHESES)
+    for number in range(len(HYPOTHESES)):
+        size = smallest(view, number)
+        assert size is not None
+        more = _Judge(view, number).energies * size**2
+        grown = np.sqrt(1.0 + np.array([more.sum() / 6, *more]) / 0.25)
+        assert grown.max() == pytest.approx(DUE, rel=1e-6)
+
+
+@pytest.mark.parametrize("noise", [0.0, 2e-3])
+def test_a_backlash_grows_the_gap_from_what_the_rig_leaves_there(noise: float) -> None:
+    """By simulation, with the same rule; the gap is no less than the noise."""
+    listed = unknowns_of([group(KEY, "m", ("more",), 4e-6, 8e-5, slot="backlash")], 2)
+    where = replace(target(np.zeros(LINES, dtype=complex), 1e-2), noise=np.full(6, noise**2))
+    simulator: Any = SimpleNamespace(
+        target=where, layout=SimpleNamespace(unknowns=listed), lines=lambda p: p[0] * np.ones(LINES, dtype=complex)
+    )
+    changed = Changed(simulator, np.zeros(1), where.floors + 1e-6)
+    assert changed.growth(2e-3) == pytest.approx(sqrt(1.0 + 4e-6 / max(1e-6, noise**2)), rel=1e-6)
 
 
 def test_fewer_records_and_more_noise_find_less() -> None:

@@ -390,3 +390,13 @@ def test_free_simulations_must_close_a_tenth_of_the_whole_gap() -> None:
     assert not whole.due and whole.gain == part.gain
     near = {"lines": held.lines + 0.1}
     assert free_closing(held, {"lines": held.lines + 1.0}, near).due
+
+
+def test_a_rig_at_its_noise_owes_a_tenth_of_that() -> None:
+    """What is left of a record holds its noise already."""
+    held = of_lines(noisy(BACKGROUND @ OTHER, 12))
+    held = replace(held, noise=np.full(len(held.floors), 0.02**2))
+    noise = np.sqrt(held.noise)[held.of_line]
+    for growth, due in (1.2, True), (1.05, False):
+        closing = free_closing(held, {"lines": held.lines + growth * noise}, {"lines": held.lines + noise})
+        assert closing.growth == pytest.approx(growth, rel=1e-6) and closing.due == due
