@@ -52,7 +52,9 @@ def with_losses(
     begin[at] = min(coefficient, float(unknowns.bounds()[1][at][0]))
     found = fit_afresh(simulator, begin, one.widened(unknowns, base.sd), renewals=RENEWALS)
     if found is not None:
-        out[one.name] = Start(one, found.p, found.evidence - base.evidence)
+        worth = found.evidence - base.evidence
+        # What forces make of it stands, wherever that fit ended.
+        out[one.name] = Start(one, found.p, max(worth, out[one.name].log_bayes_factor) if one.name in out else worth)
     return out
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.diagnosis.effects.effect import BEYOND, Hypothesis
-from gearbench.diagnosis.fitting.closeness import answers_alike, is_close
+from gearbench.diagnosis.fitting.closeness import answers_alike, better, is_close
 from gearbench.diagnosis.fitting.fit import Optimum, fit, fit_afresh, gone_on, refreshed
 from gearbench.diagnosis.fitting.moved_motions import with_motions_moved
 from gearbench.diagnosis.fitting.reshaped import has_shapes
@@ -24,7 +24,15 @@ from gearbench.diagnosis.fitting.shown import Shown
 from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.selection.by_forces import Start
 from gearbench.diagnosis.selection.needed import FAR, SAME, beside, held_against_background, needed
-from gearbench.diagnosis.selection.rivals import compared, is_like, rivals_of, unentered, usual_of
+from gearbench.diagnosis.selection.rivals import (
+    MOST_LEFT,
+    compared,
+    is_like,
+    is_same,
+    rivals_of,
+    unentered,
+    usual_of,
+)
 from gearbench.diagnosis.selection.weighing import Weighed, entering, is_own, weigh
 from gearbench.diagnosis.simulation.jacobian import WEIGHED
 from gearbench.diagnosis.simulation.simulator import Simulator
@@ -70,9 +78,7 @@ def select(
     hypothesis' name; `shown`: what the records show without simulation; `apart`: a record that has no part in
     this judges what enters."""
     unknowns = simulator.layout.unknowns
-    if not is_close(simulator, base):
-        base = refreshed(simulator, base, unknowns.of(WEIGHED))
-    base = gone_on(simulator, base, RENEWALS_FRESH)
+    base = _fresh(simulator, base)
     best, entered, weighed = _forward(simulator, base, [], hypotheses, starts, report, apart=apart)
 
     def begun_elsewhere(best: Optimum, kept: Sequence[Weighed]) -> Optimum:
@@ -87,6 +93,16 @@ def select(
     return Selection(base, bare, best, kept, tuple(weighed))
 
 
+def _fresh(simulator: Simulator, base: Optimum) -> Optimum:
+    """The background's optimum as hypotheses are weighed over it: with derivatives taken where it is, and fitted on
+    where these promise more than fits may that are compared. What a fit with an effect finds that had nothing to do
+    with it would be that effect's evidence, and what old derivatives hide of it is lost."""
+    base = refreshed(simulator, base, simulator.layout.unknowns.of(WEIGHED))
+    if base.left <= MOST_LEFT:
+        return base
+    return better(base, fit_afresh(simulator, base.p, base.sd, renewals=RENEWALS_FRESH))
+
+
 def further(
     simulator: Simulator,
     selection: Selection,
@@ -97,8 +113,14 @@ def further(
 ) -> Selection | None:
     """The selection with what the records call for besides when these effects are `out`, which had the place of others;
     None where nothing more enters, or none of that stays."""
-    tried = [one.hypothesis for one in (*selection.entered, *out)]
-    left = [one for one in selection.weighed if not any(is_like(one.hypothesis, other) for other in tried)]
+    taken, refused = ([one.hypothesis for one in several] for several in (selection.entered, out))
+    left = [
+        one
+        for one in selection.weighed
+        # What was refused is nobody's place: its rare counterpart may be what is at work.
+        if not any(is_like(one.hypothesis, other) for other in taken)
+        and not any(is_same(one.hypothesis, other) for other in refused)
+    ]
     if not out or not any(entering(simulator.layout.unknowns, one, apart) for one in left):
         return None
     rest = [one.hypothesis for one in left]
@@ -222,14 +244,23 @@ def _forward(
         found = compared(simulator, best, weigh(simulator, best, rest, starts, report, reshape=not entered))
         if not first:
             first, starts = found, {**starts, **_shaped(found)}
-        winner = usual_of(found)
-        winner = entering(unknowns, winner, apart) if winner else None
+        winner = _entering_first(unknowns, found, apart)
         if winner is None or winner.optimum is None:
             break
         entered.append(replace(winner, rivals=rivals_of(winner, found)))
         best = winner.optimum
         best = fit_afresh(simulator, best.p, best.sd, renewals=0) or best
     return best, entered, first
+
+
+def _entering_first(unknowns: Unknowns, found: Sequence[Weighed], apart: bool) -> Weighed | None:
+    """What enters first of those weighed, the best first: the usual cause, or where that has too little evidence by
+    itself the one of which it is the counterpart."""
+    for one in (usual_of(found), *found[:1]):
+        entered = entering(unknowns, one, apart) if one else None
+        if entered is not None:
+            return entered
+    return None
 
 
 def _entries(unknowns: Unknowns, effects: Sequence[Weighed]) -> NDArray[np.bool_]:

@@ -122,9 +122,8 @@ def weigh(
                 begun.append(reshaped(simulator, one, one.widened(unknowns, base.sd)))
             if one.name in called:
                 begun.append(begun_late(simulator, base, one, called[one.name]))
-            optimum = max((found for found in begun if found), key=lambda found: found.evidence, default=None)
-            if optimum is not None and denied_by_means(simulator, one, optimum):
-                optimum = None
+            likely = (found for found in begun if found and not denied_by_means(simulator, one, found))
+            optimum = max(likely, key=lambda found: found.evidence, default=None)
         except ValueError:  # a fit that leads nowhere costs its hypothesis, not the verdict
             optimum = None
         if optimum is None:

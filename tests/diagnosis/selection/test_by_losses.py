@@ -15,6 +15,7 @@ from gearbench.diagnosis.effects.effect import Hypothesis, Wide
 from gearbench.diagnosis.fitting.background import prior_of
 from gearbench.diagnosis.fitting.fit import Optimum, fit_afresh
 from gearbench.diagnosis.selection import by_losses
+from gearbench.diagnosis.selection.by_forces import Start
 from gearbench.diagnosis.selection.by_losses import read_off, with_losses
 from gearbench.diagnosis.simulation.simulator import Simulator
 from gearbench.geometry import pair
@@ -86,3 +87,9 @@ def test_friction_is_begun_where_the_loss_has_it(monkeypatch: pytest.MonkeyPatch
         monkeypatch.setattr(by_losses, "read_off", lambda simulator, p, little=little: little)
         assert with_losses(simulator, base, (FRICTION,), {}) == {}  # type: ignore[arg-type]
     assert with_losses(simulator, base, (), {}) == {}  # type: ignore[arg-type]
+    # What forces make of it is not lost where that fit ends badly.
+    monkeypatch.setattr(by_losses, "read_off", lambda simulator, p: 0.29)
+    better = replace(base, evidence=base.evidence + 1e3)
+    forces = {"friction": Start(FRICTION, np.zeros(8), 30.0)}
+    kept = with_losses(simulator, better, (FRICTION,), forces)["friction"]  # type: ignore[arg-type]
+    assert kept.log_bayes_factor == 30.0 and kept.p == pytest.approx(begun.p)

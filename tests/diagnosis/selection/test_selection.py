@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
-from shared.fake_simulator import ACROSS, LINES, FakeSimulator, beyond_a_hill, chosen, sensitivities, target
+from shared.fake_simulator import ACROSS, LINES, FakeSimulator, beyond_a_hill, chosen, sensitivities, target, unknowns
 
 from gearbench.diagnosis.effects.effect import Hypothesis, Wide, twins_of
+from gearbench.diagnosis.fitting.background import prior_of
+from gearbench.diagnosis.fitting.fit import Optimum, Sensitivity, fit, fit_afresh, sensitivity_of
 from gearbench.diagnosis.fitting.shown import Shown
 from gearbench.diagnosis.forces.unknowns import group, unknowns_of
 from gearbench.diagnosis.selection import needed as needed_module
@@ -20,6 +22,7 @@ from gearbench.diagnosis.selection.by_forces import Start
 from gearbench.diagnosis.selection.rivals import compared, is_like, rivals_of, unentered, usual_of
 from gearbench.diagnosis.selection.selection import Selection, carried_on, evidence_without, known_within, taken_out
 from gearbench.diagnosis.selection.weighing import LIMIT, Weighed
+from gearbench.diagnosis.simulation.quadratic import quadratic_of
 
 MATRIX = sensitivities(3)
 FRICTION = Hypothesis("friction", "mesh", (Wide("friction"),))
@@ -32,12 +35,15 @@ def selected(true: dict[int, float], starts: dict[str, Start] | None = None) -> 
     p = np.array([0.08, -0.1, 0.02, 0.004, -0.005, 0.006, 0.0, 0.0])
     for number, value in true.items():
         p[number] = value
-    rng = np.random.default_rng(11)
-    lines = p @ MATRIX + 0.02 * (rng.standard_normal(LINES) + 1j * rng.standard_normal(LINES))
-    simulator = FakeSimulator(lambda q: q @ MATRIX, target(lines))
+    simulator = FakeSimulator(lambda q: q @ MATRIX, target(noisy(p @ MATRIX)))
     found = chosen(simulator, LISTED, [np.zeros(8)], starts or {})
     assert found is not None
     return found
+
+
+def noisy(lines: np.ndarray) -> np.ndarray:
+    rng = np.random.default_rng(11)
+    return lines + 0.02 * (rng.standard_normal(LINES) + 1j * rng.standard_normal(LINES))
 
 
 def names(found: Selection) -> list[str]:
@@ -330,6 +336,88 @@ def test_nothing_of_what_proves_needless_is_left(monkeypatch: pytest.MonkeyPatch
     assert found.best.sd[3] == found.base.sd[3] and abs(found.best.p[3]) < 0.1
     if left:
         assert found.best.p[4:6] == pytest.approx([0.3, -0.2], abs=0.1)
+
+
+def test_a_beginning_that_means_deny_does_not_hide_one_that_they_do_not(monkeypatch: pytest.MonkeyPatch) -> None:
+    simulator = FakeSimulator(lambda q: q @ MATRIX, target(0.4 * MATRIX[3]))
+    base = fit_afresh(simulator, np.zeros(8), prior_of(simulator, unknowns().prior()), renewals=1)  # type: ignore[arg-type]
+    assert base is not None
+    late = base.p.copy()
+    late[3] = 0.3
+
+    def begun(simulator: object, base: Optimum, one: Hypothesis, begin: np.ndarray) -> Optimum:
+        return replace(base, p=begin, sd=one.widened(unknowns(), base.sd), evidence=base.evidence + 20.0)
+
+    monkeypatch.setattr(weighing, "called_for", lambda simulator, base, one: late)
+    monkeypatch.setattr(weighing, "begun_late", begun)
+    monkeypatch.setattr(weighing, "denied_by_means", lambda simulator, one, optimum: optimum.p[3] > 0.35)
+    (found,) = weighing.weigh(simulator, base, (FRICTION,), {})  # type: ignore[arg-type]
+    assert found.optimum is not None and found.optimum.p[3] == 0.3 and found.log_bayes_factor == pytest.approx(20.0)
+
+
+def test_effects_are_weighed_by_derivatives_taken_where_the_background_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Those that its fit carried along may not know of the effect at all, however close it is."""
+    lines = np.array([0.08, -0.1, 0.02, 0.4, 0.0, 0.0, 0.0, 0.0]) @ MATRIX
+    simulator = FakeSimulator(lambda q: q @ MATRIX, target(noisy(lines)))
+    monkeypatch.setattr(module, "is_close", lambda simulator, found: True)
+    base = fit_afresh(simulator, np.zeros(8), prior_of(simulator, unknowns().prior()), renewals=1)  # type: ignore[arg-type]
+    assert base is not None
+    blind = MATRIX.copy()
+    blind[3] = 0.0
+    quadratic = quadratic_of(simulator.target, simulator.target.lines - base.lines, blind, np.delete(np.arange(8), 3))
+    stale = replace(base, sensitivity=Sensitivity(blind, quadratic))
+    found = module.select(simulator, stale, LISTED, {})  # type: ignore[arg-type]
+    assert names(found) == ["friction"]
+
+
+def test_what_a_background_had_still_to_gain_is_no_evidence(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Weighed over a fit that stopped on its way, whatever is fitted on beside it seems to be at work."""
+    sound = np.array([0.08, -0.1, 0.02, 0.004, -0.005, 0.006, 0.0, 0.0]) @ MATRIX
+    simulator = FakeSimulator(lambda q: q @ MATRIX, target(noisy(sound)))
+    monkeypatch.setattr(module, "is_close", lambda simulator, found: True)
+    sd, begin = prior_of(simulator, unknowns().prior()), np.zeros(8)  # type: ignore[arg-type]
+    first = sensitivity_of(simulator, begin, sd)  # type: ignore[arg-type]
+    stopped = fit(simulator, begin, 1e-3 * sd, first)  # type: ignore[arg-type]
+    assert stopped is not None
+    stopped = replace(stopped, sd=sd, left=20.0)
+    found = module.select(simulator, stopped, LISTED, {})  # type: ignore[arg-type]
+    assert names(found) == [] and found.base.cost < stopped.cost - 20.0
+
+
+def test_what_was_refused_has_not_the_place_of_its_rare_counterpart(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "MOST", 1)
+    found = selected({3: 0.4})
+    rare = Weighed(replace(CRACKS[0], usual=(("friction",), 1.0)), 30.0, found.best)
+    listed = replace(found, weighed=(*found.entered, rare))
+    tried: list[str] = []
+
+    def forward(simulator: object, best: Optimum, beside: object, hypotheses: Any, *_: Any, **__: Any) -> Any:
+        tried.extend(one.name for one in hypotheses)
+        return best, list(cast(Any, beside)), []
+
+    monkeypatch.setattr(module, "_forward", forward)
+    simulator = FakeSimulator(lambda q: q @ MATRIX, target(0.4 * MATRIX[3]))
+    bare = module.only(simulator, listed, [])  # type: ignore[arg-type]
+    assert module.further(simulator, bare, found.entered) is None and tried == ["tooth-crack 0"]  # type: ignore[arg-type]
+    # Beside the usual one that entered it has nothing to add.
+    tried.clear()
+    assert module.further(simulator, listed, (Weighed(RIPPLE, 9.0, found.best),)) is None and not tried  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("usual", "rare", "apart", "name"),
+    [(7.7, 10.0, False, "friction"), (3.9, 6.6, True, "friction"), (8.1, 10.0, False, "torque-ripple"),
+     (7.0, 7.7, False, None)],
+)  # fmt: skip
+def test_where_a_usual_cause_lacks_evidence_its_rare_counterpart_enters(
+    monkeypatch: pytest.MonkeyPatch, usual: float, rare: float, apart: bool, name: str | None
+) -> None:
+    """Each alone has what the other has not: not to enter at all would lose both."""
+    optimum = selected({3: 0.4}).best
+    weighed = [Weighed(replace(FRICTION, usual=(("ripple",), -0.5)), rare, optimum), Weighed(RIPPLE, usual, optimum)]
+    entered = module._entering_first(unknowns(), weighed, apart)
+    assert (entered.hypothesis.name if entered else None) == name
+    assert module._entering_first(unknowns(), [], apart) is None
 
 
 def test_no_rig_at_the_start_is_no_selection() -> None:
