@@ -142,6 +142,8 @@ def _lacking(view: View, number: int, size: float) -> float | None:
     assert one.effect is not None
     at = one.entries(known.unknowns)
     at = at[np.isin(at, known.active)]
+    if not at.size:  # these records do not show it at all
+        return None
     place = np.searchsorted(known.active, at)
     covariance, wide = view.posteriors[number][0], wide_prior(known, one)[at]
     found = size * (covariance @ view.information @ direction(known, one)[known.active])[place]

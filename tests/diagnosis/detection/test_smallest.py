@@ -141,6 +141,10 @@ def test_records_that_do_not_show_it_find_nothing() -> None:
     blind = sensitivities()
     blind[3] = 0.0
     assert smallest(View(known(blind), HYPOTHESES), 0) is None
+    # Nor where nothing of it is among what they show.
+    one, shown = known(blind), np.delete(np.arange(8), 3)
+    seen = Blocks(quadratic_of(one.search.target, one.search.target.lines, blind, shown))
+    assert smallest(View(replace(one, active=shown, search=seen, judged=seen, apart=True), HYPOTHESES), 0) is None
 
 
 def test_effects_with_the_same_trace_are_rivals() -> None:
