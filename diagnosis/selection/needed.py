@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import gammaincinv
 
 from gearbench.diagnosis.effects.effect import Hypothesis
 from gearbench.diagnosis.effects.profile_error import uneven
@@ -28,9 +29,9 @@ Report = Callable[[str], None]
 
 CLEAR = 50.0  # nats promised from which an effect is needed
 SAME = 4.0  # nats up to which a good rig explains the records as well
-# Standard deviations of the background from which an effect is one though a good rig would explain the records as well,
-# if it could have as much.
-FAR = 4.0
+# Standard deviations of the background from which an effect of one number is one though a good rig would explain the
+# records as well, if it could have as much: of rigs with twice a good one's share one in thirty has that.
+FAR, TWICE, RARE = 4.0, 2.0, 0.03
 RENEWALS = 4
 
 
@@ -144,7 +145,14 @@ def beside(simulator: Simulator, base: Optimum, best: Optimum, kept: Sequence[We
 
 def _is_background(unknowns: Unknowns, one: Hypothesis, best: Optimum, without: Optimum) -> bool:
     """Whether a good rig explains the records as well, by not much more than good rigs have."""
-    return has_own(unknowns, one) and without.misfit - best.misfit < SAME and size_of(unknowns, one, best.p) < FAR
+    far = far_of(len(one.entries(unknowns)))
+    return has_own(unknowns, one) and without.misfit - best.misfit < SAME and size_of(unknowns, one, best.p) < far
+
+
+def far_of(count: int) -> float:
+    """Rms in standard deviations of the background from which an effect of so many numbers is one: many that are each
+    three times a good rig's share are no chance, where one of four may be."""
+    return min(FAR, TWICE * float(np.sqrt(2.0 * gammaincinv(count / 2, 1.0 - RARE) / count)))
 
 
 def size_of(unknowns: Unknowns, one: Hypothesis, p: Array, told: Array | None = None) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from gearbench.diagnosis.fitting.background import prior_of
 from gearbench.diagnosis.fitting.fit import Optimum, fit_afresh
 from gearbench.diagnosis.forces.unknowns import group, unknowns_of
 from gearbench.diagnosis.selection import needed as module
-from gearbench.diagnosis.selection.needed import CLEAR, beside, held_against_background, needed, size_of
+from gearbench.diagnosis.selection.needed import CLEAR, FAR, beside, far_of, held_against_background, needed, size_of
 from gearbench.diagnosis.selection.weighing import LIMIT, PROVISIONAL, Weighed
 from gearbench.diagnosis.simulation.jacobian import FOLLOWED
 from gearbench.diagnosis.simulation.quadratic import prior_cost
@@ -151,6 +152,25 @@ def test_what_the_background_explains_as_well_must_be_far_larger(deviations: flo
     )
     assert [one.hypothesis.name for one in stay] == (["torque-ripple"] if stays else [])
     assert (found is best) == stays
+
+
+@pytest.mark.parametrize("count", [2, 8, 24, 100])
+def test_many_numbers_need_not_be_as_far_each(count: int) -> None:
+    """Of rigs with twice a good one's share of everything, so many have as much: by draws."""
+    drawn = 2.0 * np.random.default_rng(count).standard_normal((20000, count))
+    part = float((np.sqrt((drawn**2).mean(axis=1)) > far_of(count)).mean())
+    assert part == pytest.approx(0.03, abs=0.005)
+    assert far_of(count) < far_of(1) == FAR
+
+
+@pytest.mark.parametrize(("deviations", "stays"), [(2.2, False), (3.0, True)])
+def test_a_ripple_in_many_orders_that_no_good_rig_has_is_one(deviations: float, stays: bool) -> None:
+    """As above, for an effect of twenty-four numbers."""
+    listed = unknowns_of([group("ripple", "1", 24, 0.01, 0.5, slot="torque")], 2)
+    size = 0.01 * deviations * np.where(np.arange(24) % 2, -1.0, 1.0)
+    at = SimpleNamespace(p=size, misfit=0.0)
+    ripple = Hypothesis("torque-ripple", "drive", (Wide("ripple"),))
+    assert module._is_background(listed, ripple, at, SimpleNamespace(misfit=3.0)) != stays  # type: ignore[arg-type]
 
 
 def test_flanks_that_stand_back_everywhere_have_no_error_of_form() -> None:
