@@ -90,7 +90,10 @@ def select(
         return begun_at_nominal(simulator, best, _entries(unknowns, kept))
 
     base, bare, best, kept = _together(simulator, base, best, entered, report, begun_elsewhere, apart=apart)
-    return Selection(base, bare, best, kept, tuple(weighed))
+    selection = Selection(base, bare, best, kept, tuple(weighed))
+    # What proved needless or a good rig's had kept others out, whose part of the gap it took.
+    gone = [one for one in entered if not any(is_same(one.hypothesis, other.hypothesis) for other in kept)]
+    return further(simulator, selection, gone, report, apart=apart) or selection
 
 
 def _fresh(simulator: Simulator, base: Optimum) -> Optimum:

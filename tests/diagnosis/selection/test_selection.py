@@ -150,6 +150,24 @@ def test_what_had_no_place_enters_when_another_is_out(monkeypatch: pytest.Monkey
     assert module.further(simulator, bare, found.entered) is None  # type: ignore[arg-type]
 
 
+def test_what_had_no_place_enters_when_the_other_proves_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As much as a good rig's after all: the one that it had kept out is tried in its place."""
+    monkeypatch.setattr(module, "MOST", 1)
+    true = np.array([0.08, -0.1, 0.02, 0.4, 0.3, -0.2, 0.0, 0.0])
+    simulator = FakeSimulator(lambda q: q @ MATRIX, target(true @ MATRIX))
+    held = module.held_against_background
+
+    def none_of_friction(simulator: Any, base: Any, best: Any, kept: Any, report: Any, apart: bool) -> Any:
+        stay = [one for one in kept if one.hypothesis is not FRICTION]
+        base, best, found = held(simulator, base, best, stay, report, apart=apart)
+        return base, best if stay else base, found
+
+    monkeypatch.setattr(module, "held_against_background", none_of_friction)
+    found = chosen(simulator, LISTED, [np.zeros(8)], {})
+    assert found is not None and names(found) == ["torque-ripple"]
+    assert found.best.p[4:6] == pytest.approx([0.3, -0.2], abs=0.1)
+
+
 def test_a_rare_effect_gives_way_to_a_usual_one_that_explains_nearly_as_much() -> None:
     optimum = selected({3: 0.4}).best
     rare = Weighed(replace(FRICTION, usual=(("ripple",), -0.5)), 100.0, optimum)
