@@ -20,7 +20,7 @@ from gearbench.diagnosis.fitting.background import prior_of
 from gearbench.diagnosis.fitting.closeness import better
 from gearbench.diagnosis.fitting.fit import Optimum, cost_of, fit, fit_afresh
 from gearbench.diagnosis.forces.unknowns import Unknowns
-from gearbench.diagnosis.selection.weighing import Weighed, entering, has_own
+from gearbench.diagnosis.selection.weighing import Weighed, beyond, entering, has_own
 from gearbench.diagnosis.simulation.jacobian import FOLLOWED
 from gearbench.diagnosis.simulation.simulator import Simulator
 
@@ -51,7 +51,7 @@ def needed(
     while len(entered) > 1:
         stay = [one if one.hypothesis.name in borne_out else _promised(simulator, best, one) for one in stay]
         open_yet = (one for one in stay if one.hypothesis.name not in borne_out)
-        one = min(open_yet, key=lambda one: one.log_bayes_factor, default=None)
+        one = min(open_yet, key=lambda one: beyond(simulator.layout.unknowns, one, apart), default=None)
         if one is None or _enters(simulator, one, apart):
             break
         rest = [other for other in stay if other is not one]

@@ -197,10 +197,15 @@ def relief(unknowns: Unknowns, narrow: Array, hypothesis: Hypothesis, p: Array, 
 def entering(unknowns: Unknowns, one: Weighed, apart: bool) -> Weighed | None:
     """What was weighed, if it enters, with what it lacks; where a record that had no part in it judges (`apart`) less
     evidence is enough."""
-    limit = limit_of(unknowns, one.hypothesis)
-    if one.log_bayes_factor < (min(limit, PROVISIONAL) if apart else limit):
+    if beyond(unknowns, one, apart) < 0.0:
         return None
-    return replace(one, lacking=max(limit - one.log_bayes_factor, 0.0))
+    return replace(one, lacking=max(limit_of(unknowns, one.hypothesis) - one.log_bayes_factor, 0.0))
+
+
+def beyond(unknowns: Unknowns, one: Weighed, apart: bool) -> float:
+    """Nats that what was weighed has beyond those from which it enters."""
+    limit = limit_of(unknowns, one.hypothesis)
+    return one.log_bayes_factor - (min(limit, PROVISIONAL) if apart else limit)
 
 
 def limit_of(unknowns: Unknowns, one: Hypothesis) -> float:

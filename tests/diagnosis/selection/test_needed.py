@@ -94,6 +94,23 @@ def test_what_is_there_stays_and_is_worth_what_a_fit_without_it_lacks() -> None:
     assert stay[0].log_bayes_factor == pytest.approx(best.evidence - without.evidence, rel=0.05)
 
 
+def test_the_least_is_what_has_least_beyond_its_own_limit(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A number of the nominal rig enters from fewer nats: it does not keep in what has more, but too few for itself."""
+    simulator = rig(0.4)
+    number = Hypothesis("support-stiffness", "mesh", (Wide("stiffness"),))
+    best, base = fitted(simulator, FRICTION, number), fitted(simulator, number)
+    nats = {"support-stiffness": 3.5, "friction": 3.9}
+    monkeypatch.setattr(
+        module, "_promised", lambda simulator, best, one: replace(one, log_bayes_factor=nats[one.hypothesis.name])
+    )
+    monkeypatch.setattr(module, "_worth", lambda one, best, without: nats[one.hypothesis.name])
+    entered = [Weighed(number, 9.0, best), Weighed(FRICTION, 9.0, best)]
+    found, stay = needed(simulator, base, best, entered, apart=False)  # type: ignore[arg-type]
+    assert [one.hypothesis.name for one in stay] == ["support-stiffness"]
+    # It is the rig without the other, too.
+    assert found is not best and found.sd[3] == base.sd[3]
+
+
 def test_of_two_that_stand_in_for_each_other_one_stays() -> None:
     """Beside the other each is needless; without both the gap is open."""
     alike = MATRIX.copy()
