@@ -120,7 +120,7 @@ def further(
     left = [
         one
         for one in selection.weighed
-        # What was refused is nobody's place: its rare counterpart may be what is at work.
+        # What was refused holds no place: its rare counterpart may be what is at work.
         if not any(is_like(one.hypothesis, other) for other in taken)
         and not any(is_same(one.hypothesis, other) for other in refused)
     ]
