@@ -138,7 +138,7 @@ def _by_information(
     if jacobian is None:
         return []
     there = quadratic_of(replace(simulator.target, floors=left), residual, jacobian, search.active)
-    apart = not any(one is judged.measured for one in found.simulator.target.measurements)
+    apart = not found.simulator.target.has(judged.measured)
     out = []
     for one in hypotheses:
         # Beside what is named, but not beside itself.

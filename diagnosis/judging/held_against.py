@@ -54,13 +54,12 @@ def judged_on(
         scatter = scattered(noise)
         nudges = {**found.simulator.nudges, **nudges_of(problem.model, [condition])}
         found = replace(found, simulator=replace(found.simulator, nudges=nudges))
-    fitted = found.simulator.target.measurements
     rough = [one for one in searched if not any(one is own for own in found.simulator.held_by)]
     parted = [target_of([one], [prepare(one, problem.model, band)]) for one in rough]
     dropped: list[Weighed] = []
     seen: set[frozenset[str]] = set()
     # A record that had part in the search cannot make up for what it lacked.
-    apart = not any(measured is searched for searched in fitted)
+    apart = not found.simulator.target.has(measured)
     while True:
         seen.add(_names(found.selection.entered))
         try:

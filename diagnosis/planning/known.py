@@ -32,6 +32,6 @@ def known_of(plan: Planned) -> Known:
         )
     active = found.quadratic.active
     judged = quadratic_of(other.target, other.target.lines - here, jacobian, active)
-    apart = not any(measured is one for measured in plan.fitted)
+    apart = not simulator.target.has(plan.judged[0])
     narrow = prior_of(simulator, unknowns.prior())
     return Known(unknowns, active, narrow, Blocks(found.quadratic), Blocks(judged), apart)

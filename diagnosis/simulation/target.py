@@ -121,6 +121,10 @@ class Target:
             self.sizes[blocks],
         )
 
+    def has(self, record: Measurement) -> bool:
+        """Whether the lines are, among others, that record's."""
+        return any(one is record for one in self.measurements)
+
     def energies(self, residual: Complex) -> Array:
         """C (blocks,) of a residual (K,)."""
         found = np.bincount(self.of_line, np.abs(residual) ** 2, len(self.floors))
