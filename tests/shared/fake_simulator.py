@@ -72,6 +72,12 @@ def target(lines: np.ndarray, floor: float = 1e-6) -> Target:
     )
 
 
+def noisy(lines: np.ndarray, seed: int = 11) -> np.ndarray:
+    """Lines (LINES,) with noise."""
+    rng = np.random.default_rng(seed)
+    return lines + 0.02 * (rng.standard_normal(LINES) + 1j * rng.standard_normal(LINES))
+
+
 class OfLines(Target):
     """A target whose signals are the lines themselves."""
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from shared.fake_simulator import LINES, FakeSimulator, OfLines, chosen, of_lines, sensitivities, target
+from shared.fake_simulator import LINES, FakeSimulator, OfLines, chosen, noisy, of_lines, sensitivities, target
 
 from gearbench.diagnosis.account import sentence_of_effect
 from gearbench.diagnosis.effects.effect import Hypothesis, Wide
@@ -49,11 +49,6 @@ class Answering(FakeSimulator):
 
     def channels(self, p: np.ndarray, measured: Any) -> dict[str, np.ndarray]:
         return {"lines": p @ OTHER, "dte": np.zeros(8)}
-
-
-def noisy(lines: np.ndarray, seed: int) -> np.ndarray:
-    rng = np.random.default_rng(seed)
-    return lines + 0.02 * (rng.standard_normal(LINES) + 1j * rng.standard_normal(LINES))
 
 
 def judged(

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from shared.fake_simulator import LINES, FakeSimulator, sensitivities, target, unknowns
+from shared.fake_simulator import FakeSimulator, noisy, sensitivities, target, unknowns
 
 from gearbench.diagnosis.effects.effect import Hypothesis, Wide
 from gearbench.diagnosis.effects.profile_error import FLANKS
@@ -29,9 +29,7 @@ def rig(friction: float, *ripple: float) -> FakeSimulator:
     """Ripple that it has is seen 300 times as clearly."""
     p = np.array([0.08, -0.1, 0.02, friction, *(ripple or (0.0, 0.0)), 0.0, 0.0])
     of = np.diag([1.0, 1.0, 1.0, 1.0, *([300.0] * 2 if ripple else [1.0] * 2), 1.0, 1.0]) @ MATRIX
-    rng = np.random.default_rng(11)
-    noise = 0.02 * (rng.standard_normal(LINES) + 1j * rng.standard_normal(LINES))
-    return FakeSimulator(lambda q: q @ of, target(p @ of + noise))
+    return FakeSimulator(lambda q: q @ of, target(noisy(p @ of)))
 
 
 def fitted(simulator: FakeSimulator, *wide: Hypothesis) -> Optimum:

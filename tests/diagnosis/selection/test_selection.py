@@ -4,50 +4,22 @@ from __future__ import annotations
 
 from dataclasses import replace
 from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pytest
-from shared.fake_simulator import ACROSS, LINES, FakeSimulator, beyond_a_hill, chosen, sensitivities, target, unknowns
+from shared.fake_simulator import ACROSS, LINES, FakeSimulator, beyond_a_hill, chosen, target
+from shared.selected_lines import FRICTION, LISTED, MATRIX, RIPPLE, names, selected
 
-from gearbench.diagnosis.effects.effect import Hypothesis, Wide, twins_of
-from gearbench.diagnosis.fitting.background import prior_of
-from gearbench.diagnosis.fitting.fit import Optimum, Sensitivity, fit, fit_afresh, sensitivity_of
+from gearbench.diagnosis.effects.effect import Hypothesis
 from gearbench.diagnosis.fitting.shown import Shown
 from gearbench.diagnosis.forces.unknowns import group, unknowns_of
 from gearbench.diagnosis.selection import needed as needed_module
 from gearbench.diagnosis.selection import selection as module
 from gearbench.diagnosis.selection import weighing
 from gearbench.diagnosis.selection.by_forces import Start
-from gearbench.diagnosis.selection.rivals import compared, is_like, rivals_of, unentered, usual_of
-from gearbench.diagnosis.selection.selection import Selection, carried_on, evidence_without, known_within, taken_out
+from gearbench.diagnosis.selection.selection import carried_on, known_within
 from gearbench.diagnosis.selection.weighing import LIMIT, Weighed
-from gearbench.diagnosis.simulation.quadratic import quadratic_of
-
-MATRIX = sensitivities(3)
-FRICTION = Hypothesis("friction", "mesh", (Wide("friction"),))
-RIPPLE = Hypothesis("torque-ripple", "drive", (Wide("ripple"),))
-CRACKS = tuple(Hypothesis(f"tooth-crack {i}", "mesh", (Wide("crack", i),), choices=2) for i in range(2))
-LISTED = (FRICTION, RIPPLE, *CRACKS)
-
-
-def selected(true: dict[int, float], starts: dict[str, Start] | None = None) -> Selection:
-    p = np.array([0.08, -0.1, 0.02, 0.004, -0.005, 0.006, 0.0, 0.0])
-    for number, value in true.items():
-        p[number] = value
-    simulator = FakeSimulator(lambda q: q @ MATRIX, target(noisy(p @ MATRIX)))
-    found = chosen(simulator, LISTED, [np.zeros(8)], starts or {})
-    assert found is not None
-    return found
-
-
-def noisy(lines: np.ndarray) -> np.ndarray:
-    rng = np.random.default_rng(11)
-    return lines + 0.02 * (rng.standard_normal(LINES) + 1j * rng.standard_normal(LINES))
-
-
-def names(found: Selection) -> list[str]:
-    return [one.hypothesis.name for one in found.entered]
 
 
 def test_a_rig_with_a_good_rigs_share_of_everything_needs_nothing() -> None:
@@ -66,69 +38,6 @@ def test_one_effect_enters_with_its_size(number: int, value: float, name: str) -
     # Recalibrated without it: nothing of it is left, though a good rig might have a little.
     assert found.bare.p[number] == 0.0 and found.base.p[3] != 0.0
     assert found.bare.misfit > found.best.misfit + LIMIT
-
-
-def test_what_explains_the_records_as_well_is_a_rival_and_leaves_with_the_one_that_is_named() -> None:
-    """Two teeth whose cracks do the same: each alone explains it, and a good rig's share of the other is no reason to
-    find that the background alone closes the gap."""
-    alike = MATRIX.copy()
-    alike[7] = alike[6]
-    true = np.array([0.08, -0.1, 0.02, 0.0, 0.0, 0.0, 0.3, 0.0])
-    simulator = FakeSimulator(lambda q: q @ alike, target(true @ alike))
-    found = chosen(simulator, LISTED, [np.zeros(8)], {})
-    assert found is not None
-    (one,) = found.entered
-    assert {one.hypothesis.name, *(other.name for other in one.rivals)} == {"tooth-crack 0", "tooth-crack 1"}
-    assert found.bare.p[6] == found.bare.p[7] == 0.0
-    assert not any(other.rivals for other in selected({7: 0.3}).entered)
-    # Of the two the usual one is named, whichever explains a little more.
-    for number, other in (0, 1), (1, 0):
-        rare = {number: (("crack",), 1.0)}
-        listed = (FRICTION, RIPPLE, *(replace(CRACKS[one], usual=rare.get(one)) for one in range(2)))
-        named = chosen(simulator, listed, [np.zeros(8)], {})
-        assert named is not None and names(named) == [f"tooth-crack {other}"]
-
-
-def test_a_rival_that_entered_too_stays_where_the_other_is_taken_out() -> None:
-    """Two that were alike when the first entered, both of which the records call for: neither is in the other's
-    place, as it would be if only one had entered."""
-    true = np.array([0.08, -0.1, 0.02, 0.4, 0.3, -0.2, 0.0, 0.0])
-    simulator = FakeSimulator(lambda q: q @ MATRIX, target(true @ MATRIX))
-    found = chosen(simulator, LISTED, [np.zeros(8)], {})
-    assert found is not None and sorted(names(found)) == ["friction", "torque-ripple"]
-    both = {one.hypothesis.name: one for one in found.entered}
-    friction = replace(both["friction"], rivals=(RIPPLE,))
-    for entered, stays in ((friction, both["torque-ripple"]), True), ((friction,), False):
-        selection = replace(found, entered=entered)
-        rest = taken_out(simulator, selection, friction)
-        assert rest.p[3] == 0.0 and (np.abs(rest.p[4:6]) > 0.1).all() == stays
-        held = evidence_without(simulator.layout.unknowns, selection, friction, rest)
-        sd = selection.best.sd.copy()
-        sd[3:6] = (0.0, *sd[4:6]) if stays else 0.0
-        assert held == rest.evidence_under(sd)
-        assert unentered(friction, entered).causes == ((FRICTION,) if stays else (FRICTION, RIPPLE))
-
-
-def test_no_other_effect_beyond_a_good_rigs_takes_the_place_of_what_is_left_out() -> None:
-    """Ripple that does almost what friction does: twelve of its deviations would explain most of the friction."""
-    alike = MATRIX.copy()
-    alike[4] = alike[3] + 0.05 * alike[4]
-    true = np.array([0.08, -0.1, 0.02, 0.12, 0.0, 0.0, 0.0, 0.0])
-    simulator = FakeSimulator(lambda q: q @ alike, target(true @ alike))
-    found = chosen(simulator, LISTED, [np.zeros(8)], {})
-    assert found is not None and names(found) == ["friction"]
-    assert found.bare.p[3] == 0.0 and abs(found.bare.p[4]) <= max(4.0 * 0.01, abs(found.base.p[4]))
-    assert found.bare.misfit > found.best.misfit + 400.0
-
-
-def test_of_gears_with_as_many_teeth_the_other_is_a_rival_unless_far_behind() -> None:
-    optimum = selected({3: 0.4}).best
-    winner = Weighed(replace(FRICTION, on=("driver",)), 100.0, optimum)
-    for nats, twins, rivals in (80.0, ("friction",), 1), (70.0, ("friction",), 0), (80.0, (), 0), (98.0, (), 1):
-        other = Weighed(replace(RIPPLE, on=("driven",), twins=twins), nats, optimum)
-        assert len(rivals_of(winner, [winner, other])) == rivals
-    assert twins_of({"driver": "one", "driven": "two"}, "driver", (30, 30)) == ("two",)
-    assert twins_of({"driver": "one", "driven": "two"}, "driver", (30, 31)) == ()
 
 
 def test_what_had_no_place_enters_when_another_is_out(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -166,64 +75,6 @@ def test_what_had_no_place_enters_when_the_other_proves_none(monkeypatch: pytest
     found = chosen(simulator, LISTED, [np.zeros(8)], {})
     assert found is not None and names(found) == ["torque-ripple"]
     assert found.best.p[4:6] == pytest.approx([0.3, -0.2], abs=0.1)
-
-
-def test_a_rare_effect_gives_way_to_a_usual_one_that_explains_nearly_as_much() -> None:
-    optimum = selected({3: 0.4}).best
-    rare = Weighed(replace(FRICTION, usual=(("ripple",), -0.5)), 100.0, optimum)
-    assert usual_of((rare, Weighed(RIPPLE, 80.0, None))) is rare
-    for nats, named in (80.0, "torque-ripple"), (70.0, "friction"):
-        found = usual_of((rare, Weighed(CRACKS[0], 99.0, optimum), Weighed(RIPPLE, nats, optimum)))
-        assert found is not None and found.hypothesis.name == named
-    assert usual_of(()) is None
-    # Beside the usual one the rare one is not weighed again.
-    assert is_like(rare.hypothesis, RIPPLE) and not is_like(RIPPLE, rare.hypothesis) and is_like(RIPPLE, RIPPLE)
-    assert not is_like(rare.hypothesis, CRACKS[0])
-
-
-def test_the_usual_one_is_fitted_from_where_the_rare_one_got() -> None:
-    """A second tooth whose crack does half of what the first one's does; its own fit had stopped short."""
-    alike = MATRIX.copy()
-    alike[7] = 0.5 * alike[6]
-    simulator = FakeSimulator(lambda q: q @ alike, target(0.2 * alike[6] + 0.08 * alike[0]))
-    simulator.jacobian = lambda p, sd, chosen, near=None: alike  # type: ignore[method-assign, assignment]
-    found = chosen(simulator, (CRACKS[0],), [np.zeros(8)], {})
-    assert found is not None and names(found) == ["tooth-crack 0"]
-    first = Weighed(replace(CRACKS[0], usual=(("crack",), 2.0)), 1e6, found.best)
-    one, other = compared(simulator, found.base, [first, Weighed(CRACKS[1], 2.0, None)])
-    assert one.optimum is found.best and other.hypothesis.name == "tooth-crack 1"
-    assert other.optimum is not None and other.optimum.p[6] == pytest.approx(0.0, abs=0.02)
-    assert other.optimum.p[7] == pytest.approx(0.4, abs=0.05) and other.log_bayes_factor > LIMIT
-    # And a rare one from where the usual one got that is ahead; nothing is handed over to what is no counterpart.
-    usual = replace(first, hypothesis=CRACKS[0])
-    rare = Weighed(replace(CRACKS[1], usual=(("crack",), 0.5)), 2.0, None)
-    turned = compared(simulator, found.base, [usual, rare])[1]
-    assert turned.optimum is not None and turned.optimum.p[6:] == pytest.approx([0.0, 0.4], abs=0.05)
-    plain = [usual, Weighed(CRACKS[1], 2.0, None)]
-    assert compared(simulator, found.base, plain) == plain
-
-
-def test_a_fit_that_stopped_while_it_promised_to_overtake_is_gone_on_with() -> None:
-    found = selected({6: 0.3})
-    true = found.weighed[0]
-    assert true.hypothesis.name == "tooth-crack 0" and true.optimum is not None
-    simulator = FakeSimulator(lambda q: q @ MATRIX, target(true.optimum.lines))
-
-    def among(promised: float) -> Weighed:
-        stopped = replace(found.base, sd=true.optimum.sd, left=found.base.left + promised)  # type: ignore[union-attr]
-        ahead = Weighed(FRICTION, 60.0, None)
-        return next(
-            one
-            for one in compared(simulator, found.base, [ahead, Weighed(true.hypothesis, 1.0, stopped)])
-            if one.hypothesis == true.hypothesis
-        )
-
-    over = among(100.0)
-    assert over.optimum is not None and over.optimum.p[6] == pytest.approx(0.3, abs=0.05)
-    assert over.log_bayes_factor > 60.0
-    # What would not reach the one ahead, or promises little, stays where it is.
-    assert among(50.0).log_bayes_factor == 1.0
-    assert among(60.0).log_bayes_factor > 1.0
 
 
 def test_two_effects_enter_the_larger_first_and_each_is_needed() -> None:
@@ -354,88 +205,6 @@ def test_nothing_of_what_proves_needless_is_left(monkeypatch: pytest.MonkeyPatch
     assert found.best.sd[3] == found.base.sd[3] and abs(found.best.p[3]) < 0.1
     if left:
         assert found.best.p[4:6] == pytest.approx([0.3, -0.2], abs=0.1)
-
-
-def test_a_beginning_that_means_deny_does_not_hide_one_that_they_do_not(monkeypatch: pytest.MonkeyPatch) -> None:
-    simulator = FakeSimulator(lambda q: q @ MATRIX, target(0.4 * MATRIX[3]))
-    base = fit_afresh(simulator, np.zeros(8), prior_of(simulator, unknowns().prior()), renewals=1)  # type: ignore[arg-type]
-    assert base is not None
-    late = base.p.copy()
-    late[3] = 0.3
-
-    def begun(simulator: object, base: Optimum, one: Hypothesis, begin: np.ndarray) -> Optimum:
-        return replace(base, p=begin, sd=one.widened(unknowns(), base.sd), evidence=base.evidence + 20.0)
-
-    monkeypatch.setattr(weighing, "called_for", lambda simulator, base, one: late)
-    monkeypatch.setattr(weighing, "begun_late", begun)
-    monkeypatch.setattr(weighing, "denied_by_means", lambda simulator, one, optimum: optimum.p[3] > 0.35)
-    (found,) = weighing.weigh(simulator, base, (FRICTION,), {})  # type: ignore[arg-type]
-    assert found.optimum is not None and found.optimum.p[3] == 0.3 and found.log_bayes_factor == pytest.approx(20.0)
-
-
-def test_effects_are_weighed_by_derivatives_taken_where_the_background_is(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Those that its fit carried along may not know of the effect at all, however close it is."""
-    lines = np.array([0.08, -0.1, 0.02, 0.4, 0.0, 0.0, 0.0, 0.0]) @ MATRIX
-    simulator = FakeSimulator(lambda q: q @ MATRIX, target(noisy(lines)))
-    monkeypatch.setattr(module, "is_close", lambda simulator, found: True)
-    base = fit_afresh(simulator, np.zeros(8), prior_of(simulator, unknowns().prior()), renewals=1)  # type: ignore[arg-type]
-    assert base is not None
-    blind = MATRIX.copy()
-    blind[3] = 0.0
-    quadratic = quadratic_of(simulator.target, simulator.target.lines - base.lines, blind, np.delete(np.arange(8), 3))
-    stale = replace(base, sensitivity=Sensitivity(blind, quadratic))
-    found = module.select(simulator, stale, LISTED, {})  # type: ignore[arg-type]
-    assert names(found) == ["friction"]
-
-
-def test_what_a_background_had_still_to_gain_is_no_evidence(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Weighed over a fit that stopped on its way, whatever is fitted on beside it seems to be at work."""
-    sound = np.array([0.08, -0.1, 0.02, 0.004, -0.005, 0.006, 0.0, 0.0]) @ MATRIX
-    simulator = FakeSimulator(lambda q: q @ MATRIX, target(noisy(sound)))
-    monkeypatch.setattr(module, "is_close", lambda simulator, found: True)
-    sd, begin = prior_of(simulator, unknowns().prior()), np.zeros(8)  # type: ignore[arg-type]
-    first = sensitivity_of(simulator, begin, sd)  # type: ignore[arg-type]
-    stopped = fit(simulator, begin, 1e-3 * sd, first)  # type: ignore[arg-type]
-    assert stopped is not None
-    stopped = replace(stopped, sd=sd, left=20.0)
-    found = module.select(simulator, stopped, LISTED, {})  # type: ignore[arg-type]
-    assert names(found) == [] and found.base.cost < stopped.cost - 20.0
-
-
-def test_what_was_refused_has_not_the_place_of_its_rare_counterpart(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "MOST", 1)
-    found = selected({3: 0.4})
-    rare = Weighed(replace(CRACKS[0], usual=(("friction",), 1.0)), 30.0, found.best)
-    listed = replace(found, weighed=(*found.entered, rare))
-    tried: list[str] = []
-
-    def forward(simulator: object, best: Optimum, beside: object, hypotheses: Any, *_: Any, **__: Any) -> Any:
-        tried.extend(one.name for one in hypotheses)
-        return best, list(cast(Any, beside)), []
-
-    monkeypatch.setattr(module, "_forward", forward)
-    simulator = FakeSimulator(lambda q: q @ MATRIX, target(0.4 * MATRIX[3]))
-    bare = module.only(simulator, listed, [])  # type: ignore[arg-type]
-    assert module.further(simulator, bare, found.entered) is None and tried == ["tooth-crack 0"]  # type: ignore[arg-type]
-    # Beside the usual one that entered it has nothing to add.
-    tried.clear()
-    assert module.further(simulator, listed, (Weighed(RIPPLE, 9.0, found.best),)) is None and not tried  # type: ignore[arg-type]
-
-
-@pytest.mark.parametrize(
-    ("usual", "rare", "apart", "name"),
-    [(7.7, 10.0, False, "friction"), (3.9, 6.6, True, "friction"), (8.1, 10.0, False, "torque-ripple"),
-     (7.0, 7.7, False, None)],
-)  # fmt: skip
-def test_where_a_usual_cause_lacks_evidence_its_rare_counterpart_enters(
-    monkeypatch: pytest.MonkeyPatch, usual: float, rare: float, apart: bool, name: str | None
-) -> None:
-    """Each alone has what the other has not: not to enter at all would lose both."""
-    optimum = selected({3: 0.4}).best
-    weighed = [Weighed(replace(FRICTION, usual=(("ripple",), -0.5)), rare, optimum), Weighed(RIPPLE, usual, optimum)]
-    entered = module._entering_first(unknowns(), weighed, apart)
-    assert (entered.hypothesis.name if entered else None) == name
-    assert module._entering_first(unknowns(), [], apart) is None
 
 
 def test_no_rig_at_the_start_is_no_selection() -> None:
