@@ -67,11 +67,11 @@ def free_closing(target: Target, without: Mapping[str, Array], with_all: Mapping
     return replace(closing, growth=min(closing.growth, whole))
 
 
-def both(nudged: Closing, *free: Closing) -> Closing:
+def both(nudged: Closing, *free: Closing, steady: bool = False) -> Closing:
     """What an effect closes by simulations that are `nudged`, if it does so too where nothing holds them on the
-    record's way; the signals are those of the `free` ones."""
+    record's way: by each, or `steady` by all that lie close; the signals are those of the `free` ones."""
     worst = min(free, key=lambda one: (one.due, one.gain))
-    if worst.due:
+    if worst.due or (steady and nudged.due):
         return replace(nudged, without=worst.without)
     return replace(worst, gain=min(nudged.gain, worst.gain))
 
@@ -98,9 +98,16 @@ def closing_of(target: Target, without: Mapping[str, Array], with_all: Mapping[s
 def growth_of(target: Target, without: Array, with_all: Array) -> tuple[float, tuple[str, str]]:
     """The largest factor between the rms gaps without and with an effect (blocks,), over the parts of each channel that
     hold a visible part of the gap without it, and which part that is."""
+    found = growths_of(target, without, with_all)
+    part = max(found, key=found.__getitem__, default=("", ""))
+    return found.get(part, 0.0), part
+
+
+def growths_of(target: Target, without: Array, with_all: Array) -> dict[tuple[str, str], float]:
+    """That factor of each such part: a channel in one kind of line or band."""
     lost, kept = without * target.sizes, with_all * target.sizes
     noise = target.noise * target.sizes
-    best, where = 0.0, ("", "")
+    out = {}
     for channel in dict.fromkeys(block.channel for block in target.blocks):
         inside = target.fluctuating & np.array([block.channel == channel for block in target.blocks])
         whole = float(lost[inside].sum())
@@ -109,10 +116,9 @@ def growth_of(target: Target, without: Array, with_all: Array) -> tuple[float, t
             mine = inside & np.array([label in part for part in labels])
             if float(lost[mine].sum()) < SEEN**2 * whole:
                 continue
-            factor = float(np.sqrt(lost[mine].sum() / max(float(kept[mine].sum()), float(noise[mine].sum()), 1e-300)))
-            if factor > best:
-                best, where = factor, (channel, label)
-    return best, where
+            least = max(float(kept[mine].sum()), float(noise[mine].sum()), 1e-300)
+            out[channel, label] = float(np.sqrt(lost[mine].sum() / least))
+    return out
 
 
 def rms_closed(measured: Measurement, channel: str, without: Array, with_all: Array) -> tuple[float, float, float]:

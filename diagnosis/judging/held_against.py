@@ -20,6 +20,7 @@ from gearbench.diagnosis.fitting.fit import Optimum
 from gearbench.diagnosis.forces.condition import prepare
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.judging.along import way_of
+from gearbench.diagnosis.judging.by_chance import closes_in_all
 from gearbench.diagnosis.judging.closing import DUE, Closing, both, closing_of, feels, free_closing
 from gearbench.diagnosis.judging.judged import GREATER, Judged
 from gearbench.diagnosis.selection.followable import nudges_of, parts
@@ -176,8 +177,11 @@ def _by_itself(
     closing = closing_of(target, simulator.channels(optimum.p, measured), nudged)
     silent = not feels(target, closing.without, nudged)
     if not simulator.anchored or (simulator.nudges and measured.name in simulator.nudges):
-        without = [free.channels(found.end_of(other), measured) for other in _others(selection, optimum)]
-        closing = both(closing, *(free_closing(target, one, signals) for one in without))
+        others = _others(selection, optimum)
+        alone = [free_closing(target, free.channels(found.end_of(one), measured), signals) for one in others]
+        told = all(one.due for one in alone)
+        steady = not told and closing.due and closes_in_all(found, target, measured, others)
+        closing = both(closing, *alone, steady=steady)
     return closing, silent
 
 

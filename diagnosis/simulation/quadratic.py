@@ -130,6 +130,14 @@ class Quadratic:
         out[free] *= np.sqrt(np.diag(np.linalg.inv(matrix)))
         return out
 
+    def drawn(self, sd: Array, normal: Array) -> Array:
+        """Steps (n, q) as uncertain as the unknowns are under the prior `sd` (size,), from independent normal numbers
+        (n, q)."""
+        free, matrix = self._scaled(self.information(np.zeros(len(self.active))), sd)
+        out = np.zeros(normal.shape)
+        out[:, free] = np.linalg.solve(np.linalg.cholesky(matrix).T, normal[:, free].T).T * sd[self.active][free]
+        return out
+
     def _scaled(self, information: Array, sd: Array) -> tuple[Flags, Array]:
         """Which unknowns (q,) are free, and data and prior's information about these in standard deviations."""
         width = sd[self.active]

@@ -89,6 +89,16 @@ def test_evidence_of_a_linear_problem_is_that_of_its_gaussian() -> None:
     assert quadratic.evidence(cost, information, sd) == pytest.approx(wanted, rel=1e-9)
 
 
+def test_steps_are_drawn_as_uncertain_as_the_unknowns_are() -> None:
+    _, quadratic = made()
+    sd = np.array([0.1, 0.1, 0.1, 0.5, 0.01, 0.01, 0.02, 0.0])
+    steps = quadratic.drawn(sd, np.random.default_rng(3).standard_normal((40_000, 8)))
+    assert not steps[:, 7].any()
+    wanted = np.linalg.inv(quadratic.information(np.zeros(8))[:7, :7] + np.diag(sd[:7] ** -2.0))
+    scale = np.sqrt(np.diag(wanted))
+    assert np.cov(steps[:, :7].T) / np.outer(scale, scale) == pytest.approx(wanted / np.outer(scale, scale), abs=0.03)
+
+
 def test_what_has_no_prior_goes_where_its_bounds_are() -> None:
     """So is an effect taken out of a fit again that the background does not know, as a crack."""
     where, quadratic = made()
