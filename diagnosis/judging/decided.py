@@ -18,7 +18,7 @@ from gearbench.diagnosis.forces.steadiness import Unsteady
 from gearbench.diagnosis.judging.judged import GREATER, Judged
 from gearbench.diagnosis.odds import Calibration, unknown_signs
 from gearbench.diagnosis.population import POPULATION
-from gearbench.diagnosis.remainder.drift import Drift
+from gearbench.diagnosis.remainder.drift import EXPLAINS, Drift
 from gearbench.diagnosis.remainder.free_forces import Form, FreeForce
 from gearbench.diagnosis.remainder.missing import Missing
 from gearbench.diagnosis.selection.needed import size_of
@@ -98,6 +98,8 @@ def decide_simulated(
         f"{percent(drift.share)} of the energy of what changes from one repetition to the next is what a stiffness"
         f" {at_place(drift.place)} makes that changes by {percent(drift.value)} over a record"
     )
+    if drift.share < EXPLAINS:
+        said += ", with which each channel of each record repeats better"
     if rest.verdict == "unknown":
         return replace(rest, because=(*rest.because, said))
     place = rest.place if rest.named else drift.place

@@ -23,6 +23,7 @@ from gearbench.diagnosis.intake.signals import measured_channels
 from gearbench.diagnosis.selection.simulated import Simulated
 from gearbench.diagnosis.selection.weighing import LIMIT
 from gearbench.diagnosis.simulation.target import INDEPENDENT
+from gearbench.diagnosis.verdict import NINE_OF_TEN
 from gearbench.rig.contract import Place
 
 Array = NDArray[np.float64]
@@ -38,6 +39,7 @@ TOLD = 0.5
 AS_WELL = 0.9
 # Change of a stiffness over a record that sound rigs stay below, which settle by 0.4 % or so.
 SOUND = 0.01
+LEAST_SHARE = 0.01  # part of what changes below which nothing is told of a size
 # Change of the logarithm of a stiffness up to which lines change in proportion to it; more is something else.
 LARGEST = 0.5
 
@@ -45,13 +47,15 @@ LARGEST = 0.5
 @dataclass(frozen=True)
 class Drift:
     """Relative change of the stiffness at `place` from the first sample of a record to the last, with its standard
-    deviation, the part of all that changes between repetitions that it explains, by energy, and nats of evidence."""
+    deviation, the part of all that changes between repetitions that it explains, by energy, nats of evidence, and
+    whether less is left with it `everywhere`: in each channel of each record in which anything changes."""
 
     place: Place
     value: float
     std: float
     share: float
     nats: float
+    everywhere: bool = False
 
     @property
     def beyond_sound(self) -> bool:
@@ -100,7 +104,8 @@ def drift_of(
     """The drift that explains most of what changes between repetitions of the `steady` records, among those of the
     search, or nearly all of it at the `place` where what changes acts; where the rig found has `told` that place none
     at another one explains it. None where it explains less than half, where another place would explain nearly as much,
-    or nothing changes beyond noise."""
+    or nothing changes beyond noise. At a place that is told records may call for it, too, that all are closer with it:
+    next to a resonance that the rig has a few percent off most of what a stiffness moves is in lines beside its own."""
     parts = _parts(found, {one.name for one in steady})
     if not parts:
         return None
@@ -113,12 +118,13 @@ def drift_of(
         return there
     best, *others = drifts
     alone = all(1.0 - best.share < TOLD * (1.0 - one.share) for one in others)
-    return best if best.share > EXPLAINS and alone else None
+    explains = best.share > EXPLAINS or (told and best.everywhere and best.nats > LIMIT)
+    return best if explains and alone else None
 
 
 def _drift_at(parts: list[_Part], place: Place) -> Drift:
-    """The drift at one place, from all parts; how well it is known is the larger of its scatter over them and of what
-    all lines leave."""
+    """The drift at one place, from all parts; how well it is known is the largest of its scatter over them, of what all
+    lines leave and of what the derivatives may be off by."""
     slopes = np.array([one.slope(place) for one in parts])
     total, weight = slopes.sum(axis=0)
     if weight == 0.0 or abs(total) > LARGEST * weight:
@@ -130,10 +136,13 @@ def _drift_at(parts: list[_Part], place: Place) -> Drift:
     lines = np.array([one.departures.shape[1] for one in parts])
     free = sum((len(one.departures) - 1) * one.departures.shape[1] for one in parts)
     scatter = (slopes[seen, 1] * apart**2).sum() / max(seen.sum() - 1, 1), left.sum() / free
-    std = sqrt(max(scatter) / weight)
-    nats = np.minimum(INDEPENDENT, lines) * np.log(energies / np.maximum(left, lines))
     share = float(1.0 - left.sum() / energies.sum())
-    return Drift(place, expm1(value), exp(value) * std, share, float(nats.sum()))
+    # As large as what changes, derivatives that explain this part of it make the size so much too small.
+    short = abs(value) * (1.0 / sqrt(max(share, LEAST_SHARE)) - 1.0) / NINE_OF_TEN
+    std = max(sqrt(max(scatter) / weight), short)
+    nats = np.minimum(INDEPENDENT, lines) * np.log(energies / np.maximum(left, lines))
+    everywhere = bool((left < energies).all())
+    return Drift(place, expm1(value), exp(value) * std, share, float(nats.sum()), everywhere)
 
 
 def _parts(found: Simulated, steady: Collection[str]) -> list[_Part]:

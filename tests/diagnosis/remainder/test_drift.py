@@ -119,6 +119,30 @@ def test_no_drift_is_told_at_another_place_than_the_rig_found_tells(monkeypatch:
     assert at_drive is None and there is not None and there.place == "driver-support"
 
 
+@pytest.mark.parametrize("aligned", [True, False])
+def test_a_rig_that_is_off_at_a_resonance_tells_a_drift_where_every_channel_is_closer(
+    aligned: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Most of what its derivatives have is in lines where nothing changes, and the other way round; at a place that is
+    told alone, with an interval that holds the size."""
+    moved = derivatives()[DRIVER].reshape(2, -1)
+    said = 1.4 * moved
+    moved[:, SHOWN[::3]], said[:, SHOWN[2::24]] = 0.0, 0.0
+    if aligned:
+        said[:, SHOWN[1::3]] = 0.0
+    else:
+        said[1] *= -0.1  # a little further off in one channel, far closer in the other
+    columns = derivatives()
+    columns[DRIVER] = said.reshape(-1)
+    passed = (np.arange(REPETITIONS) + 0.5) / REPETITIONS
+    changes = np.log1p(-0.07 * passed)[:, None] * moved.reshape(-1)
+    assert found(changes, monkeypatch, columns, "driver-support") is None
+    one = found(changes, monkeypatch, columns, "driver-support", told=True)
+    assert (one is not None) is aligned
+    if one is not None:
+        assert one.share < 0.5 and one.everywhere and abs(one.value + 0.07) < 1.6449 * one.std < 0.07
+
+
 def test_what_a_stiffness_hardly_moves_is_no_drift_of_any_size(monkeypatch: pytest.MonkeyPatch) -> None:
     """Else its logarithm would be of hundreds."""
     for sign in (-1.0, 1.0):
