@@ -144,16 +144,7 @@ def headline(verdict: Verdict) -> str:
     """The verdict in one sentence without numbers."""
     place = PLACES[verdict.place]
     if verdict.verdict == "effects":
-        words = effects_in_words([effect.name for effect in verdict.effects])
-        one = len(verdict.effects) == 1
-        if {effect.name for effect in verdict.effects} <= {effect.name for effect in CHANGING}:
-            return f"{words[:1].upper()}{words[1:]} {'is' if one else 'are'} at work while the records are taken."
-        said = f"{'explains' if one else 'explain'} the gap"
-        if _beside(verdict):
-            said = f"{'is' if one else 'are'} at work, beside a recalibration that explains most of the gap"
-        elif not explained(verdict):
-            said = f"{'is' if one else 'are'} at work, and a part of the gap remains"
-        return f"{words[:1].upper()}{words[1:]} {said}."
+        return _named(verdict)
     if verdict.verdict == "none":
         if explained(verdict):
             return "No effect is needed: within its uncertainties the nominal rig explains the records."
@@ -162,6 +153,26 @@ def headline(verdict: Verdict) -> str:
         return "No known effect is called for, and recalibration leaves the gap much as it was."
     where = f" It arises {place}." if verdict.place != "none" else ""
     return f"None of the known effects explains the gap.{where}"
+
+
+def _named(verdict: Verdict) -> str:
+    """What is at work and whether it explains the gap, which what changes between repetitions does not."""
+    changing = [effect.name for effect in verdict.effects if effect.name in {one.name for one in CHANGING}]
+    lasting = [effect.name for effect in verdict.effects if effect.name not in changing]
+    passing = f"{effects_in_words(changing)} {_are(changing)} at work while the records are taken"
+    if not lasting:
+        return f"{passing[:1].upper()}{passing[1:]}."
+    said = "explains the gap" if len(lasting) == 1 else "explain the gap"
+    if _beside(verdict):
+        said = f"{_are(lasting)} at work, beside a recalibration that explains most of the gap"
+    elif not explained(verdict):
+        said = f"{_are(lasting)} at work, and a part of the gap remains"
+    words = effects_in_words(lasting)
+    return f"{words[:1].upper()}{words[1:]} {said}{f'; {passing}' if changing else ''}."
+
+
+def _are(several: Sequence[str]) -> str:
+    return "is" if len(several) == 1 else "are"
 
 
 def _beside(verdict: Verdict) -> bool:

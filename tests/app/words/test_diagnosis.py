@@ -130,6 +130,13 @@ def test_the_sentences_of_a_verdict() -> None:
         "Probability of one of the known effects: 90 %. It acts at the drive. On record r (not held out) the rms gap of"
         " the transmission error goes from 4.00 um to 2.00 um recalibrated and 0.250 um with the effects."
     )
+    drifts = Effect(name="temperature-drift", probability=0.9)
+    also = found.model_copy(update={"effects": (found.effects[0], drifts)})
+    assert headline(also) == (
+        "An elastic coupling explains the gap; a stiffness that drifts is at work while the records are taken."
+    )
+    alone = found.model_copy(update={"effects": (drifts,)})
+    assert headline(alone) == "A stiffness that drifts is at work while the records are taken."
     noisy = gaps[1].model_copy(update={"with_effect": Range(value=1e-6, low=1e-6, high=1e-6), "floor": FLOOR})
     partly = found.model_copy(update={"effects": found.effects[:1], "gap": (noisy,)})
     assert headline(partly) == "An elastic coupling is at work, and a part of the gap remains."
