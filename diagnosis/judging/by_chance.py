@@ -31,13 +31,11 @@ def closes_in_all(
 ) -> bool:
     """Whether some part of the gap of a record is far closer, and the record likelier, in all rigs next to the one
     found than in all next to each of those `without` an effect, as they go by themselves."""
-    free = found.simulator.free
-    kept = _left(found, free, target, measured, found.selection.best)
-    for one in without:
-        lost = _left(found, free, target, measured, one)
-        if not kept or not lost or not _closer(target, lost, kept):
-            return False
-    return True
+    try:
+        kept = _left(found, target, measured, found.selection.best)
+        return all(_closer(target, _left(found, target, measured, one), kept) for one in without)
+    except ValueError:  # a rig so close that cannot be simulated: nothing is told by others
+        return False
 
 
 def _closer(target: Target, lost: Sequence[Complex], kept: Sequence[Complex]) -> bool:
@@ -49,17 +47,11 @@ def _closer(target: Target, lost: Sequence[Complex], kept: Sequence[Complex]) ->
     return any(min(one[part] for one in grown) > PLAIN for part in parts)
 
 
-def _left(
-    found: Simulated, free: Simulator, target: Target, measured: Measurement, optimum: Optimum
-) -> list[Complex]:
-    """Residuals (K,) of rigs drawn next to an optimum, of those that can be simulated."""
-    out = []
-    for p in _drawn(free, found.end_of(optimum), optimum):
-        try:
-            out.append(target.lines - target.gathered([free.channels(p, measured)]))
-        except ValueError:  # no rig has these numbers
-            continue
-    return out
+def _left(found: Simulated, target: Target, measured: Measurement, optimum: Optimum) -> list[Complex]:
+    """Residuals (K,) of rigs drawn next to an optimum."""
+    free = found.simulator.free
+    drawn = _drawn(free, found.end_of(optimum), optimum)
+    return [target.lines - target.gathered([free.channels(p, measured)]) for p in drawn]
 
 
 def _drawn(free: Simulator, p: Array, optimum: Optimum) -> list[Array]:

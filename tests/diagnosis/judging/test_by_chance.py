@@ -40,6 +40,8 @@ class Ways:
         rig = WITH if p[0] > 0.5 * WITH else WITHOUT
         self.seen.append(p)
         self.gone[rig] += 1
+        if not self.sizes[rig][self.gone[rig] - 1][0]:
+            raise ValueError("no rig has these numbers")
         return self.of_size(*self.sizes[rig][self.gone[rig] - 1])
 
     def of_size(self, *sizes: float) -> dict[str, np.ndarray]:
@@ -67,6 +69,7 @@ def told(ways: Ways) -> bool:
         ((10.0, 5.0, 9.0, 12.0), (1.0, 1.5, 3.0, 1.0), LARGE, False),  # one way is as close without the effect
         ((10.0, 8.0, 9.0, 12.0), (1.0, 1.5, 7.0, 1.0), LARGE, False),  # one with it is as far off
         ((10.0, 5.0, 9.0, 12.0), (1.0, 1.5, 3.0, 1.0), 1.07 * LARGE, False),  # though likelier elsewhere
+        ((10.0, 8.0, 9.0, 12.0), (1.0, 1.5, 0.0, 1.0), LARGE, False),  # one way is none
     ],
 )
 def test_a_part_that_is_closer_on_every_way_is_closer_by_the_effect(
