@@ -92,8 +92,8 @@ def decide_simulated(
     seen = over > 1.0 or (drift is not None and drift.shown and judged.found.simulator.anchored)
     if drift is None or not large or not seen:
         return _decided(all_told, unsteady, changing)
-    # What a drift explains speaks neither for something unknown nor against an effect.
-    rest = _decided(all_told, Unsteady.nothing(), changing)
+    # What a drift explains speaks neither for something unknown nor against an effect; what it does not, does.
+    rest = _decided(all_told, Unsteady.nothing() if drift.share > EXPLAINS else unsteady, changing)
     said = (
         f"{percent(drift.share)} of the energy of what changes from one repetition to the next is what a stiffness"
         f" {at_place(drift.place)} makes that changes by {percent(drift.value)} over a record"

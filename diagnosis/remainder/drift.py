@@ -104,8 +104,10 @@ def drift_of(
     """The drift that explains most of what changes between repetitions of the `steady` records, among those of the
     search, or nearly all of it at the `place` where what changes acts; where the rig found has `told` that place none
     at another one explains it. None where it explains less than half, where another place would explain nearly as much,
-    or nothing changes beyond noise. At a place that is told records may call for it, too, that all are closer with it:
-    next to a resonance that the rig has a few percent off most of what a stiffness moves is in lines beside its own."""
+    or nothing changes beyond noise. At a place that is told records may call for one beyond sound rigs', too, that all
+    are closer with it: next to a resonance that the rig has a few percent off most of what a stiffness moves is in
+    lines beside its own; a damper that changes looks like a drift of a percent there.
+    """
     parts = _parts(found, {one.name for one in steady})
     if not parts:
         return None
@@ -118,7 +120,7 @@ def drift_of(
         return there
     best, *others = drifts
     alone = all(1.0 - best.share < TOLD * (1.0 - one.share) for one in others)
-    explains = best.share > EXPLAINS or (told and best.everywhere and best.nats > LIMIT)
+    explains = best.share > EXPLAINS or (told and best.everywhere and best.shown)
     return best if explains and alone else None
 
 

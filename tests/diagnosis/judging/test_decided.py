@@ -321,6 +321,9 @@ def test_a_drift_that_explains_what_changes_is_named_and_speaks_against_nothing(
     for unseen, verdict in ((drift, "effects"), (replace(drift, value=-0.012), "none"),
                             (replace(drift, nats=7.0), "none")):  # fmt: skip
         assert decided(None, changing=0.2, drift=unseen).verdict == verdict
+    # What it does not explain speaks for something unknown, unless an effect outweighs that.
+    fifth = replace(drift, share=0.2)
+    assert decided(None, unsteady=support, changing=0.2, drift=fifth).verdict == "unknown"
     # Where flanks part in all records they must.
     assert decided(None, changing=0.2, drift=drift, anchored=False).verdict == "none"
     assert decided(None, unsteady=support, changing=0.2, drift=drift, anchored=False).verdict == "effects"

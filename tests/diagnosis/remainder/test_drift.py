@@ -139,6 +139,8 @@ def test_a_rig_that_is_off_at_a_resonance_tells_a_drift_where_every_channel_is_c
     assert found(changes, monkeypatch, columns, "driver-support") is None
     one = found(changes, monkeypatch, columns, "driver-support", told=True)
     assert (one is not None) is aligned
+    # A damper that changes looks like a drift of a percent there.
+    assert found(0.15 * changes, monkeypatch, columns, "driver-support", told=True) is None
     if one is not None:
         assert one.share < 0.5 and one.everywhere and abs(one.value + 0.07) < 1.6449 * one.std < 0.07
 
