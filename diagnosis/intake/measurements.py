@@ -360,6 +360,8 @@ def _refuse_clipped(record: xr.Dataset, source: str) -> None:
 def _usable(whole: dict[str, Array], notes: list[str]) -> dict[str, Array]:
     """The channels that carry a signal; what missing ones cost is said."""
     dead = {f"y_{gear}" for gear in GEARS if f"y_{gear}" in whole and np.ptp(whole[f"y_{gear}"]) == 0.0}
+    # A set point that was logged in place of the reaction's torque.
+    dead |= {name for name in ("torque_driven",) if name in whole and _constant(whole[name])}
     kept = {name: values for name, values in whole.items() if name not in dead}
     for name, loss in (
         ("y_driver", "what happens at the driver's support is seen only through the mesh"),
@@ -368,9 +370,14 @@ def _usable(whole: dict[str, Array], notes: list[str]) -> dict[str, Array]:
     ):
         if name not in kept:
             notes.append(f"there is no {name}: {loss}, so that small effects stay hidden")
-    if np.ptp(kept["torque_driver"]) <= 1e-9 * abs(float(kept["torque_driver"].mean())):
+    if _constant(kept["torque_driver"]):
         notes.append("the torque is constant: without excitation only the operating response is seen")
     return kept
+
+
+def _constant(values: Array) -> bool:
+    """Whether a torque is one number, but for rounding."""
+    return bool(np.ptp(values) <= 1e-9 * abs(float(values.mean())))
 
 
 def _one_repetition(record: xr.Dataset, notes: list[str]) -> None:

@@ -226,6 +226,10 @@ def test_missing_dead_and_silent_channels_are_said() -> None:
     assert [one.split(":")[0] for one in made.warnings] == ["there is no y_driver", "there is no torque_driven"]
     made = taken({**values, "y_driven": np.full(2 * SAMPLES, 3e-5)})
     assert "y_driven" not in made.periods and "dead sensor" in made.warnings[0]
+    for rounding in (0.0, 1e-13):
+        logged = 150.0 + rounding * np.arange(2 * SAMPLES) / SAMPLES
+        made = taken({**values, "torque_driven": logged})
+        assert "torque_driven" not in made.periods and "there is no torque_driven" in " ".join(made.warnings)
     made = taken(scaled("y_driven", 1e-3))
     assert any("y_driven stays within" in one for one in made.warnings)
 
