@@ -361,7 +361,8 @@ def _usable(whole: dict[str, Array], notes: list[str]) -> dict[str, Array]:
     """The channels that carry a signal; what missing ones cost is said."""
     dead = {f"y_{gear}" for gear in GEARS if f"y_{gear}" in whole and np.ptp(whole[f"y_{gear}"]) == 0.0}
     # A set point that was logged in place of the reaction's torque.
-    dead |= {name for name in ("torque_driven",) if name in whole and _constant(whole[name])}
+    if "torque_driven" in whole and _constant(whole["torque_driven"]):
+        dead.add("torque_driven")
     kept = {name: values for name, values in whole.items() if name not in dead}
     for name, loss in (
         ("y_driver", "what happens at the driver's support is seen only through the mesh"),
