@@ -7,51 +7,59 @@ former than in any of the latter is closer by the effect.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.diagnosis.fitting.fit import Optimum
 from gearbench.diagnosis.intake.measurements import Measurement
-from gearbench.diagnosis.judging.closing import GAIN, PLAIN, growths_of
+from gearbench.diagnosis.judging.closing import GAIN, PLAIN, Part, growths_of, parts_of
 from gearbench.diagnosis.selection.simulated import Simulated
 from gearbench.diagnosis.simulation.simulator import Simulator
 from gearbench.diagnosis.simulation.target import Target
 
 Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 DRAWN = 4  # rigs close to each
 CLOSE = 0.1  # standard deviations by which they differ, as the records tell all numbers together
 
 
-def closes_in_all(
-    found: Simulated, target: Target, measured: Measurement, without: Sequence[Optimum]
-) -> bool:
-    """Whether some part of the gap of a record is far closer, and the record likelier, in all rigs next to the one
-    found than in all next to each of those `without` an effect, as they go by themselves."""
+def closed_in_all(
+    found: Simulated, target: Target, measured: Measurement, without: Sequence[Optimum], parts: Collection[Part]
+) -> tuple[Part, float] | None:
+    """Of `parts` of the gap of a record the one that is far closer, and likelier, in all rigs next to the one found
+    than in all next to each of those `without` an effect, as they go by themselves, and by how much at least; of
+    several the one that is so by most, None without any."""
     try:
         kept = _left(found, target, measured, found.selection.best)
-        return all(_closer(target, _left(found, target, measured, one), kept) for one in without)
+        told = [_closer(target, _left(found, target, measured, one), kept) for one in without]
     except ValueError:  # a rig so close that cannot be simulated: nothing is told by others
-        return False
+        return None
+    least = {part: min(one[part] for one in told) for part in parts if all(part in one for one in told)}
+    return max(least.items(), key=lambda item: item[1], default=None)
 
 
-def _closer(target: Target, lost: Sequence[Complex], kept: Sequence[Complex]) -> bool:
-    """The same for residuals (K,) of rigs without and with it."""
-    if min(target.cost(one) for one in lost) - max(target.cost(one) for one in kept) <= GAIN:
-        return False
-    grown = [growths_of(target, target.energies(one), target.energies(other)) for one in lost for other in kept]
-    parts = set(grown[0]).intersection(*grown[1:])
-    return any(min(one[part] for one in grown) > PLAIN for part in parts)
+def _closer(target: Target, lost: Sequence[Array], kept: Sequence[Array]) -> dict[Part, float]:
+    """The same for energies (blocks,) of rigs without and with it, by part."""
+    grown = [growths_of(target, one, other) for one in lost for other in kept]
+    least = {part: min(one.get(part, 0.0) for one in grown) for part in grown[0]}
+    inside = parts_of(target)
+
+    def nats(energies: Array, part: Part) -> float:
+        return float((target.counts * target.nats(energies))[inside[part]].sum())
+
+    def gained(part: Part) -> float:
+        return min(nats(one, part) for one in lost) - max(nats(one, part) for one in kept)
+
+    return {part: growth for part, growth in least.items() if growth > PLAIN and gained(part) > GAIN}
 
 
-def _left(found: Simulated, target: Target, measured: Measurement, optimum: Optimum) -> list[Complex]:
-    """Residuals (K,) of rigs drawn next to an optimum."""
+def _left(found: Simulated, target: Target, measured: Measurement, optimum: Optimum) -> list[Array]:
+    """Energies (blocks,) that rigs drawn next to an optimum leave."""
     free = found.simulator.free
     drawn = _drawn(free, found.end_of(optimum), optimum)
-    return [target.lines - target.gathered([free.channels(p, measured)]) for p in drawn]
+    return [target.energies(target.lines - target.gathered([free.channels(p, measured)])) for p in drawn]
 
 
 def _drawn(free: Simulator, p: Array, optimum: Optimum) -> list[Array]:

@@ -14,6 +14,7 @@ from gearbench.diagnosis.intake.signals import measured_channels
 from gearbench.diagnosis.simulation.target import Target
 
 Array = NDArray[np.float64]
+Part = tuple[str, str]  # of a gap: channel, and kind of line or band in words
 
 # By how much the gap must grow without an effect for it to be named.
 DUE = 1.1
@@ -38,7 +39,7 @@ class Closing:
 
     gain: float
     growth: float
-    part: tuple[str, str]
+    part: Part
     without: Mapping[str, Array]
     lacking: float = 0.0
     optimum: Optimum | None = None
@@ -67,12 +68,15 @@ def free_closing(target: Target, without: Mapping[str, Array], with_all: Mapping
     return replace(closing, growth=min(closing.growth, whole))
 
 
-def both(nudged: Closing, *free: Closing, steady: bool = False) -> Closing:
+def both(nudged: Closing, *free: Closing, steady: tuple[Part, float] | None = None) -> Closing:
     """What an effect closes by simulations that are `nudged`, if it does so too where nothing holds them on the
-    record's way: by each, or `steady` by all that lie close; the signals are those of the `free` ones."""
+    record's way: by each, or by all that lie close, which are `steady` in one part and by how much they are at least;
+    the signals are those of the `free` ones."""
     worst = min(free, key=lambda one: (one.due, one.gain))
-    if worst.due or (steady and nudged.due):
+    if worst.due:
         return replace(nudged, without=worst.without)
+    if steady is not None and nudged.due:
+        return replace(nudged, part=steady[0], growth=steady[1], without=worst.without)
     return replace(worst, gain=min(nudged.gain, worst.gain))
 
 
@@ -95,7 +99,13 @@ def closing_of(target: Target, without: Mapping[str, Array], with_all: Mapping[s
     return Closing(target.cost(rest) - target.cost(final), growth, part, without)
 
 
-def growth_of(target: Target, without: Array, with_all: Array) -> tuple[float, tuple[str, str]]:
+def closed_parts(target: Target, without: Mapping[str, Array], with_all: Mapping[str, Array]) -> tuple[Part, ...]:
+    """The parts of a gap that are larger in signals (channel -> (N,)) without an effect, as far as makes it due."""
+    lost, kept = (target.energies(target.lines - target.gathered([one])) for one in (without, with_all))
+    return tuple(part for part, growth in growths_of(target, lost, kept).items() if growth > DUE)
+
+
+def growth_of(target: Target, without: Array, with_all: Array) -> tuple[float, Part]:
     """The largest factor between the rms gaps without and with an effect (blocks,), over the parts of each channel that
     hold a visible part of the gap without it, and which part that is."""
     found = growths_of(target, without, with_all)
@@ -103,22 +113,29 @@ def growth_of(target: Target, without: Array, with_all: Array) -> tuple[float, t
     return found.get(part, 0.0), part
 
 
-def growths_of(target: Target, without: Array, with_all: Array) -> dict[tuple[str, str], float]:
+def growths_of(target: Target, without: Array, with_all: Array) -> dict[Part, float]:
     """That factor of each such part: a channel in one kind of line or band."""
     lost, kept = without * target.sizes, with_all * target.sizes
     noise = target.noise * target.sizes
+    whole = target.of_channels(lost)
     out = {}
-    for channel in dict.fromkeys(block.channel for block in target.blocks):
-        inside = target.fluctuating & np.array([block.channel == channel for block in target.blocks])
-        whole = float(lost[inside].sum())
-        labels = [(block.kind, f"{block.band[0]:g}–{block.band[1]:g}") for block in target.blocks]
-        for label in sorted({one for part, here in zip(labels, inside, strict=True) if here for one in part}):
-            mine = inside & np.array([label in part for part in labels])
-            if float(lost[mine].sum()) < SEEN**2 * whole:
-                continue
-            least = max(float(kept[mine].sum()), float(noise[mine].sum()), 1e-300)
-            out[channel, label] = float(np.sqrt(lost[mine].sum() / least))
+    for part, mine in parts_of(target).items():
+        if float(lost[mine].sum()) < SEEN**2 * float(whole[mine][0]):
+            continue
+        least = max(float(kept[mine].sum()), float(noise[mine].sum()), 1e-300)
+        out[part] = float(np.sqrt(lost[mine].sum() / least))
     return out
+
+
+def parts_of(target: Target) -> dict[Part, NDArray[np.bool_]]:
+    """Which blocks (blocks,), no means, belong to each part that a gap is told by: a channel in one kind of line, or in
+    one band."""
+    out: dict[Part, NDArray[np.bool_]] = {}
+    for number in np.flatnonzero(target.fluctuating):
+        block = target.blocks[number]
+        for label in (block.kind, f"{block.band[0]:g}–{block.band[1]:g}"):
+            out.setdefault((block.channel, label), np.zeros(len(target.blocks), dtype=bool))[number] = True
+    return dict(sorted(out.items()))
 
 
 def rms_closed(measured: Measurement, channel: str, without: Array, with_all: Array) -> tuple[float, float, float]:

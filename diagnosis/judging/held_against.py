@@ -20,8 +20,8 @@ from gearbench.diagnosis.fitting.fit import Optimum
 from gearbench.diagnosis.forces.condition import prepare
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.judging.along import way_of
-from gearbench.diagnosis.judging.by_chance import closes_in_all
-from gearbench.diagnosis.judging.closing import DUE, Closing, both, closing_of, feels, free_closing
+from gearbench.diagnosis.judging.by_chance import closed_in_all
+from gearbench.diagnosis.judging.closing import DUE, Closing, both, closed_parts, closing_of, feels, free_closing
 from gearbench.diagnosis.judging.judged import GREATER, Judged
 from gearbench.diagnosis.selection.followable import nudges_of, parts
 from gearbench.diagnosis.selection.selection import Selection, further, only, taken_out
@@ -179,8 +179,10 @@ def _by_itself(
     if not simulator.anchored or (simulator.nudges and measured.name in simulator.nudges):
         others = _others(selection, optimum)
         alone = [free_closing(target, free.channels(found.end_of(one), measured), signals) for one in others]
-        told = all(one.due for one in alone)
-        steady = not told and closing.due and closes_in_all(found, target, measured, others)
+        steady = None
+        if closing.due and not all(one.due for one in alone):
+            parts = closed_parts(target, closing.without, nudged)
+            steady = closed_in_all(found, target, measured, others, parts)
         closing = both(closing, *alone, steady=steady)
     return closing, silent
 

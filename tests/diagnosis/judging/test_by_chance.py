@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from shared.fake_simulator import BLOCKS, LINES, of_lines, sensitivities
 
-from gearbench.diagnosis.judging.by_chance import CLOSE, DRAWN, closes_in_all
+from gearbench.diagnosis.judging.by_chance import CLOSE, DRAWN, closed_in_all
 from gearbench.diagnosis.judging.closing import closing_of, free_closing
 from gearbench.diagnosis.simulation.quadratic import quadratic_of
 from gearbench.diagnosis.simulation.target import Block
@@ -54,12 +54,15 @@ class Ways:
         return SimpleNamespace(p=p, sd=np.full(SIZE, 0.1), sensitivity=SimpleNamespace(quadratic=quadratic))
 
 
-def told(ways: Ways) -> bool:
+EXCITED, OPERATING = ("dte", "excited"), ("dte", "operating")
+
+
+def told(ways: Ways, parts: Sequence[tuple[str, str]] = (OPERATING,)) -> tuple[tuple[str, str], float] | None:
     found: Any = SimpleNamespace(
         simulator=ways, selection=SimpleNamespace(best=ways.optimum(WITH)), end_of=lambda optimum: optimum.p
     )
     measured: Any = None
-    return closes_in_all(found, ways.target, measured, [ways.optimum(WITHOUT)])
+    return closed_in_all(found, ways.target, measured, [ways.optimum(WITHOUT)], parts)
 
 
 @pytest.mark.parametrize(
@@ -77,15 +80,31 @@ def test_a_part_that_is_closer_on_every_way_is_closer_by_the_effect(
 ) -> None:
     """Though the whole is nearly as large either way, by what no effect explains."""
     ways = Ways(without, with_all, elsewhere)
-    assert told(ways) is closes
+    closed = told(ways)
+    assert (closed is not None) is closes
     one, other = ways.of_size(without[0], elsewhere), ways.of_size(with_all[0], LARGE)
     assert not free_closing(ways.target, one, other).due
     assert closing_of(ways.target, one, other).growth > 2.0
 
 
+def test_it_is_the_part_that_closes_that_is_likelier_and_closer_by_the_search_too() -> None:
+    """What other parts say is no evidence for it."""
+
+    def ways() -> Ways:
+        return Ways((10.0, 8.0, 9.0, 12.0), (1.0, 1.5, 2.0, 1.0), elsewhere=1.05 * LARGE)
+
+    closed = told(ways(), (EXCITED, OPERATING))
+    assert closed is not None and closed[0] == OPERATING
+    assert closed[1] == pytest.approx(4.0)  # 8 over 2
+    assert told(ways(), (EXCITED,)) is None
+    few = ways()
+    few.target = replace(few.target, counts=np.array([0.5, *few.target.counts[1:]]))
+    assert told(few) is None
+
+
 def test_rigs_are_drawn_close_by_what_the_records_tell() -> None:
     ways = Ways((1.0,) * DRAWN, (1.0,) * DRAWN)
-    assert not told(ways)
+    assert told(ways) is None
     quadratic = ways.optimum(WITH).sensitivity.quadratic
     matrix = quadratic.information(np.zeros(SIZE)) + np.eye(SIZE) / 0.1**2
     away = [p - (ways.optimum(WITH).p if p[0] > 0.5 * WITH else 0.0) for p in ways.seen]
