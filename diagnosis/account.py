@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from gearbench.diagnosis.effects.effect import Hypothesis
 from gearbench.diagnosis.forces.equations import PLACES
+from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.judging.closing import Closing
 from gearbench.diagnosis.judging.judged import Judged
 from gearbench.diagnosis.remainder.missing import Missing
@@ -163,6 +164,17 @@ def sentence_of_rivals(causes: Sequence[Hypothesis]) -> str:
     """That the records speak as well for other causes as for the one that is named."""
     named, *others = (_which(one) for one in causes)
     return f"The records cannot tell {named} from {' or '.join(others)}: either explains them as well"
+
+
+def sentence_of_judging(judged: Measurement, held_out: Measurement | None) -> tuple[str, ...]:
+    """That the record that was held out could not judge what was found; nothing where it did, or where none was."""
+    if held_out is None or judged is held_out:
+        return ()
+    lacks = "the rig found cannot be simulated there" if held_out.phase_known else "its mesh phase is arbitrary"
+    return (
+        f"record {held_out.name} was held out but cannot judge, since {lacks}: what effects close is told on record"
+        f" {judged.name}, which they were found from",
+    )
 
 
 def _which(one: Hypothesis) -> str:

@@ -61,8 +61,8 @@ class Inputs:
 
     @property
     def judged(self) -> Measurement:
-        """The measurement on which the gap is told: the held-out one, else the first."""
-        return self.held_out or self.measurements[0]
+        """The measurement on which the gap is told: the held-out one if its mesh phase is known, else the first."""
+        return self.held_out if self.held_out and self.held_out.phase_known else self.measurements[0]
 
 
 @dataclass(frozen=True)
@@ -225,7 +225,7 @@ def _verdict(
         signs=finding.signs,
         where=where,
         gap=shrunk,
-        held_out=inputs.held_out.name if inputs.held_out else None,
+        held_out=inputs.judged.name if inputs.judged is inputs.held_out else None,
         indistinguishable=finding.indistinguishable,
         detectable=detectable,
         advice=tuple(dict.fromkeys(advice)),

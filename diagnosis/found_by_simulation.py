@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from gearbench.diagnosis.account import (
     places_of,
     sentence_of_effect,
+    sentence_of_judging,
     sentence_of_only,
     sentence_of_rivals,
     sentence_of_shares,
@@ -109,7 +110,8 @@ def by_simulation(
         with_effect=found.with_effects if decided.named else None,
         because=(*decided.because, *why(judged, named), *settled.doubts, *flanks,
                  *([way.sentence()] if way else []), *sentences_of_means(found),
-                 *sentences_of_others(of.measurements, of.steady, band)),
+                 *sentences_of_others(of.measurements, of.steady, band),
+                 *sentence_of_judging(judged.measured, held_out)),
         structure=structure_found(found.layout.unknowns, found.selection.best.p, found.std),
         missing=missing,
         places=tuple(one.place for one in kept),
@@ -144,9 +146,9 @@ def _settled(
     and without all where the rig is closer to the judged record without any."""
     entered, doubts, doubted = found.selection.entered, list[str](), dict[str, float]()
     judged = judged_of_size(of.problem, _judgeable(of, found, held_out), held_out, of.measurements, report)
-    changing = changing_of(judged, changing_parts(of.steady, of.problem.conditions[0].band))
+    repeated = changing_parts(of.steady, of.problem.conditions[0].band)
     while True:
-        found = judged.found
+        found, changing = judged.found, changing_of(judged, repeated)
         unsteady = placed(of.unsteady, LIMITS, found, of.steady, much=changing > known.changing)
         place, _ = unsteady.worst(LIMITS.unsteady)
         free = _free(found)
@@ -165,20 +167,23 @@ def _settled(
                   "remains": judged.remains, "searched": judged.searched, "hidden": judged.hidden,
                   "changing": changing}  # fmt: skip
         chances = chances_of(judged, decided, known, signs["lines"], (*entered, *judged.dropped))
-        out, said, doubt = _doubted(of, judged, decided, chances)
+        out, said, doubt = doubtful(of, judged, decided, chances)
         doubts, doubted = [*doubts, *said], doubted | doubt
         if not out:
             signs |= doubted | signs_of_called(chances, chances.named)
             return _Settled(judged, decided, chances, missing, signs, tuple(doubts))
-        judged = judged_of_size(of.problem, left_out(found, out), held_out, of.measurements, report)
+        again = judged_of_size(of.problem, left_out(found, out), held_out, of.measurements, report)
+        judged = again.with_dropped(judged.dropped)
 
 
-def _doubted(
+def doubtful(
     of: Searched, judged: Judged, decided: Decided, chances: Chances
 ) -> tuple[tuple[Weighed, ...], list[str], dict[str, float]]:
     """Of the named effects those that are to be left out next, why, and the signs of what is too unlikely."""
-    if decided.named and judged.is_astray:
-        return decided.named, [sentence_of_astray(one) for one in decided.named], {}
+    entered = judged.found.selection.entered
+    # What leads astray speaks for something unknown no more than for itself.
+    if entered and judged.is_astray:
+        return entered, [sentence_of_astray(one) for one in entered], {}
     if one := unlikely(decided, chances):
         return (one,), [sentence_of_doubt(one, chances)], signs_of_called(chances, (one.hypothesis.name,))
     if one := _too_small(of, judged, decided.named):

@@ -222,7 +222,8 @@ def _limits(report: Report) -> list[str]:
         text(
             "These causes would leave the same traces in the records:"
             if same
-            else "Each cause that was weighed would leave traces of its own."
+            else "Each effect of the library would leave traces of its own; where one could be in either of two parts,"
+            " the reasons above say so."
         ),
         items(same),
         *_smallest(verdict),

@@ -146,6 +146,8 @@ def headline(verdict: Verdict) -> str:
     if verdict.verdict == "effects":
         return _named(verdict)
     if verdict.verdict == "none":
+        if not whole_band(verdict.gap):
+            return "No known effect is called for; how much of the gap is left cannot be told."
         if explained(verdict):
             return "No effect is needed: within its uncertainties the nominal rig explains the records."
         if mostly(verdict):
@@ -157,18 +159,26 @@ def headline(verdict: Verdict) -> str:
 
 def _named(verdict: Verdict) -> str:
     """What is at work and whether it explains the gap, which what changes between repetitions does not."""
-    changing = [effect.name for effect in verdict.effects if effect.name in {one.name for one in CHANGING}]
-    lasting = [effect.name for effect in verdict.effects if effect.name not in changing]
+    lasting = _lasting(verdict)
+    changing = [effect.name for effect in verdict.effects if effect.name not in lasting]
     passing = f"{effects_in_words(changing)} {_are(changing)} at work while the records are taken"
     if not lasting:
         return f"{passing[:1].upper()}{passing[1:]}."
     said = "explains the gap" if len(lasting) == 1 else "explain the gap"
-    if _beside(verdict):
+    if not whole_band(verdict.gap):
+        said = f"{_are(lasting)} at work"
+    elif _beside(verdict):
         said = f"{_are(lasting)} at work, beside a recalibration that explains most of the gap"
     elif not explained(verdict):
         said = f"{_are(lasting)} at work, and a part of the gap remains"
     words = effects_in_words(lasting)
     return f"{words[:1].upper()}{words[1:]} {said}{f'; {passing}' if changing else ''}."
+
+
+def _lasting(verdict: Verdict) -> list[str]:
+    """Names of the effects that do not change between repetitions: a rig with the effects has these."""
+    changing = {one.name for one in CHANGING}
+    return [effect.name for effect in verdict.effects if effect.name not in changing]
 
 
 def _are(several: Sequence[str]) -> str:
@@ -213,7 +223,7 @@ def shrinkage(verdict: Verdict) -> str:
     record = f"the held-out record{named}" if verdict.held_out else f"record {gap.record} (not held out)"
     steps = f"to {length(scale * gap.recalibrated.value)} {unit} recalibrated"
     if gap.with_effect is not None:
-        several = "effects" if len(verdict.effects) > 1 else "effect"
+        several = "effects" if len(_lasting(verdict)) > 1 else "effect"
         steps += f" and {length(scale * gap.with_effect.value)} {unit} with the {several}"
     floor = f" (noise floor {length(scale * gap.floor.value)} {unit})" if gap.floor else ""
     rest = ""
@@ -251,10 +261,11 @@ def places_in_words(verdict: Verdict) -> str:
 
 
 def explained(verdict: Verdict) -> bool:
-    """Whether little of the gap of the first channel is left in the end: a tenth of it, or what noise makes."""
+    """Whether little of the gap of the first channel is left in the end, as far as there is one: a tenth of it, or what
+    noise makes."""
     gap = next(iter(whole_band(verdict.gap)), None)
     if gap is None:
-        return True
+        return False
     floor = gap.floor.value if gap.floor else 0.0
     last = gap.with_effect or gap.recalibrated
     return last.value <= max(LEFT_OF_GAP * gap.nominal.value, LEFT_OF_FLOOR * floor)
@@ -263,7 +274,7 @@ def explained(verdict: Verdict) -> bool:
 def mostly(verdict: Verdict) -> bool:
     """Whether less than half of the gap of the first channel is left in the end."""
     gap = next(iter(whole_band(verdict.gap)), None)
-    return gap is None or (gap.with_effect or gap.recalibrated).value < 0.5 * gap.nominal.value
+    return gap is not None and (gap.with_effect or gap.recalibrated).value < 0.5 * gap.nominal.value
 
 
 def whole_band(gaps: Sequence[Gap]) -> list[Gap]:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -46,6 +46,11 @@ class Judged:
     target: Target | None = None
     noise: Mapping[str, Array] = field(default_factory=dict)
     kept: Mapping[str, Array] | None = None
+
+    def with_dropped(self, before: Sequence[Weighed]) -> Judged:
+        """With what was entered and dropped `before`, when other effects were there, but for what is kept now."""
+        now = {one.hypothesis.name for one in (*self.found.selection.entered, *self.dropped)}
+        return replace(self, dropped=(*(one for one in before if one.hypothesis.name not in now), *self.dropped))
 
     @cached_property
     def sizes(self) -> dict[str, Sizes]:

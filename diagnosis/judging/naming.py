@@ -41,16 +41,31 @@ def effects_of(judged: Judged, decided: Decided, chances: Chances) -> tuple[Effe
         estimates = effect.add(found.layout.nominal.rig, one.hypothesis, values)[1]
         other = out.get(effect.name)
         closing = judged.closings[one.hypothesis.name]
-        out[effect.name] = Effect(
+        here = Effect(
             name=effect.name,
             probability=chances.named[one.hypothesis.name],
             due=closing.due,
-            parameters={**(other.parameters if other else {}), **parameters_of(effect, estimates)},
+            parameters=parameters_of(effect, estimates),
             share=judged.share_of(one.hypothesis),
             closes=_closes(judged, closing),
-            grows=max(closing.growth, (other.grows or 0.0) if other else 0.0),
+            grows=closing.growth,
         )
+        out[effect.name] = here if other is None else _together(other, here)
     return tuple(out.values())
+
+
+def _together(one: Effect, other: Effect) -> Effect:
+    """An effect that is named in two places: as likely as where it is likelier, with what it closes where it closes
+    more."""
+    more = max(one, other, key=lambda each: each.share or 0.0)
+    return more.model_copy(
+        update={
+            "probability": max(one.probability, other.probability),
+            "due": one.due or other.due,
+            "parameters": {**one.parameters, **other.parameters},
+            "grows": max(one.grows or 0.0, other.grows or 0.0),
+        }
+    )
 
 
 def drifts_of(decided: Decided, changing: float, chances: Chances) -> tuple[Effect, ...]:

@@ -28,9 +28,10 @@ def judged_of_size(
     report: Report = lambda step: None,
 ) -> Judged:
     """What was found on the judged record, but for effects of which a sound rig has as much: some enter there only."""
+    dropped: tuple[Weighed, ...] = ()
     while True:
-        judged = judgement(problem, found, held_out, searched, report)
-        found = sized(judged.found)
+        judged = judgement(problem, found, held_out, searched, report).with_dropped(dropped)
+        found, dropped = sized(judged.found), judged.dropped
         if found is judged.found:
             return judged
 

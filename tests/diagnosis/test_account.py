@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from gearbench.diagnosis.account import (
     place_in,
     places_of,
     sentence_of_effect,
+    sentence_of_judging,
     sentence_of_rivals,
     sentences_of_gap,
     weights,
@@ -116,3 +118,14 @@ def test_rivals_are_told_with_what_tells_them_apart() -> None:
         "The records cannot tell run-out of a gear (driver) from run-out of an encoder (driver) or friction between the"
         " flanks: either explains them as well"
     )
+
+
+def test_it_is_said_that_a_record_held_out_could_not_judge() -> None:
+    base: Any = SimpleNamespace(name="base", phase_known=True)
+    blind: Any = SimpleNamespace(name="fast", phase_known=False)
+    (said,) = sentence_of_judging(base, blind)
+    assert said.startswith("record fast was held out but cannot judge, since its mesh phase is arbitrary")
+    assert "on record base" in said
+    known: Any = SimpleNamespace(name="fast", phase_known=True)
+    assert "cannot be simulated there" in sentence_of_judging(base, known)[0]
+    assert sentence_of_judging(known, known) == sentence_of_judging(base, None) == ()

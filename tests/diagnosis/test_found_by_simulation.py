@@ -9,7 +9,7 @@ import pytest
 
 from gearbench.diagnosis.effects.eccentricity import ECCENTRICITY
 from gearbench.diagnosis.effects.effect import Hypothesis, Wide
-from gearbench.diagnosis.found_by_simulation import changing_of, why
+from gearbench.diagnosis.found_by_simulation import changing_of, doubtful, why
 from gearbench.diagnosis.judging.closing import Closing
 from gearbench.diagnosis.judging.judged import Sizes
 from gearbench.diagnosis.selection.weighing import Weighed
@@ -38,3 +38,18 @@ def test_it_is_said_where_good_rigs_shares_of_other_effects_close_as_much(plain:
     assert first.startswith(f"Without {ECCENTRICITY.noun} the gap")
     assert [f"({plain:.2f} um, and 1.00 um" in sentence for sentence in more] == [True] * said
     assert not why(judged, ())
+
+
+@pytest.mark.parametrize("named", [True, False])
+def test_what_leads_astray_is_left_out_whether_or_not_it_would_be_named(named: bool) -> None:
+    """Beside what a force without a name explains better it would be called unknown."""
+    one = Weighed(Hypothesis("run-out", "mesh", (Wide("none"),), effect=ECCENTRICITY), 60.0, None)
+    found = SimpleNamespace(selection=SimpleNamespace(entered=(one,)))
+    decided: Any = SimpleNamespace(named=(one,) if named else ())
+    of: Any = None
+    chances: Any = SimpleNamespace(named={"run-out": 0.9})
+    judged: Any = SimpleNamespace(found=found, is_astray=True, target=None)
+    out, (said,), _ = doubtful(of, judged, decided, chances)
+    assert out == (one,) and ECCENTRICITY.noun[1:] in said
+    near: Any = SimpleNamespace(found=found, is_astray=False, target=None)
+    assert doubtful(of, near, decided, chances) == ((), [], {})

@@ -137,6 +137,11 @@ def test_the_sentences_of_a_verdict() -> None:
     )
     alone = found.model_copy(update={"effects": (drifts,)})
     assert headline(alone) == "A stiffness that drifts is at work while the records are taken."
+    assert "um with the effect." in confidence(also)  # a rig with what changes between repetitions is none
+    blind = found.model_copy(update={"gap": ()})
+    assert headline(blind) == "An elastic coupling and ripple of the driving torque are at work."
+    sound = blind.model_copy(update={"verdict": "none", "effects": (), "place": "none"})
+    assert headline(sound) == "No known effect is called for; how much of the gap is left cannot be told."
     noisy = gaps[1].model_copy(update={"with_effect": Range(value=1e-6, low=1e-6, high=1e-6), "floor": FLOOR})
     partly = found.model_copy(update={"effects": found.effects[:1], "gap": (noisy,)})
     assert headline(partly) == "An elastic coupling is at work, and a part of the gap remains."

@@ -115,6 +115,14 @@ def test_an_effect_that_leaves_the_judged_record_as_it_was_is_not(monkeypatch: p
     assert not none.found.selection.entered and none.found.selection.best is none.found.selection.base
 
 
+def test_what_was_dropped_before_is_remembered_unless_it_is_kept_now(monkeypatch: pytest.MonkeyPatch) -> None:
+    first = judged({3: 0.4, 4: 0.3, 5: -0.2}, {3: 0.4}, monkeypatch)
+    again = judged({3: 0.4}, {3: 0.4}, monkeypatch)
+    assert names(again.with_dropped(first.dropped).dropped) == ["torque-ripple"]
+    assert names(first.with_dropped(first.dropped).dropped) == ["torque-ripple"]
+    assert not again.with_dropped(again.found.selection.entered).dropped
+
+
 @pytest.mark.parametrize(("grown", "named"), [(1.2, ["support"]), (1.05, [])])
 def test_a_number_of_the_nominal_rig_must_make_a_difference_to_the_whole(
     grown: float, named: list[str], monkeypatch: pytest.MonkeyPatch
