@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from gearbench.diagnosis.effects.effect import Hypothesis
 from gearbench.diagnosis.evidence.separable import APART
 from gearbench.diagnosis.fitting.fit import Optimum, fit
+from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.selection.weighing import LIMIT, Weighed, worth
 from gearbench.diagnosis.simulation.simulator import Simulator
 
@@ -15,20 +18,39 @@ MOST_LEFT = 6.0  # nats still promised by fits that count for comparing them
 # Part of a rare effect's evidence that its usual counterpart must have: what both explain is nine tenths of it, and the
 # rest is told by resonances that no model has to the per cent.
 NEARLY = 0.75
+# The same of all that both explain, a good rig's share of them included: what tells them apart is sidebands, which no
+# model has to a few per cent of the lines that both make.
+ALIKE = 0.95
 RENEWALS = 1
 
 
-def usual_of(weighed: Sequence[Weighed]) -> Weighed | None:
+def usual_of(weighed: Sequence[Weighed], shared: float = 0.0) -> Weighed | None:
     """The best of those weighed; in place of a rare one its usual counterpart where that explains the records nearly as
-    well. None of none."""
+    well, beside the nats `shared` by both. None of none."""
     if not weighed:
         return None
     best = weighed[0]
     usual = next((one for one in weighed if _is_usual(one, best) and one.optimum is not None), None)
-    if usual is None:
-        return best
-    needed = min(NEARLY * best.log_bayes_factor, best.log_bayes_factor - APART - _left(usual, best))
-    return usual if usual.log_bayes_factor > needed else best
+    return usual if usual is not None and usual.log_bayes_factor > _needed(usual, best, shared) else best
+
+
+def _needed(usual: Weighed, rare: Weighed, shared: float) -> float:
+    """Nats from which a usual one explains the records nearly as well as a rare one."""
+    of_all = ALIKE * (shared + rare.log_bayes_factor) - shared
+    return min(NEARLY * rare.log_bayes_factor, of_all, rare.log_bayes_factor - APART - _left(usual, rare))
+
+
+def shared_by(unknowns: Unknowns, base: Optimum, weighed: Sequence[Weighed]) -> float:
+    """Nats that a good rig's share of the best one of those weighed, if it is rare, and of its usual counterparts has
+    explained in `base`, as its quadratic tells."""
+    usual = [one for one in weighed[1:] if _is_usual(one, weighed[0]) and one.optimum is not None]
+    if not usual:
+        return 0.0
+    quadratic, sd, (low, high) = base.sensitivity.quadratic, base.sd.copy(), unknowns.bounds()
+    entries = np.concatenate([one.hypothesis.entries(unknowns) for one in (weighed[0], *usual)])
+    sd[entries], low[entries], high[entries] = 0.0, 0.0, 0.0
+    _, cost, information = quadratic.best(base.p, sd, (low, high))
+    return max(base.evidence - quadratic.evidence(cost, information, sd), 0.0)
 
 
 def compared(simulator: Simulator, base: Optimum, weighed: Sequence[Weighed]) -> list[Weighed]:
@@ -100,10 +122,10 @@ def _is_usual(one: Weighed, rare: Weighed) -> bool:
     return one is not rare and rare.hypothesis.gives_way_to(one.hypothesis)
 
 
-def rivals_of(winner: Weighed, weighed: Sequence[Weighed]) -> tuple[Hypothesis, ...]:
+def rivals_of(winner: Weighed, weighed: Sequence[Weighed], shared: float = 0.0) -> tuple[Hypothesis, ...]:
     """Those of the hypotheses weighed beside the winner that explain the records as well, by other unknowns, and are
-    another cause to look for."""
-    return tuple(one.hypothesis for one in weighed if _as_good(one, winner))
+    another cause to look for; of a rare winner's usual counterparts beside the nats `shared` by both."""
+    return tuple(one.hypothesis for one in weighed if _as_good(one, winner, shared))
 
 
 def unentered(one: Weighed, entered: Sequence[Weighed]) -> Weighed:
@@ -114,9 +136,11 @@ def unentered(one: Weighed, entered: Sequence[Weighed]) -> Weighed:
     return replace(one, rivals=tuple(rivals))
 
 
-def _as_good(one: Weighed, winner: Weighed) -> bool:
+def _as_good(one: Weighed, winner: Weighed, shared: float) -> bool:
     """Whether one explains the records as another cause does; of twins what tells them apart is a resonance, too."""
     behind = APART
+    if _is_usual(one, winner):
+        behind = max(behind, winner.log_bayes_factor - _needed(one, winner, shared))
     if one.hypothesis.is_twin_of(winner.hypothesis):
         behind = max(behind, (1.0 - NEARLY) * winner.log_bayes_factor)
     return (

@@ -30,6 +30,7 @@ from gearbench.diagnosis.selection.rivals import (
     is_like,
     is_same,
     rivals_of,
+    shared_by,
     unentered,
     usual_of,
 )
@@ -247,19 +248,20 @@ def _forward(
         found = compared(simulator, best, weigh(simulator, best, rest, starts, report, reshape=not entered))
         if not first:
             first, starts = found, {**starts, **_shaped(found)}
-        winner = _entering_first(unknowns, found, apart)
+        shared = shared_by(unknowns, best, found)
+        winner = _entering_first(unknowns, found, apart, shared)
         if winner is None or winner.optimum is None:
             break
-        entered.append(replace(winner, rivals=rivals_of(winner, found)))
+        entered.append(replace(winner, rivals=rivals_of(winner, found, shared)))
         best = winner.optimum
         best = fit_afresh(simulator, best.p, best.sd, renewals=0) or best
     return best, entered, first
 
 
-def _entering_first(unknowns: Unknowns, found: Sequence[Weighed], apart: bool) -> Weighed | None:
+def _entering_first(unknowns: Unknowns, found: Sequence[Weighed], apart: bool, shared: float = 0.0) -> Weighed | None:
     """What enters first of those weighed, the best first: the usual cause, or where that has too little evidence by
-    itself the one of which it is the counterpart."""
-    for one in (usual_of(found), *found[:1]):
+    itself the one of which it is the counterpart; `shared`: nats that both have by a good rig's share."""
+    for one in (usual_of(found, shared), *found[:1]):
         entered = entering(unknowns, one, apart) if one else None
         if entered is not None:
             return entered

@@ -16,9 +16,9 @@ from shared.fake_simulator import (
 from shared.selected_lines import CRACKS, FRICTION, LISTED, MATRIX, RIPPLE, names, selected
 
 from gearbench.diagnosis.effects.effect import twins_of
-from gearbench.diagnosis.fitting.fit import Optimum
+from gearbench.diagnosis.fitting.fit import Optimum, fit_afresh
 from gearbench.diagnosis.selection import selection as module
-from gearbench.diagnosis.selection.rivals import compared, is_like, rivals_of, unentered, usual_of
+from gearbench.diagnosis.selection.rivals import compared, is_like, rivals_of, shared_by, unentered, usual_of
 from gearbench.diagnosis.selection.selection import evidence_without, taken_out
 from gearbench.diagnosis.selection.weighing import LIMIT, Weighed
 
@@ -97,6 +97,36 @@ def test_a_rare_effect_gives_way_to_a_usual_one_that_explains_nearly_as_much() -
     # Beside the usual one the rare one is not weighed again.
     assert is_like(rare.hypothesis, RIPPLE) and not is_like(RIPPLE, rare.hypothesis) and is_like(RIPPLE, RIPPLE)
     assert not is_like(rare.hypothesis, CRACKS[0])
+
+
+def test_what_both_explain_already_counts_for_the_usual_one() -> None:
+    """Ten nats tell a rare one that explains 15 more from its counterpart, but not where both have explained 200."""
+    optimum = selected({3: 0.4}).best
+    rare = Weighed(replace(FRICTION, on=("driver",), usual=(("ripple",), -0.5)), 15.0, optimum)
+    usual = Weighed(replace(RIPPLE, on=("driven",)), 5.0, optimum)
+    for shared, named, rivals in (0.0, rare, 0), (150.0, rare, 0), (200.0, usual, 1):
+        assert usual_of((rare, usual), shared) is named
+        # Where the usual one has too little evidence to enter by itself it is still told.
+        assert len(rivals_of(rare, (rare, usual), shared)) == rivals
+        assert len(rivals_of(usual, (rare, usual), shared)) == 1
+    assert not rivals_of(rare, (rare, Weighed(CRACKS[0], 5.0, optimum)), 200.0)
+
+
+def test_what_both_explain_already_is_what_a_rig_without_either_lacks() -> None:
+    true = np.array([0.08, -0.1, 0.02, 0.015, 0.01, -0.012, 0.0, 0.0])
+    simulator = FakeSimulator(lambda q: q @ MATRIX, target(true @ MATRIX))
+    found = chosen(simulator, LISTED, [np.zeros(8)], {})
+    assert found is not None and not found.entered
+    rare = Weighed(replace(FRICTION, usual=(("ripple",), -0.5)), 1.0, found.base)
+    usual = Weighed(RIPPLE, 0.5, found.base)
+    sd = found.base.sd.copy()
+    sd[3:6] = 0.0
+    without = fit_afresh(simulator, np.zeros(8), sd, renewals=2)
+    assert without is not None and not without.p[3:6].any()
+    lacking = found.base.evidence - without.evidence
+    assert lacking > 10.0
+    assert shared_by(simulator.layout.unknowns, found.base, [rare, usual]) == pytest.approx(lacking, rel=0.05)
+    assert shared_by(simulator.layout.unknowns, found.base, [usual, rare]) == 0.0  # no rare one is ahead
 
 
 def test_the_usual_one_is_fitted_from_where_the_rare_one_got() -> None:
