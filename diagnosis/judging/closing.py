@@ -138,11 +138,13 @@ def parts_of(target: Target) -> dict[Part, NDArray[np.bool_]]:
     return dict(sorted(out.items()))
 
 
-def rms_closed(measured: Measurement, channel: str, without: Array, with_all: Array) -> tuple[float, float, float]:
+def rms_closed(
+    measured: Measurement, channel: str, without: Array, with_all: Array, top: int | None = None
+) -> tuple[float, float, float]:
     """Rms (value, low, high) by which a channel's gap grows without an effect, with its 90 % interval: the lines of the
-    difference of energies, each counted as one draw."""
+    difference of energies up to the line `top` (None: all), each counted as one draw."""
     real = measured_channels(measured)[channel].mean(axis=0)
-    energy = energy_of(real - without) - energy_of(real - with_all)
+    energy = (energy_of(real - without) - energy_of(real - with_all))[:top]
     total, spread = float(energy.sum()), 1.6449 * float(np.sqrt(0.5 * (energy**2).sum()))
     value, low, high = (float(np.sqrt(max(one, 0.0))) for one in (total, total - spread, total + spread))
     return value, low, high

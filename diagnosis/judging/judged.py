@@ -68,10 +68,10 @@ class Judged:
     def _rms(self, values: Array) -> float:
         """Rms of a signal (N,), or of parts (parts, N) that add up by their squares, up to the highest line that the
         search sees: beyond the excitation nothing determines the rig."""
-        return max(float(np.sqrt(sum(energy_of(one)[: self._top].sum() for one in np.atleast_2d(values)))), 1e-300)
+        return max(float(np.sqrt(sum(energy_of(one)[: self.top].sum() for one in np.atleast_2d(values)))), 1e-300)
 
     @cached_property
-    def _top(self) -> int | None:
+    def top(self) -> int | None:
         """The highest line that the search sees; None: all."""
         return max((int(bins.max()) for _, _, bins in self.target.plan), default=None) if self.target else None
 

@@ -91,7 +91,7 @@ def _closes(judged: Judged, closing: Closing) -> dict[str, Range]:
     """By channel, rms in um or N m that comes back without an effect."""
     out = {}
     for channel in judged.sizes:
-        sizes = rms_closed(judged.measured, channel, closing.without[channel], judged.answer[channel])
+        sizes = rms_closed(judged.measured, channel, closing.without[channel], judged.answer[channel], judged.top)
         scale = SHOWN_UNITS.get(UNITS[channel], (1.0, ""))[0]
         value, low, high = (scale * size for size in sizes)
         out[channel] = Range(value=value, low=low, high=high)

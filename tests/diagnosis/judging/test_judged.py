@@ -282,6 +282,9 @@ def test_parts_of_the_gap_are_energies_beyond_noise_in_units_of_each_channel(mon
     assert whole.left == 0.0 and whole.grown(half) > 1e6
     value, low, high = rms_closed(None, "dte", half["dte"], final["dte"])  # type: ignore[arg-type]
     assert low < value < high < 1.1 * value and value == pytest.approx(np.sqrt(0.15) * gap["dte"].std(), rel=1e-6)
+    # Up to the line where the excitation ends, as all sizes are told.
+    half_band, _, _ = rms_closed(None, "dte", half["dte"], final["dte"], 1024)  # type: ignore[arg-type]
+    assert half_band == pytest.approx(np.sqrt(0.5) * value, rel=0.05)
 
 
 def test_a_rig_strays_whose_gap_is_that_of_another_way(monkeypatch: pytest.MonkeyPatch) -> None:
