@@ -38,8 +38,8 @@ def unknowns(model: NominalModel, conditions: Sequence[Condition]) -> tuple[Grou
 
 
 def hypotheses(model: NominalModel) -> tuple[Hypothesis, ...]:
-    """The drive has one coupling."""
-    return (Hypothesis("coupling", "drive", (Wide(KEY),)),)
+    """The drive has one coupling, if there is a rotor to swing on it."""
+    return (Hypothesis("coupling", "drive", (Wide(KEY),)),) if model.rotor > 0.0 else ()
 
 
 def starts(group: Group) -> tuple[float, ...]:

@@ -135,16 +135,13 @@ def mesh_forces(layout: Layout, p: Array, along: Along, chosen: Flags) -> tuple[
         indices = unknowns.at(key)
         if chosen[indices].any():
             put(key, _by_tooth(tooth, along.pair_stiffness, (z1, z2)[side]))
-    soft = []
-    for one in layout.teeth:
-        side, number = (0, one) if one < z1 else (1, one - z1)
-        meant = numbers % (z1, z2)[side] == number
-        soft.append(-(meant * along.pairs.force * bending[..., side]).sum(axis=1))
-    if soft:
-        indices = unknowns[CRACK].start + np.array(layout.teeth)
-        keep = chosen[indices]
-        parts.append(np.stack(soft, axis=1)[:, keep])
-        at.extend(indices[keep])
+    for side, (count, before) in enumerate(((z1, 0), (z2, z1))):
+        own = np.array([one for one in layout.teeth if before <= one < before + count], dtype=int)
+        own = own[chosen[unknowns[CRACK].start + own]]
+        if len(own):
+            softer = _by_tooth(numbers % count, -along.pairs.force * bending[..., side], count)
+            parts.append(softer[:, own - before])
+            at.extend(unknowns[CRACK].start + own)
     return parts, np.array(at)
 
 
@@ -154,12 +151,12 @@ def _series_at(cosine: Sequence[float], sine: Sequence[float], phase: Array) -> 
     return np.asarray(np.asarray(cosine) @ np.cos(turns) + np.asarray(sine) @ np.sin(turns))
 
 
-def _by_tooth(tooth: NDArray[np.int64], stiffness: Array, count: int) -> Array:
-    """Stiffness (entries, count) [N/m] that each tooth of a gear has in the mesh."""
+def _by_tooth(tooth: NDArray[np.int64], of_pairs: Array, count: int) -> Array:
+    """What each tooth of a gear has (entries, count) of what its pairs have (entries, n_o) in the mesh."""
     out = np.zeros((len(tooth), count))
     rows = np.arange(len(tooth))
     for column in range(tooth.shape[1]):
-        out[rows, tooth[:, column]] += stiffness[:, column]
+        out[rows, tooth[:, column]] += of_pairs[:, column]
     return out
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from shared.measured import nominal
@@ -106,6 +108,11 @@ def test_each_hypothesis_widens_what_it_names(model: NominalModel, where: Unknow
 def test_an_effect_can_be_left_out(model: NominalModel, left_out: Effect) -> None:
     left = hypotheses(model, (left_out.name,))
     assert {h.effect.name for h in left if h.effect} == {effect.name for effect in LIBRARY} - {left_out.name}
+
+
+def test_without_a_rotor_there_is_no_coupling(model: NominalModel) -> None:
+    alone = replace(model, rotor=0.0)
+    assert {h.effect.name for h in hypotheses(alone) if h.effect} == {effect.name for effect in LIBRARY} - {"coupling"}
 
 
 def test_starts_move_only_what_the_hypothesis_widens(model: NominalModel, where: Unknowns) -> None:

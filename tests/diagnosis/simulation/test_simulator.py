@@ -68,6 +68,23 @@ def test_a_derivative_is_what_two_simulations_differ_by(bench: Bench, key: str, 
     assert largest > 0.0
 
 
+@pytest.mark.parametrize("side", [0, 1])
+def test_so_it_is_of_teeth_that_may_be_cracked(bench: Bench, side: int) -> None:
+    """Of each gear one; those that may not have no derivative."""
+    z1, _ = bench.layout.model.teeth
+    teeth = (3, z1 + 5)
+    simulator = replace(bench.simulator, layout=replace(bench.layout, teeth=teeth), _kept={})
+    p, start = np.zeros(bench.layout.size), bench.layout.unknowns["crack"].start
+    p[start + teeth[side]] = 0.02  # no loss is less than none
+    jacobian = jacobian_at(simulator, p)
+    found = off(simulator, jacobian[start + teeth[side]], p, start + teeth[side], 0.01)
+    for channel, (error, size) in found.items():
+        # Edges of contact that move: see EDGES of `test_structure_derivatives`.
+        assert error < (0.2 if channel == "torque_driven" else CLOSE) * size, channel
+    others = [one for one in range(sum(bench.layout.model.teeth)) if one not in teeth]
+    assert not jacobian[start + np.array(others)].any()
+
+
 @pytest.fixture(scope="module")
 def turning() -> Bench:
     """A record without displacements, whose transmission error is that of the rotations."""
