@@ -23,7 +23,7 @@ from gearbench.diagnosis.effects.effect import Hypothesis
 from gearbench.diagnosis.evidence.calibration import LIMITS
 from gearbench.diagnosis.evidence.separable import APART
 from gearbench.diagnosis.judging.closing import DUE, GAIN, growth_of
-from gearbench.diagnosis.selection.rivals import NEARLY
+from gearbench.diagnosis.selection.rivals import ALIKE, NEARLY
 from gearbench.diagnosis.selection.selection import known_within
 from gearbench.diagnosis.selection.weighing import Weighed, entering, is_own, limit_of
 
@@ -79,6 +79,20 @@ class View:
     def evidence(self, truth: int, size: float) -> Array:
         """Log Bayes factors (hypotheses,) over the background where `truth` has that size."""
         return 0.5 * size**2 * self.growth[truth] + np.array([constant for _, constant in self.posteriors])
+
+    @cached_property
+    def shared(self) -> dict[tuple[int, int], float]:
+        """Twice what a good rig's share of a rare cause and of a usual one explains per square of the rare one's size,
+        by their numbers, where the rare one gives way."""
+        out = {}
+        for rare, one in enumerate(self.hypotheses):
+            pull = self.information @ direction(self.known, one)[self.known.active]
+            for usual, other in enumerate(self.hypotheses):
+                if one.gives_way_to(other):
+                    sd = self.known.narrow.copy()
+                    sd[[*one.entries(self.known.unknowns), *other.entries(self.known.unknowns)]] = 0.0
+                    out[rare, usual] = float(pull @ (self.plain[0] - self._posterior(sd)[0]) @ pull)
+        return out
 
     def std(self, number: int) -> Array:
         """Posterior standard deviations (size,) of all unknowns under a hypothesis."""
@@ -206,7 +220,8 @@ def rivals_at(view: View, number: int, size: float, usual: bool = True) -> tuple
         if usual and one.gives_way_to(truth):
             continue
         if usual and truth.gives_way_to(one):
-            needed = min(NEARLY * own, needed)
+            shared = 0.5 * size**2 * view.shared[number, other]
+            needed = min(NEARLY * own, ALIKE * (own + shared) - shared, needed)
         if evidence[other] > max(needed, limit_of(view.known.unknowns, one)):
             out.append(other)
     return tuple(out)

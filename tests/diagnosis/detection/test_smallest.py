@@ -31,6 +31,7 @@ from gearbench.diagnosis.effects.tooth_crack import TOOTH_CRACK
 from gearbench.diagnosis.effects.torque_ripple import TORQUE_RIPPLE
 from gearbench.diagnosis.forces.unknowns import group, unknowns_of
 from gearbench.diagnosis.judging.closing import DUE, GAIN
+from gearbench.diagnosis.selection.rivals import ALIKE, NEARLY
 from gearbench.diagnosis.selection.weighing import LIMIT
 from gearbench.diagnosis.simulation.quadratic import quadratic_of
 
@@ -78,6 +79,26 @@ def test_what_is_named_is_named_at_any_larger_size() -> None:
         assert view.evidence(number, found)[number] >= LIMIT
         assert apart_from(view, number, found) == pytest.approx(found)
         assert rivals_at(view, number, found) == ()
+
+
+def test_what_both_causes_explain_counts_for_the_usual_one() -> None:
+    """As where effects are selected: the rest that tells a rare one from it is faint beside that."""
+    matrix = sensitivities()
+    matrix[4] = matrix[3] + 0.25 * matrix[4]
+    listed = (replace(HYPOTHESES[0], usual=(("ripple",), -0.5)), HYPOTHESES[1])
+    near, bounds, size = known(matrix, floor=1e4), unknowns().bounds(), 0.02
+    moved = near.search.quadratic.moved(size * direction(near, listed[0]) @ matrix)
+    neither = near.narrow.copy()
+    neither[[*listed[0].entries(unknowns()), *listed[1].entries(unknowns())]] = 0.0
+    costs = [moved.best(np.zeros(8), sd, bounds)[1] for sd in (neither, near.narrow)]
+    assert 0.5 * size**2 * View(near, listed).shared[0, 1] == pytest.approx(costs[0] - costs[1], rel=1e-3)
+    view, there = View(known(matrix), listed), 0.6
+    own, usual = view.evidence(0, there)
+    assert usual < NEARLY * own and rivals_at(view, 0, there) == (1,)
+    shared = 0.5 * there**2 * view.shared[0, 1]
+    assert usual + shared > ALIKE * (own + shared)
+    view.__dict__["shared"] = {(0, 1): 0.0}
+    assert rivals_at(view, 0, there) == ()
 
 
 def test_a_record_of_its_own_makes_up_for_what_the_search_lacks() -> None:
