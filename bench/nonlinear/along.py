@@ -84,21 +84,19 @@ class Along:
         gear's base radius [N]."""
         weights = AT_ONCE if self.instants else OVER_STEP
         places, pushes = departures(self.tangent, acting, self.substeps, self.early, weights)
-        rows = self.model.displacements
-        wanted = {U1, U2, *(int(one) for row in rows for one in np.flatnonzero(row))}
-        if self.model.rig.load.twists:
-            wanted.add(LOAD)
-        lines = {one: _spectrum(places[:, one, :].T) for one in wanted}
+        whole = [U1, U2, *([LOAD] if self.model.rig.load.twists else [])]
+        lines = {one: _spectrum(places[:, one, :].T) for one in whole}
         moved = {"angle_driver": lines[U1], "angle_driven": lines[U2]}
-        for name, row in zip(("y_driver", "y_driven"), rows, strict=True):
-            moved[name] = np.sum([np.float32(row[one]) * lines[int(one)] for one in np.flatnonzero(row)], axis=0)
+        for name, row in zip(("y_driver", "y_driven"), self.model.displacements, strict=True):
+            seen = np.sum([np.float32(row[one]) * places[:, one, :] for one in np.flatnonzero(row)], axis=0)
+            moved[name] = _spectrum(seen.T)
         moved["torque_driven"] = self._borne(pushes, lines, acting)
         sensors, frequency = self.model.rig.sensors, self._omega / (2 * np.pi)
         response = {name: shown_by(sensors, name, frequency).astype(np.complex64) for name in moved}
-        seen: dict[str, Lines] = {name: change * response[name] for name, change in moved.items()}
-        y = seen["y_driver"] - seen["y_driven"]
-        seen["dte"] = seen["angle_driver"] - seen["angle_driven"] + np.float32(self.model.factor) * y
-        return seen
+        shown: dict[str, Lines] = {name: change * response[name] for name, change in moved.items()}
+        y = shown["y_driver"] - shown["y_driven"]
+        shown["dte"] = shown["angle_driver"] - shown["angle_driven"] + np.float32(self.model.factor) * y
+        return shown
 
     def _borne(self, pushes: NDArray[np.float32], lines: Mapping[int, Lines], acting: Acting) -> Lines:
         """Half-spectra (columns, K) of the force [N] that the load bears at its base circle, from those of the

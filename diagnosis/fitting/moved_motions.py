@@ -13,6 +13,7 @@ from gearbench.diagnosis.effects.effect import SIDES
 from gearbench.diagnosis.fitting.closeness import is_close
 from gearbench.diagnosis.fitting.fit import Optimum, fit_afresh
 from gearbench.diagnosis.fitting.hidden_housing import with_hidden_motions
+from gearbench.diagnosis.fitting.rotation import but_rotation, with_rotation
 from gearbench.diagnosis.simulation.simulator import Simulator
 from gearbench.diagnosis.structure.structure import HOUSING, LEAST_STEP, OBLIQUE
 
@@ -48,16 +49,19 @@ def with_motions_moved(simulator: Simulator, found: Optimum, report: Report = la
 
 
 def _moved(simulator: Simulator, found: Optimum, number: int) -> Optimum | None:
-    """The fit with that motion where it explains most of what is left without it; None where that is next to
-    nothing."""
-    unknowns = simulator.layout.unknowns
+    """The fit with that motion where it explains most of what is left without it; None where that is next to nothing,
+    or where the lines that answer the excitation are no closer with it: the rotation's, which teeth move one by one,
+    wait for that."""
+    unknowns, chosen = simulator.layout.unknowns, but_rotation(simulator.layout.unknowns, found.sd)
     p, sd, at = found.p.copy(), found.sd, unknowns[HOUSING].start + number
     had, across = p[at], unknowns[OBLIQUE].start + len(SIDES) * number
     p[at], p[across : across + 2] = 0.0, 0.0
     if had > FEW:
-        without = fit_afresh(simulator, p, np.where(np.arange(p.size) == at, 0.0, sd), renewals=RENEWALS_WITHOUT)
+        held = np.where(np.arange(p.size) == at, 0.0, sd)
+        without = fit_afresh(simulator, p, held, renewals=RENEWALS_WITHOUT, chosen=chosen)
         p = without.p if without is not None else p
     seen = with_hidden_motions(simulator, p, sd, number)
     if not seen or seen[0][0] < WORTH:
         return None
-    return fit_afresh(simulator, seen[0][1], sd, renewals=RENEWALS)
+    part = fit_afresh(simulator, seen[0][1], sd, renewals=RENEWALS, chosen=chosen)
+    return with_rotation(simulator, found, part) if part is not None else None

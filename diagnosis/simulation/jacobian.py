@@ -9,7 +9,7 @@ little and simulated.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,6 +45,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+Real = NDArray[np.floating[Any]]
 Flags = NDArray[np.bool_]
 Integers = NDArray[np.int64]
 
@@ -92,18 +93,18 @@ def forces_of(
     return Forces(Acting(np.concatenate(parts, axis=1, out=values), on, of), at)
 
 
-def mesh_forces(layout: Layout, p: Array, along: Along, chosen: Flags) -> tuple[list[Array], Integers]:
+def mesh_forces(layout: Layout, p: Array, along: Along, chosen: Flags) -> tuple[list[Real], Integers]:
     """Forces (entries, n) [N] per unit of the chosen unknowns (size,) that act in the mesh, group by group, and the
     unknowns' indices."""
     unknowns, law, phase = layout.unknowns, along.law, along.phase
     z1, z2 = layout.model.teeth
-    parts: list[Array] = []
+    parts: list[Real] = []
     at: list[int] = []
 
-    def put(key: str, columns: Array) -> None:
+    def put(key: str, columns: Real) -> None:
         indices = unknowns.at(key)
         keep = chosen[indices]
-        parts.append(columns[:, keep])
+        parts.append(columns if keep.all() else columns[:, keep])
         at.extend(indices[keep])
 
     numbers, bending = law.pairs(phase)[0], law.bending_of(phase)
@@ -151,9 +152,10 @@ def _series_at(cosine: Sequence[float], sine: Sequence[float], phase: Array) -> 
     return np.asarray(np.asarray(cosine) @ np.cos(turns) + np.asarray(sine) @ np.sin(turns))
 
 
-def _by_tooth(tooth: NDArray[np.int64], of_pairs: Array, count: int) -> Array:
-    """What each tooth of a gear has (entries, count) of what its pairs have (entries, n_o) in the mesh."""
-    out = np.zeros((len(tooth), count))
+def _by_tooth(tooth: NDArray[np.int64], of_pairs: Array, count: int) -> NDArray[np.float32]:
+    """What each tooth of a gear has (entries, count) of what its pairs have (entries, n_o) in the mesh, in the
+    precision in which it is carried through the rig."""
+    out = np.zeros((len(tooth), count), np.float32)
     rows = np.arange(len(tooth))
     for column in range(tooth.shape[1]):
         out[rows, tooth[:, column]] += of_pairs[:, column]
