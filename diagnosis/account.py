@@ -162,7 +162,7 @@ def sentence_of_only(noun: str, record: str) -> str:
 
 def sentence_of_rivals(causes: Sequence[Hypothesis]) -> str:
     """That the records speak as well for other causes as for the one that is named."""
-    named, *others = (_which(one) for one in causes)
+    named, *others = (which(one) for one in causes)
     return f"The records cannot tell {named} from {' or '.join(others)}: either explains them as well"
 
 
@@ -170,14 +170,17 @@ def sentence_of_judging(judged: Measurement, held_out: Measurement | None) -> tu
     """That the record that was held out could not judge what was found; nothing where it did, or where none was."""
     if held_out is None or judged is held_out:
         return ()
-    lacks = "the rig found cannot be simulated there" if held_out.phase_known else "its mesh phase is arbitrary"
+    lacks = "a rig that has to answer it cannot be simulated there"
+    if not held_out.phase_known:
+        lacks = "its mesh phase is arbitrary"
     return (
         f"record {held_out.name} was held out but cannot judge, since {lacks}: what effects close is told on record"
         f" {judged.name}, which they were found from",
     )
 
 
-def _which(one: Hypothesis) -> str:
+def which(one: Hypothesis) -> str:
+    """An effect in words, with the part that it is in."""
     assert one.effect is not None
     which = one.name.removeprefix(one.effect.name).strip()
     return f"{one.effect.noun} ({which})" if which else one.effect.noun

@@ -64,7 +64,7 @@ def find_cause(
         decision, plain = decide(result, silent, unsteady), recalibrated(nominal, fitted(problem, result.base))
         if all(one.phase_known for one in measurements):
             common["advice"] = (PARTED,)
-            decision = unexplained(decision, silent, left_of(nominal, plain, held_out or measurements[0], simulate))
+            decision = unexplained(decision, silent, left_of(nominal, plain, judged or measurements[0], simulate))
         return by_forces_alone(problem, nominal, plain, result, decision, known, common)
     report("judging")
     searched = Searched(problem, nominal, tuple(measurements), result, fit, steady, unsteady, tuple(without))

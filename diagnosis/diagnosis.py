@@ -61,8 +61,12 @@ class Inputs:
 
     @property
     def judged(self) -> Measurement:
-        """The measurement on which the gap is told: the held-out one if its mesh phase is known, else the first."""
+        """The measurement that is to judge: the held-out one if its mesh phase is known, else the first."""
         return self.held_out if self.held_out and self.held_out.phase_known else self.measurements[0]
+
+    def of_name(self, name: str) -> Measurement:
+        """The measurement of that name, else the one that is to judge."""
+        return next((one for one in self.all if one.name == name), self.judged)
 
 
 @dataclass(frozen=True)
@@ -73,6 +77,11 @@ class Diagnosis:
     verdict: Verdict
     recalibrated: Case
     with_effect: Case | None
+
+    @property
+    def told(self) -> Measurement:
+        """The measurement on which the gap is told."""
+        return self.inputs.of_name(self.verdict.gap[0].record) if self.verdict.gap else self.inputs.judged
 
     @property
     def updated(self) -> Case:
@@ -172,7 +181,8 @@ def diagnosed(
     said("how far the gap shrinks")
     plain = inputs.damped(finding.recalibrated)
     improved = inputs.damped(finding.with_effect) if finding.with_effect is not None else None
-    shrunk = gaps(inputs.nominal, plain, improved, inputs.judged, simulate=simulate)
+    told = inputs.of_name(finding.judged.measured.name) if finding.judged is not None else inputs.judged
+    shrunk = gaps(inputs.nominal, plain, improved, told, simulate=simulate)
     where, detectable = finding.where, tuple[Detectable, ...]()
     if not quick:
         said("where the gap is")
@@ -180,7 +190,8 @@ def diagnosed(
         said("how small an effect would show")
         detectable = _detectable(inputs, finding)
     confirmed = confirmed_by_elements(finding.judged, finding.effects, said) if confirm else None
-    return Diagnosis(inputs, _verdict(inputs, finding, where, shrunk, confirmed, detectable), plain, improved)
+    verdict = _verdict(inputs, finding, where, shrunk, confirmed, detectable, held_out=told is inputs.held_out)
+    return Diagnosis(inputs, verdict, plain, improved)
 
 
 def _budget(inputs: Inputs, simulate: Simulate) -> tuple[Share, ...]:
@@ -207,6 +218,8 @@ def _verdict(
     shrunk: tuple[Gap, ...],
     confirmed: Confirmed | None,
     detectable: tuple[Detectable, ...],
+    *,
+    held_out: bool,
 ) -> Verdict:
     advice = (*finding.advice, *advice_of(inputs.measurements, inputs.held_out), *advice_on(confirmed))
     explained, remaining = parts_of(shrunk, finding.missing, finding.places)
@@ -225,7 +238,7 @@ def _verdict(
         signs=finding.signs,
         where=where,
         gap=shrunk,
-        held_out=inputs.judged.name if inputs.judged is inputs.held_out else None,
+        held_out=inputs.held_out.name if inputs.held_out and held_out else None,
         indistinguishable=finding.indistinguishable,
         detectable=detectable,
         advice=tuple(dict.fromkeys(advice)),

@@ -17,6 +17,7 @@ from gearbench.diagnosis.account import (
     sentence_of_only,
     sentence_of_rivals,
     sentence_of_shares,
+    which,
 )
 from gearbench.diagnosis.detection.detectable import too_small
 from gearbench.diagnosis.effects.backlash import BACKLASH
@@ -266,6 +267,6 @@ def why(judged: Judged, named: Sequence[Weighed]) -> tuple[str, ...]:
     said += [sentence_of_only(one.effect.noun, one.only_in) for one in named if one.only_in]
     said += [sentence_of_rivals(one.causes) for one in named if one.rivals]
     for weighed in judged.dropped:
-        noun = weighed.effect.noun
+        noun = which(weighed.hypothesis)
         said.append(f"The records of the search speak for {noun}, but the judged record's gap stays as it was with it")
-    return tuple(said)
+    return tuple(dict.fromkeys(said))

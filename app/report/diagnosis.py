@@ -118,8 +118,8 @@ def _how_far(report: Report) -> list[str]:
     where = (
         f"Rms of measured minus simulated on record {record}, which was held out of the search"
         if report.verdict.held_out
-        else f"Rms of measured minus simulated on record {record}. No record was held out: the rig was fitted to this"
-        " very record, and the gap on another one would be larger"
+        else f"Rms of measured minus simulated on record {record}, which had part in the search: the rig was fitted to"
+        " it, and the gap on another one would be larger"
     )
     main = [gap for gap in gaps if gap in whole_band(gaps) or gap.channel == gaps[0].channel]
     rest = len(gaps) - len(main)

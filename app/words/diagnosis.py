@@ -154,7 +154,8 @@ def headline(verdict: Verdict) -> str:
             return "No effect is needed: recalibrated, the rig explains most of the gap, and a part of it remains."
         return "No known effect is called for, and recalibration leaves the gap much as it was."
     where = f" It arises {place}." if verdict.place != "none" else ""
-    return f"None of the known effects explains the gap.{where}"
+    known = "explains the gap" if whole_band(verdict.gap) else "is what these records show"
+    return f"None of the known effects {known}.{where}"
 
 
 def _named(verdict: Verdict) -> str:

@@ -82,16 +82,18 @@ class View:
 
     @cached_property
     def shared(self) -> dict[tuple[int, int], float]:
-        """Twice what a good rig's share of a rare cause and of a usual one explains per square of the rare one's size,
-        by their numbers, where the rare one gives way."""
-        out = {}
+        """Twice what a good rig's share of a rare cause and of all that it gives way to explains per square of the rare
+        one's size, by the numbers of both."""
+        out: dict[tuple[int, int], float] = {}
         for rare, one in enumerate(self.hypotheses):
             pull = self.information @ direction(self.known, one)[self.known.active]
-            for usual, other in enumerate(self.hypotheses):
-                if one.gives_way_to(other):
-                    sd = self.known.narrow.copy()
-                    sd[[*one.entries(self.known.unknowns), *other.entries(self.known.unknowns)]] = 0.0
-                    out[rare, usual] = float(pull @ (self.plain[0] - self._posterior(sd)[0]) @ pull)
+            usual = [number for number, other in enumerate(self.hypotheses) if one.gives_way_to(other)]
+            sd = self.known.narrow.copy()
+            for cause in (one, *(self.hypotheses[number] for number in usual)):
+                sd[cause.entries(self.known.unknowns)] = 0.0
+            if usual:
+                shared = float(pull @ (self.plain[0] - self._posterior(sd)[0]) @ pull)
+                out |= {(rare, number): shared for number in usual}
         return out
 
     def std(self, number: int) -> Array:
@@ -216,13 +218,13 @@ def rivals_at(view: View, number: int, size: float, usual: bool = True) -> tuple
     for other, one in enumerate(view.hypotheses):
         if one.effect is truth.effect:
             continue
-        needed = own - APART
+        needed = max(own - APART, limit_of(view.known.unknowns, one))
         if usual and one.gives_way_to(truth):
             continue
         if usual and truth.gives_way_to(one):
             shared = 0.5 * size**2 * view.shared[number, other]
-            needed = min(NEARLY * own, ALIKE * (own + shared) - shared, needed)
-        if evidence[other] > max(needed, limit_of(view.known.unknowns, one)):
+            needed = min(NEARLY * own, ALIKE * (own + shared) - shared, own - APART)
+        if evidence[other] > needed:
             out.append(other)
     return tuple(out)
 

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gearbench.diagnosis.account import which
 from gearbench.diagnosis.effects.temperature_drift import TEMPERATURE_DRIFT
 from gearbench.diagnosis.judging.decided import Decided
 from gearbench.diagnosis.judging.judged import Judged
@@ -121,5 +122,5 @@ def sentence_of_size(one: Weighed) -> str:
 
 def sentence_of_astray(one: Weighed) -> str:
     """Why an effect is not named with which the rig is further from the judged record than without any."""
-    noun = one.effect.noun
+    noun = which(one.hypothesis)
     return f"The records of the search speak for {noun}, but the rig without it is far closer to the judged record"

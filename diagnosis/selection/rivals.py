@@ -47,10 +47,12 @@ def shared_by(unknowns: Unknowns, base: Optimum, weighed: Sequence[Weighed]) -> 
     if not usual:
         return 0.0
     quadratic, sd, (low, high) = base.sensitivity.quadratic, base.sd.copy(), unknowns.bounds()
+    _, cost, information = quadratic.best(base.p, sd, (low, high))
+    whole = quadratic.evidence(cost, information, sd)  # with what the fit of `base` still promises, as without either
     entries = np.concatenate([one.hypothesis.entries(unknowns) for one in (weighed[0], *usual)])
     sd[entries], low[entries], high[entries] = 0.0, 0.0, 0.0
     _, cost, information = quadratic.best(base.p, sd, (low, high))
-    return max(base.evidence - quadratic.evidence(cost, information, sd), 0.0)
+    return max(whole - quadratic.evidence(cost, information, sd), 0.0)
 
 
 def compared(simulator: Simulator, base: Optimum, weighed: Sequence[Weighed]) -> list[Weighed]:

@@ -324,7 +324,7 @@ def evidence_without(unknowns: Unknowns, selection: Selection, effect: Weighed, 
     """Log evidence of the `optimum` without one of the effects that entered, whose backgrounds were held for it, beside
     that of the optimum with all."""
     sd = selection.best.sd.copy()
-    for cause in unentered(effect, selection.entered).causes:
+    for cause in unentered(effect, selection.entered).in_its_place:
         sd[cause.entries(unknowns)] = 0.0
     return optimum.evidence_under(sd)
 
@@ -349,7 +349,7 @@ def _without(simulator: Simulator, base: Optimum, effects: Sequence[Weighed]) ->
     """The background's optimum with the unknowns of these effects and their rivals held at zero, and numbers of the
     nominal rig where its uncertainty ends, within which recalibration moves them; itself where that is no rig."""
     sd, p, unknowns = base.sd.copy(), base.p.copy(), simulator.layout.unknowns
-    for wide in (wide for one in effects for cause in one.causes for wide in cause.wide):
+    for wide in (wide for one in effects for cause in one.in_its_place for wide in cause.wide):
         at = wide.entries(unknowns)
         low, high = (0.0, 0.0) if is_own(unknowns, wide) else known_within(unknowns.prior()[at])
         sd[at], p[at] = 0.0, np.clip(p[at], low, high)

@@ -64,6 +64,12 @@ class Weighed:
         """The hypothesis and its rivals."""
         return (self.hypothesis, *self.rivals)
 
+    @property
+    def in_its_place(self) -> tuple[Hypothesis, ...]:
+        """The hypothesis and what would take its place: not a usual cause that had too little evidence to enter, of
+        which a good rig has a share whether or not this rare one is at work."""
+        return (self.hypothesis, *(one for one in self.rivals if not self.hypothesis.gives_way_to(one)))
+
 
 def best_evidence(*lists: Sequence[Weighed]) -> dict[str, float]:
     """Most evidence of each effect in what was weighed, by its name."""

@@ -154,23 +154,23 @@ def report_of(diagnosis: Diagnosis) -> Report:
         draws["where"] = partial(draw_where, shares=verdict.where)
     if verdict.gap:
         draws["waterfall"] = partial(
-            draw_waterfall, gaps=verdict.gap, effects=verdict.effects, record=inputs.judged.name
+            draw_waterfall, gaps=verdict.gap, effects=verdict.effects, record=diagnosis.told.name
         )
-        draws["gap"] = partial(draw_gap, gaps=verdict.gap, record=inputs.judged.name)
+        draws["gap"] = partial(draw_gap, gaps=verdict.gap, record=diagnosis.told.name)
         simulate = replays_of(inputs.nominal, inputs.all)
-        traces = traces_of(verdict.gap[0].channel, inputs.judged, diagnosis.stages, simulate)
+        traces = traces_of(verdict.gap[0].channel, diagnosis.told, diagnosis.stages, simulate)
         draws["traces"] = partial(draw_traces, traces=traces)
     pictures = {name: (draw, PICTURES[name]) for name, draw in draws.items()}
-    return Report(inputs.nominal.name, verdict, _sources(inputs), pictures, _about(inputs))
+    return Report(inputs.nominal.name, verdict, _sources(diagnosis), pictures, _about(inputs))
 
 
-def _sources(inputs: Inputs) -> tuple[Source, ...]:
+def _sources(diagnosis: Diagnosis) -> tuple[Source, ...]:
     from gearbench.report.diagnosis import Source
 
-    made = []
+    inputs, made = diagnosis.inputs, []
     for one in inputs.all:
         assert one.path is not None
-        used = "judging" if one is inputs.held_out else "finding"
+        used = "finding" if one is not inputs.held_out else "judging" if diagnosis.verdict.held_out else "nothing"
         made.append(Source(one.name, one.path.name, digest_of(one.path), used, one.warnings))
     return tuple(made)
 

@@ -92,6 +92,10 @@ def test_what_both_causes_explain_counts_for_the_usual_one() -> None:
     neither[[*listed[0].entries(unknowns()), *listed[1].entries(unknowns())]] = 0.0
     costs = [moved.best(np.zeros(8), sd, bounds)[1] for sd in (neither, near.narrow)]
     assert 0.5 * size**2 * View(near, listed).shared[0, 1] == pytest.approx(costs[0] - costs[1], rel=1e-3)
+    # Of two usual causes neither takes the other's place.
+    crack = TOOTH_CRACK.hypotheses(cast(Any, SimpleNamespace(teeth=(1, 1))))[:1]
+    more = View(near, (replace(listed[0], usual=(("ripple", CRACK), -0.5)), listed[1], *crack))
+    assert more.shared[0, 1] == more.shared[0, 2]
     view, there = View(known(matrix), listed), 0.6
     own, usual = view.evidence(0, there)
     assert usual < NEARLY * own and rivals_at(view, 0, there) == (1,)

@@ -64,6 +64,19 @@ def test_a_rival_that_entered_too_stays_where_the_other_is_taken_out() -> None:
         assert unentered(friction, entered).causes == ((FRICTION,) if stays else (FRICTION, RIPPLE))
 
 
+def test_a_usual_cause_that_did_not_enter_keeps_a_good_rigs_share() -> None:
+    """Told as a rival it is no part of what a rare one closes."""
+    true = np.array([0.08, -0.1, 0.02, 0.4, 0.3, -0.2, 0.0, 0.0])
+    simulator = FakeSimulator(lambda q: q @ MATRIX, target(true @ MATRIX))
+    found = chosen(simulator, LISTED, [np.zeros(8)], {})
+    assert found is not None
+    friction = next(one for one in found.entered if one.hypothesis is FRICTION)
+    rare = replace(friction, hypothesis=replace(FRICTION, usual=(("ripple",), -0.5)), rivals=(RIPPLE,))
+    assert rare.in_its_place == (rare.hypothesis,) and len(rare.causes) == 2
+    rest = taken_out(simulator, replace(found, entered=(rare,)), rare)
+    assert rest.p[3] == 0.0 and (np.abs(rest.p[4:6]) > 0.1).all()
+
+
 def test_no_other_effect_beyond_a_good_rigs_takes_the_place_of_what_is_left_out() -> None:
     """Ripple that does almost what friction does: twelve of its deviations would explain most of the friction."""
     alike = MATRIX.copy()
@@ -126,6 +139,14 @@ def test_what_both_explain_already_is_what_a_rig_without_either_lacks() -> None:
     lacking = found.base.evidence - without.evidence
     assert lacking > 10.0
     assert shared_by(simulator.layout.unknowns, found.base, [rare, usual]) == pytest.approx(lacking, rel=0.05)
+    # What a fit still promises is shared by neither.
+    p = found.base.p.copy()
+    p[0] -= 0.01
+    moved = simulator.target.lines - simulator.lines(p)
+    near = found.base.sensitivity.quadratic.moved(moved)
+    behind = replace(found.base, p=p, sensitivity=replace(found.base.sensitivity, quadratic=near),
+                     evidence=found.base.evidence - 50.0)  # fmt: skip
+    assert shared_by(simulator.layout.unknowns, behind, [rare, usual]) == pytest.approx(lacking, rel=0.05)
     assert shared_by(simulator.layout.unknowns, found.base, [usual, rare]) == 0.0  # no rare one is ahead
 
 

@@ -8,6 +8,7 @@ import json
 import re
 import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -18,13 +19,15 @@ from shared.measured import channels, nominal, written
 
 from gearbench.bench.results.compare_records import differences
 from gearbench.cli import run_command_line
+from gearbench.commands.measured.diagnose import report_of
 from gearbench.diagnosis import diagnosis as job
-from gearbench.diagnosis.diagnosis import take_in
+from gearbench.diagnosis.diagnosis import Diagnosis, take_in
 from gearbench.diagnosis.verdict import Confirmation, Confirmed
 from gearbench.diagnosis.verdict_file import read_verdict
 from gearbench.records import read_record
 from gearbench.report.html import bar, items, page, table, text
 from gearbench.rig import Case, read_case
+from gearbench.words.diagnosis import shrinkage
 
 PICTURES = {"where.png", "waterfall.png", "gap.png", "traces.png"}
 PRODUCTS = {"verdict.json", "updated.toml", "recalibrated.toml", "report.html"} | PICTURES
@@ -328,3 +331,25 @@ def test_what_is_held_out_is_what_is_judged_by(records: list[Path]) -> None:
     inputs = take_in(records, nominal(), held_out="light")
     assert [one.name for one in inputs.measurements] == ["base", "held-out"]
     assert inputs.judged is inputs.held_out and inputs.judged.name == "light"
+
+
+def test_a_record_that_is_held_out_and_cannot_judge_is_said_to_do_nothing(
+    done: tuple[Path, dict, str, str], records: list[Path]
+) -> None:
+    """The gap is told on the one that did, which the verdict names."""
+    inputs = take_in(records, nominal(), held_out="light")
+    assert inputs.held_out is not None
+    blind = replace(inputs, held_out=replace(inputs.held_out, phase_known=False))
+    assert blind.judged is blind.measurements[0] and blind.of_name("base") is blind.measurements[0]
+    verdict = read_verdict(done[0] / "verdict.json")
+    there = tuple(one.model_copy(update={"record": "base"}) for one in verdict.gap)
+    told = verdict.model_copy(update={"held_out": None, "gap": there})
+    made = Diagnosis(blind, told, blind.nominal, None)
+    assert made.told is blind.measurements[0]
+    report = report_of(made)
+    assert {one.name: one.used for one in report.sources} == {"base": "finding", "held-out": "finding",
+                                                             "light": "nothing"}  # fmt: skip
+    words = shrinkage(told)
+    assert "On record base (not held out)" in words
+    found = Diagnosis(inputs, verdict.model_copy(update={"held_out": "light"}), inputs.nominal, None)
+    assert {one.name: one.used for one in report_of(found).sources}["light"] == "judging"
