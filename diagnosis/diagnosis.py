@@ -190,8 +190,7 @@ def diagnosed(
         said("how small an effect would show")
         detectable = _detectable(inputs, finding)
     confirmed = confirmed_by_elements(finding.judged, finding.effects, said) if confirm else None
-    verdict = _verdict(inputs, finding, where, shrunk, confirmed, detectable, held_out=told is inputs.held_out)
-    return Diagnosis(inputs, verdict, plain, improved)
+    return Diagnosis(inputs, _verdict(inputs, finding, told, where, shrunk, confirmed, detectable), plain, improved)
 
 
 def _budget(inputs: Inputs, simulate: Simulate) -> tuple[Share, ...]:
@@ -214,12 +213,11 @@ def _detectable(inputs: Inputs, finding: Finding) -> tuple[Detectable, ...]:
 def _verdict(
     inputs: Inputs,
     finding: Finding,
+    told: Measurement,
     where: tuple[Share, ...],
     shrunk: tuple[Gap, ...],
     confirmed: Confirmed | None,
     detectable: tuple[Detectable, ...],
-    *,
-    held_out: bool,
 ) -> Verdict:
     advice = (*finding.advice, *advice_of(inputs.measurements, inputs.held_out), *advice_on(confirmed))
     explained, remaining = parts_of(shrunk, finding.missing, finding.places)
@@ -238,7 +236,7 @@ def _verdict(
         signs=finding.signs,
         where=where,
         gap=shrunk,
-        held_out=inputs.held_out.name if inputs.held_out and held_out else None,
+        held_out=told.name if told is inputs.held_out else None,
         indistinguishable=finding.indistinguishable,
         detectable=detectable,
         advice=tuple(dict.fromkeys(advice)),

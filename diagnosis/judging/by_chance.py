@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from gearbench.diagnosis.fitting.fit import Optimum
 from gearbench.diagnosis.intake.measurements import Measurement
-from gearbench.diagnosis.judging.closing import GAIN, PLAIN, Part, growths_of, parts_of
+from gearbench.diagnosis.judging.closing import GAIN, PLAIN, Part, growths_of, left_by, parts_of
 from gearbench.diagnosis.selection.simulated import Simulated
 from gearbench.diagnosis.simulation.simulator import Simulator
 from gearbench.diagnosis.simulation.target import Target
@@ -59,7 +59,7 @@ def _left(found: Simulated, target: Target, measured: Measurement, optimum: Opti
     """Energies (blocks,) that rigs drawn next to an optimum leave."""
     free = found.simulator.free
     drawn = _drawn(free, found.end_of(optimum), optimum)
-    return [target.energies(target.lines - target.gathered([free.channels(p, measured)])) for p in drawn]
+    return [left_by(target, free.channels(p, measured)) for p in drawn]
 
 
 def _drawn(free: Simulator, p: Array, optimum: Optimum) -> list[Array]:

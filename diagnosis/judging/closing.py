@@ -62,7 +62,7 @@ def free_closing(target: Target, without: Mapping[str, Array], with_all: Mapping
     """What an effect closes by simulations that go their own way: some part of the gap, and of the whole as much. Where
     flanks part, one part or another is closer by chance."""
     closing = closing_of(target, without, with_all)
-    lost, kept = (target.energies(target.lines - target.gathered([one])) for one in (without, with_all))
+    lost, kept = (left_by(target, one) for one in (without, with_all))
     size = target.fluctuating * target.sizes / target.of_channels(target.energies(target.lines) * target.sizes)
     whole = float(np.sqrt((lost * size).sum() / max((np.maximum(kept, target.noise) * size).sum(), 1e-300)))
     return replace(closing, growth=min(closing.growth, whole))
@@ -99,9 +99,14 @@ def closing_of(target: Target, without: Mapping[str, Array], with_all: Mapping[s
     return Closing(target.cost(rest) - target.cost(final), growth, part, without)
 
 
+def left_by(target: Target, signals: Mapping[str, Array]) -> Array:
+    """Energies (blocks,) that signals (channel -> (N,)) leave of a record."""
+    return target.energies(target.lines - target.gathered([signals]))
+
+
 def closed_parts(target: Target, without: Mapping[str, Array], with_all: Mapping[str, Array]) -> tuple[Part, ...]:
     """The parts of a gap that are larger in signals (channel -> (N,)) without an effect, as far as makes it due."""
-    lost, kept = (target.energies(target.lines - target.gathered([one])) for one in (without, with_all))
+    lost, kept = (left_by(target, one) for one in (without, with_all))
     return tuple(part for part, growth in growths_of(target, lost, kept).items() if growth > DUE)
 
 

@@ -305,7 +305,7 @@ def only(simulator: Simulator, selection: Selection, kept: Sequence[Weighed]) ->
 
 
 def taken_out(simulator: Simulator, selection: Selection, effect: Weighed) -> Optimum:
-    """The optimum without any part of one of the effects that entered, or of its rivals that did not.
+    """The optimum without any part of one of the effects that entered, or of what would take its place.
 
     The rig, its structure and the other effects that entered are fitted again; what a good rig has of all others stays
     as it is: pitch errors that take the shape of the run-out left out would make it seem to close nothing.
@@ -346,8 +346,9 @@ def _bare(simulator: Simulator, base: Optimum, effects: Sequence[Weighed]) -> Op
 
 
 def _without(simulator: Simulator, base: Optimum, effects: Sequence[Weighed]) -> Optimum:
-    """The background's optimum with the unknowns of these effects and their rivals held at zero, and numbers of the
-    nominal rig where its uncertainty ends, within which recalibration moves them; itself where that is no rig."""
+    """The background's optimum with the unknowns of these effects and of what would take their place held at zero, and
+    numbers of the nominal rig where its uncertainty ends, within which recalibration moves them; itself where that is
+    no rig."""
     sd, p, unknowns = base.sd.copy(), base.p.copy(), simulator.layout.unknowns
     for wide in (wide for one in effects for cause in one.in_its_place for wide in cause.wide):
         at = wide.entries(unknowns)

@@ -131,16 +131,14 @@ def mesh_forces(layout: Layout, p: Array, along: Along, chosen: Flags) -> tuple[
     put(FLANKS, in_mesh_of_form(along, layout.meshing, travel))
     for side, key in enumerate(RUNOUTS.values()):
         put(key, in_mesh_of_runout(along, side))
-    for side, key in enumerate(PITCHES.values()):
-        tooth = numbers % (z1, z2)[side]
-        indices = unknowns.at(key)
-        if chosen[indices].any():
-            put(key, _by_tooth(tooth, along.pair_stiffness, (z1, z2)[side]))
-    for side, (count, before) in enumerate(((z1, 0), (z2, z1))):
+    for side, (key, count, before) in enumerate(zip(PITCHES.values(), (z1, z2), (0, z1), strict=True)):
+        tooth = numbers % count
+        if chosen[unknowns.at(key)].any():
+            put(key, _by_tooth(tooth, along.pair_stiffness, count))
         own = np.array([one for one in layout.teeth if before <= one < before + count], dtype=int)
         own = own[chosen[unknowns[CRACK].start + own]]
         if len(own):
-            softer = _by_tooth(numbers % count, -along.pairs.force * bending[..., side], count)
+            softer = _by_tooth(tooth, -along.pairs.force * bending[..., side], count)
             parts.append(softer[:, own - before])
             at.extend(unknowns[CRACK].start + own)
     return parts, np.array(at)
