@@ -168,7 +168,8 @@ def _parts(found: Simulated, steady: Collection[str]) -> list[_Part]:
             scatter = scatter_of(lines)
             changing = scatter.changing & ~driven[number][bins] & (bins > 0)
             unit = np.sqrt(scatter.white) if scatter.white > 0.0 else 1.0
-            columns = {place: jacobian[row, start:stop][changing] / unit for place, row in rows.items()}
+            gains = unit * target.gains[start:stop]
+            columns = {place: (jacobian[row, start:stop] / gains)[changing] for place, row in rows.items()}
             time = ((np.arange(count) + 0.5) / count - 0.5)[:, None]
             departures = (lines - lines.mean(axis=0))[:, changing] / unit
             if changing.any():

@@ -8,7 +8,7 @@ little and simulated.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -61,6 +61,9 @@ SHORT_STEP = 2e-3
 # Of those moved what hypotheses are weighed by, and what goes along with one: a late angle turns the mesh on as well.
 WEIGHED = (FRICTION, COMPLIANCE, FOLLOWED, PHASE)
 
+# Samples times unknowns whose answers are held at a time, and unknowns at least.
+AT_ONCE, FEWEST = 2**22, 32
+
 
 class Other(NamedTuple):
     """A rig in which one unknown, by its number, is larger by `step`."""
@@ -93,6 +96,16 @@ def forces_of(
     return Forces(Acting(np.concatenate(parts, axis=1, out=values), on, of), at)
 
 
+def pieces(forces: Forces, samples: int) -> Iterator[Forces]:
+    """The forces piece by piece, so many unknowns at a time that what they do to a record of so many samples can be
+    held in memory."""
+    acting, most = forces.acting, max(AT_ONCE // samples, FEWEST)
+    for first in range(0, len(forces.at), most):
+        mine = (acting.of >= first) & (acting.of < first + most)
+        values = acting.values if mine.all() else acting.values[:, mine]
+        yield Forces(Acting(values, acting.on[mine], acting.of[mine] - first), forces.at[first : first + most])
+
+
 def mesh_forces(layout: Layout, p: Array, along: Along, chosen: Flags) -> tuple[list[Real], Integers]:
     """Forces (entries, n) [N] per unit of the chosen unknowns (size,) that act in the mesh, group by group, and the
     unknowns' indices."""
@@ -104,7 +117,8 @@ def mesh_forces(layout: Layout, p: Array, along: Along, chosen: Flags) -> tuple[
     def put(key: str, columns: Real) -> None:
         indices = unknowns.at(key)
         keep = chosen[indices]
-        parts.append(columns if keep.all() else columns[:, keep])
+        # As they are carried: of a long record all of them in double precision would fill the memory.
+        parts.append(np.asarray(columns if keep.all() else columns[:, keep], dtype=np.float32))
         at.extend(indices[keep])
 
     numbers, bending = law.pairs(phase)[0], law.bending_of(phase)

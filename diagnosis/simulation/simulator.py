@@ -13,7 +13,16 @@ from gearbench.bench.plan.workers import side_by_side
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.intake.signals import has_both_y, simulated_channels
 from gearbench.diagnosis.replay.replays import Replay, Replays, law_of
-from gearbench.diagnosis.simulation.jacobian import MOVED, SHORT_STEP, STEP, Other, forces_of, others_of, sensor_columns
+from gearbench.diagnosis.simulation.jacobian import (
+    MOVED,
+    SHORT_STEP,
+    STEP,
+    Other,
+    forces_of,
+    others_of,
+    pieces,
+    sensor_columns,
+)
 from gearbench.diagnosis.simulation.target import Target
 from gearbench.diagnosis.structure.layout import Layout
 from gearbench.diagnosis.structure.structure import least_steps
@@ -186,21 +195,20 @@ class Simulator:
         from gearbench.bench.nonlinear.along import along
         from gearbench.bench.nonlinear.replay import seen_of
 
-        def one(item: tuple[int, Measurement]) -> tuple[Integers, Spectra, dict[int, dict[str, Complex]]]:
+        def one(item: tuple[int, Measurement]) -> None:
             number, measured = item
             case, steady = self.motion(p, measured)
             tangent = along(steady)
             forces = forces_of(self.layout, p, tangent, measured.name, chosen, others)
-            answers = self.answers(measured, tangent, forces.acting)
+            for part in pieces(forces, measured.phase.size):
+                self.put(out, number, part.at, self.answers(measured, tangent, part.acting))
             seen = simulated_channels(measured, seen_of(case, steady))
-            sensed = sensor_columns(self.layout, self.target, number, seen)
-            return forces.at, answers, sensed
-
-        for number, (at, answers, sensed) in enumerate(side_by_side(one, list(enumerate(self.target.measurements)))):
-            self.put(out, number, at, answers)
-            for index, parts in sensed.items():
+            for index, parts in sensor_columns(self.layout, self.target, number, seen).items():
                 if chosen[index]:
                     self.put(out, number, np.array([index]), {name: values[None] for name, values in parts.items()})
+
+        # Each record fills lines of its own.
+        side_by_side(one, list(enumerate(self.target.measurements)))
 
     def put(self, out: Complex, number: int, at: Integers, spectra: Spectra) -> None:
         """Add to rows `at` (n,) of `out` the lines of half-spectra (n, K) that a record answers; one row may have
@@ -209,6 +217,7 @@ class Simulator:
         for record, channel, bins in self.target.plan:
             stop = start + len(bins)
             if record == number:
+                gains = self.target.gains[start:stop] / samples
                 for row, lines in zip(at, spectra[channel][:, bins], strict=True):
-                    out[row, start:stop] += lines / samples
+                    out[row, start:stop] += lines * gains
             start = stop

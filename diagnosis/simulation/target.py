@@ -18,6 +18,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,7 @@ from gearbench.diagnosis.forces.condition import Condition
 from gearbench.diagnosis.forces.covariance import KINDS, SHAFTS, kinds_of
 from gearbench.diagnosis.intake.measurements import Measurement
 from gearbench.diagnosis.intake.signals import bands, frequencies, has_both_y, measured_channels, noise_of_mean
+from gearbench.diagnosis.simulation.sampled import sampled
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -39,7 +41,7 @@ INDEPENDENT = 8  # lines that a block counts as, at most
 BY_TEETH = 0.5
 # Orders of the excitation whose products are lines of their own, as long as they are no more than this part of all.
 PRODUCTS, FEW = (2, 3, 4, 5), 0.25
-DISTORTED, MEAN = "distorted", "mean"
+OTHER, DISTORTED, MEAN = "other", "distorted", "mean"
 # Of the mean deflection under the load, what a rig's stiffness leaves unknown of it: fits to lines alone leave 0.03.
 UNKNOWN = 0.05
 # Of two speeds that a lag tells from a zero which is off, at least.
@@ -62,7 +64,9 @@ class Block:
 @dataclass(frozen=True, eq=False)
 class Target:
     """Measured lines (K,) of all blocks in a row; `plan` says which: record, channel, line numbers. `of_line` (K,)
-    their blocks; floors s^2, the noise in them, independent counts n and sizes (blocks,)."""
+    their blocks; floors s^2, the noise in them, independent counts n and sizes (blocks,), the number of lines. Those of
+    a large block are a sample (`sampled`): one that stands for several, a simulated one too, is the larger by its
+    `gains` (K,), the root of how many."""
 
     measurements: tuple[Measurement, ...]
     plan: tuple[tuple[int, str, Integers], ...]
@@ -73,6 +77,7 @@ class Target:
     noise: Array
     counts: Array
     sizes: Array
+    gains: Array
 
     @cached_property
     def order(self) -> Integers:
@@ -82,13 +87,13 @@ class Target:
     @cached_property
     def runs(self) -> tuple[slice, ...]:
         """Where the lines of each block lie in that order."""
-        ends = np.cumsum(self.sizes).astype(int)
-        return tuple(slice(end - int(size), end) for end, size in zip(ends, self.sizes, strict=True))
+        told = np.bincount(self.of_line, minlength=len(self.blocks))
+        return tuple(slice(end - one, end) for end, one in zip(np.cumsum(told), told, strict=True))
 
     def gathered(self, channels: Sequence[Mapping[str, Array]]) -> Complex:
         """The same lines (K,) or (..., K) of simulated signals (..., N): by record, channel -> signal."""
         spectra = [_spectrum(channels[number][channel])[..., bins] for number, channel, bins in self.plan]
-        return np.concatenate(spectra, axis=-1)
+        return np.concatenate(spectra, axis=-1) * self.gains
 
     def of_record(self, number: int) -> Target:
         """What is measured in one record alone."""
@@ -119,6 +124,7 @@ class Target:
             self.noise[blocks],
             self.counts[blocks],
             self.sizes[blocks],
+            self.gains[inside],
         )
 
     def has(self, record: Measurement) -> bool:
@@ -194,56 +200,95 @@ def target_of(
     parts (parts, N) of the noise that the channels' residuals have, that of their repetitions where not given."""
     pairs = list(zip(measurements, conditions, strict=True))
     meant = [one.zero_known and condition.rest_known for one, condition in pairs]
-    told = _different([condition.pitch_speed for (_, condition), known in zip(pairs, meant, strict=True) if known])
-    plan: list[tuple[int, str, Integers]] = []
-    lines: list[Complex] = []
-    labels: list[Integers] = []
-    blocks: list[Block] = []
-    floors: list[float] = []
-    noises: list[float] = []
-    counts: list[float] = []
+    different = _different([condition.pitch_speed for (_, condition), known in zip(pairs, meant, strict=True) if known])
+    made, plan, before = list[_Channel](), list[tuple[int, str, Integers]](), 0
     for number, (one, condition) in enumerate(pairs):
+        noises = residual[number] if residual is not None else {}
         kinds, frequency = with_products(condition), frequencies(one)[: condition.bins]
-        parts = residual[number] if residual is not None else {}
-        for channel, repetitions in measured_channels(one).items():
-            if channel not in FITTED:
+        parts = list(_parts(kinds, frequency, one))
+        of_mean = different / sum(meant) if meant[number] else 0.0
+        for name, repetitions in measured_channels(one).items():
+            if name not in FITTED:
                 continue
-            spectrum = _spectrum(repetitions.mean(axis=0))[: condition.bins]
-            noise = np.zeros(spectrum.size)
-            if len(repetitions) > 1:
-                rows = parts[channel] if channel in parts else noise_of_mean(repetitions)
-                noise = (np.abs(_spectrum(rows)) ** 2).sum(axis=0)[: condition.bins]
-            leak = REACH**2 * float(np.abs(spectrum[1:]).max() ** 2)
-            label = np.full(spectrum.size, -1)
-            for kind, band, inside in _parts(kinds, frequency, one):
-                level = float(np.mean(np.abs(spectrum[inside]) ** 2))
-                label[inside] = len(blocks)
-                blocks.append(Block(one.name, channel, kind, band))
-                noises.append(float(noise[inside].mean()))
-                floors.append(noises[-1] + LEVEL**2 * level + leak + TINY)
-                counts.append(min(_independent(kind, condition.teeth), int(inside.sum())))
-            if channel == "dte" and meant[number]:
-                label[0] = len(blocks)
-                blocks.append(Block(one.name, channel, MEAN, (0.0, 0.0)))
-                noises.append(float(noise[0]))
-                floors.append(noises[-1] + (UNKNOWN * _deflection(one, condition, spectrum)) ** 2 + TINY)
-                counts.append(told / sum(meant))
-            kept = np.flatnonzero(label >= 0)
-            plan.append((number, channel, kept))
-            lines.append(spectrum[kept])
-            labels.append(label[kept])
-    of_line = np.concatenate(labels)
+            channel = _channel(one, condition, parts, name, repetitions, noises.get(name), of_mean)
+            made.append(replace(channel, of_line=channel.of_line + before))
+            plan.append((number, name, channel.bins))
+            before += len(channel.rows)
+    rows = [row for channel in made for row in channel.rows]
+    floors, noise, counts, sizes = np.array([(row.floor, row.noise, row.independent, row.size) for row in rows], float).T
     return Target(
         tuple(measurements),
         tuple(plan),
-        np.concatenate(lines),
-        of_line,
-        tuple(blocks),
-        np.array(floors),
-        np.array(noises),
-        np.array(counts, dtype=float),
-        np.bincount(of_line, minlength=len(blocks)).astype(float),
+        np.concatenate([channel.lines for channel in made]),
+        np.concatenate([channel.of_line for channel in made]),
+        tuple(row.block for row in rows),
+        floors,
+        noise,
+        counts,
+        sizes,
+        np.concatenate([channel.gains for channel in made]),
     )
+
+
+class _Part(NamedTuple):
+    """A kind of lines of a record in a band [Hz], and which lines (K,) that are."""
+
+    kind: str
+    band: tuple[float, float]
+    inside: Flags
+
+
+class _Row(NamedTuple):
+    """A block: where it lies, s^2, the noise in it, independent lines n and size."""
+
+    block: Block
+    floor: float
+    noise: float
+    independent: float
+    size: int
+
+
+@dataclass(frozen=True, eq=False)
+class _Channel:
+    """Of one channel of a record the numbers of the lines (K,), these lines, their blocks by number and gains."""
+
+    bins: Integers
+    lines: Complex
+    of_line: Integers
+    gains: Array
+    rows: tuple[_Row, ...]
+
+
+def _channel(
+    one: Measurement, condition: Condition, parts: Sequence[_Part], name: str, repetitions: Array,
+    residual: Array | None, of_mean: float,
+) -> _Channel:  # fmt: skip
+    """The lines of a channel with those repetitions (P, N) in the parts of its record, and noise that its `residual`
+    (parts, N) has, if given; the mean of the transmission error among them if it counts, as `of_mean` lines."""
+    spectrum = _spectrum(repetitions.mean(axis=0))[: condition.bins]
+    noise = np.zeros(spectrum.size)
+    if len(repetitions) > 1:
+        rows_of_noise = residual if residual is not None else noise_of_mean(repetitions)
+        noise = (np.abs(_spectrum(rows_of_noise)) ** 2).sum(axis=0)[: condition.bins]
+    leak = REACH**2 * float(np.abs(spectrum[1:]).max() ** 2)
+    of_line, gains, rows = np.full(spectrum.size, -1), np.ones(spectrum.size), list[_Row]()
+    for kind, band, inside in parts:
+        energies, at = np.abs(spectrum[inside]) ** 2, np.flatnonzero(inside)
+        if kind == OTHER:
+            told, gain = sampled(energies)
+            of_line[at[told]], gains[at[told]] = len(rows), gain
+        else:
+            of_line[at] = len(rows)
+        here = float(noise[inside].mean())
+        floor = here + LEVEL**2 * float(np.mean(energies)) + leak + TINY
+        count = min(_independent(kind, condition.teeth), at.size)
+        rows.append(_Row(Block(one.name, name, kind, band), floor, here, count, at.size))
+    if name == "dte" and of_mean > 0.0:
+        of_line[0], here = len(rows), float(noise[0])
+        floor = here + (UNKNOWN * _deflection(one, condition, spectrum)) ** 2 + TINY
+        rows.append(_Row(Block(one.name, name, MEAN, (0.0, 0.0)), floor, here, of_mean, 1))
+    kept = np.flatnonzero(of_line >= 0)
+    return _Channel(kept, spectrum[kept] * gains[kept], of_line[kept], gains[kept], tuple(rows))
 
 
 def _different(speeds: Sequence[float]) -> int:
@@ -273,6 +318,7 @@ def joined(first: Target, second: Target) -> Target:
         np.concatenate([first.noise, second.noise]),
         np.concatenate([first.counts, second.counts]),
         np.concatenate([first.sizes, second.sizes]),
+        np.concatenate([first.gains, second.gains]),
     )
 
 
@@ -306,13 +352,13 @@ def _independent(kind: str, teeth: Sequence[int]) -> int:
 
 def _parts(
     kinds: Integers, frequency: Array, one: Measurement
-) -> Iterator[tuple[str, tuple[float, float], Flags]]:
+) -> Iterator[_Part]:
     """Kind, band and flags of every block of a record; the mean is in none of these."""
     for number, kind in enumerate((*KINDS, DISTORTED)):
         for low, high in bands(one):
             inside = (kinds == number) & (frequency > low * (1 + 1e-12)) & (frequency <= high * (1 + 1e-12))
             if inside.any():
-                yield kind, (low, high), inside
+                yield _Part(kind, (low, high), inside)
 
 
 def _spectrum(values: Array) -> Complex:

@@ -69,6 +69,7 @@ def target(lines: np.ndarray, floor: float = 1e-6) -> Target:
         noise=np.zeros(BLOCKS),
         counts=np.full(BLOCKS, 8.0),
         sizes=np.bincount(of_line).astype(float),
+        gains=np.ones(LINES),
     )
 
 

@@ -55,7 +55,8 @@ def found(
     monkeypatch.setattr(module, "measured_channels", lambda one: channels)
     driven = np.zeros((REPETITIONS, SAMPLES)) if torque is None else torque
     measured: Any = SimpleNamespace(name="one", repetitions=REPETITIONS, periods={"torque_driver": driven})
-    target = SimpleNamespace(plan=((0, "dte", BINS), (0, "y_driver", BINS)), measurements=(measured,))
+    plan = ((0, "dte", BINS), (0, "y_driver", BINS))
+    target = SimpleNamespace(plan=plan, measurements=(measured,), gains=np.ones(2 * len(BINS)))
     optimum = SimpleNamespace(sensitivity=SimpleNamespace(jacobian=derivatives() if columns is None else columns))
     simulated: Any = SimpleNamespace(
         simulator=SimpleNamespace(nudges={}, target=target, smooth=(0,)),
