@@ -215,7 +215,8 @@ def target_of(
             plan.append((number, name, channel.bins))
             before += len(channel.rows)
     rows = [row for channel in made for row in channel.rows]
-    floors, noise, counts, sizes = np.array([(row.floor, row.noise, row.independent, row.size) for row in rows], float).T
+    numbers = [(row.floor, row.noise, row.independent, row.size) for row in rows]
+    floors, noise, counts, sizes = np.array(numbers, dtype=float).T
     return Target(
         tuple(measurements),
         tuple(plan),

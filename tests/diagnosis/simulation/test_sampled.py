@@ -23,7 +23,7 @@ def noise(seed: int) -> np.ndarray:
 
 
 def test_the_mean_square_of_the_sample_is_that_of_all() -> None:
-    """Of 200 residuals, which the sample does not know: without bias, and within what so few independent lines allow."""
+    """Of 200 residuals that the sample does not know: without bias, within what so few independent lines allow."""
     at, gains = sampled(np.abs(noise(0)) ** 2)
     assert at.size == gains.size == MOST and (np.diff(at) > 0).all()
     assert (gains**2).sum() == pytest.approx(MANY)
@@ -71,7 +71,8 @@ def others(simulator: Simulator) -> np.ndarray:
 def test_a_thinned_record_costs_what_the_whole_does(whole: Simulator, thinned: Simulator) -> None:
     one, few = whole.target, thinned.target
     assert few.blocks == one.blocks and few.lines.size < 0.8 * one.lines.size
-    assert all(np.array_equal(getattr(few, name), getattr(one, name)) for name in ("floors", "noise", "counts", "sizes"))
+    for name in ("floors", "noise", "counts", "sizes"):
+        assert np.array_equal(getattr(few, name), getattr(one, name)), name
     energies, sampled_ones = one.energies(one.lines), few.energies(few.lines)
     assert np.allclose(sampled_ones[~others(whole)], energies[~others(whole)], rtol=1e-12)
     over = sampled_ones[others(whole)] / energies[others(whole)]
