@@ -199,25 +199,28 @@ def seen_at(fine: NDArray[np.floating[Any]], samples: int, axis: int = -1) -> ND
 
 def _rotation(case: Case, record: xr.Dataset, realisation: int) -> tuple[float, float]:
     """Mesh frequency [Hz], such that the record holds whole cycles, and mesh phase of the first sample [cycles]."""
-    rate = float(record.attrs["sampling_rate"])
+    rate, total = float(record.attrs["sampling_rate"]), record.sizes["time"]
+    sensors, lagging = case.rig.sensors, 0.0
     if "mesh_phase" in record:
-        phase = record["mesh_phase"].values[realisation]
-        first, speed = float(phase[0]), float(phase[-1] - phase[0]) / (len(phase) - 1)
+        turned = record["mesh_phase"].values[realisation]
     elif record.attrs.get("mesh_phase_origin") == "geometry" and "angle_driven" in record:
-        angle = record["angle_driven"].values[realisation] * case.rig.driven.teeth / (2 * np.pi)
-        speed, first = (float(value) for value in np.polyfit(np.arange(angle.size), angle, 1))
-        sensors = case.rig.sensors
-        first += speed * rate * lag(sensors, "angle_driven")
+        turned = record["angle_driven"].values[realisation] * case.rig.driven.teeth / (2 * np.pi)
+        lagging = lag(sensors, "angle_driven")
     else:
         raise BenchError(
             'the record has no channel mesh_phase, and mesh_phase_origin is not "geometry": its mesh phase is unknown'
         )
-    first -= case.rig.sensors.mesh_phase_zero
-    total = record.sizes["time"]
-    cycles = round(speed * total)
-    if cycles < 1 or abs(speed * total - cycles) > 0.01:
-        raise BenchError(f"the record holds {speed * total:.6g} mesh periods, which must be a whole number")
-    return cycles * rate / total, first
+    # Gears that a load lets swing are elsewhere at both ends of a record than they turn to.
+    if "mesh_period" in record.attrs:
+        held = total / (rate * float(record.attrs["mesh_period"]))
+    else:
+        held = float(np.polyfit(np.arange(total), turned, 1)[0]) * total
+    cycles = round(held)
+    if cycles < 1 or abs(held - cycles) > 0.01:
+        raise BenchError(f"the record holds {held:.6g} mesh periods, which must be a whole number")
+    frequency = cycles * rate / total
+    first = float(np.mean(turned - np.arange(total) * (cycles / total))) + frequency * lagging
+    return frequency, first - sensors.mesh_phase_zero
 
 
 def _experiment(

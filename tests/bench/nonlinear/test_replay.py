@@ -76,6 +76,16 @@ def test_a_replay_is_one_period_of_the_simulation(case: Case, record: xr.Dataset
     np.testing.assert_allclose(found["mesh_phase"].values[0], record["mesh_phase"].values[0, :SAMPLES], atol=1e-9)
 
 
+def test_gears_that_swing_begin_where_they_turn_to(case: Case, record: xr.Dataset) -> None:
+    """A mesh phase that was made of the angles of gears which a load lets swing, forty times a repetition."""
+    law = mesh_law(case.rig, case.simulation, 200.0)
+    steady = record["mesh_phase"]
+    swing = 0.1 * np.sin(2 * np.pi * 40 * np.arange(record.sizes["time"]) / SAMPLES + 0.7)
+    found = replay(case, record.assign(mesh_phase=steady + swing), law)
+    np.testing.assert_allclose(found["mesh_phase"].values[0], steady.values[0, :SAMPLES], atol=1e-9)
+    assert differs(found, record) < 1e-5
+
+
 def cut(record: xr.Dataset, start: int, drop: tuple[str, ...] = (), **attributes: Any) -> xr.Dataset:
     """One period of a record from sample `start`."""
     keep = {str(n): record[n].values[:, start : start + SAMPLES] for n in record.data_vars if n not in drop}
