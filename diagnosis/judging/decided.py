@@ -247,7 +247,9 @@ def _without(of: _Told, left: _Left) -> Decided:
         leading = clear.form.place
     if left.size > 1.0 and judged.left > GREATER:
         because = "no effect of the library closes the gap, and the greater part of it stays"
-        return Decided("unknown", leading, (), left.sign, (because,))
+        # So large a remainder acts somewhere, though no place leaves more than sound rigs do.
+        most, over = outstanding(missing)
+        return Decided("unknown", most if leading == "none" and over > 0.0 else leading, (), left.sign, (because,))
     if left.shown > PLAIN:
         because = (
             f"{percent(left.shown * known.structure)} of a channel's fluctuation stays, where sound rigs leave"

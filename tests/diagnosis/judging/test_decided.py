@@ -117,6 +117,8 @@ def test_the_greater_part_unexplained_is_unknown_unless_any_rig_leaves_as_much()
     much = {"left": 1.1 * GREATER, "remains": 1.1 * STRUCTURE}
     assert decided(None, **much).verdict == "unknown" and decided(None, **much).place == "none"
     assert decided(None, **much, excess=at(3, 2 * OUTSTANDING["driven-support"])).place == "driven-support"
+    two = at(3, 0.7 * OUTSTANDING["driven-support"]) + at(1, 0.6 * OUTSTANDING["driver-support"])
+    assert decided(None, **much, excess=two).place == "driven-support"
     assert decided(None, **(much | {"left": 0.9 * GREATER})).verdict == "none"
     assert decided(None, **(much | {"remains": 0.9 * STRUCTURE})).verdict == "none"
 
