@@ -249,7 +249,7 @@ def _without(of: _Told, left: _Left) -> Decided:
         because = "no effect of the library closes the gap, and the greater part of it stays"
         # So large a remainder acts somewhere, though no place leaves more than sound rigs do.
         most, over = outstanding(missing)
-        return Decided("unknown", most if leading == "none" and over > 0.0 else leading, (), left.sign, (because,))
+        return Decided("unknown", most if leading == "none" and over > FAINT else leading, (), left.sign, (because,))
     if left.shown > PLAIN:
         because = (
             f"{percent(left.shown * known.structure)} of a channel's fluctuation stays, where sound rigs leave"
