@@ -261,7 +261,7 @@ def test_far_more_than_any_sound_rig_leaves_is_unknown_whatever_part_of_the_gap_
 
 
 def test_a_place_is_told_that_stands_out_far_more_than_any_other_or_where_most_stays() -> None:
-    """Of two that stand out alike, where most is missing, as the report says: only if the greater part of the gap is."""
+    """Of two alike, as the report says, the one where most is missing: only if the greater part of the gap is."""
     greater: dict[str, Any] = {"left": 1.1 * GREATER, "remains": 1.1 * STRUCTURE}
     far: dict[str, Any] = {"left": 0.1, "remains": 1.1 * PLAIN * STRUCTURE}
     faint = at(4, 0.5 * OUTSTANDING["mesh"])
