@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import exp, pi
+from math import exp, hypot, pi
 
 import numpy as np
 
-from gearbench.diagnosis.effects.effect import Added, Effect, Estimate, Fitted, Hypothesis, Wide, changed
+from gearbench.diagnosis.effects.effect import BEYOND, Added, Effect, Estimate, Fitted, Hypothesis, Wide, changed
 from gearbench.diagnosis.forces.condition import Condition
 from gearbench.diagnosis.forces.nominal import NominalModel
 from gearbench.diagnosis.forces.residuals import LOSS_FACTOR
@@ -26,15 +26,15 @@ RATIOS = (2.0, 2.7, 3.6, 4.8, 6.5)
 
 
 def unknowns(model: NominalModel, conditions: Sequence[Condition]) -> tuple[Group, ...]:
-    """Compliance beyond the nominal one; it cannot be negative."""
+    """Compliance beyond the nominal one, which a sound rig has as far as that is uncertain; it cannot be negative."""
     reduced = 1.0 / (1.0 / max(model.rotor, 1e-12) + 1.0 / model.inertia[0])
 
     def compliance(resonance: float) -> float:
         return 1.0 / (reduced * (2 * np.pi * resonance * model.resonance) ** 2)
 
-    return (
-        group(KEY, "rad/(N m)", ("compliance",), compliance(RIGID), compliance(ELASTIC), slot="coupling", low=0.0),
-    )
+    sd = hypot(compliance(RIGID), model.compliance * model.sd_compliance)
+    wide = max(compliance(ELASTIC), BEYOND * sd)
+    return (group(KEY, "rad/(N m)", ("compliance",), sd, wide, slot="coupling", low=0.0),)
 
 
 def hypotheses(model: NominalModel) -> tuple[Hypothesis, ...]:
@@ -44,7 +44,8 @@ def hypotheses(model: NominalModel) -> tuple[Hypothesis, ...]:
 
 def starts(group: Group) -> tuple[float, ...]:
     """Compliances that move the resonance through the band."""
-    return tuple(group.sd[0] * ratio**2 for ratio in RATIOS)
+    stiff = min(group.sd[0], group.wide[0] * (ELASTIC / RIGID) ** 2)
+    return tuple(stiff * ratio**2 for ratio in RATIOS)
 
 
 def add(rig: Rig, hypothesis: Hypothesis, fitted: Fitted) -> Added:

@@ -71,6 +71,7 @@ class NominalModel:
     sd_mass: tuple[float, float]
     sd_inertia: tuple[float, float]
     sd_rotor: float
+    sd_compliance: float
     sd_scale: float
     sd_mesh_ratio: float
     noise: tuple[float, float, float]  # rms per sample of angle [rad], displacement [m], torque [N m]
@@ -168,6 +169,7 @@ def nominal_model(nominal: Case, load: float, mean: float) -> NominalModel:
         sd_mass=known.both("rig.{}.mass", [b.mass for b in bodies], "mass"),
         sd_inertia=known.both("rig.{}.inertia", list(inertias), "inertia"),
         sd_rotor=known.one("rig.drive.coupling.inertia", rotor, "inertia"),
+        sd_compliance=known.one("rig.drive.coupling.stiffness", stiff or 0.0, "support_stiffness"),
         sd_scale=known.one("rig.mesh.stiffness_scale", rig.mesh.stiffness_scale, "mesh_scale"),
         sd_mesh_ratio=known.one("rig.damping.mesh_ratio", rig.damping.mesh_ratio, "mesh_ratio"),
         noise=(rig.sensors.noise_angle, rig.sensors.noise_displacement, rig.sensors.noise_torque),

@@ -10,6 +10,7 @@ from shared.measured import nominal
 from shared.synthetic import measurement
 
 from gearbench.diagnosis.effects.background import background
+from gearbench.diagnosis.effects.coupling import COUPLING
 from gearbench.diagnosis.effects.effect import Effect, Estimate, Hypothesis, Wide
 from gearbench.diagnosis.effects.free_forms import free_forms
 from gearbench.diagnosis.effects.library import CHANGING, LIBRARY, all_unknowns, hypotheses
@@ -108,6 +109,23 @@ def test_each_hypothesis_widens_what_it_names(model: NominalModel, where: Unknow
 def test_an_effect_can_be_left_out(model: NominalModel, left_out: Effect) -> None:
     left = hypotheses(model, (left_out.name,))
     assert {h.effect.name for h in left if h.effect} == {effect.name for effect in LIBRARY} - {left_out.name}
+
+
+def test_a_stated_coupling_is_as_uncertain_as_the_case_says(model: NominalModel) -> None:
+    """3000 N m/rad known to 240: of a sound rig its compliance is off by 8 %, beside what a stiff one yields."""
+    case = nominal()
+    coupling = case.rig.drive.coupling
+    assert coupling is not None
+    drive = case.rig.drive.model_copy(update={"coupling": coupling.model_copy(update={"stiffness": 3000.0})})
+    uncertain = {**case.uncertainty, "rig.drive.coupling.stiffness": 240.0}
+    rig = case.rig.model_copy(update={"drive": drive})
+    stated = nominal_model(case.model_copy(update={"rig": rig, "uncertainty": uncertain}), 220.0, 100.0)
+    (rigid,), (known,) = (COUPLING.unknowns(one, []) for one in (model, stated))
+    assert known.sd[0] ** 2 == pytest.approx(rigid.sd[0] ** 2 + (0.08 / 3000.0) ** 2)
+    assert known.wide[0] >= 3.0 * known.sd[0] and known.wide[0] >= rigid.wide[0]
+    assert COUPLING.starts is not None
+    # The search still begins at a stiff one, not at what the case leaves uncertain.
+    assert COUPLING.starts(rigid)[0] <= COUPLING.starts(known)[0] < 2.0 * COUPLING.starts(rigid)[0]
 
 
 def test_without_a_rotor_there_is_no_coupling(model: NominalModel) -> None:
