@@ -103,14 +103,14 @@ def with_hidden_motions(simulator: Simulator, p: Array, sd: Array, number: int) 
     """By how many nats that motion of a housing its sensors stand on explains the excited lines, and `p` (size,) with
     it, where its resonance does so best under the prior `sd` (size,), and, of a second one, without shares across there
     and where it does so next; none where no line is excited, or no such rig can be."""
-    whole = simulator.target
+    whole, unknowns = simulator.target, simulator.layout.unknowns
     if not whole.excited.any():
         return []
     excited = simulator.of_target(whole.of_lines(whole.excited[whole.of_line]))
     over = _over(excited)
     try:
         told = _told(excited, p, number, over)
-        sensitivity = sensitivity_of(excited, p, sd)
+        sensitivity = sensitivity_of(excited, p, sd, but_rotation(unknowns, sd))
     except ValueError:
         return []
     if told is None or sensitivity is None:
@@ -122,7 +122,7 @@ def with_hidden_motions(simulator: Simulator, p: Array, sd: Array, number: int) 
             (gain, Motion(one.resonance, one.shares * (1, 1, 0, 0), max(one.compliance, SHOWS))) for gain, one in begun
         ]
         begun = [*begun[:1], *plain]
-    return [(gain, with_hidden(simulator.layout.unknowns, p, number, one)) for gain, one in begun]
+    return [(gain, with_hidden(unknowns, p, number, one)) for gain, one in begun]
 
 
 def _told(excited: Simulator, p: Array, number: int, over: Array) -> Complex | None:

@@ -73,21 +73,25 @@ class Quadratic:
         self, p: Array, sd: Array, bounds: tuple[Array, Array], start: Array | None = None, reach: float = inf
     ) -> tuple[Array, float, Array]:
         """The step (q,) to the least cost under the prior `sd` (size,) from unknowns `p` (size,) within bounds (size,),
-        what it costs with the prior, and the information there. Unknowns of sd 0 stay, or go where their bounds are.
+        what it costs with the prior of all, and the information there. Unknowns of sd 0 stay, or go where their bounds
+        are.
         A step is damped to about `reach` standard deviations (Levenberg 1944)."""
         here, width = p[self.active], sd[self.active]
         low, high = (bound[self.active] - here for bound in bounds)
         step = np.clip(np.zeros(len(here)) if start is None else start, low, high)
         free, tied = width > 0.0, reach**-2
+        # What no step moves costs as much before as after: a step that saved it would promise what none can keep.
+        unmoved = prior_cost(np.delete(p, self.active), np.delete(sd, self.active))
         energies = self._energies(step)
-        cost = self._cost(energies) + prior_cost(here + step, width)
+        cost = self._cost(energies) + prior_cost(here + step, width) + unmoved
         held = tied * prior_cost(step, width)
         for _ in range(ROUNDS):
             weights = self._weights(energies)
             information = np.tensordot(weights, self.squares, axes=1)
             trial = self._solved(information, weights @ self.slopes, here, width, free, (low, high), tied)
             there = self._energies(trial)
-            value, pull = self._cost(there) + prior_cost(here + trial, width), tied * prior_cost(trial, width)
+            value = self._cost(there) + prior_cost(here + trial, width) + unmoved
+            pull = tied * prior_cost(trial, width)
             if value + pull < cost + held:
                 gained = cost + held - value - pull
                 step, energies, cost, held = trial, there, value, pull

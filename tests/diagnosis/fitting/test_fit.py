@@ -51,6 +51,16 @@ def test_what_is_not_chosen_stays_as_it_is() -> None:
     assert whole is not None and whole.p == pytest.approx(TRUE, abs=2e-3)
 
 
+def test_what_is_not_chosen_promises_nothing_by_its_own_prior() -> None:
+    """Its fifty nats stay whatever is moved: a fit that hopes for them renews its Jacobian in vain."""
+    simulator = FakeSimulator(lambda p: p @ MATRIX, target(TRUE @ MATRIX + noise(1e-3)))
+    begin = np.where(np.arange(8) == 4, 10.0 * SD[4], 0.0)
+    best = fit_afresh(simulator, begin, SD, renewals=4, chosen=np.arange(8) != 4)
+    assert best is not None and best.p[4] == begin[4] and best.left < 0.5
+    assert best.cost == pytest.approx(best.misfit + prior_cost(best.p, SD)) and prior_cost(best.p, SD) > 50.0
+    assert simulator.jacobians == 2  # one where it began, one where it ended
+
+
 def test_a_step_to_where_no_rig_is_is_shortened() -> None:
     simulator = FakeSimulator(curved, target(curved(TRUE) + noise(1e-3)), largest=0.31)
     first = sensitivity_of(simulator, np.zeros(8), SD)

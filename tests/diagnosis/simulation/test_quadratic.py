@@ -64,6 +64,14 @@ def test_a_damped_step_is_that_of_a_general_minimiser_that_is_tied_to_where_it_b
     assert np.linalg.norm(step[:7] / sd[:7]) < 0.5 * np.linalg.norm(far[:7] / sd[:7])
 
 
+def test_the_cost_of_a_step_holds_the_prior_of_what_no_step_moves() -> None:
+    where, _ = made()
+    p, sd = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.05, 0.3]), np.full(8, 0.1)
+    step, cost, _ = quadratic_of(where, RESIDUAL, MATRIX, np.arange(6)).best(p, sd, FREE)
+    prior = 0.5 * float(((p[:6] + step) ** 2).sum() + (p[6:] ** 2).sum()) / 0.01
+    assert cost == pytest.approx(where.cost(RESIDUAL - step @ MATRIX[:6]) + prior, rel=1e-9)
+
+
 def test_bounds_hold_and_the_rest_is_the_best_beside_them() -> None:
     _, quadratic = made()
     p, sd = np.zeros(8), np.full(8, 0.5)
