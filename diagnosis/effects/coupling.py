@@ -1,9 +1,10 @@
-"""An elastic coupling between the drive's rotor and the driver, which the nominal rig takes for stiffer or rigid."""
+"""An elastic coupling between the drive's rotor and the driver, which the nominal rig takes for rigid, or for another
+than it is."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import exp, hypot, pi
+from math import exp, hypot, pi, sqrt
 
 import numpy as np
 
@@ -11,22 +12,26 @@ from gearbench.diagnosis.effects.effect import BEYOND, Added, Effect, Estimate, 
 from gearbench.diagnosis.forces.condition import Condition
 from gearbench.diagnosis.forces.nominal import NominalModel
 from gearbench.diagnosis.forces.residuals import LOSS_FACTOR
-from gearbench.diagnosis.forces.unknowns import Group, group
+from gearbench.diagnosis.forces.unknowns import Group, Unknowns, group
 from gearbench.rig import Rig
 from gearbench.rig.drive import Coupling
 
 KEY = "coupling"
-# Logarithm of its loss factor over the one that the residuals assume, where unknowns have it: rubber and steel differ.
+# Logarithm of its loss factor over that of the case, or the one that the residuals assume, where unknowns have it:
+# rubber and steel differ.
 LOSS = "coupling-loss"
 # Resonance of the rotor against the driver over that of the mesh: a stiff one lies far above, one worth a diagnosis
 # near or below it (truth rigs: 3.9 to 5.8, and 0.5 to 1.6).
 RIGID, ELASTIC = 3.1, 0.67
+# Part of a stated compliance that another coupling may lack: two and a half times as stiff.
+STIFFER = 0.6
 # Compliances to begin from, as squares of a stiff one's resonance over the coupling's: a half of it to a seventh.
 RATIOS = (2.0, 2.7, 3.6, 4.8, 6.5)
 
 
 def unknowns(model: NominalModel, conditions: Sequence[Condition]) -> tuple[Group, ...]:
-    """Compliance beyond the nominal one, which a sound rig has as far as that is uncertain; it cannot be negative."""
+    """Compliance beyond the nominal one, which a sound rig has as far as that is uncertain; of one that is stated some
+    may be missing."""
     reduced = 1.0 / (1.0 / max(model.rotor, 1e-12) + 1.0 / model.inertia[0])
 
     def compliance(resonance: float) -> float:
@@ -34,7 +39,12 @@ def unknowns(model: NominalModel, conditions: Sequence[Condition]) -> tuple[Grou
 
     sd = hypot(compliance(RIGID), model.compliance * model.sd_compliance)
     wide = max(compliance(ELASTIC), BEYOND * sd)
-    return (group(KEY, "rad/(N m)", ("compliance",), sd, wide, slot="coupling", low=0.0),)
+    return (group(KEY, "rad/(N m)", ("compliance",), sd, wide, slot="coupling", low=-STIFFER * model.compliance),)
+
+
+def is_stated(unknowns: Unknowns) -> bool:
+    """Whether the nominal rig has an elastic coupling, so that there is one whatever its unknown is."""
+    return KEY in unknowns.slices and unknowns.group(KEY).low < 0.0
 
 
 def hypotheses(model: NominalModel) -> tuple[Hypothesis, ...]:
@@ -49,7 +59,8 @@ def starts(group: Group) -> tuple[float, ...]:
 
 
 def add(rig: Rig, hypothesis: Hypothesis, fitted: Fitted) -> Added:
-    """Gives the drive a coupling of the whole compliance, with the loss factor that the residuals assume or its own."""
+    """Gives the drive a coupling of the whole compliance, with the loss factor of the case, or the one that the
+    residuals assume, or its own."""
     model = fitted.model
     total = model.compliance + float(fitted.of(KEY)[0])
     std = float(fitted.std_of(KEY)[0])
@@ -57,13 +68,19 @@ def add(rig: Rig, hypothesis: Hypothesis, fitted: Fitted) -> Added:
     reduced = 1 / (1 / rotor + 1 / (model.inertia[0] * (1 + fitted.of("inertia")[0])))
     stiffness = 1 / total
     resonance = np.sqrt(stiffness / reduced) / (2 * pi)
-    loss = LOSS_FACTOR * (exp(float(fitted.of(LOSS)[0])) if LOSS in fitted.unknowns.slices else 1.0)
+    loss = _loss_factor(model) * (exp(float(fitted.of(LOSS)[0])) if LOSS in fitted.unknowns.slices else 1.0)
     damping = loss * stiffness / (2 * pi * resonance)
     coupling = Coupling(inertia=float(rotor), stiffness=float(stiffness), damping=float(damping))
     return changed(rig, "drive", coupling=coupling), (
         Estimate("stiffness", stiffness, stiffness * std / total, "N m/rad"),
         Estimate("resonance", float(resonance), float(0.5 * resonance * std / total), "Hz"),
     )
+
+
+def _loss_factor(model: NominalModel) -> float:
+    """That of the case's coupling at its resonance; the residuals' where it states no damping."""
+    reduced = 1.0 / (1.0 / max(model.rotor, 1e-12) + 1.0 / model.inertia[0])
+    return model.coupling_damping * sqrt(model.compliance / reduced) or LOSS_FACTOR
 
 
 COUPLING = Effect(

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from gearbench.diagnosis.effects.coupling import KEY as COMPLIANCE
-from gearbench.diagnosis.effects.coupling import LOSS
+from gearbench.diagnosis.effects.coupling import LOSS, is_stated
 from gearbench.diagnosis.effects.sensor_delay import KEYS as DELAYS
 from gearbench.diagnosis.fitting.answering import (
     MOVED,
@@ -136,7 +136,8 @@ class Account:
         """Prior standard deviations (size,): those of the background, a coupling's own where `p` (size,) has one."""
         out = self.unknowns.prior()
         at = self.unknowns[COMPLIANCE]
-        out[at] = np.where(p[at] > 0.0, self.unknowns.group(COMPLIANCE).wide, out[at])
+        if not is_stated(self.unknowns):
+            out[at] = np.where(p[at] > 0.0, self.unknowns.group(COMPLIANCE).wide, out[at])
         return out
 
     def _free(self, begin: Array, keys: Sequence[str]) -> tuple[NDArray[np.int64], Array]:
@@ -148,8 +149,8 @@ class Account:
         unseen = np.zeros(unknowns.size, dtype=bool)
         for key in (ACROSS, CROSS, DAMPED):
             unseen[unknowns[key]] = begin[unknowns[CROSS]] == 0.0
-        # A coupling is an effect: it is found where it is held to be, and not looked for.
-        for key in (COMPLIANCE, LOSS):
+        # A coupling that the case does not have is an effect: it is found where it is held to be, and not looked for.
+        for key in (COMPLIANCE, LOSS) if not is_stated(unknowns) else ():
             unseen[unknowns[key]] = begin[unknowns[COMPLIANCE]] == 0.0
         kept = (sd > 0.0) & ~unseen[at]
         return at[kept], sd[kept]

@@ -166,7 +166,7 @@ def _supports(rig: Rig, layout: Layout, p: Array) -> Rig:
 
 
 def _coupled(rig: Rig, layout: Layout, fitted: Fitted) -> Rig:
-    least = least_steps(layout.unknowns)[COMPLIANCE]
+    least = least_steps(layout.unknowns).get(COMPLIANCE, 0.0)
     if layout.model.rotor > 0.0 and layout.model.compliance + float(fitted.of(COMPLIANCE)[0]) >= least:
         rig = COUPLING.add(rig, _all_of("coupling"), fitted)[0]
     return rig

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearbench.diagnosis.effects.coupling import KEY as COMPLIANCE
-from gearbench.diagnosis.effects.coupling import LOSS
+from gearbench.diagnosis.effects.coupling import LOSS, is_stated
 from gearbench.diagnosis.effects.effect import SIDES, changed
 from gearbench.diagnosis.forces.nominal import NominalModel
 from gearbench.diagnosis.forces.unknowns import Group, Unknowns, group
@@ -143,7 +143,7 @@ def housings(unknowns: Unknowns, p: Array) -> list[Array]:
 def least_steps(unknowns: Unknowns) -> Mapping[str, float]:
     """Least that a rig feels of each group, by its key, that it need not have."""
     least = dict(LEAST_STEP)
-    if COMPLIANCE in unknowns.slices:
+    if COMPLIANCE in unknowns.slices and not is_stated(unknowns):
         least[COMPLIANCE] = NEARLY_RIGID * float(unknowns.group(COMPLIANCE).wide[0])
     return least
 

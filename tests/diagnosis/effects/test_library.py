@@ -124,6 +124,8 @@ def test_a_stated_coupling_is_as_uncertain_as_the_case_says(model: NominalModel)
     assert known.sd[0] ** 2 == pytest.approx(rigid.sd[0] ** 2 + (0.08 / 3000.0) ** 2)
     assert known.wide[0] >= 3.0 * known.sd[0] and known.wide[0] >= rigid.wide[0]
     assert COUPLING.starts is not None
+    # Of it some may be missing, of a rigid one nothing.
+    assert rigid.low == 0.0 and -1.0 < known.low * 3000.0 <= -5.0 * 0.08
     # The search still begins at a stiff one, not at what the case leaves uncertain.
     assert COUPLING.starts(rigid)[0] <= COUPLING.starts(known)[0] < 2.0 * COUPLING.starts(rigid)[0]
 

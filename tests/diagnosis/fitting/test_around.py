@@ -16,10 +16,21 @@ from gearbench.diagnosis.evidence.problem import problem_of
 from gearbench.diagnosis.fitting.answering import System, left_over, left_over_moved, lines_of, slopes_of, system_of
 from gearbench.diagnosis.fitting.around import KEYS, MOVED, REACTION, around
 from gearbench.diagnosis.forces.condition import Condition
+from gearbench.diagnosis.forces.nominal import nominal_model
 from gearbench.diagnosis.forces.residuals import LOSS_FACTOR
 from gearbench.diagnosis.intake.measurements import measurement
 from gearbench.diagnosis.structure.layout import Layout, layout_of
-from gearbench.diagnosis.structure.structure import ACROSS, CROSS, HOUSED, HOUSING, MODE, SEAT, SHAPE, kind_of
+from gearbench.diagnosis.structure.structure import (
+    ACROSS,
+    CROSS,
+    HOUSED,
+    HOUSING,
+    MODE,
+    SEAT,
+    SHAPE,
+    kind_of,
+    least_steps,
+)
 from gearbench.rig import read_case
 
 K1, K2, SOFTNESS, RATIO = 0.93e8, 1.08e8, 0.06, 0.05  # stiffness of the supports, compliance of the housing, damping
@@ -204,6 +215,31 @@ def test_a_coupling_is_found_where_there_is_one(rig: tuple[Layout, Condition]) -
     assert turning(layout, found) == pytest.approx(1.0, abs=0.01)
     stays = around(layout, (recorded(layout, like, None),), np.zeros(layout.size))
     assert stays is not None and stays[layout.unknowns[COMPLIANCE]] == 0.0
+
+
+def test_a_stated_coupling_may_be_stiffer_than_the_case_says(rig: tuple[Layout, Condition]) -> None:
+    layout, like = rig
+    case = layout.nominal
+    reduced = 1 / (1 / layout.model.rotor + 1 / layout.model.inertia[0])
+    omega = 2 * np.pi * 1500.0
+    stiffness, loss = omega**2 * reduced, 0.09
+    assert case.rig.drive.coupling is not None
+    said = {"stiffness": stiffness / 1.1, "damping": 0.07 * stiffness / 1.1 / omega}
+    drive = case.rig.drive.model_copy(update={"coupling": case.rig.drive.coupling.model_copy(update=said)})
+    case = case.model_copy(update={"rig": case.rig.model_copy(update={"drive": drive})})
+    mean = layout.model.torque_mean
+    stated = layout_of(case, nominal_model(case, 2.0 * mean, mean), [like], ())
+    nothing = stated.case(np.zeros(stated.size)).rig.drive.coupling
+    assert nothing is not None and (nothing.stiffness, nothing.damping) == pytest.approx(tuple(said.values()))
+    # It is there from the beginning: nothing has to be a jump's length away to be felt.
+    assert COMPLIANCE in least_steps(layout.unknowns) and COMPLIANCE not in least_steps(stated.unknowns)
+    true = recorded(stated, like, None, coupling=(stiffness, loss * stiffness / omega))
+    found = around(stated, (true,), np.zeros(stated.size))
+    assert found is not None
+    coupling = stated.case(found).rig.drive.coupling
+    assert coupling is not None and coupling.stiffness == pytest.approx(stiffness, rel=0.01)
+    assert coupling.damping == pytest.approx(loss * stiffness / omega, rel=0.1)
+    assert turning(stated, found) == pytest.approx(1.0, abs=0.01)
 
 
 def test_no_housing_is_hardly_any(rig: tuple[Layout, Condition]) -> None:
