@@ -34,6 +34,7 @@ from gearbench.diagnosis.simulation.target import Target
 from gearbench.diagnosis.structure.contrast import CONTRAST, contrast_slope
 from gearbench.diagnosis.structure.ends import ENDS, ends_slope
 from gearbench.diagnosis.structure.layout import Layout, around_mesh
+from gearbench.diagnosis.structure.rubbing import TURNING
 from gearbench.diagnosis.structure.structure import GAIN, LATE, PHASE, SEAT, STRUCTURE, least_steps
 from gearbench.diagnosis.structure.viscous import LOADED, damping_reference
 from gearbench.lumped.nonlinear.coordinates import IN_MESH, U1, Acting
@@ -55,11 +56,11 @@ AROUND, APART = ("stiffness", "damping", "mass", "inertia", *BEARINGS.values(), 
 # are the lag of the drive and the delay of the driven angle, since a replay is given both channels. A compliant
 # coupling twists at frequencies that samples do not hold; the zero of the mesh phase turns friction round with it.
 FOLLOWED = DELAYS["angle_driven"]
-MOVED, STEP = (FRICTION, COMPLIANCE, *STRUCTURE, SEAT, LATE, FOLLOWED, PHASE), 0.05
+MOVED, STEP = (FRICTION, TURNING, COMPLIANCE, *STRUCTURE, SEAT, LATE, FOLLOWED, PHASE), 0.05
 # The same part where flanks part: over a longer one an impact that is met otherwise makes a jump.
 SHORT_STEP = 2e-3
 # Of those moved what hypotheses are weighed by, and what goes along with one: a late angle turns the mesh on as well.
-WEIGHED = (FRICTION, COMPLIANCE, FOLLOWED, PHASE)
+WEIGHED = (FRICTION, TURNING, COMPLIANCE, FOLLOWED, PHASE)
 
 # Samples times unknowns whose answers are held at a time, and unknowns at least.
 AT_ONCE, FEWEST = 2**22, 32

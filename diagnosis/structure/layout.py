@@ -32,6 +32,7 @@ from gearbench.diagnosis.forces.nominal import NominalModel
 from gearbench.diagnosis.forces.unknowns import Group, Unknowns, unknowns_of
 from gearbench.diagnosis.structure.contrast import contrast_groups, contrasted, tangents_of
 from gearbench.diagnosis.structure.ends import Ends, ended, ends_groups, ends_of
+from gearbench.diagnosis.structure.rubbing import rubbing, rubbing_groups
 from gearbench.diagnosis.structure.structure import held, least_steps, sensed, structure_groups
 from gearbench.diagnosis.structure.viscous import viscous, viscous_groups
 from gearbench.geometry import Pair, pair
@@ -97,7 +98,7 @@ class Layout:
         rig = held(_supports(rig, self, p), self.model, self.unknowns, p)
         rig = contrasted(rig, self.tangents, self.unknowns, p)
         rig = ended(rig, self.ends, self.unknowns, p)
-        rig = viscous(rig, self.model, self.unknowns, p)
+        rig = rubbing(viscous(rig, self.model, self.unknowns, p), self.unknowns, p)
         rig = sensed(rig, self.model, self.unknowns, p, DELAYS)
         rig = _drive(rig, self, fitted, condition)
         return with_rig(case, rig)
@@ -124,7 +125,7 @@ def layout_of(
     for effect in LIBRARY:
         groups += effect.unknowns(model, conditions)
     groups += structure_groups(nominal.rig, model)
-    groups += [*contrast_groups(), *ends_groups(), *viscous_groups(nominal, model)]
+    groups += [*contrast_groups(), *ends_groups(), *viscous_groups(nominal, model), *rubbing_groups()]
     # What force residuals take for these has other errors of theirs in it.
     known = {CONTACT: SD_SIMULATED, RATIO: deviation(model)}
     plain = [_as_simulated(one, known.get(one.key)) for one in groups]

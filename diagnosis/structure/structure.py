@@ -21,6 +21,7 @@ from gearbench.diagnosis.forces.nominal import NominalModel
 from gearbench.diagnosis.forces.unknowns import Group, Unknowns, group
 from gearbench.diagnosis.structure.contrast import CONTRAST, CONTRAST_NAME
 from gearbench.diagnosis.structure.ends import ENDS, ENDS_NAME
+from gearbench.diagnosis.structure.rubbing import TURNING, TURNING_NAME
 from gearbench.diagnosis.structure.viscous import LOADED, LOADED_NAME
 from gearbench.diagnosis.verdict import NINE_OF_TEN, Found
 from gearbench.rig import Across, Housing, Rig, Rocking
@@ -80,6 +81,7 @@ NAMES = (
     (PHASE, "zero of the mesh phase in cycles", "1"),
     (LATE, "lag of the drive's torque behind its channel", "s"),
     (LOADED, LOADED_NAME, "1"),
+    (TURNING, TURNING_NAME, "1"),
     (CONTRAST, CONTRAST_NAME, "1"),
     (ENDS, ENDS_NAME, "1"),
 )
