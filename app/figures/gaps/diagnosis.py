@@ -27,6 +27,8 @@ PANELS = {
 COLUMNS = 3
 # Bars of a panel; the smaller rest is drawn as one.
 MOST = 8
+# Teeth that are told by their numbers, and each how many-th one is where there are more.
+MOST_TEETH, EVERY = 48, (1, 2, 5, 10, 20)
 # How far floors may reach beyond the largest bar before the axis cuts them.
 FLOOR_REACH = 1.6
 
@@ -78,7 +80,9 @@ def _teeth(axes: Any, shares: list[Share]) -> None:
     edge = _edge(values, shares)
     for x, share in zip(position, shares, strict=True):
         _marks(axes, x, share, edge, upright=True)
-    axes.set_xticks(position, [share.name.rsplit(" ", 1)[-1] for share in shares])
+    teeth = [share.name.rsplit(" ", 1)[-1] for share in shares]
+    every = next((step for step in EVERY if len(teeth) <= step * MOST_TEETH), EVERY[-1])
+    axes.set_xticks(position, [tooth if int(tooth) % every == 0 else "" for tooth in teeth])
     axes.tick_params(axis="x", labelsize=8)
     axes.set_ylim(0, edge)
     axes.set_ylabel("share [%]")
