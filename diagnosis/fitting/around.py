@@ -17,6 +17,7 @@ from scipy.optimize import least_squares
 
 from gearbench.diagnosis.effects.coupling import KEY as COMPLIANCE
 from gearbench.diagnosis.effects.coupling import LOSS, is_stated
+from gearbench.diagnosis.effects.effect import BEYOND
 from gearbench.diagnosis.effects.sensor_delay import KEYS as DELAYS
 from gearbench.diagnosis.fitting.answering import (
     MOVED,
@@ -136,8 +137,9 @@ class Account:
         """Prior standard deviations (size,): those of the background, a coupling's own where `p` (size,) has one."""
         out = self.unknowns.prior()
         at = self.unknowns[COMPLIANCE]
-        if not is_stated(self.unknowns):
-            out[at] = np.where(p[at] > 0.0, self.unknowns.group(COMPLIANCE).wide, out[at])
+        # One that the case states has it where it is held beyond what is uncertain: an effect, not the nominal one.
+        own = np.abs(p[at]) > BEYOND * out[at] if is_stated(self.unknowns) else p[at] > 0.0
+        out[at] = np.where(own, self.unknowns.group(COMPLIANCE).wide, out[at])
         return out
 
     def _free(self, begin: Array, keys: Sequence[str]) -> tuple[NDArray[np.int64], Array]:
