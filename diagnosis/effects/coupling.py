@@ -32,7 +32,7 @@ RATIOS = (2.0, 2.7, 3.6, 4.8, 6.5)
 def unknowns(model: NominalModel, conditions: Sequence[Condition]) -> tuple[Group, ...]:
     """Compliance beyond the nominal one, which a sound rig has as far as that is uncertain; of one that is stated some
     may be missing."""
-    reduced = 1.0 / (1.0 / max(model.rotor, 1e-12) + 1.0 / model.inertia[0])
+    reduced = _reduced(model.rotor, model.inertia[0])
 
     def compliance(resonance: float) -> float:
         return 1.0 / (reduced * (2 * np.pi * resonance * model.resonance) ** 2)
@@ -65,7 +65,7 @@ def add(rig: Rig, hypothesis: Hypothesis, fitted: Fitted) -> Added:
     total = model.compliance + float(fitted.of(KEY)[0])
     std = float(fitted.std_of(KEY)[0])
     rotor = model.rotor * (1 + fitted.of("inertia")[2])
-    reduced = 1 / (1 / rotor + 1 / (model.inertia[0] * (1 + fitted.of("inertia")[0])))
+    reduced = _reduced(rotor, model.inertia[0] * (1 + fitted.of("inertia")[0]))
     stiffness = 1 / total
     resonance = np.sqrt(stiffness / reduced) / (2 * pi)
     loss = _loss_factor(model) * (exp(float(fitted.of(LOSS)[0])) if LOSS in fitted.unknowns.slices else 1.0)
@@ -77,9 +77,14 @@ def add(rig: Rig, hypothesis: Hypothesis, fitted: Fitted) -> Added:
     )
 
 
+def _reduced(rotor: float, driver: float) -> float:
+    """Inertia [kg m2] by which the two swing against each other."""
+    return 1.0 / (1.0 / max(rotor, 1e-12) + 1.0 / driver)
+
+
 def _loss_factor(model: NominalModel) -> float:
     """That of the case's coupling at its resonance; the residuals' where it states no damping."""
-    reduced = 1.0 / (1.0 / max(model.rotor, 1e-12) + 1.0 / model.inertia[0])
+    reduced = _reduced(model.rotor, model.inertia[0])
     return model.coupling_damping * sqrt(model.compliance / reduced) or LOSS_FACTOR
 
 
