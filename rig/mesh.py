@@ -50,6 +50,13 @@ class MeshCorrection(Value):
         le=_LARGEST_COMPLIANCE,
         doc="c of what each pair yields more, c (x^2 - 1/3), by its place x on the path of contact, -1 to 1",
     )
+    tilt_compliance: float = quantity(
+        0.0,
+        "um_per_kn",
+        ge=-_LARGEST_COMPLIANCE,
+        le=_LARGEST_COMPLIANCE,
+        doc="c of what each pair yields more, c x, by its place x on the path, -1 where it begins to 1 where it ends",
+    )
     exponent: float = quantity(
         0.0, gt=-0.5, le=1.0, doc="e of the force F (F / reference_force)^e, F being that of the teeth; 0: F"
     )

@@ -46,7 +46,8 @@ class Along:
     `places` (samples, n) of all coordinates [m], sampled at `sampling_rate`, and `turned` (samples,) what all that
     turns moves by besides, as the nominal rotation departs from a steady one. `early` steps let free vibrations die
     out. Samples of forces are those of `instants`, or hold no more than half the sampling rate. `led` (entries,):
-    velocity [m/s] that the driver is nudged towards, if it is.
+    velocity [m/s] that the driver is nudged towards, if it is. `ahead` (entries,): by how much the mesh is turned on
+    beyond that phase, as shafts twist and gears vibrate [cycles].
     """
 
     model: NonLinear
@@ -67,6 +68,7 @@ class Along:
     sampling_rate: float
     instants: bool
     led: Array
+    ahead: Array
 
     @property
     def law(self) -> MeshLaw:
@@ -251,6 +253,7 @@ def along(steady: Steady) -> Along:
         sampling_rate=setup.sampling_rate,
         instants=steady.given.instants,
         led=grid.led(0, entries),
+        ahead=found.ahead,
     )
 
 

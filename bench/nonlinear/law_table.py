@@ -27,7 +27,7 @@ from gearbench.lumped import mesh_stiffness
 from gearbench.lumped.nonlinear.forms import formed
 from gearbench.lumped.nonlinear.law import REFERENCE, MeshLaw, approach_grid
 from gearbench.lumped.stiffness.potential_energy import hertz_compliance, tooth_compliance
-from gearbench.rig import Gear, Rig, Simulation
+from gearbench.rig import Gear, MeshCorrection, Rig, Simulation
 from gearbench.rig.neutral import is_formed, relieved_gear, without_reliefs
 
 Array = NDArray[np.float64]
@@ -53,17 +53,19 @@ def mesh_law(rig: Rig, simulation: Simulation, load_max_nm: float) -> MeshLaw:
 
 def with_flanks(teeth: MeshLaw, rig: Rig, simulation: Simulation) -> MeshLaw:
     """The `teeth_law` with the flanks and the compliances of a rig's mesh."""
-    own = own_compliance(teeth, pair(rig), rig.mesh.end_compliance)
+    own = own_compliance(teeth, pair(rig), rig.mesh)
     return formed(teeth, flank_excess(teeth, rig, simulation), rig.mesh.shared_compliance, own)
 
 
-def own_compliance(teeth: MeshLaw, meshing: Pair, ends: float) -> Array | None:
-    """What each pair yields more by itself (phases, n_o) [m/N] than by the `teeth_law`: `ends` times x^2 - 1/3, x its
-    place on the path of contact from -1 to 1, and no more beyond its ends; None for nothing."""
-    if ends == 0.0:
+def own_compliance(teeth: MeshLaw, meshing: Pair, mesh: MeshCorrection) -> Array | None:
+    """What each pair yields more by itself (phases, n_o) [m/N] than by the `teeth_law`: the end compliance of a rig's
+    mesh times x^2 - 1/3 and its tilt compliance times x, x its place on the path of contact from -1 to 1, and no more
+    beyond its ends; None for nothing."""
+    uneven = np.array([mesh.end_compliance, mesh.tilt_compliance])
+    if not uneven.any():
         return None
     phase = np.arange(teeth.phases)[:, None] / teeth.phases
-    return ends * meshing.towards_ends(phase - teeth.offsets)
+    return np.tensordot(uneven, meshing.uneven(phase - teeth.offsets), 1)
 
 
 def flank_excess(teeth: MeshLaw, rig: Rig, simulation: Simulation) -> Array | None:

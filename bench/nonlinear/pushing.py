@@ -36,6 +36,7 @@ class Pushing(NamedTuple):
     damping: Array
     turning: Array
     rubbed: Array
+    ahead: Array
 
 
 def stepped(steady: Steady, substeps: int) -> Setup:
@@ -73,13 +74,14 @@ def pushing(steady: Steady, motion: Motion, substeps: int) -> Pushing:
     answer = sensitivities(model.law, at, travel, whole, mesh.exponent, mesh.reference_force)
     stiffness = slope * stiffer + _met(damping, force, closing, setup.step / 2)
     nominal = setup.phases(0, count)
-    ahead = np.round(nominal - turned) - np.floor(nominal)
-    pairs = (_numbered(one, ahead) for one in (*of_pairs(model.law, at, travel), answer.form, answer.own))
+    whole_turns = np.round(nominal - turned)
+    another = whole_turns - np.floor(nominal)
+    pairs = (_numbered(one, another) for one in (*of_pairs(model.law, at, travel), answer.form, answer.own))
     pair_force, pair_tangent, form, own = (np.where(idle[:, None], 0.0, one) for one in pairs)
     rubbed = _rubbed(setup, table, motion, turned * model.law.phases)
     return Pushing(
         force, pair_force, pair_tangent, form, own, closing, answer.level, answer.sharing, stiffer, stiffness, damping,
-        onward, rubbed,
+        onward, rubbed, turned + whole_turns - nominal,
     )  # fmt: skip
 
 

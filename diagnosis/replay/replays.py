@@ -39,7 +39,7 @@ def law_of(sound: MeshLaw, case: Case) -> MeshLaw:
 
     meshing, mesh = pair(case.rig), case.rig.mesh
     law = _with_backlash(sound, max(meshing.backlash_normal, 0.0))
-    excess, own = flank_excess(sound, case.rig, case.simulation), own_compliance(sound, meshing, mesh.end_compliance)
+    excess, own = flank_excess(sound, case.rig, case.simulation), own_compliance(sound, meshing, mesh)
     return _with_flanks(law, _key(excess), mesh.shared_compliance, _key(own))
 
 

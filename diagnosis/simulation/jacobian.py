@@ -32,7 +32,7 @@ from gearbench.diagnosis.simulation.form import in_mesh_of_form
 from gearbench.diagnosis.simulation.runout import in_mesh_of_runout, lobes_of, on_gears_of_runout, turn_of
 from gearbench.diagnosis.simulation.target import Target
 from gearbench.diagnosis.structure.contrast import CONTRAST, contrast_slope
-from gearbench.diagnosis.structure.ends import ENDS, ends_slope
+from gearbench.diagnosis.structure.ends import UNEVEN, ends_slope, uneven_of
 from gearbench.diagnosis.structure.layout import Layout, around_mesh
 from gearbench.diagnosis.structure.rubbing import TURNING
 from gearbench.diagnosis.structure.structure import GAIN, LATE, PHASE, SEAT, STRUCTURE, least_steps
@@ -123,7 +123,7 @@ def mesh_forces(layout: Layout, p: Array, along: Along, chosen: Flags) -> tuple[
         at.extend(indices[keep])
 
     numbers, bending = law.pairs(phase)[0], law.bending_of(phase)
-    travel = phase[:, None] - numbers
+    travel = (phase + along.ahead)[:, None] - numbers
     wave = waves(phase).T
     damped = (along.tangent.damping * along.rate)[:, None]
     loaded = along.model.rig.damping
@@ -138,9 +138,9 @@ def mesh_forces(layout: Layout, p: Array, along: Along, chosen: Flags) -> tuple[
     put("curvature", stiffer * along.level[:, None] + 0.5 / (1.0 + mesh.exponent) * damped)
     series = 1.0 + _series_at(mesh.stiffness_cos, mesh.stiffness_sin, phase)
     put(CONTRAST, stiffer * contrast_slope(layout.tangents, float(p[unknowns[CONTRAST]][0]), along.sharing)[:, None])
-    more = layout.meshing.towards_ends(travel) / layout.ends.mean
-    kept = stiffer * ends_slope(layout.ends, float(p[unknowns[ENDS]][0]))
-    put(ENDS, along.of_own_compliance(more)[:, None] + kept)
+    slopes = ends_slope(layout.ends, uneven_of(unknowns, p))
+    for key, more, kept in zip(UNEVEN, layout.meshing.uneven(travel) / layout.ends.mean, slopes, strict=True):
+        put(key, along.of_own_compliance(more)[:, None] + stiffer * kept)
     put("shape", stiffer * (wave / series[:, None]))
     put("profile", along.of_excess(wave))
     put(FLANKS, in_mesh_of_form(along, layout.meshing, travel))

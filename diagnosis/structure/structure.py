@@ -20,7 +20,7 @@ from gearbench.diagnosis.effects.effect import SIDES, changed
 from gearbench.diagnosis.forces.nominal import NominalModel
 from gearbench.diagnosis.forces.unknowns import Group, Unknowns, group
 from gearbench.diagnosis.structure.contrast import CONTRAST, CONTRAST_NAME
-from gearbench.diagnosis.structure.ends import ENDS, ENDS_NAME
+from gearbench.diagnosis.structure.ends import ENDS, ENDS_NAME, TILT, TILT_NAME
 from gearbench.diagnosis.structure.rubbing import TURNING, TURNING_NAME
 from gearbench.diagnosis.structure.viscous import LOADED, LOADED_NAME
 from gearbench.diagnosis.verdict import NINE_OF_TEN, Found
@@ -84,6 +84,7 @@ NAMES = (
     (TURNING, TURNING_NAME, "1"),
     (CONTRAST, CONTRAST_NAME, "1"),
     (ENDS, ENDS_NAME, "1"),
+    (TILT, TILT_NAME, "1"),
 )
 # Where a fit begins with them: below some per cent a rig does not show them.
 ACROSS_BEGIN, HOUSING_BEGIN = 0.15, 0.04

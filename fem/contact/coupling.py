@@ -47,7 +47,7 @@ def on_driven(places: Places, p: int) -> Place:
 def couple(law: Law, pairs: Meetings, n: int, places: Places, q: int, out: Array) -> None:
     """Write the approach at the first n pairs per force on pair q [m/N] into column q of `out`; of the pair itself,
     besides its own curve, only what a crack adds, what all pairs share and what it has more towards the ends of its
-    path."""
+    path, or towards one."""
     # Counter-clockwise: the driver's numbers run clockwise; back pairs join driven tooth number + 1.
     loaded, loaded1, loaded2 = pairs[q].side, -pairs[q].tooth, pairs[q].tooth + pairs[q].side
     push1, push2 = on_driver(places, q), on_driven(places, q)
@@ -56,7 +56,7 @@ def couple(law: Law, pairs: Meetings, n: int, places: Places, q: int, out: Array
         value = law.shared if at == loaded else -law.shared
         if p == q:
             place = min(max((pairs[q].xi1 - law.middle) / law.half, -1.0), 1.0)
-            value += law.ends * (place * place - 1.0 / 3.0)
+            value += law.ends * (place * place - 1.0 / 3.0) + law.tilt * place
         else:
             value += cross_between(law.k1, loaded, push1, at, on_driver(places, p), tooth1 - loaded1)
             value += cross_between(law.k2, loaded, push2, at, on_driven(places, p), tooth2 - loaded2)

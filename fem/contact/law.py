@@ -66,6 +66,7 @@ class Law(NamedTuple):
     play: float
     shared: float  # compliance [m/N] that all pairs share beside the gears' own
     ends: float  # c [m/N] of what each pair yields more, c (x^2 - 1/3), by its place x on the path, -1 to 1
+    tilt: float  # the same of c x
     middle: float  # roll length [m] of the driver in the middle of the path of contact
     half: float  # half of that path's length [m]
 
@@ -97,7 +98,7 @@ def make_law(
     alpha, play = meshing.working_pressure_angle, f1.largest + f2.largest
     start, stop = meshing.active_driver
     path = (0.5 * (start + stop), 0.5 * (stop - start))
-    return Law(t1, t2, k1, k2, a, alpha, half_plane, every, reach1, reach2, f1, f2, play, 0.0, 0.0, *path)
+    return Law(t1, t2, k1, k2, a, alpha, half_plane, every, reach1, reach2, f1, f2, play, 0.0, 0.0, 0.0, *path)
 
 
 def _deviations(meshing: Pair, gears: tuple[Gear, Gear] | None, reach1: float, reach2: float) -> tuple[Flanks, Flanks]:

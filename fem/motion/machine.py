@@ -150,7 +150,7 @@ def make_machine(
     series = (mesh.stiffness_cos, mesh.stiffness_sin, mesh.error_cos, mesh.error_sin)
     one, two, three, four = (np.array(values, dtype=float) for values in series)
     return Machine(
-        law=law._replace(shared=mesh.shared_compliance, ends=mesh.end_compliance),
+        law=law._replace(shared=mesh.shared_compliance, ends=mesh.end_compliance, tilt=mesh.tilt_compliance),
         rotations=1 if hubs.unknowns.driven == ABSENT else 2,
         hubs=len(hubs.mass),
         at=hubs.unknowns,

@@ -81,12 +81,12 @@ class Pair:
         start, stop = ((rho - self.rho_pitch[0]) / self.base_pitch for rho in self.active_driver)
         return start, stop
 
-    def towards_ends(self, travel: Array) -> Array:
-        """x^2 - 1/3 at distances (...) behind the pitch point [base pitches], x from -1 to 1 along the path of contact,
-        over which it is nothing in the mean; beyond the ends as there."""
+    def uneven(self, travel: Array) -> Array:
+        """x^2 - 1/3 and x (2, ...) at distances (...) behind the pitch point [base pitches], x from -1 to 1 along the
+        path of contact, over which both are nothing in the mean; beyond the ends as there."""
         start, stop = self.path
         place = np.clip((2.0 * travel - start - stop) / (stop - start), -1.0, 1.0)
-        return np.asarray(place**2 - 1.0 / 3.0)
+        return np.stack([place**2 - 1.0 / 3.0, place])
 
     @property
     def contact_ratio(self) -> float:

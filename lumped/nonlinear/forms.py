@@ -91,7 +91,8 @@ def _check_teeth(law: MeshLaw, own: Array) -> None:
     left = 1.0 - law.shared * slopes.sum(axis=2, keepdims=True)
     if (left + own[:, None] * slopes < (1.0 - LEAST_LEFT) * left).any():
         raise LumpedError(
-            "rig.mesh.end_compliance_um_per_kn takes more than a pair of teeth yields by itself: it must lie nearer 0"
+            "rig.mesh.end_compliance_um_per_kn and tilt_compliance_um_per_kn take more than a pair of teeth yields by"
+            " itself: they must lie nearer 0"
         )
 
 

@@ -64,6 +64,7 @@ def refusal(*settings: str) -> str:
         ),
         ("rig.mesh.shared_compliance_um_per_kn=-0.4", lambda rig: rig.mesh.shared_compliance, -0.4e-9),
         ("rig.mesh.end_compliance_um_per_kn=0.7", lambda rig: rig.mesh.end_compliance, 0.7e-9),
+        ("rig.mesh.tilt_compliance_um_per_kn=-0.2", lambda rig: rig.mesh.tilt_compliance, -0.2e-9),
         ("rig.mesh.stiffness_drift=-0.004", lambda rig: rig.mesh.stiffness_drift, -0.004),
         ("rig.sensors.encoder_runout_driven_urad=20.1", lambda rig: rig.sensors.encoder_runout_driven, 20.1e-6),
         ("rig.sensors.encoder_runout_driver_phase_deg=90", lambda rig: rig.sensors.encoder_runout_driver_phase, pi / 2),
@@ -123,6 +124,7 @@ def test_a_rig_without_effects_has_none() -> None:
         ((CONSTANT, "rig.load.boundary=torque", "rig.drive.boundary=speed"), ("rig.drive.boundary",)),
         (("rig.mesh.shared_compliance_um_per_kn=0.1",), ("rig.mesh.shared_compliance_um_per_kn",)),
         (("rig.mesh.end_compliance_um_per_kn=-0.1",), ("rig.mesh.end_compliance_um_per_kn",)),
+        (("rig.mesh.tilt_compliance_um_per_kn=0.1",), ("rig.mesh.tilt_compliance_um_per_kn",)),
         (("rig.mesh.stiffness_drift=0.001",), ("rig.mesh.stiffness_drift",)),
         (
             ("rig.sensors.gain_torque_driven=0.99", "rig.sensors.filter_hz=1e3"),

@@ -216,19 +216,22 @@ def test_pairs_that_yield_more_by_themselves_are_softer_springs(shared: float, o
 
 
 def test_teeth_cannot_give_back_more_than_they_yield() -> None:
-    with pytest.raises(LumpedError, match=r"end_compliance_um_per_kn"):
+    with pytest.raises(LumpedError, match=r"end_compliance_um_per_kn and tilt_compliance_um_per_kn"):
         formed(springs(), None, 0.0, np.full((8, 2), -4.6e-9))
 
 
-@pytest.mark.parametrize("compliance", [2e-9, -1e-9])
-def test_pairs_yield_more_at_the_ends_of_their_path_as_in_finite_elements(compliance: float) -> None:
+@pytest.mark.parametrize(
+    ("ends", "tilt"), [(2e-9, 0.0), (-1e-9, 0.0), (0.0, 1e-9), (0.0, -1e-9)], ids=["soft", "stiff", "late", "early"]
+)
+def test_pairs_yield_more_at_the_ends_of_their_path_as_in_finite_elements(ends: float, tilt: float) -> None:
     rig = make_rig({})
     law = elastic_rig(rig, SIMULATION).law
     plain, changed = (
         static_cycle(one, PHASE, torque=list(TORQUES)).transmission_error
-        for one in (law, law._replace(ends=compliance))
+        for one in (law, law._replace(ends=ends, tilt=tilt))
     )
-    softer = rig.model_copy(update={"mesh": rig.mesh.model_copy(update={"end_compliance": compliance})})
+    uneven = {"end_compliance": ends, "tilt_compliance": tilt}
+    softer = rig.model_copy(update={"mesh": rig.mesh.model_copy(update=uneven)})
     found = lumped_error(softer) - lumped_error(rig)
     for true, here in zip(changed - plain, found, strict=True):
         assert np.sqrt(np.mean((here - true) ** 2)) < 0.05 * np.sqrt(np.mean(true**2))

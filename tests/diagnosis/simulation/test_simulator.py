@@ -12,7 +12,7 @@ from gearbench.diagnosis.effects.coupling import KEY as COMPLIANCE
 from gearbench.diagnosis.forces.basis import FORM_PARTS, in_parts
 from gearbench.diagnosis.simulation.simulator import Simulator
 from gearbench.diagnosis.structure.contrast import CONTRAST
-from gearbench.diagnosis.structure.ends import ENDS
+from gearbench.diagnosis.structure.ends import ENDS, TILT
 from gearbench.diagnosis.structure.layout import Layout
 from gearbench.diagnosis.structure.structure import ACROSS, CROSS, GAIN, HOUSING, MODE, PHASE, housings, least_steps
 from gearbench.rig import Case
@@ -123,7 +123,8 @@ def uneven() -> tuple[Simulator, np.ndarray, np.ndarray]:
 
 @pytest.mark.parametrize(
     ("key", "part", "within"),
-    [("curvature", 0.1, 0.06), (CONTRAST, 0.1, 0.06), ("scale", 0.1, 0.06), (ENDS, 0.02, 0.07)],
+    [("curvature", 0.1, 0.06), (CONTRAST, 0.1, 0.06), ("scale", 0.1, 0.06), (ENDS, 0.02, 0.07),
+     (TILT, 0.05, 0.07)],
 )
 def test_teeth_that_differ_are_each_as_far_up_the_law_as_they_are_pressed(
     uneven: tuple[Simulator, np.ndarray, np.ndarray], key: str, part: float, within: float

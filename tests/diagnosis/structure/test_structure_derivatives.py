@@ -11,7 +11,7 @@ from shared.simulated_lines import demonstration, jacobian_at, off
 from gearbench.diagnosis.effects.bearing_nonlinearity import KEYS as BEARINGS
 from gearbench.diagnosis.simulation.simulator import Simulator
 from gearbench.diagnosis.structure.contrast import CONTRAST
-from gearbench.diagnosis.structure.ends import ENDS
+from gearbench.diagnosis.structure.ends import ENDS, TILT
 from gearbench.diagnosis.structure.structure import ACROSS, CROSS, HOUSING, MODE, SHAPE, with_motion
 from gearbench.diagnosis.structure.viscous import LOADED
 from gearbench.rig import Load, OutputShaft
@@ -54,6 +54,7 @@ def bench() -> Bench:
         (LOADED, 0, 0.05),
         (CONTRAST, 0, 0.02),
         (ENDS, 0, 0.02),
+        (TILT, 0, 0.05),
         (BEARINGS["driver"], 0, 0.02),
         (ACROSS, 0, 0.02),
         (CROSS, 1, 0.02),
@@ -71,7 +72,7 @@ def test_a_derivative_is_what_two_simulations_differ_by(bench: Bench, key: str, 
     unknowns = bench.simulator.layout.unknowns
     at = unknowns[key].start + entry
     found = off(bench.simulator, bench.jacobian[at], bench.p, at, part * unknowns.prior()[at])
-    within = EDGES if key in (CONTRAST, ENDS, "eccentricity-driven") else {}
+    within = EDGES if key in (CONTRAST, ENDS, TILT, "eccentricity-driven") else {}
     for channel, (error, size) in found.items():
         assert error <= within.get(channel, CLOSE) * size, channel
     assert max(size for _, size in found.values()) > 0.0
