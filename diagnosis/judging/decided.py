@@ -26,7 +26,7 @@ from gearbench.diagnosis.selection.simulated import Simulated
 from gearbench.diagnosis.selection.weighing import Weighed
 from gearbench.diagnosis.structure.structure import lag_of_drive
 from gearbench.diagnosis.verdict import Outcome
-from gearbench.diagnosis.words import percent
+from gearbench.diagnosis.words import CHANNELS, percent
 from gearbench.rig.contract import Place
 
 Array = NDArray[np.float64]
@@ -155,8 +155,11 @@ def _decided(of: _Told, unsteady: Unsteady, changing: float) -> Decided:
         return doubt
     if judged.left > 1.0 and left.size > 1.0:
         return Decided("unknown", _leading(missing), (), left.sign, (_astray(judged, named),))
-    if left.seen > 1.0 and sum(shares) < judged.left**2:
-        return Decided("unknown", _leading(missing), (), left.sign, (_made_up(missing, named),))
+    if sum(shares) < judged.left**2:
+        if left.seen > 1.0:
+            return Decided("unknown", _leading(missing), (), left.sign, (_made_up(missing, named),))
+        if left.shown > PLAIN:
+            return Decided("unknown", _leading(missing), (), left.sign, (_drowned(judged, named, known),))
     it = "it" if len(named) == 1 else "them"
     because = f"simulated with {it}, the rig comes closer to the records than any rig without an effect"
     beside = (_beside(of.clear),) if of.clear else ()
@@ -309,6 +312,15 @@ def _made_up(missing: Missing, named: tuple[Weighed, ...]) -> str:
     return (
         f"a force {at_place(place)} remains that no effect of the library explains, and more of the gap with it than"
         f" {_nouns(named)} would close, which may only make up for it"
+    )
+
+
+def _drowned(judged: Judged, named: tuple[Weighed, ...], known: Calibration) -> str:
+    """That what was found closes less of the gap than what stays of a channel, at no place that stands out."""
+    channel, part = judged.most_left
+    return (
+        f"{percent(part)} of the {CHANNELS[channel]} is left, where sound rigs leave {percent(known.structure)} of any"
+        f" channel, and of the gap more than {_nouns(named)} would close, which may only make up for something unknown"
     )
 
 

@@ -132,7 +132,12 @@ class Judged:
     @property
     def remains(self) -> float:
         """The largest part of any channel's fluctuation that is left beyond noise."""
-        return max(self._remaining.values(), default=0.0)
+        return self.most_left[1]
+
+    @property
+    def most_left(self) -> tuple[str, float]:
+        """The channel of which most is left beyond noise, and that part of its fluctuation."""
+        return max(self._remaining.items(), key=lambda pair: pair[1], default=("", 0.0))
 
     @property
     def _remaining(self) -> dict[str, float]:

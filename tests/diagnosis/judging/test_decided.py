@@ -88,6 +88,7 @@ def decided(
         share_of=lambda effect: share,
         left=left,
         remains=remains,
+        most_left=("torque_driven", remains),
         searched=remains if searched is None else searched,
         hidden=hidden,
         kept={} if kept else None,
@@ -184,6 +185,18 @@ def test_an_effect_that_closes_less_than_what_stands_out_elsewhere_only_makes_up
     assert decided(40.0, share=0.3, **far).verdict == "effects"
     assert decided(40.0, share=0.2, **(far | {"remains": 0.9 * VISIBLE * STRUCTURE})).verdict == "effects"
     assert decided(40.0, share=0.2, **(far | {"excess": QUIET})).verdict == "effects"
+
+
+def test_an_effect_that_closes_less_than_what_is_left_of_a_channel_only_makes_up_for_something() -> None:
+    """A resonance on a shaft looks like a stiffer support to the angles, and leaves the reaction as it was."""
+    much: dict[str, Any] = {"left": 0.33, "remains": 2 * PLAIN * STRUCTURE}
+    made = decided(40.0, share=0.04, **much)
+    assert (made.verdict, made.place, made.named) == ("unknown", "none", ()) and made.sign == pytest.approx(2.0)
+    assert made.because[0].startswith(f"{percent(much['remains'])} of the torque on the driven gear is left")
+    assert "more than friction between the flanks would close" in made.because[0]
+    assert decided(40.0, share=0.33**2 + 0.01, **much).verdict == "effects"
+    assert decided(40.0, share=0.04, **(much | {"remains": 0.9 * PLAIN * STRUCTURE})).verdict == "effects"
+    assert decided(40.0, share=0.04, **much, searched=0.9 * PLAIN * STRUCTURE).verdict == "effects"
 
 
 def test_records_that_are_explained_and_predict_no_other_do_not_determine_the_rig() -> None:
