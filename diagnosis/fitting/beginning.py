@@ -27,7 +27,7 @@ Flags = NDArray[np.bool_]
 
 # What the answer of the rig to the force in the mesh does not show: compliance across over along, and the stiffness of
 # the mesh, in standard deviations of the nominal one, that goes with it.
-SOFT, STIFFER = (0.05, 0.1, 0.15, 0.2, 0.27, 0.35), (-0.8, 0.0, 0.8)
+SOFT, STIFFER = (0.05, 0.1, 0.15, 0.2, 0.27, 0.35, 0.5, 0.7, 1.0), (-0.8, 0.0, 0.8)
 VALLEYS, EVALUATIONS = 3, 10  # followed from the best levels, with so many simulations for each of both
 COUPLED = 0.03  # cross-coupling by which a support shows how soft it is across
 
