@@ -90,7 +90,7 @@ def _loss_factor(model: NominalModel) -> float:
 
 COUPLING = Effect(
     name="coupling",
-    noun="an elastic coupling",
+    noun="another stiffness of the coupling",
     meaning="The motor's rotor swings against the driver: the torque measured at the motor is not the one at the gear."
     " Check the coupling's stiffness.",
     parameters={"stiffness": "torsional stiffness", "resonance": "resonance of rotor against driver"},

@@ -125,7 +125,7 @@ def test_the_sentences_of_a_verdict() -> None:
         verdict="effects", probability=Probabilities(effect=0.9, none=0.0, unknown=0.1), place="drive", gap=gaps,
         effects=(Effect(name="coupling", probability=0.8), Effect(name="torque-ripple", probability=0.7)),
     )
-    assert headline(found) == "An elastic coupling and ripple of the driving torque explain the gap."
+    assert headline(found) == "Another stiffness of the coupling and ripple of the driving torque explain the gap."
     assert confidence(found) == (
         "Probability of one of the known effects: 90 %. It acts at the drive. On record r (not held out) the rms gap of"
         " the transmission error goes from 4.00 um to 2.00 um recalibrated and 0.250 um with the effects."
@@ -133,18 +133,18 @@ def test_the_sentences_of_a_verdict() -> None:
     drifts = Effect(name="temperature-drift", probability=0.9)
     also = found.model_copy(update={"effects": (found.effects[0], drifts)})
     assert headline(also) == (
-        "An elastic coupling explains the gap; a stiffness that drifts is at work while the records are taken."
+        "Another stiffness of the coupling explains the gap; a stiffness that drifts is at work while the records are taken."
     )
     alone = found.model_copy(update={"effects": (drifts,)})
     assert headline(alone) == "A stiffness that drifts is at work while the records are taken."
     assert "um with the effect." in confidence(also)  # a rig with what changes between repetitions is none
     blind = found.model_copy(update={"gap": ()})
-    assert headline(blind) == "An elastic coupling and ripple of the driving torque are at work."
+    assert headline(blind) == "Another stiffness of the coupling and ripple of the driving torque are at work."
     sound = blind.model_copy(update={"verdict": "none", "effects": (), "place": "none"})
     assert headline(sound) == "No known effect is called for; how much of the gap is left cannot be told."
     noisy = gaps[1].model_copy(update={"with_effect": Range(value=1e-6, low=1e-6, high=1e-6), "floor": FLOOR})
     partly = found.model_copy(update={"effects": found.effects[:1], "gap": (noisy,)})
-    assert headline(partly) == "An elastic coupling is at work, and a part of the gap remains."
+    assert headline(partly) == "Another stiffness of the coupling is at work, and a part of the gap remains."
     assert confidence(partly).endswith(
         "1.00 um with the effect (noise floor 0.0500 um). What remains is 20 times the floor: the rig's own structure,"
         " or another cause."
@@ -156,7 +156,7 @@ def test_the_sentences_of_a_verdict() -> None:
     small = gaps[1].model_copy(update={"recalibrated": Range(value=5e-7, low=5e-7, high=5e-7)})
     beside = partly.model_copy(update={"gap": (small,)})
     assert headline(beside) == (
-        "An elastic coupling is at work, beside a recalibration that explains most of the gap."
+        "Another stiffness of the coupling is at work, beside a recalibration that explains most of the gap."
     )
     refused = Verdict(
         verdict="unknown", probability=Probabilities(effect=0.1, none=0.0, unknown=0.9), place="none", held_out="r",
@@ -198,5 +198,5 @@ def test_of_what_is_not_named_it_is_said_from_which_size_on_it_would_have_been()
     found = detectable_in_words(verdict)
     assert [(row.effect, row.told, row.found, row.good) for row in found] == [
         ("run-out of a gear (driver)", "run-out [um]", 3.5, 0.8),
-        ("an elastic coupling", "torsional stiffness [N m/rad]", 8e4, 4e5),
+        ("another stiffness of the coupling", "torsional stiffness [N m/rad]", 8e4, 4e5),
     ]
