@@ -31,7 +31,8 @@ def test_each_step_leaves_what_the_later_ones_take_off() -> None:
     # By energy 5^2 = 3^2 + 4^2: with coupling and friction 3 um are left, and friction alone takes 4 of the rest off.
     rows = steps_of(gap(3e-6), (effect("friction", 2.0), effect("coupling", 3.4641016)))
     assert [one.words for one in rows] == [
-        "nominal rig", "recalibrated", "+ another stiffness of the coupling", "+ friction between the flanks", "noise floor",
+        "nominal rig", "recalibrated", "+ another stiffness of the coupling", "+ friction between the flanks",
+        "noise floor",
     ]  # fmt: skip
     assert [one.left for one in rows] == pytest.approx([13.0, 5.0, 13**0.5, 3.0, 1.0])
     assert [one.words for one in steps_of(gap(None), ())] == ["nominal rig", "recalibrated", "noise floor"]

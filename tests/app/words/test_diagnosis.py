@@ -133,7 +133,8 @@ def test_the_sentences_of_a_verdict() -> None:
     drifts = Effect(name="temperature-drift", probability=0.9)
     also = found.model_copy(update={"effects": (found.effects[0], drifts)})
     assert headline(also) == (
-        "Another stiffness of the coupling explains the gap; a stiffness that drifts is at work while the records are taken."
+        "Another stiffness of the coupling explains the gap; a stiffness that drifts is at work while the records are"
+        " taken."
     )
     alone = found.model_copy(update={"effects": (drifts,)})
     assert headline(alone) == "A stiffness that drifts is at work while the records are taken."
