@@ -32,13 +32,13 @@ from gearbench.diagnosis.forces.mesh import (
 from gearbench.diagnosis.forces.nominal import NominalModel
 from gearbench.diagnosis.forces.residuals import (
     LEVER_OF,
-    LOSS_FACTOR,
     Residuals,
     assemble,
     carried_force,
     coupling_compliance,
     support_force,
     transform,
+    yielding,
 )
 from gearbench.diagnosis.forces.unknowns import Unknowns
 
@@ -262,7 +262,7 @@ def _drive_columns(at: _Point, put: _Put) -> None:
     late = DELAYED.index("angle_driver")
     put(Equation.DRIVE, "inertia", 0, -factor * model.inertia[0] * turning / rb1)
     put(Equation.DRIVE, "inertia", 2, -model.rotor * (turning + s**2 * soft * shaft) / rb1)
-    put(Equation.DRIVE, "coupling", 0, -rotor * s**2 * (1 - 1j * LOSS_FACTOR * (s.imag > 0)) * shaft / rb1)
+    put(Equation.DRIVE, "coupling", 0, -rotor * s**2 * yielding(model, at.condition.omega[:k]) * shaft / rb1)
     put(Equation.DRIVE, "delay", late, -(rotor + factor * inertia) * s * turning / rb1)
     for one in put.unknowns.based("torque"):
         assert one.basis is not None

@@ -106,8 +106,15 @@ def carried_force(model: NominalModel, condition: Condition, departures: Departu
 def coupling_compliance(model: NominalModel, condition: Condition, departures: Departures) -> Complex:
     """H (K,) [rad/(N m)] of the drive's coupling."""
     omega = condition.omega[: condition.bins]
-    more = departures.coupling * (1.0 - 1j * LOSS_FACTOR * np.sign(omega))
-    return np.asarray(model.coupling_compliance(omega) + more)
+    return np.asarray(model.coupling_compliance(omega) + departures.coupling * yielding(model, omega))
+
+
+def yielding(model: NominalModel, omega: Array) -> Complex:
+    """What a part of the coupling's compliance has at frequencies (K,) [rad/s]: as that of the case, so that a stiffer
+    one is damped as well; with a loss factor where the case has a rigid one."""
+    if model.compliance > 0.0:
+        return model.coupling_compliance(omega) / model.compliance
+    return np.asarray(1.0 - 1j * LOSS_FACTOR * np.sign(omega))
 
 
 def support_force(model: NominalModel, side: int, y: Array, departures: Departures) -> tuple[Array, Array]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,7 @@ from gearbench.diagnosis.forces.equations import DELAYED, PLACES, Equation
 from gearbench.diagnosis.forces.jacobian import linearised
 from gearbench.diagnosis.forces.mesh import corrected, mesh
 from gearbench.diagnosis.forces.nominal import NominalModel, nominal_model
-from gearbench.diagnosis.forces.residuals import Residuals, residuals
+from gearbench.diagnosis.forces.residuals import Residuals, coupling_compliance, residuals
 from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.forces.volume import log_volume, log_volume_gradient, stiffening_gradient
 from gearbench.rig import read_case
@@ -81,6 +82,24 @@ def test_the_jacobian_is_that_of_differences(prepared: Prepared) -> None:
         assert norm(difference - at.jacobian[:, :, entry]) < limit * norm(difference), name
         pressed = (above.mesh_force - below.mesh_force) / (2 * step[entry])
         assert norm(pressed - at.mesh_jacobian[:, entry]) <= limit * norm(pressed) + 1e-9 * norm(difference), name
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.4])
+def test_a_stiffer_coupling_does_not_drive(prepared: Prepared, damping: float) -> None:
+    """It has the loss factor of the case's, a spring beside a damper."""
+    made, condition, where = prepared
+    stated = replace(made, compliance=1e-5, coupling_damping=damping)
+    p = np.zeros(where.size)
+    p[where["coupling"]] = -0.5e-5
+    found = coupling_compliance(stated, condition, where.departures(p, condition))
+    omega = condition.omega[1 : condition.bins]
+    assert found[1:].imag / found[1:].real == pytest.approx(-omega * damping * 1e-5, rel=1e-9)
+    below = linearised(stated, condition, where, p, np.arange(condition.bins))
+    step = np.zeros(where.size)
+    step[where["coupling"]] = 1e-9
+    above, under = (residuals(stated, condition, where.departures(x, condition)) for x in (p + step, p - step))
+    difference = (above.left - under.left) / 2e-9
+    assert norm(difference - below.jacobian[:, :, where["coupling"].start]) < 1e-5 * norm(difference)
 
 
 ON_BACK_FLANKS = (
