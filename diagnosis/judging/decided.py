@@ -254,9 +254,10 @@ def _without(of: _Told, left: _Left) -> Decided:
         most, over = outstanding(missing)
         return Decided("unknown", most if leading == "none" and over > FAINT else leading, (), left.sign, (because,))
     if left.shown > PLAIN:
+        channel, _ = judged.most_left
         because = (
-            f"{percent(left.shown * known.structure)} of a channel's fluctuation stays, where sound rigs leave"
-            f" {percent(known.structure)} at most, and no effect of the library explains it"
+            f"{percent(left.shown * known.structure)} of the {CHANNELS[channel]} stays, where sound rigs leave"
+            f" {percent(known.structure)} of a channel's fluctuation at most, and no effect of the library explains it"
         )
         return Decided("unknown", leading, (), left.sign, (because,))
     if left.seen > 1.0:
@@ -319,8 +320,9 @@ def _drowned(judged: Judged, named: tuple[Weighed, ...], known: Calibration) -> 
     """That what was found closes less of the gap than what stays of a channel, at no place that stands out."""
     channel, part = judged.most_left
     return (
-        f"{percent(part)} of the {CHANNELS[channel]} is left, where sound rigs leave {percent(known.structure)} of any"
-        f" channel, and of the gap more than {_nouns(named)} would close, which may only make up for something unknown"
+        f"{percent(part)} of the {CHANNELS[channel]} is left, where sound rigs leave {percent(known.structure)} of a"
+        f" channel's fluctuation at most, and of the gap more than {_nouns(named)} would close, which may only make up"
+        " for something unknown"
     )
 
 
