@@ -12,11 +12,13 @@ WIDTH = 110
 
 
 def effect_lines(rig: Rig) -> list[str]:
-    """Lines that name the effects of a rig, and inertias that a prescribed speed makes idle; none for an ideal rig."""
+    """Lines that name what a rig has beyond an ideal one, and inertias that a prescribed speed makes idle; none for an
+    ideal rig."""
     from gearbench.rig import effects_in
 
     found = effects_in(rig)
-    lines = wrap(f"effects: {', '.join(found)}", WIDTH, subsequent_indent="  ") if found else []
+    said = f"beyond gears, supports and damping: {', '.join(found)}"
+    lines = wrap(said, WIDTH, subsequent_indent="  ") if found else []
     for key, side in (("rig.drive", rig.drive), ("rig.load", rig.load)):
         shaft = side.coupling
         if side.boundary == "speed" and shaft is not None and shaft.inertia:

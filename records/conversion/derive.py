@@ -239,7 +239,8 @@ def say_locations(work: Assembly) -> None:
     if places:
         work.notes.append(
             f"{' and '.join(places)} (location: {', '.join(places.values())}): recorded unchanged, as at the outermost"
-            " inertia: shaft torque is not gear torque while a coupling is unmodelled"
+            " inertia: it is not gear torque unless the rig's case has what lies between, [rig.drive.coupling] or"
+            " [rig.load.coupling]"
         )
 
 
