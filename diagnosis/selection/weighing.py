@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 
 from gearbench.bench.plan.workers import side_by_side
 from gearbench.diagnosis.effects.effect import Effect, Hypothesis, Wide
-from gearbench.diagnosis.fitting.fit import GAIN, Optimum, cost_of, fit, fit_afresh
+from gearbench.diagnosis.effects.friction import KEY as FRICTION
+from gearbench.diagnosis.fitting.closeness import better
+from gearbench.diagnosis.fitting.fit import GAIN, Optimum, cost_of, fit, fit_afresh, refreshed
 from gearbench.diagnosis.fitting.reshaped import has_shapes, reshaped
 from gearbench.diagnosis.forces.unknowns import Unknowns
 from gearbench.diagnosis.selection.by_forces import Start
@@ -18,6 +20,7 @@ from gearbench.diagnosis.selection.standing import begun_late, called_for, denie
 from gearbench.diagnosis.simulation.jacobian import FOLLOWED
 from gearbench.diagnosis.simulation.simulator import Simulator
 from gearbench.diagnosis.structure.contrast import is_strange
+from gearbench.diagnosis.structure.rubbing import TURNING
 
 Array = NDArray[np.float64]
 Report = Callable[[str], None]
@@ -123,7 +126,7 @@ def weigh(
         # What any further step from there promises says nothing for this one.
         renewals = RENEWALS if value - base.left > LIMIT else 0
         try:
-            begun = [_refit(simulator, base, one, step, starts.get(one.name), renewals)]
+            begun = [turned_round(simulator, one, _refit(simulator, base, one, step, starts.get(one.name), renewals))]
             if one.name in shaped:
                 begun.append(reshaped(simulator, one, one.widened(unknowns, base.sd)))
             if one.name in called:
@@ -189,6 +192,16 @@ def _refit(
         return fit_afresh(simulator, there, sd, renewals=renewals)
     begin = trials[int(np.argmin(costs))]
     return fit(simulator, begin, sd, base.sensitivity, renewals=renewals)
+
+
+def turned_round(simulator: Simulator, one: Hypothesis, found: Optimum | None) -> Optimum | None:
+    """The optimum of a hypothesis, of friction with how fast it turns round fitted besides: a rig without friction does
+    not feel that, so that what is known of it there is nothing."""
+    unknowns = simulator.layout.unknowns
+    if found is None or TURNING not in unknowns.slices or all(wide.key != FRICTION for wide in one.wide):
+        return found
+    anew = refreshed(simulator, found, unknowns.of((TURNING,)))
+    return better(found, fit(simulator, anew.p, anew.sd, anew.sensitivity))
 
 
 def relief(unknowns: Unknowns, narrow: Array, hypothesis: Hypothesis, p: Array, sd: Array) -> float:

@@ -10,10 +10,12 @@ import xarray as xr
 from shared.simulated_lines import demonstration
 
 from gearbench.bench import simulate
+from gearbench.diagnosis.effects.effect import Hypothesis, Wide
 from gearbench.diagnosis.effects.friction import KEY as FRICTION
 from gearbench.diagnosis.evidence.problem import problem_of
 from gearbench.diagnosis.fitting.fit import fit_afresh
 from gearbench.diagnosis.intake.measurements import measurement
+from gearbench.diagnosis.selection.weighing import turned_round
 from gearbench.diagnosis.simulation.simulator import Simulator
 from gearbench.diagnosis.simulation.target import target_of
 from gearbench.diagnosis.structure.rubbing import TURNING
@@ -60,6 +62,25 @@ def test_a_record_tells_how_fast(simulator: Simulator) -> None:
     at = unknowns[TURNING].start
     assert abs(found.p[at] - log(0.02 / NOMINAL)) < 3.0 * found.std[at] < 0.3
     assert found.cost < held.cost - 100.0
+
+
+def test_friction_is_weighed_with_how_fast_it_turns_round(simulator: Simulator) -> None:
+    """Beside a rig that has none, which does not feel how fast it would."""
+    nominal, unknowns = simulator.layout.nominal, simulator.layout.unknowns
+    rubbing = nominal.rig.model_copy(update={"friction": Friction(coefficient=0.06, transition_speed=0.02)})
+    record = simulate(nominal.model_copy(update={"rig": rubbing}).under(nominal.conditions[0]))
+    there = _of(simulator, record)
+    sd = np.where(unknowns.of((FRICTION, TURNING)), unknowns.prior(), 0.0)
+    base = fit_afresh(there, departed(simulator), sd, renewals=0)
+    assert base is not None and unknowns[TURNING].start not in base.sensitivity.quadratic.active
+    hypothesis = Hypothesis("friction", "mesh", (Wide(FRICTION),))
+    sd[unknowns[FRICTION]] = unknowns.group(FRICTION).wide
+    alone = fit_afresh(there, departed(simulator, friction=0.06), sd, renewals=0, chosen=unknowns.of((FRICTION,)))
+    assert alone is not None and not alone.p[unknowns[TURNING]].any()
+    found = turned_round(there, hypothesis, alone)
+    assert found is not None and found.evidence > alone.evidence + 50.0
+    assert found.p[unknowns[TURNING]][0] == pytest.approx(log(0.02 / NOMINAL), abs=0.2)
+    assert turned_round(there, Hypothesis("coupling", "drive", (Wide("coupling"),)), alone) is alone
 
 
 def _of(simulator: Simulator, record: xr.Dataset) -> Simulator:
