@@ -78,14 +78,15 @@ def _worth(one: Weighed, best: Optimum, without: Optimum) -> float:
 
 def _promised(simulator: Simulator, best: Optimum, one: Weighed) -> Weighed:
     """An effect with what it is worth by the quadratic. One that is not felt where it is, as flanks that part over a
-    wider gap are not, keeps its worth."""
+    wider gap are not, keeps its worth; what is not felt of one is no more than a good rig may have."""
     unknowns, quadratic = simulator.layout.unknowns, best.sensitivity.quadratic
     at = one.hypothesis.entries(unknowns)
-    if not np.isin(at, quadratic.active).any():
+    felt = np.isin(at, quadratic.active)
+    if not felt.any():
         return one
-    sd = best.sd.copy()
-    sd[at] = prior_of(simulator, unknowns.prior())[at]
-    _, cost, information = quadratic.best(best.p, sd, _bounds_at(unknowns, best, sd))
+    sd, p = best.sd.copy(), best.p.copy()
+    sd[at], p[at[~felt]] = prior_of(simulator, unknowns.prior())[at], 0.0
+    _, cost, information = quadratic.best(p, sd, _bounds_at(unknowns, best, sd))
     return replace(one, log_bayes_factor=best.evidence - quadratic.evidence(cost, information, sd))
 
 

@@ -63,6 +63,20 @@ def test_a_rig_without_an_effect_that_is_fitted_further_is_not_better_for_it() -
     assert stay == ["friction"] and found.evidence == pytest.approx(best.evidence, abs=0.5)
 
 
+def test_what_no_record_feels_of_an_effect_does_not_make_it_needed() -> None:
+    """Flanks that stand back behind all contact cost a prior that a rig without them would pay for nothing."""
+    of = np.where(np.arange(8)[:, None] == 5, 0.0, MATRIX)
+    p = np.array([0.08, -0.1, 0.02, 0.0, 0.03, 0.0, 0.0, 0.0])
+    simulator = FakeSimulator(lambda q: q @ of, target(noisy(p @ of)))
+    best = fitted(simulator, RIPPLE)
+    assert 5 not in best.sensitivity.quadratic.active
+    far = replace(best, p=np.where(np.arange(8) == 5, 10.0 * best.sd, best.p))
+    one = Weighed(RIPPLE, 3.0, best)
+    plain, beside_it = (module._promised(simulator, at, one) for at in (best, far))  # type: ignore[arg-type]
+    assert beside_it.log_bayes_factor == pytest.approx(plain.log_bayes_factor, abs=1e-9)
+    assert plain.log_bayes_factor != one.log_bayes_factor
+
+
 def test_what_entered_because_a_fit_was_on_its_way_leaves() -> None:
     """The background's fit stopped at the nominal rig; beside friction, of which there is none, it went on."""
     simulator = rig(0.0)
