@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import pi
 
 import numpy as np
 
 from gearbench.diagnosis.effects.effect import (
+    BEYOND,
     SIDES,
     Added,
     Effect,
@@ -21,6 +23,7 @@ from gearbench.diagnosis.effects.effect import (
 from gearbench.diagnosis.forces.condition import Condition
 from gearbench.diagnosis.forces.nominal import NominalModel
 from gearbench.diagnosis.forces.unknowns import Group, group
+from gearbench.geometry.tooth.iso1328 import DIAMETERS, MODULES, tolerances
 from gearbench.rig import Rig
 
 # Groups by gear.
@@ -28,6 +31,9 @@ KEYS = {side: f"pitch-{side}" for side in SIDES}
 # Of each tooth over the deflection of the mesh: an rms of 0.5 is severity 1 of the truth rigs of `challenge`; sound
 # gears have a tenth.
 SD, WIDE = 0.04, 0.4
+# Of the single pitch tolerance of the best grade (ISO 1328-1:2013) the part that no gear is made without, as an rms,
+# however little its teeth are loaded.
+GRADE, MADE = 1, 0.1
 # Over the former, from which gears are uneven: fifty teeth tell half as much again of it from none, but not good gears
 # from very good ones, of which both are sound.
 LEAST = 2.5
@@ -37,10 +43,20 @@ def unknowns(model: NominalModel, conditions: Sequence[Condition]) -> tuple[Grou
     """Excess material of every tooth."""
     first = dict(zip(SIDES, (0, model.teeth[0]), strict=True))
     counts = dict(zip(SIDES, model.teeth, strict=True))
-    sound, large = SD * model.deflection, WIDE * model.deflection
-    return tuple(
-        group(key, "m", counts[side], sound, large, slot="pitch", first=first[side]) for side, key in KEYS.items()
-    )
+    out = []
+    for side, key in KEYS.items():
+        sound = max(SD * model.deflection, made(model, counts[side]))
+        large = max(WIDE * model.deflection, BEYOND * sound)
+        out.append(group(key, "m", counts[side], sound, large, slot="pitch", first=first[side]))
+    return tuple(out)
+
+
+def made(model: NominalModel, teeth: int) -> float:
+    """Rms [m] of the pitch errors that the best gear of so many teeth has: by its base pitch, which tells the module
+    but for the pressure angle's cosine, and as the nearest one that the standard knows."""
+    least, most = (1e-3 * one for one in MODULES)
+    module = min(max(model.law.base_pitch / pi, least, 1e-3 * DIAMETERS[0] / teeth), most)
+    return MADE * tolerances(module, teeth, GRADE).single_pitch
 
 
 def hypotheses(model: NominalModel) -> tuple[Hypothesis, ...]:
